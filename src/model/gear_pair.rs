@@ -1,0 +1,208 @@
+//! The gear pair with backlash: Table 1 and equations (11) to (13), (22) of the paper.
+
+use super::{Domain, Law, Oscillator, Parameter, ParameterError, Range};
+
+/// A pair of gears on damped elastic supports, meshing through a backlash `2b`.
+///
+/// Free motion, `|z| < b` with `z = x1 - x2` (11):
+///
+/// ```text
+/// m1 x1'' + r1 x1' + k1 x1 = F cos(omega t)
+/// m2 x2'' + r2 x2' + k2 x2 = 0
+/// ```
+///
+/// Meshing on side `s` (12), (13) adds the contact force `r w + k (z - s b)`,
+/// `w = v1 - v2`, with opposite signs to both. All quantities are dimensionless.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GearPair {
+    /// Equivalent mass of gear 1, > 0.
+    pub m1: f64,
+    /// Equivalent mass of gear 2, > 0.
+    pub m2: f64,
+    /// Support damping of gear 1, >= 0.
+    pub r1: f64,
+    /// Support damping of gear 2, >= 0.
+    pub r2: f64,
+    /// Support stiffness of gear 1, >= 0.
+    pub k1: f64,
+    /// Support stiffness of gear 2, >= 0.
+    pub k2: f64,
+    /// Meshing damping, >= 0.
+    pub r: f64,
+    /// Meshing stiffness, >= 0.
+    pub k: f64,
+    /// Force amplitude on gear 1.
+    pub force: f64,
+    /// Excitation frequency, > 0; the forcing period is `2 pi / omega`.
+    pub omega: f64,
+    /// Half backlash, > 0.
+    pub b: f64,
+    /// Coefficient of restitution, 0 to 1.
+    pub e: f64,
+    /// Leaving speed at or below which a pressed contact becomes meshing, >= 0.
+    pub mesh_speed: f64,
+}
+
+/// How a parameter is reached inside the struct.
+type Accessor = fn(&mut GearPair) -> &mut f64;
+
+macro_rules! parameters {
+    ($($name:literal $field:ident $default:expr, $range:ident, $meaning:literal;)*) => {
+        const TABLE: &[Parameter] = &[$(Parameter {
+            name: $name, meaning: $meaning, default: $default, range: Range::$range,
+        }),*];
+        const ACCESSORS: &[Accessor] = &[$(|pair| &mut pair.$field),*];
+    };
+}
+
+parameters! {
+    "m1" m1 Some(2.0), Positive, "equivalent mass of gear 1";
+    "m2" m2 Some(1.0), Positive, "equivalent mass of gear 2";
+    "r1" r1 Some(0.6), NonNegative, "support damping of gear 1";
+    "r2" r2 Some(0.6), NonNegative, "support damping of gear 2";
+    "k1" k1 Some(30.0), NonNegative, "support stiffness of gear 1";
+    "k2" k2 Some(20.0), NonNegative, "support stiffness of gear 2";
+    "r" r Some(1.0), NonNegative, "meshing damping";
+    "k" k Some(1000.0), NonNegative, "meshing stiffness";
+    "F" force Some(50.0), Finite, "force amplitude on gear 1";
+    "omega" omega Some(5.6), Positive, "excitation frequency";
+    "b" b Some(0.5), Positive, "half backlash";
+    "e" e None, Unit, "coefficient of restitution";
+    "mesh_speed" mesh_speed Some(0.01), NonNegative, "leaving speed at which a pressed contact becomes meshing";
+}
+
+impl GearPair {
+    /// Every parameter, in the order of Table 1.
+    pub const PARAMETERS: &'static [Parameter] = TABLE;
+
+    /// Table 1 with restitution `e`. Valid if `0 <= e <= 1`.
+    pub fn paper(e: f64) -> GearPair {
+        GearPair {
+            m1: 2.0,
+            m2: 1.0,
+            r1: 0.6,
+            r2: 0.6,
+            k1: 30.0,
+            k2: 20.0,
+            r: 1.0,
+            k: 1000.0,
+            force: 50.0,
+            omega: 5.6,
+            b: 0.5,
+            e,
+            mesh_speed: 0.01,
+        }
+    }
+
+    /// The table line of a parameter.
+    ///
+    /// # Errors
+    /// [`ParameterError::Unknown`] if the model has no such parameter.
+    pub fn parameter(name: &str) -> Result<&'static Parameter, ParameterError> {
+        Ok(&TABLE[index(name)?])
+    }
+
+    /// The value of the parameter called `name`.
+    ///
+    /// # Errors
+    /// [`ParameterError::Unknown`] if the model has no such parameter.
+    pub fn get(&self, name: &str) -> Result<f64, ParameterError> {
+        Ok(*ACCESSORS[index(name)?](&mut { *self }))
+    }
+
+    /// Sets the parameter called `name`.
+    ///
+    /// # Errors
+    /// [`ParameterError::Unknown`], or [`ParameterError::OutOfRange`] with nothing changed.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        let i = index(name)?;
+        check(&TABLE[i], value)?;
+        *ACCESSORS[i](self) = value;
+        Ok(())
+    }
+
+    /// Checks every parameter against its range.
+    ///
+    /// # Errors
+    /// [`ParameterError::OutOfRange`] for the first one that fails.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        let mut pair = *self;
+        TABLE.iter().zip(ACCESSORS).try_for_each(|(parameter, at)| check(parameter, *at(&mut pair)))
+    }
+
+    /// The description that flow and reference work from.
+    ///
+    /// # Errors
+    /// [`ParameterError::OutOfRange`] if a parameter is not valid.
+    pub fn oscillator(&self) -> Result<Oscillator, ParameterError> {
+        self.validate()?;
+        let free = Domain {
+            damping: [[self.r1, 0.0], [0.0, self.r2]],
+            stiffness: [[self.k1, 0.0], [0.0, self.k2]],
+            load: [0.0, 0.0],
+        };
+        let meshing = |sign: f64| Domain {
+            damping: [[self.r1 + self.r, -self.r], [-self.r, self.r2 + self.r]],
+            stiffness: [[self.k1 + self.k, -self.k], [-self.k, self.k2 + self.k]],
+            load: [sign * self.k * self.b, -sign * self.k * self.b],
+        };
+        Ok(Oscillator {
+            masses: [self.m1, self.m2],
+            gap: [1.0, -1.0],
+            walls: [self.b, -self.b],
+            omega: self.omega,
+            force: [self.force, 0.0],
+            free,
+            meshing: Some([meshing(1.0), meshing(-1.0)]),
+        })
+    }
+
+    /// The contact law of this cell: what an oscillator does not fix.
+    pub fn law(&self) -> Law {
+        Law { restitution: self.e, mesh_speed: self.mesh_speed }
+    }
+}
+
+fn index(name: &str) -> Result<usize, ParameterError> {
+    TABLE.iter().position(|p| p.name == name).ok_or_else(|| ParameterError::Unknown {
+        name: name.to_owned(),
+        known: TABLE.iter().map(|p| p.name).collect::<Vec<_>>().join(", "),
+    })
+}
+
+fn check(parameter: &Parameter, value: f64) -> Result<(), ParameterError> {
+    if parameter.range.contains(value) {
+        return Ok(());
+    }
+    Err(ParameterError::OutOfRange {
+        name: parameter.name,
+        value,
+        requirement: parameter.range.requirement(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn table_and_paper_agree() {
+        let mut pair = GearPair::paper(0.5);
+        for (parameter, at) in TABLE.iter().zip(ACCESSORS) {
+            assert_eq!(*at(&mut pair), parameter.default.unwrap_or(0.5), "{}", parameter.name);
+        }
+    }
+
+    #[test]
+    fn setting_out_of_range_changes_nothing() {
+        let mut pair = GearPair::paper(0.5);
+        let before = pair;
+        for (name, value) in
+            [("e", 1.01), ("m1", 0.0), ("b", 0.0), ("omega", -1.0), ("F", f64::NAN), ("k", f64::INFINITY)]
+        {
+            assert!(matches!(pair.set(name, value), Err(ParameterError::OutOfRange { .. })), "{name}");
+        }
+        assert_eq!(pair, before);
+        assert!(matches!(pair.set("mass", 1.0), Err(ParameterError::Unknown { .. })));
+    }
+}

@@ -1,0 +1,128 @@
+//! One trajectory, read: its class, its cycle and the events on it.
+
+use crate::model::{Side, State};
+use crate::word::Word;
+
+/// What an event is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum EventKind {
+    /// A contact after which motion stays free.
+    Impact,
+    /// A contact after which the teeth mesh.
+    MeshStart,
+    /// Meshing ends and free motion follows.
+    MeshEnd,
+}
+
+/// One event on a trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// What happened.
+    pub kind: EventKind,
+    /// At which wall.
+    pub side: Side,
+    /// Time since phase 0 of the cycle (of the first period looked at).
+    pub t: f64,
+    /// Time since the last phase 0, in `[0, T)`.
+    pub t_mod_period: f64,
+    /// State just before.
+    pub before: State,
+    /// State just after; equal to `before` where meshing ends.
+    pub after: State,
+}
+
+/// What kind of motion a cell settles on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Class {
+    /// A stable periodic orbit of `period` forcing periods.
+    Periodic {
+        /// Forcing periods per cycle, at least 1.
+        period: u32,
+    },
+    /// A bounded motion that is not periodic, with a positive Lyapunov exponent.
+    Chaotic,
+    /// Neither was shown within the periods allowed.
+    Undecided,
+    /// The integration ended early; the status says why.
+    Failed,
+}
+
+/// How a cell's integration ended. `Failed` cells have one of the last three.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Status {
+    /// Nothing to remark.
+    Ok,
+    /// Convergence so slow that the class rests on Newton, or was not reached at all.
+    Slow,
+    /// An event so near to grazing that the linearisation loses its meaning.
+    NearGrazing,
+    /// An event lies on the strobe phase.
+    StrobeOnEvent,
+    /// More events in one period than the cap allows.
+    CapEvents,
+    /// More steps or root iterations than the cap allows.
+    CapRoot,
+    /// Too stiff for this engine.
+    TooStiff,
+    /// The state left the range of finite numbers.
+    NonFinite,
+}
+
+/// A trajectory's long-time behaviour.
+#[derive(Clone, Debug)]
+pub struct Orbit {
+    /// What it is.
+    pub class: Class,
+    /// How the integration ended.
+    pub status: Status,
+    /// Largest Lyapunov exponent per unit time.
+    pub lyapunov: f64,
+    /// Its standard error where it is an average; none for periodic orbits.
+    pub lyapunov_error: Option<f64>,
+    /// Floquet multipliers `(re, im)` of a periodic orbit, largest modulus first.
+    pub floquet: Option<Vec<[f64; 2]>>,
+    /// Whether a periodic orbit is its own mirror image.
+    pub symmetric: Option<bool>,
+    /// The cyclic word of a periodic orbit; of the last periods looked at otherwise.
+    pub word: Word,
+    /// Impacts per forcing period; starts of meshing are not counted.
+    pub impacts_per_period: f64,
+    /// Fraction of the time spent meshing.
+    pub mesh_fraction: f64,
+    /// State at the phase 0 that precedes the first of `events`.
+    pub strobe: State,
+    /// The events of one cycle, or of the last periods looked at, in order of time.
+    pub events: Vec<Event>,
+    /// Forcing periods that `events` and `word` span.
+    pub cycle_periods: u32,
+    /// The forcing period `T`.
+    pub forcing_period: f64,
+}
+
+/// One point of a densely sampled trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Time since the phase 0 at which the trace starts.
+    pub t: f64,
+    /// State.
+    pub state: State,
+    /// The wall the teeth mesh on, if they do.
+    pub meshing: Option<Side>,
+}
+
+/// How long to integrate and what to look for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Forcing periods to let pass before anything is looked at.
+    pub transient_periods: u32,
+    /// Forcing periods to observe.
+    pub observed_periods: u32,
+    /// Longest period, in forcing periods, that is looked for.
+    pub max_period: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { transient_periods: 400, observed_periods: 128, max_period: 64 }
+    }
+}
