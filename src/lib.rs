@@ -7,6 +7,9 @@
 //! then written down ([`output`]).
 
 pub mod bifurcation;
+mod certificate;
+pub mod flow;
 pub mod model;
 pub mod orbit;
+pub mod reference;
 pub mod word;

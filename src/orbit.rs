@@ -3,16 +3,7 @@
 use crate::model::{Side, State};
 use crate::word::Word;
 
-/// What an event is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum EventKind {
-    /// A contact after which motion stays free.
-    Impact,
-    /// A contact after which the teeth mesh.
-    MeshStart,
-    /// Meshing ends and free motion follows.
-    MeshEnd,
-}
+pub use crate::reference::EventKind;
 
 /// One event on a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]

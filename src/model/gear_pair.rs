@@ -153,7 +153,7 @@ impl GearPair {
             omega: self.omega,
             force: [self.force, 0.0],
             free,
-            meshing: Some([meshing(1.0), meshing(-1.0)]),
+            meshing: [meshing(1.0), meshing(-1.0)],
         })
     }
 

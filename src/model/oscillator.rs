@@ -29,8 +29,8 @@ pub struct Oscillator {
     pub force: [f64; 2],
     /// Motion between the walls.
     pub free: Domain,
-    /// Motion in contact with the right and the left wall; none where walls are rigid.
-    pub meshing: Option<[Domain; 2]>,
+    /// Motion in lasting contact with the right and with the left wall.
+    pub meshing: [Domain; 2],
 }
 
 impl Oscillator {

@@ -1,0 +1,353 @@
+//! Complete event detection: is a function free of roots on a step, and if not, where is
+//! its first one?
+//!
+//! # The argument
+//!
+//! Let `f > 0` be the distance from an event on a step of length `h`, `u` in `[0, 1]` the
+//! fraction of the step. Value, slope and curvature at both ends are known exactly. Their
+//! Hermite quintic `p` satisfies
+//!
+//! ```text
+//! f(u) = p(u) + u^3 (1-u)^3 h^6 f^(6)(xi) / 720,
+//! ```
+//!
+//! and `u^3 (1-u)^3 = B(u) / 20` with `B` the middle Bernstein polynomial of degree 6.
+//! Write `p` with the Bernstein coefficients `c_0 .. c_6` of degree 6; then with
+//! `eps = h^6 max|f^(6)| / 14400` the function lies between the polynomials that have
+//! `c_3 - eps` and `c_3 + eps` in the middle. So:
+//!
+//! * All coefficients positive, `c_3 - eps` too: no root, the step is [`Verdict::Clear`].
+//! * Both bounding polynomials change sign once along their coefficients, from `+` to `-`:
+//!   each has exactly one root (Descartes), and all roots of `f` lie between the two. If
+//!   in addition `f' < 0` there, `f` has exactly one root: [`Verdict::Crossing`].
+//! * Else, double crossings and grazing among it, the step is halved. That divides `eps`
+//!   by 64, so it ends: at the latest where what remains open is below rounding.
+//!
+//! `f' < 0` on the bracket is shown at an approximate root `g` of `p`. With
+//! `s = -p'(g)` and `K = 20 max|second differences of p's coefficients| >= max|p''|`,
+//! `p' <= -s/2` within `D = s / (2K)` of `g`. There `|B| <= beta` and `|B'| <= beta'` give
+//! bounding polynomials with slopes below `-(s/2 - beta' eps)`, and so their roots lie
+//! within `D` of `g` if `|p(g)| + beta eps < D (s/2 - beta' eps)`. The slope of `f` itself
+//! departs from `p'` by less than `1.08 eps` (the sharp constant for the quintic's first
+//! derivative is `sqrt(5)/30000 h^5 max|f^(6)|`).
+//!
+//! A start on the wall itself is a root of order `m` at `u = 0`. Dividing `u^m` out turns
+//! `c_i` into a positive multiple of `c_i` for `i >= m` and drops the rest, so the same
+//! test serves: it merely starts at `i = m`.
+
+use crate::flow::ORDER;
+
+/// Value, slope and curvature of a function at both ends of a step, in units of the step:
+/// `(f, h f', h^2 f'')`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hermite {
+    pub(crate) left: [f64; 3],
+    pub(crate) right: [f64; 3],
+}
+
+impl Hermite {
+    /// From values, slopes and curvatures per unit time.
+    #[inline]
+    pub(crate) fn new(left: [f64; 3], right: [f64; 3], h: f64) -> Hermite {
+        let scale = |[f, s, a]: [f64; 3]| [f, h * s, h * h * a];
+        Hermite { left: scale(left), right: scale(right) }
+    }
+}
+
+/// What a step holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Verdict {
+    /// No root.
+    Clear {
+        /// Whether a step twice as long would probably be clear, too.
+        roomy: bool,
+    },
+    /// Exactly one root after the start, a crossing outwards.
+    Crossing(Bracket),
+    /// Not decided at this length.
+    Unclear,
+}
+
+/// Where the one root of a step lies, in fractions of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bracket {
+    pub(crate) guess: f64,
+    pub(crate) lo: f64,
+    pub(crate) hi: f64,
+}
+
+/// Judges the distance `sign * (f - level)` on a step.
+///
+/// `order` is the order of its root at the start, 0 where it starts inside; `remainder` is
+/// `eps` of the module's argument.
+#[inline]
+pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder: f64) -> Verdict {
+    let [_, s0, a0] = f.left.map(|value| sign * value);
+    let [_, s1, a1] = f.right.map(|value| sign * value);
+    // From the wall, coefficients are departures: a tiny one keeps its sign.
+    let start = if order > 0 { 0.0 } else { sign * (f.left[0] - level) };
+    let end = sign * (f.right[0] - level);
+    let quintic = [
+        start,
+        start + 0.2 * s0,
+        start + 0.4 * s0 + 0.05 * a0,
+        end - 0.4 * s1 + 0.05 * a1,
+        end - 0.2 * s1,
+        end,
+    ];
+    let c = [
+        start,
+        start + s0 * (1.0 / 6.0),
+        start + s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0),
+        0.5 * (quintic[2] + quintic[3]),
+        end - s1 * (1.0 / 3.0) + a1 * (1.0 / 30.0),
+        end - s1 * (1.0 / 6.0),
+        end,
+    ];
+    let eps = remainder + 4.0 * f64::EPSILON * (f.left[0].abs() + f.right[0].abs() + level.abs());
+
+    let right = c[4].min(c[5]).min(c[6]);
+    let left = match order {
+        0 => c[0].min(c[1]).min(c[2]),
+        1 => c[1].min(c[2]),
+        2 => c[2],
+        _ => f64::INFINITY,
+    };
+    if left > 0.0 && right > 0.0 && c[3] > eps {
+        return Verdict::Clear { roomy: 64.0 * remainder < left.min(right).min(c[3]) };
+    }
+    turn(&c, order.min(3), eps)
+        .and_then(|turn| bracket(&quintic, [s0, a0, s1, a1], &c, order, turn, eps))
+        .map_or(Verdict::Unclear, Verdict::Crossing)
+}
+
+/// Index of the first coefficient that is not positive, if both bounding polynomials change
+/// sign exactly once.
+#[inline]
+fn turn(c: &[f64; 7], first: usize, eps: f64) -> Option<usize> {
+    let slack = |i: usize| if i == 3 { eps } else { 0.0 };
+    let turn = (first..7).find(|&i| c[i] <= slack(i))?;
+    if turn == first {
+        return None;
+    }
+    let negative_from = if turn == 3 && c[3] >= -eps { 4 } else { turn };
+    (negative_from..7).all(|i| c[i] < -slack(i)).then_some(turn)
+}
+
+/// A bracket that holds exactly one root, if the slope there is large enough to show it.
+fn bracket(
+    b: &[f64; 6],
+    ends: [f64; 4],
+    c: &[f64; 7],
+    order: usize,
+    turn: usize,
+    eps: f64,
+) -> Option<Bracket> {
+    let [s0, a0, s1, a1] = ends;
+    let (d, d1, d2) = (b[5] - b[0] - s0 - 0.5 * a0, s1 - s0 - a0, a1 - a0);
+    let power = [
+        b[0],
+        s0,
+        0.5 * a0,
+        10.0 * d - 4.0 * d1 + 0.5 * d2,
+        -15.0 * d + 7.0 * d1 - d2,
+        6.0 * d - 3.0 * d1 + 0.5 * d2,
+    ];
+    let guess = quintic_root(&power, order, polygon_root(c, turn))?;
+    let [p, slope] = horner(&power, guess);
+    let s = -slope;
+    let bend = second_difference_bound(b);
+    let reach = 0.5 * s / bend;
+    let outer = (guess + reach).min(1.0);
+    let beta = (20.0 * outer * outer * outer).min(0.3125);
+    let steepness = 0.5 * s - 1.08 * eps * (60.0 * outer * outer).min(1.0);
+    (steepness > 0.0 && p.abs() + beta * eps < reach * steepness && s > 2.16 * eps).then_some(Bracket {
+        guess,
+        lo: (guess - reach).max(0.0),
+        hi: outer,
+    })
+}
+
+/// `20 max |second differences| >= max |p''|` of a quintic in Bernstein form.
+#[inline]
+fn second_difference_bound(b: &[f64; 6]) -> f64 {
+    let second = |i: usize| ((b[i + 2] - b[i + 1]) - (b[i + 1] - b[i])).abs();
+    20.0 * second(0).max(second(1)).max(second(2).max(second(3)))
+}
+
+/// Where the control polygon crosses zero.
+#[inline]
+fn polygon_root(c: &[f64; 7], turn: usize) -> f64 {
+    let (above, below) = (c[turn - 1], c[turn].min(0.0));
+    ((turn - 1) as f64 + above / (above - below)) * (1.0 / 6.0)
+}
+
+/// Newton on the quintic with its root at the start divided out: a few digits suffice.
+#[inline]
+fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
+    let deflated: [f64; 6] = std::array::from_fn(|i| power.get(i + order).copied().unwrap_or(0.0));
+    let mut u = start;
+    for _ in 0..6 {
+        let [p, slope] = horner(&deflated, u);
+        let step = p / slope;
+        u -= step;
+        if !(u > 0.0 && u < 1.0 + 1e-6) {
+            return None;
+        }
+        if step.abs() < 1e-3 * u {
+            return Some(u);
+        }
+    }
+    None
+}
+
+#[inline]
+fn horner(c: &[f64; 6], u: f64) -> [f64; 2] {
+    c.iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
+}
+
+/// Root iterations allowed; Halley from a three-digit guess needs one or two.
+const ROOT_CAP: u32 = 30;
+
+/// The root of `level = sum c_n u^n` in a bracket known to hold exactly one, converged to
+/// rounding; none if [`ROOT_CAP`] is reached. Bracket and root are in Taylor units.
+///
+/// A root of order `order` at 0 is divided out first, so that a root close to the start
+/// keeps its relative accuracy.
+#[inline]
+pub(crate) fn locate(
+    c: &[f64; ORDER],
+    level: f64,
+    order: usize,
+    bracket: Bracket,
+    iterations: &mut u64,
+) -> Option<f64> {
+    let mut c = *c;
+    if order > 0 {
+        c.copy_within(order.., 0);
+        c[ORDER - order..].fill(0.0);
+    } else {
+        c[0] -= level;
+    }
+    let (mut lo, mut hi) = (bracket.lo, bracket.hi);
+    // Inside is where the distance has the sign of the (deflated) start.
+    let inside = c[0];
+    let mut u = bracket.guess;
+    for _ in 0..ROOT_CAP {
+        *iterations += 1;
+        let [f, slope, half_bend] = expand(&c, u);
+        if f * inside > 0.0 {
+            lo = u;
+        } else {
+            hi = u;
+        }
+        let newton = f / slope;
+        let curl = newton * half_bend / slope;
+        let step = newton / (1.0 - curl);
+        let mut next = u - step;
+        if step.abs() <= 3e-6 * u && curl.abs() <= 3e-6 {
+            // Convergence is cubic: the error of `next` is below rounding.
+            return Some(next);
+        }
+        if !(next > lo && next < hi) {
+            next = 0.5 * (lo + hi);
+        }
+        u = next;
+    }
+    None
+}
+
+/// Terms of a Taylor polynomial that matter, by the size of `u` in Taylor units: the first
+/// one left out is below 1e-17 of the largest, in the slope, too.
+#[inline]
+fn terms(u: f64) -> usize {
+    match u {
+        u if u.abs() < 0.02 => 10,
+        u if u.abs() < 0.15 => 14,
+        u if u.abs() < 0.5 => 18,
+        _ => ORDER,
+    }
+}
+
+/// Value and slope of a Taylor polynomial, per Taylor unit.
+#[inline]
+pub(crate) fn value_and_slope(c: &[f64; ORDER], u: f64) -> [f64; 2] {
+    c[..terms(u)].iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
+}
+
+/// Value, slope and half the second derivative of a Taylor polynomial.
+#[inline]
+fn expand(c: &[f64; ORDER], u: f64) -> [f64; 3] {
+    c[..terms(u)].iter().rev().fold([0.0, 0.0, 0.0], |[value, slope, half_bend], c| {
+        [value * u + c, slope * u + value, half_bend * u + slope]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `f(u) = a + b u + c u^2 + d u^3` on a step of length 1.
+    fn cubic([a, b, c, d]: [f64; 4]) -> Hermite {
+        let at =
+            |u: f64| [a + u * (b + u * (c + u * d)), b + u * (2.0 * c + 3.0 * d * u), 2.0 * c + 6.0 * d * u];
+        Hermite::new(at(0.0), at(1.0), 1.0)
+    }
+
+    fn distance(f: [f64; 4], order: usize, remainder: f64) -> Verdict {
+        judge(&cubic(f), 0.0, 1.0, order, remainder)
+    }
+
+    #[test]
+    fn a_double_crossing_is_never_called_clear() {
+        // Dips below zero between u = 0.45 and u = 0.55, positive at both ends.
+        let dip = [0.45 * 0.55, -1.0, 1.0, 0.0];
+        assert_eq!(distance(dip, 0, 0.0), Verdict::Unclear);
+        // The same parabola lifted clear of zero.
+        let lifted = [0.45 * 0.55 + 0.3, -1.0, 1.0, 0.0];
+        assert!(matches!(distance(lifted, 0, 1e-6), Verdict::Clear { .. }));
+        // A remainder as large as its clearance takes the verdict back.
+        assert_eq!(distance(lifted, 0, 0.5), Verdict::Unclear);
+    }
+
+    #[test]
+    fn one_crossing_is_bracketed() {
+        let Verdict::Crossing(b) = distance([0.3, -1.0, 0.1, 0.0], 0, 1e-6) else { panic!("not a crossing") };
+        let root = (1.0 - (1.0f64 - 0.12).sqrt()) / 0.2;
+        assert!(b.lo < root && root < b.hi, "{b:?} does not hold {root}");
+        assert!((b.guess - root).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_root_at_the_start_is_divided_out() {
+        // u (0.25 - u): leaves the wall and comes back at 0.25.
+        let Verdict::Crossing(b) = distance([0.0, 0.25, -1.0, 0.0], 1, 1e-9) else {
+            panic!("not a crossing")
+        };
+        assert!((b.guess - 0.25).abs() < 1e-3);
+        // u^2 (0.5 - u)
+        let Verdict::Crossing(b) = distance([0.0, 0.0, 0.5, -1.0], 2, 1e-9) else { panic!("not a crossing") };
+        assert!((b.guess - 0.5).abs() < 1e-3);
+        // Leaves for good.
+        assert!(matches!(distance([0.0, 0.25, 1.0, 0.0], 1, 1e-9), Verdict::Clear { .. }));
+        // A departure far below the rounding of the wall's position.
+        let near = judge(&Hermite::new([0.5, -1e-19, -1.0], [0.0, -1.0, -1.0], 1.0), 0.5, -1.0, 1, 1e-9);
+        assert!(matches!(near, Verdict::Clear { .. }));
+    }
+
+    #[test]
+    fn roots_converge_to_rounding() {
+        // exp(u) - 1 - 1.5 u: roots 0 and 0.7627...
+        let mut c = [0.0; ORDER];
+        let mut factorial = 1.0;
+        for n in 1..ORDER {
+            factorial *= n as f64;
+            c[n] = 1.0 / factorial;
+        }
+        c[1] -= 1.5;
+        let mut count = 0;
+        let root = locate(&c, 0.0, 1, Bracket { guess: 0.7, lo: 0.1, hi: 1.0 }, &mut count).unwrap();
+        assert!((root.exp() - 1.0 - 1.5 * root).abs() < 4e-16, "{root}");
+        assert!(count <= 4, "{count} iterations");
+    }
+}

@@ -1,0 +1,332 @@
+//! One linear forced domain: generator, Taylor table, propagators.
+
+use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2};
+
+use super::energy::EnergyBound;
+use super::{Gap, Phasor, displacement_matrix};
+use crate::model::{Domain, Oscillator};
+
+/// Generator and propagators of `a = (z, w, x, v, cos, sin, 1)`.
+pub(super) type Generator = SMatrix<f64, 7, 7>;
+
+/// Terms of the Taylor table. The radius is at most [`RADIUS`]: `1.25^22 / 22! < 2e-19`.
+pub(crate) const ORDER: usize = 22;
+
+/// Largest `|G| h` at which the Taylor table is used; larger costs digits by cancellation.
+const RADIUS: f64 = 1.25;
+
+/// Halvings of the Taylor step, enough to resolve any grazing that rounding leaves visible.
+const FINE_LEVELS: usize = 26;
+
+/// Doublings of the Taylor step, by squaring; each costs about one bit.
+const COARSE_LEVELS: usize = 3;
+
+/// Powers of the Taylor variable for one coordinate, one column per entry of `a`.
+#[derive(Clone, Debug)]
+pub(crate) struct Series {
+    columns: [[f64; ORDER]; 7],
+}
+
+impl Series {
+    /// Taylor coefficients of the coordinate along the solution through `(q, phasor)`,
+    /// in the variable `u = s / unit`.
+    #[inline]
+    pub(crate) fn coefficients(&self, q: &Gap, phasor: &Phasor) -> [f64; ORDER] {
+        let mut sum = self.columns[6];
+        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]];
+        for (column, &value) in self.columns.iter().zip(&a) {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += value * c;
+            }
+        }
+        sum
+    }
+
+    /// The same for a tangent vector, which feels neither forcing nor load.
+    #[inline]
+    pub(crate) fn tangent_coefficients(&self, u: &Gap) -> [f64; ORDER] {
+        let mut sum = [0.0; ORDER];
+        for (column, &value) in self.columns.iter().zip(u) {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += value * c;
+            }
+        }
+        sum
+    }
+}
+
+/// The propagator of one step length.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    /// Step length.
+    pub(crate) h: f64,
+    /// Step length in units of the Taylor step, and its sixth power.
+    pub(crate) u: f64,
+    pub(crate) u6: f64,
+    columns: [Gap; 7],
+    rotation: Phasor,
+}
+
+impl Step {
+    /// The state one step on.
+    #[inline]
+    pub(crate) fn apply(&self, q: &Gap, phasor: &Phasor) -> Gap {
+        let mut sum = self.columns[6];
+        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]];
+        for (column, &value) in self.columns.iter().zip(&a) {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += value * c;
+            }
+        }
+        sum
+    }
+
+    /// The tangent vector one step on.
+    #[inline]
+    pub(crate) fn apply_tangent(&self, u: &Gap) -> Gap {
+        let mut sum = [0.0; 4];
+        for (column, &value) in self.columns.iter().zip(u) {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += value * c;
+            }
+        }
+        sum
+    }
+
+    /// The forcing phasor one step on.
+    #[inline]
+    pub(crate) fn rotate(&self, p: &Phasor) -> Phasor {
+        let [c, s] = self.rotation;
+        [c * p[0] - s * p[1], s * p[0] + c * p[1]]
+    }
+}
+
+/// The exact flow of one linear domain.
+#[derive(Clone, Debug)]
+pub struct LinearFlow {
+    generator: Generator,
+    omega: f64,
+    rate: f64,
+    /// The Taylor step: the unit of time of the series below.
+    pub(crate) unit: f64,
+    /// Propagators, coarsest first, each half as long as the one before.
+    pub(crate) steps: Vec<Step>,
+    /// Index of the longest step that the Taylor table covers.
+    pub(crate) taylor_level: usize,
+    /// Taylor table of the gap.
+    pub(crate) gap_series: Series,
+    /// Taylor table of the second displacement.
+    pub(crate) x_series: Series,
+    /// Columns of the vector field `(w, w', v, v')`.
+    field: [Gap; 7],
+    /// Rows of `z'', z''', z''''` on `a`.
+    gap_rates: [[f64; 7]; 3],
+    /// Bound on `z^(6)`, for the gap itself.
+    pub(crate) gap_bound: EnergyBound,
+    /// Bound on `z^(8)`, for the relative acceleration.
+    pub(crate) pressing_bound: EnergyBound,
+}
+
+impl LinearFlow {
+    pub(super) fn new(oscillator: &Oscillator, domain: &Domain) -> LinearFlow {
+        let generator = generator(oscillator, domain);
+        let rate = rate(oscillator, domain);
+        let unit = RADIUS / rate;
+        let [gap_series, x_series] = [0, 2].map(|row| series(&generator, unit, row));
+        let omega = oscillator.omega;
+
+        // Steps longer than half a forcing period would only be cut short by the strobe.
+        let fit = (0.5 * oscillator.period() / unit).log2().floor();
+        let coarse = fit.clamp(0.0, COARSE_LEVELS as f64) as usize;
+        let mut longer = vec![propagator_of(&gap_series, &x_series, unit, 1.0, omega)];
+        for _ in 0..coarse {
+            let last = longer[longer.len() - 1];
+            longer.push(last * last);
+        }
+        let step = |halvings: i32, propagator: &Generator| {
+            let u = 0.5f64.powi(halvings);
+            step(propagator, u * unit, u, omega)
+        };
+        let mut steps: Vec<Step> =
+            longer.iter().enumerate().rev().map(|(i, propagator)| step(-(i as i32), propagator)).collect();
+        for halvings in 1..=FINE_LEVELS as i32 {
+            let u = 0.5f64.powi(halvings);
+            steps.push(step(halvings, &propagator_of(&gap_series, &x_series, unit, u, omega)));
+        }
+
+        let mut power = generator;
+        let mut gap_rates = [[0.0; 7]; 3];
+        for rates in &mut gap_rates {
+            power *= generator;
+            *rates = std::array::from_fn(|j| power[(0, j)]);
+        }
+        LinearFlow {
+            field: std::array::from_fn(|j| std::array::from_fn(|i| generator[(i, j)])),
+            gap_bound: EnergyBound::new(oscillator, domain, &generator, 5, unit),
+            pressing_bound: EnergyBound::new(oscillator, domain, &generator, 7, unit),
+            generator,
+            omega,
+            rate,
+            unit,
+            steps,
+            taylor_level: coarse,
+            gap_series,
+            x_series,
+            gap_rates,
+        }
+    }
+
+    /// The vector field `(w, w', v, v')` at a point.
+    #[inline]
+    pub fn field(&self, q: &Gap, phasor: &Phasor) -> Gap {
+        let mut sum = self.field[6];
+        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]];
+        for (column, &value) in self.field.iter().zip(&a) {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += value * c;
+            }
+        }
+        sum
+    }
+
+    /// The relative acceleration `w' = z''`.
+    #[inline]
+    pub fn acceleration(&self, q: &Gap, phasor: &Phasor) -> f64 {
+        dot(&self.gap_rates[0], q, phasor)
+    }
+
+    /// `z'', z''', z''''`.
+    #[inline]
+    pub(crate) fn acceleration_rates(&self, q: &Gap, phasor: &Phasor) -> [f64; 3] {
+        self.gap_rates.map(|row| dot(&row, q, phasor))
+    }
+
+    /// The row of the relative acceleration on `a = (z, w, x, v, cos, sin, 1)`.
+    pub(crate) fn acceleration_row(&self) -> &[f64; 7] {
+        &self.gap_rates[0]
+    }
+
+    /// The fundamental matrix `exp(A tau)` in gap coordinates.
+    pub fn fundamental(&self, tau: f64) -> Matrix4<f64> {
+        self.exponential(tau).fixed_view::<4, 4>(0, 0).into_owned()
+    }
+
+    /// The state a time `tau >= 0` later, for any `tau`.
+    ///
+    /// Scaling and squaring of the Taylor table; the error grows like rounding in
+    /// `|G| tau` does.
+    pub fn propagate(&self, q: Gap, phasor: Phasor, tau: f64) -> Gap {
+        let e = self.exponential(tau);
+        let a = SMatrix::<f64, 7, 1>::from([q[0], q[1], q[2], q[3], phasor[0], phasor[1], 1.0]);
+        let end = e * a;
+        [end[0], end[1], end[2], end[3]]
+    }
+
+    fn exponential(&self, tau: f64) -> Generator {
+        let doublings = (self.rate * tau / RADIUS).log2().ceil().max(0.0) as i32;
+        let u = tau / self.unit * 0.5f64.powi(doublings);
+        let mut propagator = propagator_of(&self.gap_series, &self.x_series, self.unit, u, self.omega);
+        for _ in 0..doublings {
+            propagator *= propagator;
+        }
+        propagator
+    }
+
+    /// Trace of the generator on `q`: the rate at which phase volume shrinks.
+    pub fn trace(&self) -> f64 {
+        self.generator.fixed_view::<4, 4>(0, 0).trace()
+    }
+}
+
+#[inline]
+fn dot(row: &[f64; 7], q: &Gap, phasor: &Phasor) -> f64 {
+    (row[0] * q[0] + row[1] * q[1])
+        + (row[2] * q[2] + row[3] * q[3])
+        + (row[4] * phasor[0] + row[5] * phasor[1])
+        + row[6]
+}
+
+/// `a' = G a`, from the equations of motion in the coordinates `(z, x2)`.
+fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
+    let d = displacement_matrix(oscillator);
+    let d_inverse = d.try_inverse().expect("the first entry of the gap row is not zero");
+    let by_mass = Matrix2::from_diagonal(&Vector2::from(oscillator.masses).map(f64::recip));
+    let matrix =
+        |m: [[f64; 2]; 2]| d * by_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * d_inverse;
+    let (damping, stiffness) = (matrix(domain.damping), matrix(domain.stiffness));
+    let force = d * by_mass * Vector2::from(oscillator.force);
+    let load = d * by_mass * Vector2::from(domain.load);
+    let mut g = Generator::zeros();
+    for i in 0..2 {
+        g[(2 * i, 2 * i + 1)] = 1.0;
+        for j in 0..2 {
+            g[(2 * i + 1, 2 * j)] = -stiffness[(i, j)];
+            g[(2 * i + 1, 2 * j + 1)] = -damping[(i, j)];
+        }
+        g[(2 * i + 1, 4)] = force[i];
+        g[(2 * i + 1, 6)] = load[i];
+    }
+    g[(4, 5)] = -oscillator.omega;
+    g[(5, 4)] = oscillator.omega;
+    g
+}
+
+/// A bound on all rates of the domain: forcing, and the norm of the mass-scaled system.
+fn rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
+    let root = Vector2::from(oscillator.masses).map(|m| m.sqrt().recip());
+    let norm = |m: [[f64; 2]; 2]| {
+        let scaled =
+            Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]).component_mul(&(root * root.transpose()));
+        scaled.symmetric_eigenvalues().abs().max()
+    };
+    (norm(domain.damping) + norm(domain.stiffness).sqrt()).max(oscillator.omega)
+}
+
+/// Rows `e (G unit)^n / n!` of one coordinate.
+fn series(generator: &Generator, unit: f64, coordinate: usize) -> Series {
+    let mut row = SMatrix::<f64, 1, 7>::zeros();
+    row[coordinate] = 1.0;
+    let mut columns = [[0.0; ORDER]; 7];
+    for n in 0..ORDER {
+        for j in 0..7 {
+            columns[j][n] = row[j];
+        }
+        row = row * generator * (unit / (n + 1) as f64);
+    }
+    Series { columns }
+}
+
+/// The propagator of a step `u * unit`, `0 <= u <= 1`, summed from the smallest term up.
+fn propagator_of(gap: &Series, x: &Series, unit: f64, u: f64, omega: f64) -> Generator {
+    let mut p = Generator::zeros();
+    for (row, series) in [(0, gap), (2, x)] {
+        for j in 0..7 {
+            let (mut value, mut slope) = (0.0, 0.0);
+            for n in (0..ORDER).rev() {
+                let c = series.columns[j][n];
+                slope = slope * u + value;
+                value = value * u + c;
+            }
+            p[(row, j)] = value;
+            p[(row + 1, j)] = slope / unit;
+        }
+    }
+    let (sin, cos) = (omega * unit * u).sin_cos();
+    p[(4, 4)] = cos;
+    p[(4, 5)] = -sin;
+    p[(5, 4)] = sin;
+    p[(5, 5)] = cos;
+    p[(6, 6)] = 1.0;
+    p
+}
+
+fn step(propagator: &Generator, h: f64, u: f64, omega: f64) -> Step {
+    let (sin, cos) = (omega * h).sin_cos();
+    Step {
+        h,
+        u,
+        u6: u.powi(6),
+        columns: std::array::from_fn(|j| std::array::from_fn(|i| propagator[(i, j)])),
+        rotation: [cos, sin],
+    }
+}
