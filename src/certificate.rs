@@ -35,8 +35,6 @@
 //! `c_i` into a positive multiple of `c_i` for `i >= m` and drops the rest, so the same
 //! test serves: it merely starts at `i = m`.
 
-use crate::flow::ORDER;
-
 /// Value, slope and curvature of a function at both ends of a step, in units of the step:
 /// `(f, h f', h^2 f'')`.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +45,7 @@ pub(crate) struct Hermite {
 
 impl Hermite {
     /// From values, slopes and curvatures per unit time.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn new(left: [f64; 3], right: [f64; 3], h: f64) -> Hermite {
         let scale = |[f, s, a]: [f64; 3]| [f, h * s, h * h * a];
         Hermite { left: scale(left), right: scale(right) }
@@ -80,7 +78,7 @@ pub(crate) struct Bracket {
 ///
 /// `order` is the order of its root at the start, 0 where it starts inside; `remainder` is
 /// `eps` of the module's argument.
-#[inline]
+#[inline(always)]
 pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder: f64) -> Verdict {
     let [_, s0, a0] = f.left.map(|value| sign * value);
     let [_, s1, a1] = f.right.map(|value| sign * value);
@@ -123,7 +121,7 @@ pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder:
 
 /// Index of the first coefficient that is not positive, if both bounding polynomials change
 /// sign exactly once.
-#[inline]
+#[inline(always)]
 fn turn(c: &[f64; 7], first: usize, eps: f64) -> Option<usize> {
     let slack = |i: usize| if i == 3 { eps } else { 0.0 };
     let turn = (first..7).find(|&i| c[i] <= slack(i))?;
@@ -169,21 +167,21 @@ fn bracket(
 }
 
 /// `20 max |second differences| >= max |p''|` of a quintic in Bernstein form.
-#[inline]
+#[inline(always)]
 fn second_difference_bound(b: &[f64; 6]) -> f64 {
     let second = |i: usize| ((b[i + 2] - b[i + 1]) - (b[i + 1] - b[i])).abs();
     20.0 * second(0).max(second(1)).max(second(2).max(second(3)))
 }
 
 /// Where the control polygon crosses zero.
-#[inline]
+#[inline(always)]
 fn polygon_root(c: &[f64; 7], turn: usize) -> f64 {
     let (above, below) = (c[turn - 1], c[turn].min(0.0));
     ((turn - 1) as f64 + above / (above - below)) * (1.0 / 6.0)
 }
 
 /// Newton on the quintic with its root at the start divided out: a few digits suffice.
-#[inline]
+#[inline(always)]
 fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
     let deflated: [f64; 6] = std::array::from_fn(|i| power.get(i + order).copied().unwrap_or(0.0));
     let mut u = start;
@@ -201,86 +199,9 @@ fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
     None
 }
 
-#[inline]
+#[inline(always)]
 fn horner(c: &[f64; 6], u: f64) -> [f64; 2] {
     c.iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
-}
-
-/// Root iterations allowed; Halley from a three-digit guess needs one or two.
-const ROOT_CAP: u32 = 30;
-
-/// The root of `level = sum c_n u^n` in a bracket known to hold exactly one, converged to
-/// rounding; none if [`ROOT_CAP`] is reached. Bracket and root are in Taylor units.
-///
-/// A root of order `order` at 0 is divided out first, so that a root close to the start
-/// keeps its relative accuracy.
-#[inline]
-pub(crate) fn locate(
-    c: &[f64; ORDER],
-    level: f64,
-    order: usize,
-    bracket: Bracket,
-    iterations: &mut u64,
-) -> Option<f64> {
-    let mut c = *c;
-    if order > 0 {
-        c.copy_within(order.., 0);
-        c[ORDER - order..].fill(0.0);
-    } else {
-        c[0] -= level;
-    }
-    let (mut lo, mut hi) = (bracket.lo, bracket.hi);
-    // Inside is where the distance has the sign of the (deflated) start.
-    let inside = c[0];
-    let mut u = bracket.guess;
-    for _ in 0..ROOT_CAP {
-        *iterations += 1;
-        let [f, slope, half_bend] = expand(&c, u);
-        if f * inside > 0.0 {
-            lo = u;
-        } else {
-            hi = u;
-        }
-        let newton = f / slope;
-        let curl = newton * half_bend / slope;
-        let step = newton / (1.0 - curl);
-        let mut next = u - step;
-        if step.abs() <= 3e-6 * u && curl.abs() <= 3e-6 {
-            // Convergence is cubic: the error of `next` is below rounding.
-            return Some(next);
-        }
-        if !(next > lo && next < hi) {
-            next = 0.5 * (lo + hi);
-        }
-        u = next;
-    }
-    None
-}
-
-/// Terms of a Taylor polynomial that matter, by the size of `u` in Taylor units: the first
-/// one left out is below 1e-17 of the largest, in the slope, too.
-#[inline]
-fn terms(u: f64) -> usize {
-    match u {
-        u if u.abs() < 0.02 => 10,
-        u if u.abs() < 0.15 => 14,
-        u if u.abs() < 0.5 => 18,
-        _ => ORDER,
-    }
-}
-
-/// Value and slope of a Taylor polynomial, per Taylor unit.
-#[inline]
-pub(crate) fn value_and_slope(c: &[f64; ORDER], u: f64) -> [f64; 2] {
-    c[..terms(u)].iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
-}
-
-/// Value, slope and half the second derivative of a Taylor polynomial.
-#[inline]
-fn expand(c: &[f64; ORDER], u: f64) -> [f64; 3] {
-    c[..terms(u)].iter().rev().fold([0.0, 0.0, 0.0], |[value, slope, half_bend], c| {
-        [value * u + c, slope * u + value, half_bend * u + slope]
-    })
 }
 
 #[cfg(test)]
@@ -333,21 +254,5 @@ mod tests {
         // A departure far below the rounding of the wall's position.
         let near = judge(&Hermite::new([0.5, -1e-19, -1.0], [0.0, -1.0, -1.0], 1.0), 0.5, -1.0, 1, 1e-9);
         assert!(matches!(near, Verdict::Clear { .. }));
-    }
-
-    #[test]
-    fn roots_converge_to_rounding() {
-        // exp(u) - 1 - 1.5 u: roots 0 and 0.7627...
-        let mut c = [0.0; ORDER];
-        let mut factorial = 1.0;
-        for n in 1..ORDER {
-            factorial *= n as f64;
-            c[n] = 1.0 / factorial;
-        }
-        c[1] -= 1.5;
-        let mut count = 0;
-        let root = locate(&c, 0.0, 1, Bracket { guess: 0.7, lo: 0.1, hi: 1.0 }, &mut count).unwrap();
-        assert!((root.exp() - 1.0 - 1.5 * root).abs() < 4e-16, "{root}");
-        assert!(count <= 4, "{count} iterations");
     }
 }

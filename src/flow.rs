@@ -18,11 +18,10 @@
 //!
 //! # How it is evaluated
 //!
-//! [`LinearFlow`] holds one Taylor table, the rows `e (G h)^n / n!` of the gap and of `x`
-//! for a step `h` with `|G| h <= 1.25`; at order 22 the remainder is below `1e-19`.
-//! Propagators of steps `h/2, h/4, ...` are sums of that table, and a few longer ones come
-//! from squaring. Between steps the table gives the gap as a polynomial in time, exact
-//! to rounding, on which events are located ([`crate::certificate`]).
+//! [`LinearFlow`] holds one Taylor table `(G h)^n / n!` for a step `h` with `|G| h <= 1.25`;
+//! at order 22 the remainder is below `1e-19`. Summing it gives the propagator of any part
+//! of the step, less the identity, so that a short flight keeps its relative accuracy.
+//! Propagators of `h, h/2, h/4, ...` are stored, and a few longer ones made by squaring.
 //!
 //! # Bounds on derivatives
 //!
@@ -38,13 +37,14 @@
 //! That holds at resonance and without damping, costs one square root, and is tight where
 //! motion is slow: a stiff meshing spring that is not excited does not shorten the step.
 
+mod columns;
 mod energy;
 mod linear;
 
 use nalgebra::{Matrix2, Matrix4};
 
+pub(crate) use columns::add;
 pub use linear::LinearFlow;
-pub(crate) use linear::{ORDER, Series, Step};
 
 use crate::model::{Oscillator, Side, State};
 

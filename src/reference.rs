@@ -16,10 +16,11 @@
 
 mod chatter;
 mod contact;
+mod landing;
 mod tangent;
 
-use crate::certificate::{Bracket, Hermite, Verdict, judge, locate, value_and_slope};
-use crate::flow::{DomainKind, Flow, Gap, LinearFlow, ORDER, Phasor};
+use crate::certificate::{Bracket, Hermite, Verdict, judge};
+use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, add};
 use crate::model::{Law, Side, State};
 
 /// Events allowed in one forcing period.
@@ -284,6 +285,25 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has the feature that the function is compiled for.
+            #[allow(unsafe_code)]
+            return unsafe { self.advance_wide(until, observer) };
+        }
+        self.advance_plain(until, observer)
+    }
+
+    /// The same instructions on wider registers: nothing is reassociated or contracted, so
+    /// the results are the same to the last bit.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn advance_wide(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        self.advance_plain(until, observer)
+    }
+
+    #[inline(always)]
+    fn advance_plain(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         if let Some(side) = self.pending.take() {
             self.contact(side, observer);
         }
@@ -295,6 +315,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 
     /// One step: as far as it is clear, or to its event, or to `until`.
+    #[inline(always)]
     fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         let flow = self.flow;
         let linear = flow.domain(self.mode.domain());
@@ -319,7 +340,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 }
                 Outlook::Crossing(crossing, bracket) if level >= linear.taylor_level => {
                     self.level[slot] = level;
-                    return self.cross(linear, level, crossing, bracket, until, observer);
+                    return self.cross(linear, linear.steps[level].u, crossing, bracket, until, observer);
                 }
                 Outlook::Unclear if self.settle_start(observer) => return Ok(()),
                 Outlook::Unclear if level + 1 == linear.steps.len() => {
@@ -335,11 +356,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 
     /// Judges everything that could end the flight within one step.
-    #[inline]
+    #[inline(always)]
     fn outlook(&self, linear: &LinearFlow, level: usize) -> Outlook {
         let step = &linear.steps[level];
         let (q0, p0) = (&self.q, &self.phasor);
-        let (q1, p1) = (step.apply(q0, p0), step.rotate(p0));
+        let (q1, p1) = (step.columns.apply(q0, p0), step.columns.rotate(p0));
         let jet = |q: &Gap, p: &Phasor| [q[0], q[1], linear.acceleration(q, p)];
         let gap = Hermite::new(jet(q0, p0), jet(&q1, &p1), step.h);
         let remainder = step.u6 * linear.gap_bound.remainder(q0, p0, step.u);
@@ -372,104 +393,39 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 
     /// Takes a step that is clear, cut at `until`.
-    #[inline]
+    #[inline(always)]
     fn clear_step(&mut self, linear: &LinearFlow, level: usize, until: f64) {
         let step = &linear.steps[level];
         let remaining = until - self.t;
         self.from_wall = None;
         if step.h < remaining {
-            let q = step.apply(&self.q, &self.phasor);
-            self.phasor = step.rotate(&self.phasor);
+            let q = step.columns.apply(&self.q, &self.phasor);
+            self.phasor = step.columns.rotate(&self.phasor);
             self.q = q;
             self.t += step.h;
             if N > 0 {
-                self.tangents = self.tangents.map(|u| step.apply_tangent(&u));
+                self.tangents = self.tangents.map(|u| step.columns.apply_tangent(&u));
             }
             self.count_meshing(step.h);
         } else {
-            let gap = linear.gap_series.coefficients(&self.q, &self.phasor);
-            self.move_within(linear, &gap, remaining / linear.unit);
-            self.arrive(until, remaining);
+            self.move_within(linear, remaining);
+            self.t = until;
         }
     }
 
-    /// Goes to the crossing of a step, or to `until` if that comes first.
-    fn cross(
-        &mut self,
-        linear: &LinearFlow,
-        level: usize,
-        crossing: Crossing,
-        bracket: Bracket,
-        until: f64,
-        observer: &mut impl Observer,
-    ) -> Result<(), Stop> {
-        let gap = linear.gap_series.coefficients(&self.q, &self.phasor);
-        let u = self.root(linear, level, &gap, crossing, bracket).ok_or(Stop::CapRoot)?;
-        let remaining = until - self.t;
-        let s = u * linear.unit;
-        self.from_wall = None;
-        if s > remaining {
-            self.move_within(linear, &gap, remaining / linear.unit);
-            self.arrive(until, remaining);
-            return Ok(());
-        }
-        self.move_within(linear, &gap, u);
-        self.arrive(self.t + s, s);
-        self.act(crossing, observer);
-        if self.events_in_period > EVENTS_PER_PERIOD_CAP { Err(Stop::CapEvents) } else { Ok(()) }
-    }
-
-    /// The root of a crossing in Taylor units, on the exact polynomial.
-    fn root(
-        &mut self,
-        linear: &LinearFlow,
-        level: usize,
-        gap: &[f64; ORDER],
-        crossing: Crossing,
-        bracket: Bracket,
-    ) -> Option<f64> {
-        let h = linear.steps[level].u;
-        let bracket = Bracket { guess: h * bracket.guess, lo: h * bracket.lo, hi: h * bracket.hi };
-        let iterations = &mut self.work.root_iterations;
-        match crossing {
-            Crossing::PressingEnds(_) => {
-                let mut acceleration = [0.0; ORDER];
-                for n in 2..ORDER {
-                    acceleration[n - 2] = (n * (n - 1)) as f64 * gap[n];
-                }
-                locate(&acceleration, 0.0, 0, bracket, iterations)
-            }
-            Crossing::Contact(side) | Crossing::Emerge(side) | Crossing::MeshEnds(side) => {
-                let order = self.from_wall.map_or(0, |(from, order)| if from == side { order } else { 0 });
-                locate(gap, self.flow.wall(side), order, bracket, iterations)
-            }
-        }
-    }
-
-    /// Moves state and tangents by `u` Taylor units, at most one Taylor step.
-    #[inline]
-    fn move_within(&mut self, linear: &LinearFlow, gap: &[f64; ORDER], u: f64) {
-        let x = linear.x_series.coefficients(&self.q, &self.phasor);
-        self.q = pair(gap, &x, u, linear.unit);
+    /// Moves everything by a time of at most one Taylor step.
+    #[inline(always)]
+    fn move_within(&mut self, linear: &LinearFlow, s: f64) {
+        let partial = linear.partial(s / linear.unit);
+        self.q = add(&self.q, &partial.increment(&self.q, &self.phasor));
+        self.phasor = partial.rotate(&self.phasor);
         if N > 0 {
-            self.tangents = self.tangents.map(|tangent| {
-                let gap = linear.gap_series.tangent_coefficients(&tangent);
-                let x = linear.x_series.tangent_coefficients(&tangent);
-                pair(&gap, &x, u, linear.unit)
-            });
+            self.tangents = self.tangents.map(|u| partial.apply_tangent(&u));
         }
-    }
-
-    /// Sets clock and phasor after a move of length `s`.
-    #[inline]
-    fn arrive(&mut self, t: f64, s: f64) {
-        self.t = t;
-        let (sin, cos) = (self.flow.omega * t).sin_cos();
-        self.phasor = [cos, sin];
         self.count_meshing(s);
     }
 
-    #[inline]
+    #[inline(always)]
     fn count_meshing(&mut self, s: f64) {
         if self.mode != Mode::Free {
             self.meshing_time += s;
@@ -477,16 +433,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 }
 
-/// Gap coordinates from two Taylor polynomials.
-#[inline]
-fn pair(gap: &[f64; ORDER], x: &[f64; ORDER], u: f64, unit: f64) -> Gap {
-    let [z, w] = value_and_slope(gap, u);
-    let [x, v] = value_and_slope(x, u);
-    [z, w / unit, x, v / unit]
-}
-
 /// The earlier of two things that may happen on a step.
-#[inline]
+#[inline(always)]
 fn first_of((a, crossing_a): (Verdict, Crossing), (b, crossing_b): (Verdict, Crossing)) -> Outlook {
     match (a, b) {
         (Verdict::Clear { roomy: a }, Verdict::Clear { roomy: b }) => Outlook::Clear { roomy: a && b },

@@ -1,7 +1,8 @@
 //! Bounds on derivatives of the gap from the energy of differentiated solutions.
 
-use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 
+use super::columns::Columns;
 use super::linear::Generator;
 use super::{Gap, Phasor, displacement_matrix};
 use crate::model::{Domain, Oscillator};
@@ -14,7 +15,7 @@ use crate::model::{Domain, Oscillator};
 /// polynomial of degree 6 over 20: so `h^6 max|f^(6)| / 14400` on the middle coefficient.
 #[derive(Clone, Debug)]
 pub(crate) struct EnergyBound {
-    columns: [Gap; 7],
+    columns: Columns,
     growth: f64,
 }
 
@@ -34,11 +35,13 @@ impl EnergyBound {
 
         let weight = energy_root(oscillator, domain);
         let power = generator.pow(n);
-        let rows: SMatrix<f64, 4, 7> = weight * power.fixed_view::<4, 7>(0, 0) * scale;
+        let rows = weight * power.fixed_view::<4, 7>(0, 0) * scale;
+        let mut padded = Generator::zeros();
+        padded.fixed_view_mut::<4, 7>(0, 0).copy_from(&rows);
         let force = Vector2::from(oscillator.force);
         let drive = force.component_mul(&force).component_div(&masses).sum().sqrt();
         EnergyBound {
-            columns: std::array::from_fn(|j| std::array::from_fn(|i| rows[(i, j)])),
+            columns: Columns::of(&padded),
             growth: scale * drive * oscillator.omega.powi(n as i32) * unit,
         }
     }
@@ -47,13 +50,7 @@ impl EnergyBound {
     /// Taylor units that starts at `(q, phasor)`.
     #[inline]
     pub(crate) fn remainder(&self, q: &Gap, phasor: &Phasor, u: f64) -> f64 {
-        let mut sum = self.columns[6];
-        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]];
-        for (column, &value) in self.columns.iter().zip(&a) {
-            for (s, c) in sum.iter_mut().zip(column) {
-                *s += value * c;
-            }
-        }
+        let sum = self.columns.apply(q, phasor);
         let energy = (sum[0] * sum[0] + sum[1] * sum[1]) + (sum[2] * sum[2] + sum[3] * sum[3]);
         energy.sqrt() + self.growth * u
     }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2};
 
+use super::columns::{Columns, add};
 use super::energy::EnergyBound;
 use super::{Gap, Phasor, displacement_matrix};
 use crate::model::{Domain, Oscillator};
@@ -21,37 +22,29 @@ const FINE_LEVELS: usize = 26;
 /// Doublings of the Taylor step, by squaring; each costs about one bit.
 const COARSE_LEVELS: usize = 3;
 
-/// Powers of the Taylor variable for one coordinate, one column per entry of `a`.
-#[derive(Clone, Debug)]
-pub(crate) struct Series {
-    columns: [[f64; ORDER]; 7],
-}
+/// The propagator of a partial step, less the identity, so that small departures keep
+/// their relative accuracy.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Partial(Columns);
 
-impl Series {
-    /// Taylor coefficients of the coordinate along the solution through `(q, phasor)`,
-    /// in the variable `u = s / unit`.
-    #[inline]
-    pub(crate) fn coefficients(&self, q: &Gap, phasor: &Phasor) -> [f64; ORDER] {
-        let mut sum = self.columns[6];
-        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]];
-        for (column, &value) in self.columns.iter().zip(&a) {
-            for (s, c) in sum.iter_mut().zip(column) {
-                *s += value * c;
-            }
-        }
-        sum
+impl Partial {
+    /// What is added to the state.
+    #[inline(always)]
+    pub(crate) fn increment(&self, q: &Gap, phasor: &Phasor) -> Gap {
+        self.0.apply(q, phasor)
     }
 
-    /// The same for a tangent vector, which feels neither forcing nor load.
-    #[inline]
-    pub(crate) fn tangent_coefficients(&self, u: &Gap) -> [f64; ORDER] {
-        let mut sum = [0.0; ORDER];
-        for (column, &value) in self.columns.iter().zip(u) {
-            for (s, c) in sum.iter_mut().zip(column) {
-                *s += value * c;
-            }
-        }
-        sum
+    /// The tangent vector after the partial step.
+    #[inline(always)]
+    pub(crate) fn apply_tangent(&self, u: &Gap) -> Gap {
+        add(u, &self.0.apply_tangent(u))
+    }
+
+    /// The forcing phasor after the partial step.
+    #[inline(always)]
+    pub(crate) fn rotate(&self, p: &Phasor) -> Phasor {
+        let [c, s] = self.0.rotate(p);
+        [p[0] + c, p[1] + s]
     }
 }
 
@@ -63,42 +56,8 @@ pub(crate) struct Step {
     /// Step length in units of the Taylor step, and its sixth power.
     pub(crate) u: f64,
     pub(crate) u6: f64,
-    columns: [Gap; 7],
-    rotation: Phasor,
-}
-
-impl Step {
-    /// The state one step on.
-    #[inline]
-    pub(crate) fn apply(&self, q: &Gap, phasor: &Phasor) -> Gap {
-        let mut sum = self.columns[6];
-        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]];
-        for (column, &value) in self.columns.iter().zip(&a) {
-            for (s, c) in sum.iter_mut().zip(column) {
-                *s += value * c;
-            }
-        }
-        sum
-    }
-
-    /// The tangent vector one step on.
-    #[inline]
-    pub(crate) fn apply_tangent(&self, u: &Gap) -> Gap {
-        let mut sum = [0.0; 4];
-        for (column, &value) in self.columns.iter().zip(u) {
-            for (s, c) in sum.iter_mut().zip(column) {
-                *s += value * c;
-            }
-        }
-        sum
-    }
-
-    /// The forcing phasor one step on.
-    #[inline]
-    pub(crate) fn rotate(&self, p: &Phasor) -> Phasor {
-        let [c, s] = self.rotation;
-        [c * p[0] - s * p[1], s * p[0] + c * p[1]]
-    }
+    /// The propagator.
+    pub(crate) columns: Columns,
 }
 
 /// The exact flow of one linear domain.
@@ -113,12 +72,10 @@ pub struct LinearFlow {
     pub(crate) steps: Vec<Step>,
     /// Index of the longest step that the Taylor table covers.
     pub(crate) taylor_level: usize,
-    /// Taylor table of the gap.
-    pub(crate) gap_series: Series,
-    /// Taylor table of the second displacement.
-    pub(crate) x_series: Series,
+    /// Taylor table of the propagator: term `n` multiplies `u^(n+1)`.
+    table: Vec<Columns>,
     /// Columns of the vector field `(w, w', v, v')`.
-    field: [Gap; 7],
+    field: Columns,
     /// Rows of `z'', z''', z''''` on `a`.
     gap_rates: [[f64; 7]; 3],
     /// Bound on `z^(6)`, for the gap itself.
@@ -132,26 +89,26 @@ impl LinearFlow {
         let generator = generator(oscillator, domain);
         let rate = rate(oscillator, domain);
         let unit = RADIUS / rate;
-        let [gap_series, x_series] = [0, 2].map(|row| series(&generator, unit, row));
+        let table = taylor_table(&generator, unit);
         let omega = oscillator.omega;
 
         // Steps longer than half a forcing period would only be cut short by the strobe.
         let fit = (0.5 * oscillator.period() / unit).log2().floor();
         let coarse = fit.clamp(0.0, COARSE_LEVELS as f64) as usize;
-        let mut longer = vec![propagator_of(&gap_series, &x_series, unit, 1.0, omega)];
+        let mut longer = vec![propagator_of(&table, 1.0)];
         for _ in 0..coarse {
             let last = longer[longer.len() - 1];
             longer.push(last * last);
         }
         let step = |halvings: i32, propagator: &Generator| {
             let u = 0.5f64.powi(halvings);
-            step(propagator, u * unit, u, omega)
+            Step { h: u * unit, u, u6: u.powi(6), columns: Columns::of(propagator) }
         };
         let mut steps: Vec<Step> =
             longer.iter().enumerate().rev().map(|(i, propagator)| step(-(i as i32), propagator)).collect();
         for halvings in 1..=FINE_LEVELS as i32 {
             let u = 0.5f64.powi(halvings);
-            steps.push(step(halvings, &propagator_of(&gap_series, &x_series, unit, u, omega)));
+            steps.push(step(halvings, &propagator_of(&table, u)));
         }
 
         let mut power = generator;
@@ -161,7 +118,7 @@ impl LinearFlow {
             *rates = std::array::from_fn(|j| power[(0, j)]);
         }
         LinearFlow {
-            field: std::array::from_fn(|j| std::array::from_fn(|i| generator[(i, j)])),
+            field: Columns::of(&generator),
             gap_bound: EnergyBound::new(oscillator, domain, &generator, 5, unit),
             pressing_bound: EnergyBound::new(oscillator, domain, &generator, 7, unit),
             generator,
@@ -170,23 +127,41 @@ impl LinearFlow {
             unit,
             steps,
             taylor_level: coarse,
-            gap_series,
-            x_series,
+            table,
             gap_rates,
         }
     }
 
     /// The vector field `(w, w', v, v')` at a point.
-    #[inline]
+    #[inline(always)]
     pub fn field(&self, q: &Gap, phasor: &Phasor) -> Gap {
-        let mut sum = self.field[6];
-        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]];
-        for (column, &value) in self.field.iter().zip(&a) {
-            for (s, c) in sum.iter_mut().zip(column) {
-                *s += value * c;
-            }
-        }
-        sum
+        self.field.apply(q, phasor)
+    }
+
+    /// The first four time derivatives of `q` along the solution.
+    #[inline(always)]
+    pub(crate) fn derivatives(&self, q: &Gap, phasor: &Phasor) -> [Gap; 4] {
+        let turn = |p: &Phasor| [-self.omega * p[1], self.omega * p[0]];
+        let p1 = turn(phasor);
+        let p2 = turn(&p1);
+        let d1 = self.field.apply(q, phasor);
+        let d2 = self.field.apply_unloaded(&d1, &p1);
+        let d3 = self.field.apply_unloaded(&d2, &p2);
+        [d1, d2, d3, self.field.apply_unloaded(&d3, &turn(&p2))]
+    }
+
+    /// The tangent vector a small time `delta` later, to second order.
+    #[inline(always)]
+    pub(crate) fn nudge_tangent(&self, u: &Gap, delta: f64) -> Gap {
+        let first = self.field.apply_tangent(u);
+        let second = self.field.apply_tangent(&first);
+        std::array::from_fn(|i| u[i] + delta * (first[i] + 0.5 * delta * second[i]))
+    }
+
+    /// The propagator, less the identity, of `u` Taylor units, `0 <= u <= 1`.
+    #[inline(always)]
+    pub(crate) fn partial(&self, u: f64) -> Partial {
+        Partial(Columns::horner(&self.table[..terms(u)], u))
     }
 
     /// The relative acceleration `w' = z''`.
@@ -225,7 +200,7 @@ impl LinearFlow {
     fn exponential(&self, tau: f64) -> Generator {
         let doublings = (self.rate * tau / RADIUS).log2().ceil().max(0.0) as i32;
         let u = tau / self.unit * 0.5f64.powi(doublings);
-        let mut propagator = propagator_of(&self.gap_series, &self.x_series, self.unit, u, self.omega);
+        let mut propagator = propagator_of(&self.table, u);
         for _ in 0..doublings {
             propagator *= propagator;
         }
@@ -282,51 +257,28 @@ fn rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
     (norm(domain.damping) + norm(domain.stiffness).sqrt()).max(oscillator.omega)
 }
 
-/// Rows `e (G unit)^n / n!` of one coordinate.
-fn series(generator: &Generator, unit: f64, coordinate: usize) -> Series {
-    let mut row = SMatrix::<f64, 1, 7>::zeros();
-    row[coordinate] = 1.0;
-    let mut columns = [[0.0; ORDER]; 7];
-    for n in 0..ORDER {
-        for j in 0..7 {
-            columns[j][n] = row[j];
-        }
-        row = row * generator * (unit / (n + 1) as f64);
-    }
-    Series { columns }
+/// Terms `(G unit)^(n+1) / (n+1)!` of the propagator.
+fn taylor_table(generator: &Generator, unit: f64) -> Vec<Columns> {
+    let mut power = Generator::identity();
+    let mut term = |n: usize| {
+        power = power * generator * (unit / n as f64);
+        Columns::of(&power)
+    };
+    (1..=ORDER).map(&mut term).collect()
 }
 
-/// The propagator of a step `u * unit`, `0 <= u <= 1`, summed from the smallest term up.
-fn propagator_of(gap: &Series, x: &Series, unit: f64, u: f64, omega: f64) -> Generator {
-    let mut p = Generator::zeros();
-    for (row, series) in [(0, gap), (2, x)] {
-        for j in 0..7 {
-            let (mut value, mut slope) = (0.0, 0.0);
-            for n in (0..ORDER).rev() {
-                let c = series.columns[j][n];
-                slope = slope * u + value;
-                value = value * u + c;
-            }
-            p[(row, j)] = value;
-            p[(row + 1, j)] = slope / unit;
-        }
+/// Terms that matter, by the size of `u`: the first one left out is below 1e-17.
+#[inline(always)]
+fn terms(u: f64) -> usize {
+    match u {
+        u if u < 0.02 => 8,
+        u if u < 0.15 => 12,
+        u if u < 0.5 => 16,
+        _ => ORDER,
     }
-    let (sin, cos) = (omega * unit * u).sin_cos();
-    p[(4, 4)] = cos;
-    p[(4, 5)] = -sin;
-    p[(5, 4)] = sin;
-    p[(5, 5)] = cos;
-    p[(6, 6)] = 1.0;
-    p
 }
 
-fn step(propagator: &Generator, h: f64, u: f64, omega: f64) -> Step {
-    let (sin, cos) = (omega * h).sin_cos();
-    Step {
-        h,
-        u,
-        u6: u.powi(6),
-        columns: std::array::from_fn(|j| std::array::from_fn(|i| propagator[(i, j)])),
-        rotation: [cos, sin],
-    }
+/// The propagator of `u` Taylor units, `0 <= u <= 1`.
+fn propagator_of(table: &[Columns], u: f64) -> Generator {
+    Generator::identity() + Columns::horner(table, u).matrix()
 }

@@ -67,7 +67,9 @@ impl<const N: usize> Trajectory<'_, N> {
         self.q =
             [z, 0.0, x + duration * (v + 0.5 * duration * sliding.v_rate), v + duration * sliding.v_rate];
         self.tangents = self.tangents.map(|u| [0.0, 0.0, u[2] + kick * u[0], u[3] + kick * u[1]]);
-        self.arrive(self.t + duration, duration);
+        self.t += duration;
+        let (sin, cos) = (flow.omega * self.t).sin_cos();
+        self.phasor = [cos, sin];
         let before = self.q;
         self.record(EventKind::MeshStart, side, before, observer);
         self.start_meshing(side, 0.0);

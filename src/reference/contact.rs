@@ -6,7 +6,7 @@ use crate::model::Side;
 
 /// Approach speeds below this, with the load pulling away, count as near grazing: the
 /// saltation matrix grows like its inverse.
-pub const GRAZING_SPEED: f64 = 1e-4;
+pub(super) const GRAZING_SPEED: f64 = 1e-4;
 
 /// The gradient of the gap in gap coordinates.
 const ALONG_GAP: Gap = [1.0, 0.0, 0.0, 0.0];
@@ -33,6 +33,7 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// Acts on a crossing at the present state.
+    #[inline(always)]
     pub(super) fn act(&mut self, crossing: Crossing, observer: &mut impl Observer) {
         match crossing {
             Crossing::Contact(side) => self.contact(side, observer),
@@ -59,6 +60,7 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// Free motion reaches a wall: the impact law, then meshing or not (22), (37).
+    #[inline(always)]
     pub(super) fn contact(&mut self, side: Side, observer: &mut impl Observer) {
         let e = self.law.restitution;
         self.q[0] = self.flow.wall(side);
@@ -226,9 +228,8 @@ impl<const N: usize> Trajectory<'_, N> {
         self.near_grazing = true;
         let remaining = until - self.t;
         let s = linear.steps[level].h.min(remaining);
-        let gap = linear.gap_series.coefficients(&self.q, &self.phasor);
-        self.move_within(linear, &gap, s / linear.unit);
-        self.arrive(if s < remaining { self.t + s } else { until }, s);
+        self.move_within(linear, s);
+        self.t = if s < remaining { self.t + s } else { until };
         self.from_wall = None;
         self.settle_start(observer);
     }
