@@ -74,6 +74,27 @@ pub(crate) struct Bracket {
     pub(crate) hi: f64,
 }
 
+/// Whether a function stays strictly between two levels on a step, with how much room to
+/// spare; none if that is not certain. The quick test, for steps that start inside.
+#[inline(always)]
+pub(crate) fn stays_between(f: &Hermite, below: f64, above: f64, remainder: f64) -> Option<f64> {
+    let [f0, s0, a0] = f.left;
+    let [f1, s1, a1] = f.right;
+    let (b2, b3) = (f0 + 0.4 * s0 + 0.05 * a0, f1 - 0.4 * s1 + 0.05 * a1);
+    let c1 = f0 + s0 * (1.0 / 6.0);
+    let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
+    let c3 = 0.5 * (b2 + b3);
+    let c4 = f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0));
+    let c5 = f1 - s1 * (1.0 / 6.0);
+    let highest = f0.max(f1).max(c1.max(c2)).max(c4.max(c5)).max(c3 + remainder);
+    let lowest = f0.min(f1).min(c1.min(c2)).min(c4.min(c5)).min(c3 - remainder);
+    let room = (above - highest).min(lowest - below) - ROUNDING * (f0.abs() + f1.abs());
+    (room > 0.0).then_some(room)
+}
+
+/// Rounding of a Bernstein coefficient, relative to the ends it is made of.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// Judges the distance `sign * (f - level)` on a step.
 ///
 /// `order` is the order of its root at the start, 0 where it starts inside; `remainder` is
@@ -102,7 +123,7 @@ pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder:
         end - s1 * (1.0 / 6.0),
         end,
     ];
-    let eps = remainder + 4.0 * f64::EPSILON * (f.left[0].abs() + f.right[0].abs() + level.abs());
+    let eps = remainder + ROUNDING * (f.left[0].abs() + f.right[0].abs() + level.abs());
 
     let right = c[4].min(c[5]).min(c[6]);
     let left = match order {
@@ -112,12 +133,15 @@ pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder:
         _ => f64::INFINITY,
     };
     if left > 0.0 && right > 0.0 && c[3] > eps {
-        return Verdict::Clear { roomy: 64.0 * remainder < left.min(right).min(c[3]) };
+        return Verdict::Clear { roomy: ROOMY * remainder < left.min(right).min(c[3]) };
     }
     turn(&c, order.min(3), eps)
         .and_then(|turn| bracket(&quintic, [s0, a0, s1, a1], &c, order, turn, eps))
         .map_or(Verdict::Unclear, Verdict::Crossing)
 }
+
+/// A remainder this many times smaller than the room left suits a step twice as long.
+pub(crate) const ROOMY: f64 = 64.0;
 
 /// Index of the first coefficient that is not positive, if both bounding polynomials change
 /// sign exactly once.
@@ -152,7 +176,7 @@ fn bracket(
         6.0 * d - 3.0 * d1 + 0.5 * d2,
     ];
     let guess = quintic_root(&power, order, polygon_root(c, turn))?;
-    let [p, slope] = horner(&power, guess);
+    let [p, slope] = quintic(&power, guess);
     let s = -slope;
     let bend = second_difference_bound(b);
     let reach = 0.5 * s / bend;
@@ -186,22 +210,27 @@ fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
     let deflated: [f64; 6] = std::array::from_fn(|i| power.get(i + order).copied().unwrap_or(0.0));
     let mut u = start;
     for _ in 0..6 {
-        let [p, slope] = horner(&deflated, u);
+        let [p, slope] = quintic(&deflated, u);
         let step = p / slope;
         u -= step;
         if !(u > 0.0 && u < 1.0 + 1e-6) {
             return None;
         }
-        if step.abs() < 1e-3 * u {
+        if step.abs() < 3e-3 * u {
             return Some(u);
         }
     }
     None
 }
 
+/// Value and slope of a quintic, in a tree to shorten the chain.
 #[inline(always)]
-fn horner(c: &[f64; 6], u: f64) -> [f64; 2] {
-    c.iter().rev().fold([0.0, 0.0], |[value, slope], c| [value * u + c, slope * u + value])
+fn quintic(c: &[f64; 6], u: f64) -> [f64; 2] {
+    let square = u * u;
+    let fourth = square * square;
+    let value = ((c[0] + c[1] * u) + square * (c[2] + c[3] * u)) + fourth * (c[4] + c[5] * u);
+    let slope = ((c[1] + 2.0 * c[2] * u) + square * (3.0 * c[3] + 4.0 * c[4] * u)) + fourth * (5.0 * c[5]);
+    [value, slope]
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ mod contact;
 mod landing;
 mod tangent;
 
-use crate::certificate::{Bracket, Hermite, Verdict, judge};
+use crate::certificate::{Bracket, Hermite, ROOMY, Verdict, judge, stays_between};
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, add};
 use crate::model::{Law, Side, State};
 
@@ -285,25 +285,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has the feature that the function is compiled for.
-            #[allow(unsafe_code)]
-            return unsafe { self.advance_wide(until, observer) };
-        }
-        self.advance_plain(until, observer)
-    }
-
-    /// The same instructions on wider registers: nothing is reassociated or contracted, so
-    /// the results are the same to the last bit.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn advance_wide(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
-        self.advance_plain(until, observer)
-    }
-
-    #[inline(always)]
-    fn advance_plain(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         if let Some(side) = self.pending.take() {
             self.contact(side, observer);
         }
@@ -364,6 +345,15 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let jet = |q: &Gap, p: &Phasor| [q[0], q[1], linear.acceleration(q, p)];
         let gap = Hermite::new(jet(q0, p0), jet(&q1, &p1), step.h);
         let remainder = step.u6 * linear.gap_bound.remainder(q0, p0, step.u);
+        if self.from_wall.is_none() && self.mode == Mode::Free {
+            let [above, below] = self.flow.walls;
+            if let Some(room) = stays_between(&gap, below, above, remainder) {
+                return Outlook::Clear { roomy: ROOMY * remainder < room };
+            }
+        }
+        if level < linear.taylor_level && self.mode == Mode::Free && self.from_wall.is_none() {
+            return Outlook::Unclear;
+        }
         let distance = |side: Side, inwards: f64| {
             let order = self.from_wall.map_or(0, |(from, order)| if from == side { order } else { 0 });
             judge(&gap, self.flow.wall(side), inwards * side.sign(), order, remainder)
@@ -408,9 +398,16 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             }
             self.count_meshing(step.h);
         } else {
-            self.move_within(linear, remaining);
-            self.t = until;
+            self.move_to(linear, remaining, until);
         }
+    }
+
+    /// Moves everything to `until`, the rest `s` of a step away that is clear so far.
+    #[inline(always)]
+    fn move_to(&mut self, linear: &LinearFlow, s: f64, until: f64) {
+        self.move_within(linear, s);
+        self.from_wall = None;
+        self.t = until;
     }
 
     /// Moves everything by a time of at most one Taylor step.

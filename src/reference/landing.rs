@@ -8,8 +8,12 @@ use crate::flow::{Gap, LinearFlow, Phasor, add};
 const ROOT_CAP: u32 = 60;
 
 /// The last correction, in Taylor units, below which four terms of the local Taylor series
-/// reach rounding: `(1.25e-4)^5 / 5! < 1e-21`.
-const LAST_CORRECTION: f64 = 1e-4;
+/// reach rounding: `(1.25 * 5e-4)^5 / 5! < 1e-18`.
+const LAST_CORRECTION: f64 = 5e-4;
+
+/// Largest share of the last correction that curvature may account for: reversion of the
+/// series then leaves `14e-8`, and one Newton step squares that.
+const LAST_CURL: f64 = 1e-2;
 
 /// Where a root search ended.
 struct Landing {
@@ -34,12 +38,14 @@ impl<const N: usize> Trajectory<'_, N> {
         until: f64,
         observer: &mut impl Observer,
     ) -> Result<(), Stop> {
-        let landing = self.land(linear, h, crossing, bracket).ok_or(Stop::CapRoot)?;
         let remaining = until - self.t;
+        if bracket.lo * h * linear.unit > remaining {
+            self.move_to(linear, remaining, until);
+            return Ok(());
+        }
+        let landing = self.land(linear, h, crossing, bracket).ok_or(Stop::CapRoot)?;
         if landing.s > remaining {
-            self.move_within(linear, remaining);
-            self.from_wall = None;
-            self.t = until;
+            self.move_to(linear, remaining, until);
             return Ok(());
         }
         if N > 0 {
@@ -80,11 +86,11 @@ impl<const N: usize> Trajectory<'_, N> {
             let phasor = partial.rotate(&self.phasor);
             let d = linear.derivatives(&q, &phasor);
             let series = match crossing {
-                Crossing::PressingEnds(_) => [d[0][1], d[1][1], d[2][1] / 2.0, d[3][1] / 6.0],
-                _ => [offset + moved[0], q[1], d[0][1] / 2.0, d[1][1] / 6.0],
+                Crossing::PressingEnds(_) => [d[0][1], d[1][1], d[2][1] / 2.0, d[3][1] / 6.0, 0.0],
+                _ => [offset + moved[0], q[1], d[0][1] / 2.0, d[1][1] / 6.0, d[2][1] / 24.0],
             };
-            let delta = nearby_root(&series);
-            if delta.abs() <= LAST_CORRECTION * linear.unit {
+            let (delta, curl) = nearby_root(&series);
+            if delta.abs() <= LAST_CORRECTION * linear.unit && curl.abs() <= LAST_CURL {
                 return Some(Landing {
                     s: u * linear.unit + delta,
                     u,
@@ -109,16 +115,18 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 }
 
-/// The root near 0 of a cubic, by Newton.
+/// The root near 0 of `c0 + c1 x + ... + c4 x^4`, by reversion of the series and one Newton
+/// step, with the share of it that is due to curvature.
 #[inline(always)]
-fn nearby_root(c: &[f64; 4]) -> f64 {
-    let mut x = -c[0] / c[1];
-    for _ in 0..2 {
-        let value = c[0] + x * (c[1] + x * (c[2] + x * c[3]));
-        let slope = c[1] + x * (2.0 * c[2] + 3.0 * x * c[3]);
-        x -= value / slope;
-    }
-    x
+fn nearby_root(c: &[f64; 5]) -> (f64, f64) {
+    let inverse = 1.0 / c[1];
+    let first = -c[0] * inverse;
+    let curl = c[2] * inverse * first;
+    let twist = c[3] * inverse * first * first;
+    let x = first * (1.0 - curl + (2.0 * curl * curl - twist) + 5.0 * curl * (twist - curl * curl));
+    let value = c[0] + x * (c[1] + x * (c[2] + x * (c[3] + x * c[4])));
+    let slope = c[1] + x * (2.0 * c[2] + 3.0 * x * c[3]);
+    (x - value / slope, curl)
 }
 
 /// Rotates a phasor by a small angle.
