@@ -12,4 +12,5 @@ pub mod flow;
 pub mod model;
 pub mod orbit;
 pub mod reference;
+pub mod output;
 pub mod word;
