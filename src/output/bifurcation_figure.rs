@@ -20,9 +20,9 @@ const BETWEEN: f64 = 30.0;
 /// Height of the strip that holds the marks of columns without an attractor.
 const MARKS: f64 = 16.0;
 /// Opacity of a place that a single point falls on; more points add to it.
-const SINGLE: f64 = 0.45;
+const SINGLE: f64 = 0.6;
 /// Radius of a dot: the larger where columns lie apart, the smaller where they touch.
-const DOT: (f64, f64) = (0.7, 1.6);
+const DOT: (f64, f64) = (0.7, 2.2);
 
 /// Draws the displacement of both gears at every section point `|z| = b` as a PNG.
 ///
@@ -83,11 +83,12 @@ fn legend(left_out: bool) -> Vec<Entry> {
     entries
 }
 
-/// From the first column to the last.
+/// From the first column to the last, with room for their dots.
 fn value_axis(label: &str, columns: &[Column]) -> Axis {
     let values = columns.iter().map(|c| c.value).filter(|v| v.is_finite());
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-    Axis::exact(label, low, high)
+    let room = 0.006 * (high - low);
+    Axis::exact(label, low - room, high + room)
 }
 
 /// Counts the dots on every canvas pixel, then blends each pixel once.

@@ -1,5 +1,6 @@
 //! One orbit drawn like Figs 6 to 9 of the paper: phase planes, time history, gap.
 
+mod heading;
 mod motion;
 
 use std::path::{Path, PathBuf};
@@ -14,20 +15,20 @@ use super::plot_style::{
     Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MESHING, Marker, Rect, SMALL, Shape, save_figure, wall_color,
 };
 use crate::model::{GearPair, Side, State};
-use crate::orbit::{Class, Event, EventKind, Orbit, Sample};
+use crate::orbit::{EventKind, Orbit, Sample};
 
 const WIDTH: u32 = 1600;
 /// Panels' distance from the left and right edge of a figure.
 const LEFT: f64 = 130.0;
 const RIGHT: f64 = 45.0;
+/// Between the two phase planes: room for the labels of the right one.
+const BETWEEN: f64 = 150.0;
 /// Room below the lowest panel, for tick labels and the axis label.
 const BELOW: f64 = 100.0;
 const LINE: f64 = 2.2;
 const MESHING_LINE: f64 = 4.0;
 /// Opacity of the bands that show when the teeth mesh.
 const BAND: f64 = 0.16;
-/// Symbols of a word that a heading has room for.
-const WORD_SYMBOLS: usize = 32;
 const TIME_LABEL: &str = "time in forcing periods, t / T";
 
 /// Draws an orbit as `phase_plane.png`, `time_history.png` and `gap.png` in `dir`.
@@ -43,8 +44,8 @@ pub fn write(dir: &Path, pair: &GearPair, orbit: &Orbit, trace: &[Sample]) -> Re
     let scene = Scene {
         pair,
         motion: Motion::new(orbit, trace),
-        title: parameters(pair),
-        subtitle: character(orbit),
+        title: heading::parameters(pair),
+        subtitle: heading::character(orbit),
     };
     let [phase_plane, time_history, gap] =
         ["phase_plane.png", "time_history.png", "gap.png"].map(|name| dir.join(name));
@@ -52,61 +53,6 @@ pub fn write(dir: &Path, pair: &GearPair, orbit: &Orbit, trace: &[Sample]) -> Re
     save_figure(&time_history, (WIDTH, 1150), |canvas| scene.draw_time_history(canvas))?;
     save_figure(&gap, (WIDTH, 1050), |canvas| scene.draw_gap(canvas))?;
     Ok(vec![phase_plane, time_history, gap])
-}
-
-/// The parameters that tell this cell from the paper's Table 1.
-fn parameters(pair: &GearPair) -> String {
-    let mut text = format!("Gear pair: e = {}, \u{3c9} = {}", pair.e, pair.omega);
-    for parameter in GearPair::PARAMETERS.iter().filter(|p| p.name != "omega") {
-        let value = pair.get(parameter.name).expect("the name is from the model's own table");
-        if parameter.default.is_some_and(|default| default != value) {
-            text += &format!(", {} = {value}", parameter.name);
-        }
-    }
-    text.replace('-', "\u{2212}")
-}
-
-/// Class, word and numbers of the orbit.
-fn character(orbit: &Orbit) -> String {
-    let mut parts = vec![match (orbit.class, orbit.symmetric) {
-        (Class::Periodic { period }, Some(true)) => format!("period {period}, symmetric"),
-        (Class::Periodic { period }, Some(false)) => format!("period {period}, not symmetric"),
-        (Class::Periodic { period }, None) => format!("period {period}"),
-        (Class::Chaotic, _) => "chaotic".to_owned(),
-        (Class::Undecided, _) => "undecided".to_owned(),
-        (Class::Failed, _) => "failed".to_owned(),
-    }];
-    let word = flights(&orbit.events);
-    parts.push(match word.len() {
-        0 => "no contact".to_owned(),
-        n if n > WORD_SYMBOLS => format!("word {}\u{2026} ({n} flights)", &word[..WORD_SYMBOLS]),
-        _ => format!("word {word}"),
-    });
-    if orbit.lyapunov.is_finite() {
-        let error = orbit.lyapunov_error.map_or(String::new(), |error| format!(" \u{b1} {error:.4}"));
-        parts.push(format!("\u{3bb} = {:.4}{error}", orbit.lyapunov).replace('-', "\u{2212}"));
-    }
-    parts.join("  \u{b7}  ")
-}
-
-/// The cyclic word of a series of events (18) to (23), in canonical rotation.
-fn flights(events: &[Event]) -> String {
-    let symbols = events.iter().enumerate().map(|(i, end)| {
-        let start = events[(i + events.len() - 1) % events.len()];
-        match (start.kind == EventKind::MeshStart, start.side, end.side) {
-            (true, Side::Right, _) => '1',
-            (true, Side::Left, _) => '4',
-            (false, Side::Right, Side::Right) => '2',
-            (false, Side::Left, Side::Left) => '5',
-            (false, Side::Right, Side::Left) => '3',
-            (false, Side::Left, Side::Right) => '6',
-        }
-    });
-    let word: String = symbols.collect();
-    let rotations = (0..word.len()).map(|i| [&word[i..], &word[..i]]);
-    rotations
-        .min_by(|a, b| a.iter().copied().flat_map(str::bytes).cmp(b.iter().copied().flat_map(str::bytes)))
-        .map_or(String::new(), |halves| halves.concat())
 }
 
 /// One orbit on its way onto paper.
@@ -124,9 +70,10 @@ impl Scene<'_> {
         legend.extend(self.event_entries(true));
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
         let bottom = canvas.size().1 - BELOW;
-        for (gear, left, right) in [(1, LEFT, 775.0), (2, 925.0, canvas.size().0 - RIGHT)] {
+        let width = (canvas.size().0 - RIGHT - LEFT - BETWEEN) / 2.0;
+        for (gear, left) in [(1, LEFT), (2, LEFT + width + BETWEEN)] {
             let (x, v) = (2 * gear - 2, 2 * gear - 1);
-            let rect = Rect { left, top, right, bottom };
+            let rect = Rect { left, top, right: left + width, bottom };
             let frame = Frame {
                 rect,
                 x: self.state_axis(&format!("displacement of gear {gear}, x{}", subscript(gear)), &[x], 1.0),
@@ -153,7 +100,7 @@ impl Scene<'_> {
             let band = Key::Patch { color: wall_color(side), opacity: BAND };
             legend.push(Entry::new(band, &format!("meshing, {} wall", name(side))));
         }
-        legend.extend(self.event_entries(false));
+        legend.extend(self.event_entries(true));
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
         let bottom = canvas.size().1 - BELOW;
         let middle = (top + bottom) / 2.0;
@@ -276,7 +223,14 @@ impl Scene<'_> {
                 _ => (free, LINE),
             };
             let path = piece.points.iter().map(|(t, state)| at(*t, state)).map(|(x, y)| frame.at(x, y));
-            canvas.stroke(&path.collect::<Vec<_>>(), width * thin, color)?;
+            let path: Vec<_> = path.collect();
+            canvas.stroke(&path, width * thin, color)?;
+            // A gear at rest is a point, and too small to be seen as such.
+            if path.iter().all(|p| (p.0 - path[0].0).hypot(p.1 - path[0].1) < 3.0)
+                && self.motion.pieces.len() == 1
+            {
+                canvas.marker(path[0], Marker { shape: Shape::Circle, color, radius: 6.0, hollow: false })?;
+            }
         }
         Ok(())
     }
@@ -294,7 +248,7 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// Marks the events; with `both`, impacts before and after.
+    /// Marks the events, meshing above impacts; with `both`, impacts before and after.
     fn draw_markers(
         &self,
         canvas: &Canvas<'_>,
@@ -302,14 +256,16 @@ impl Scene<'_> {
         both: bool,
         at: impl Fn(f64, &State) -> (f64, f64),
     ) -> Result<()> {
-        for (t, event) in &self.motion.events {
-            let marker = self.marker(event.kind, wall_color(event.side));
-            let [before, after] = [at(*t, &event.before), at(*t, &event.after)].map(|(x, y)| frame.at(x, y));
-            if both && event.kind == EventKind::Impact {
-                canvas.marker(before, marker)?;
-                canvas.marker(after, Marker { hollow: true, ..marker })?;
-            } else {
-                canvas.marker(after, marker)?;
+        for kind in self.motion.kinds() {
+            for (t, event) in self.motion.events.iter().filter(|(_, event)| event.kind == kind) {
+                let marker = self.marker(kind, wall_color(event.side));
+                let [before, after] =
+                    [at(*t, &event.before), at(*t, &event.after)].map(|(x, y)| frame.at(x, y));
+                let twice = both && kind == EventKind::Impact;
+                if twice {
+                    canvas.marker(before, marker)?;
+                }
+                canvas.marker(after, Marker { hollow: twice, ..marker })?;
             }
         }
         Ok(())
@@ -359,8 +315,8 @@ impl Scene<'_> {
     /// An axis for components of the state; `scale` is theirs relative to a displacement.
     fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
         let values = self.motion.points().flat_map(|(_, state)| components.iter().map(|i| state[*i]));
-        // A hundredth of the half backlash is motion that has died down.
-        Axis::around(label, values, 0.01 * self.pair.b * scale)
+        // A tenth of the half backlash is motion that has died down.
+        Axis::around(label, values, 0.1 * self.pair.b * scale)
     }
 }
 

@@ -203,10 +203,13 @@ impl Canvas<'_> {
         Ok(f64::from(width) / scale)
     }
 
-    /// Draws an event marker with a thin white rim that sets it off from the line.
+    /// Draws an event marker, with a thin white rim that sets it off from the line.
     pub(super) fn marker(&self, at: Point, marker: Marker) -> Result<()> {
         let Marker { shape, color, radius, hollow } = marker;
-        self.shape(at, shape, radius + 1.0, WHITE)?;
+        // Small markers are many, and the rim of one would wipe out its neighbour.
+        if radius > 4.0 {
+            self.shape(at, shape, radius + 1.0, WHITE)?;
+        }
         self.shape(at, shape, radius, color)?;
         if hollow { self.shape(at, shape, 0.6 * radius, WHITE) } else { Ok(()) }
     }

@@ -64,7 +64,7 @@ pub(in crate::output) fn draw_head(
         draw_fitted(canvas, subtitle, y, MEDIUM)?;
     }
     y += 44.0;
-    for row in rows(canvas, entries)? {
+    for row in rows(canvas, entries)?.into_iter().filter(|row| !row.is_empty()) {
         let widths = row.iter().map(|e| width(canvas, e)).collect::<Result<Vec<_>>>()?;
         let total = widths.iter().sum::<f64>() + BETWEEN * (row.len() - 1) as f64;
         let mut x = (canvas.size().0 - total) / 2.0;
@@ -94,19 +94,25 @@ fn width(canvas: &Canvas<'_>, entry: &Entry) -> Result<f64> {
     Ok(KEY + GAP + canvas.text_width(&entry.text, SMALL)?)
 }
 
-fn rows<'e>(canvas: &Canvas<'_>, entries: &'e [Entry]) -> Result<Vec<Vec<&'e Entry>>> {
+/// Breaks the legend into as few rows as fit, of about the same length.
+fn rows<'e>(canvas: &Canvas<'_>, entries: &'e [Entry]) -> Result<Vec<&'e [Entry]>> {
     let room = canvas.size().0 - 2.0 * MARGIN;
-    let mut rows: Vec<Vec<&Entry>> = Vec::new();
-    let mut used = f64::INFINITY;
-    for entry in entries {
-        let width = width(canvas, entry)?;
-        if used + BETWEEN + width > room {
-            rows.push(Vec::new());
-            used = -BETWEEN;
+    let widths = entries.iter().map(|e| Ok(width(canvas, e)? + BETWEEN)).collect::<Result<Vec<_>>>()?;
+    let total: f64 = widths.iter().sum();
+    let count = (total / room).ceil().max(1.0);
+    let mut rows = Vec::new();
+    let (mut start, mut used, mut before) = (0, 0.0, 0.0);
+    for (i, width) in widths.iter().enumerate() {
+        // An entry belongs to the row in whose share of the total its middle lies.
+        let row_is_full = before + width / 2.0 > total / count * (rows.len() + 1) as f64;
+        if i > start && (row_is_full || used + width - BETWEEN > room) {
+            rows.push(&entries[start..i]);
+            (start, used) = (i, 0.0);
         }
-        used += BETWEEN + width;
-        rows.last_mut().expect("the first entry opens a row").push(entry);
+        used += width;
+        before += width;
     }
+    rows.push(&entries[start..]);
     Ok(rows)
 }
 
