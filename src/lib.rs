@@ -11,6 +11,6 @@ mod certificate;
 pub mod flow;
 pub mod model;
 pub mod orbit;
-pub mod reference;
 pub mod output;
+pub mod reference;
 pub mod word;
