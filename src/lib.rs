@@ -11,5 +11,6 @@ mod certificate;
 pub mod flow;
 pub mod model;
 pub mod orbit;
+pub mod output;
 pub mod reference;
 pub mod word;

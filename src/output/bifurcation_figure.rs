@@ -1,0 +1,150 @@
+//! Section points against one parameter, drawn like Fig. 5 of the paper.
+
+use std::path::Path;
+
+use anyhow::Result;
+use plotters::style::RGBColor;
+
+use super::plot_style::axes::{Axis, Frame};
+use super::plot_style::legend::{Entry, Key, draw_head};
+use super::plot_style::{Canvas, FAINT, Marker, Rect, Shape, save_figure, wall_color};
+use crate::bifurcation::Column;
+use crate::model::Side;
+use crate::orbit::Class;
+
+const SIZE: (u32, u32) = (1600, 1400);
+const LEFT: f64 = 130.0;
+const RIGHT: f64 = 45.0;
+const BELOW: f64 = 100.0;
+const BETWEEN: f64 = 30.0;
+/// Height of the strip that holds the marks of columns without an attractor.
+const MARKS: f64 = 16.0;
+/// Opacity of a place that a single point falls on; more points add to it.
+const SINGLE: f64 = 0.6;
+/// Radius of a dot: the larger where columns lie apart, the smaller where they touch.
+const DOT: (f64, f64) = (0.7, 2.2);
+
+/// Draws the displacement of both gears at every section point `|z| = b` as a PNG.
+///
+/// One dot per point, coloured by wall; where dots pile up they darken with the
+/// logarithm of their number, so that the density of a chaotic band shows. Columns
+/// that are undecided or failed get a mark at the lower edge. No column, no point and
+/// values that are not finite are all accepted.
+///
+/// # Errors
+/// A file that cannot be written, by name.
+pub fn write(path: &Path, title: &str, axis_label: &str, columns: &[Column]) -> Result<()> {
+    save_figure(path, SIZE, |canvas| draw(canvas, title, axis_label, columns))
+}
+
+fn draw(canvas: &Canvas<'_>, title: &str, axis_label: &str, columns: &[Column]) -> Result<()> {
+    let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
+    let top = draw_head(canvas, title, "", &legend(!left_out.is_empty()))? + 14.0;
+    let bottom = canvas.size().1 - BELOW;
+    let middle = (top + bottom) / 2.0;
+    let panels = [
+        (0, "x\u{2081} at |z| = b", top, middle - BETWEEN / 2.0),
+        (2, "x\u{2082} at |z| = b", middle + BETWEEN / 2.0, bottom),
+    ];
+    for (component, label, top, bottom) in panels {
+        let values = columns.iter().flat_map(|c| &c.points).map(|p| p.before[component]);
+        let mut frame = Frame {
+            rect: Rect { left: LEFT, top, right: canvas.size().0 - RIGHT, bottom },
+            x: value_axis(axis_label, columns),
+            y: Axis::around(label, values, 1e-6),
+        };
+        // The marks must not lie on data.
+        frame.y.low -= (frame.y.high - frame.y.low) * MARKS / (bottom - top);
+        frame.draw_grid(canvas)?;
+        draw_points(canvas, &frame, component, columns)?;
+        for value in left_out.iter().filter(|v| v.is_finite()) {
+            let x = frame.at(*value, 0.0).0;
+            canvas.stroke(&[(x, bottom - MARKS + 2.0), (x, bottom)], 1.2, FAINT)?;
+        }
+        frame.draw_axes(canvas, component == 2)?;
+    }
+    Ok(())
+}
+
+fn is_left_out(column: &Column) -> bool {
+    matches!(column.class, Class::Undecided | Class::Failed)
+}
+
+fn legend(left_out: bool) -> Vec<Entry> {
+    let wall = |side, text| {
+        let marker = Marker { shape: Shape::Circle, color: wall_color(side), radius: 6.0, hollow: false };
+        Entry::new(Key::Marker(marker), text)
+    };
+    let mut entries =
+        vec![wall(Side::Right, "right wall, z = +b"), wall(Side::Left, "left wall, z = \u{2212}b")];
+    if left_out {
+        entries.push(Entry::new(Key::Mark { color: FAINT }, "undecided or failed"));
+    }
+    entries
+}
+
+/// From the first column to the last, with room for their dots.
+fn value_axis(label: &str, columns: &[Column]) -> Axis {
+    let values = columns.iter().map(|c| c.value).filter(|v| v.is_finite());
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    let room = 0.006 * (high - low);
+    Axis::exact(label, low - room, high + room)
+}
+
+/// Counts the dots on every canvas pixel, then blends each pixel once.
+fn draw_points(canvas: &Canvas<'_>, frame: &Frame, component: usize, columns: &[Column]) -> Result<()> {
+    let (left, top, width, height) = Canvas::fine_rect(frame.rect);
+    let mut counts = vec![[0u32; 2]; width * height];
+    let dot = dot(frame, columns);
+    for column in columns {
+        for point in &column.points {
+            let (x, y) = frame.at(column.value, point.before[component]);
+            if !(x.is_finite() && y.is_finite()) {
+                continue;
+            }
+            let (x, y) = Canvas::fine_pixel((x, y));
+            for (dx, dy) in &dot {
+                let (column, row) = (x + dx - left, y + dy - top);
+                if (0..width as i32).contains(&column) && (0..height as i32).contains(&row) {
+                    counts[row as usize * width + column as usize][point.side as usize] += 1;
+                }
+            }
+        }
+    }
+    let darkest = darkest(&counts);
+    for (i, [right, left_wall]) in counts.iter().enumerate().filter(|(_, sides)| **sides != [0, 0]) {
+        let (count, share) = (f64::from(right + left_wall), f64::from(*right) / f64::from(right + left_wall));
+        let opacity = SINGLE + (1.0 - SINGLE) * (count.ln() / darkest.ln()).min(1.0);
+        let at = (left + (i % width) as i32, top + (i / width) as i32);
+        canvas.blend(at, mixed(share), opacity)?;
+    }
+    Ok(())
+}
+
+/// The canvas pixels of one dot around its centre.
+fn dot(frame: &Frame, columns: &[Column]) -> Vec<(i32, i32)> {
+    let spacing = (frame.rect.right - frame.rect.left) / columns.len().max(1) as f64;
+    let radius = Canvas::fine_length((0.4 * spacing).clamp(DOT.0, DOT.1));
+    let reach = radius.ceil() as i32;
+    let all = (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy)));
+    all.filter(|(dx, dy)| f64::from(*dx).hypot(f64::from(*dy)) <= radius).collect()
+}
+
+/// The number of dots drawn at full strength: only one pixel in a hundred has more.
+///
+/// The few pixels that a periodic orbit hits every time would fade all others.
+fn darkest(counts: &[[u32; 2]]) -> f64 {
+    let mut totals: Vec<u32> = counts.iter().map(|[a, b]| a + b).filter(|n| *n > 0).collect();
+    if totals.is_empty() {
+        return 2.0;
+    }
+    let rank = (totals.len() - 1) * 99 / 100;
+    f64::from(*totals.select_nth_unstable(rank).1).max(2.0)
+}
+
+/// The walls' colours, mixed where both meet.
+fn mixed(right: f64) -> RGBColor {
+    let [a, b] = Side::BOTH.map(wall_color);
+    let mix = |a: u8, b: u8| (right * f64::from(a) + (1.0 - right) * f64::from(b)).round() as u8;
+    RGBColor(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
+}

@@ -1,0 +1,332 @@
+//! One orbit drawn like Figs 6 to 9 of the paper: phase planes, time history, gap.
+
+mod heading;
+mod motion;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use plotters::style::RGBColor;
+
+use self::motion::{Motion, Piece};
+use super::plot_style::axes::{Axis, Frame};
+use super::plot_style::legend::{Entry, Key, draw_head};
+use super::plot_style::{
+    Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MESHING, Marker, Rect, SMALL, Shape, save_figure, wall_color,
+};
+use crate::model::{GearPair, Side, State};
+use crate::orbit::{EventKind, Orbit, Sample};
+
+const WIDTH: u32 = 1600;
+/// Panels' distance from the left and right edge of a figure.
+const LEFT: f64 = 130.0;
+const RIGHT: f64 = 45.0;
+/// Between the two phase planes: room for the labels of the right one.
+const BETWEEN: f64 = 150.0;
+/// Room below the lowest panel, for tick labels and the axis label.
+const BELOW: f64 = 100.0;
+const LINE: f64 = 2.2;
+const MESHING_LINE: f64 = 4.0;
+/// Opacity of the bands that show when the teeth mesh.
+const BAND: f64 = 0.16;
+const TIME_LABEL: &str = "time in forcing periods, t / T";
+
+/// Draws an orbit as `phase_plane.png`, `time_history.png` and `gap.png` in `dir`.
+///
+/// `trace` holds samples in order of time, from phase 0 on, over at least one forcing
+/// period; the events of `orbit` are merged into it so that corners and velocity jumps
+/// are exact. No events, no trace and states that are not finite are all accepted.
+/// Returns the files written.
+///
+/// # Errors
+/// A file that cannot be written, by name.
+pub fn write(dir: &Path, pair: &GearPair, orbit: &Orbit, trace: &[Sample]) -> Result<Vec<PathBuf>> {
+    let scene = Scene {
+        pair,
+        motion: Motion::new(orbit, trace),
+        title: heading::parameters(pair),
+        subtitle: heading::character(orbit),
+    };
+    let [phase_plane, time_history, gap] =
+        ["phase_plane.png", "time_history.png", "gap.png"].map(|name| dir.join(name));
+    save_figure(&phase_plane, (WIDTH, 980), |canvas| scene.draw_phase_planes(canvas))?;
+    save_figure(&time_history, (WIDTH, 1150), |canvas| scene.draw_time_history(canvas))?;
+    save_figure(&gap, (WIDTH, 1050), |canvas| scene.draw_gap(canvas))?;
+    Ok(vec![phase_plane, time_history, gap])
+}
+
+/// One orbit on its way onto paper.
+struct Scene<'a> {
+    pair: &'a GearPair,
+    motion: Motion,
+    title: String,
+    subtitle: String,
+}
+
+impl Scene<'_> {
+    fn draw_phase_planes(&self, canvas: &Canvas<'_>) -> Result<()> {
+        let mut legend = vec![Entry::new(Key::Line { color: DARK, width: LINE }, "free motion")];
+        legend.extend(self.meshing_entry());
+        legend.extend(self.event_entries(true));
+        let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
+        let bottom = canvas.size().1 - BELOW;
+        let width = (canvas.size().0 - RIGHT - LEFT - BETWEEN) / 2.0;
+        for (gear, left) in [(1, LEFT), (2, LEFT + width + BETWEEN)] {
+            let (x, v) = (2 * gear - 2, 2 * gear - 1);
+            let rect = Rect { left, top, right: left + width, bottom };
+            let frame = Frame {
+                rect,
+                x: self.state_axis(&format!("displacement of gear {gear}, x{}", subscript(gear)), &[x], 1.0),
+                y: self.state_axis(&format!("velocity, v{}", subscript(gear)), &[v], self.pair.omega),
+            };
+            frame.draw_grid(canvas)?;
+            let at = |_: f64, state: &State| (state[x], state[v]);
+            self.draw_jumps(canvas, &frame, at)?;
+            self.draw_lines(canvas, &frame, (DARK, MESHING), at)?;
+            self.draw_markers(canvas, &frame, true, at)?;
+            frame.draw_axes(canvas, true)?;
+        }
+        Ok(())
+    }
+
+    fn draw_time_history(&self, canvas: &Canvas<'_>) -> Result<()> {
+        let mut legend = vec![
+            Entry::new(Key::Line { color: GEAR_1, width: LINE }, "gear 1"),
+            Entry::new(Key::Line { color: GEAR_2, width: LINE }, "gear 2"),
+        ];
+        for side in
+            Side::BOTH.into_iter().filter(|s| self.motion.pieces.iter().any(|p| p.meshing == Some(*s)))
+        {
+            let band = Key::Patch { color: wall_color(side), opacity: BAND };
+            legend.push(Entry::new(band, &format!("meshing, {} wall", name(side))));
+        }
+        legend.extend(self.event_entries(true));
+        let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
+        let bottom = canvas.size().1 - BELOW;
+        let middle = (top + bottom) / 2.0;
+        let panels = [
+            (0, "displacement, x", 1.0, top, middle - 15.0),
+            (1, "velocity, v", self.pair.omega, middle + 15.0, bottom),
+        ];
+        for (quantity, label, scale, top, bottom) in panels {
+            let frame = Frame {
+                rect: Rect { left: LEFT, top, right: canvas.size().0 - RIGHT, bottom },
+                x: self.time_axis(),
+                y: self.state_axis(label, &[quantity, quantity + 2], scale),
+            };
+            self.draw_bands(canvas, &frame)?;
+            frame.draw_grid(canvas)?;
+            for (index, color) in [(quantity, GEAR_1), (quantity + 2, GEAR_2)] {
+                let at = |t: f64, state: &State| (t, state[index]);
+                self.draw_jumps(canvas, &frame, at)?;
+                self.draw_lines(canvas, &frame, (color, color), at)?;
+                self.draw_markers(canvas, &frame, quantity == 1, at)?;
+            }
+            frame.draw_axes(canvas, quantity == 1)?;
+        }
+        Ok(())
+    }
+
+    fn draw_gap(&self, canvas: &Canvas<'_>) -> Result<()> {
+        // Room for the walls' names.
+        let right = canvas.size().0 - 155.0;
+        let mut legend = vec![Entry::new(Key::Line { color: DARK, width: LINE }, "gap in free motion")];
+        legend.extend(self.meshing_entry());
+        legend.extend(self.event_entries(false));
+        let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
+        let bottom = canvas.size().1 - BELOW;
+        let split = if self.motion.meshes() { top + 0.64 * (bottom - top) } else { bottom };
+        let b = self.pair.b;
+        let walls = [1.25 * b, -1.25 * b];
+        let gaps = self.motion.points().map(|(_, state)| state[0] - state[2]);
+        let frame = Frame {
+            rect: Rect { left: LEFT, top, right, bottom: split },
+            x: self.time_axis(),
+            y: Axis::around("gap, z = x\u{2081} \u{2212} x\u{2082}", gaps.chain(walls), b),
+        };
+        self.draw_walls(canvas, &frame)?;
+        let at = |t: f64, state: &State| (t, state[0] - state[2]);
+        self.draw_lines(canvas, &frame, (DARK, MESHING), at)?;
+        self.draw_markers(canvas, &frame, false, at)?;
+        frame.draw_axes(canvas, split == bottom)?;
+        if split < bottom {
+            self.draw_penetration(canvas, Rect { left: LEFT, top: split + 30.0, right, bottom })?;
+        }
+        Ok(())
+    }
+
+    /// The walls of the gap, and what lies behind them.
+    fn draw_walls(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
+        let rect = frame.rect;
+        let [upper, lower] = Side::BOTH.map(|side| frame.at(0.0, side.sign() * self.pair.b).1);
+        canvas.fill(Rect { bottom: upper, ..rect }, DARK, 0.08)?;
+        canvas.fill(Rect { top: lower, ..rect }, DARK, 0.08)?;
+        frame.draw_grid(canvas)?;
+        for (side, y, text) in [(Side::Right, upper, "z = +b"), (Side::Left, lower, "z = \u{2212}b")] {
+            let color = wall_color(side);
+            canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, color)?;
+            let x = rect.right + 14.0;
+            canvas.text(&format!("{} wall", name(side)), (x, y - 14.0), SMALL, Align::Left, color)?;
+            canvas.text(text, (x, y + 14.0), SMALL, Align::Left, color)?;
+        }
+        Ok(())
+    }
+
+    /// How deep the teeth press into the wall: too little to be seen in the gap itself.
+    fn draw_penetration(&self, canvas: &Canvas<'_>, rect: Rect) -> Result<()> {
+        let depth = |piece: &Piece, state: &State| {
+            piece.meshing.map_or(0.0, |side| side.sign() * (state[0] - state[2]) - self.pair.b)
+        };
+        let depths = self.motion.pieces.iter().flat_map(|p| p.points.iter().map(move |(_, s)| depth(p, s)));
+        let frame = Frame {
+            rect,
+            x: self.time_axis(),
+            y: Axis::around("depth, |z| \u{2212} b", depths, 1e-6 * self.pair.b),
+        };
+        frame.draw_grid(canvas)?;
+        let y = frame.at(0.0, 0.0).1;
+        canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, DARK)?;
+        canvas.text("wall", (rect.right + 14.0, y), SMALL, Align::Left, DARK)?;
+        for piece in &self.motion.pieces {
+            if let Some(side) = piece.meshing {
+                let path: Vec<_> =
+                    piece.points.iter().map(|(t, state)| frame.at(*t, depth(piece, state))).collect();
+                canvas.stroke(&path, LINE + 0.6, wall_color(side))?;
+            }
+        }
+        frame.draw_axes(canvas, true)
+    }
+
+    fn draw_bands(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
+        for piece in &self.motion.pieces {
+            if let Some(side) = piece.meshing {
+                let (from, to) = piece.span();
+                canvas.fill(frame.column(from, to), wall_color(side), BAND)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws the motion in its colours, free and meshing.
+    fn draw_lines(
+        &self,
+        canvas: &Canvas<'_>,
+        frame: &Frame,
+        (free, meshing): (RGBColor, RGBColor),
+        at: impl Fn(f64, &State) -> (f64, f64),
+    ) -> Result<()> {
+        // Many turns in one panel need a thinner line.
+        let thin = if self.motion.pieces.len() > 100 { 0.6 } else { 1.0 };
+        for piece in &self.motion.pieces {
+            let (color, width) = match piece.meshing {
+                Some(_) if free != meshing => (meshing, MESHING_LINE),
+                _ => (free, LINE),
+            };
+            let path = piece.points.iter().map(|(t, state)| at(*t, state)).map(|(x, y)| frame.at(x, y));
+            let path: Vec<_> = path.collect();
+            canvas.stroke(&path, width * thin, color)?;
+            // A gear at rest is a point, and too small to be seen as such.
+            if path.iter().all(|p| (p.0 - path[0].0).hypot(p.1 - path[0].1) < 3.0)
+                && self.motion.pieces.len() == 1
+            {
+                canvas.marker(path[0], Marker { shape: Shape::Circle, color, radius: 6.0, hollow: false })?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_jumps(
+        &self,
+        canvas: &Canvas<'_>,
+        frame: &Frame,
+        at: impl Fn(f64, &State) -> (f64, f64),
+    ) -> Result<()> {
+        for (t, event) in &self.motion.events {
+            let [from, to] = [at(*t, &event.before), at(*t, &event.after)].map(|(x, y)| frame.at(x, y));
+            canvas.dashes(from, to, 1.3, FAINT)?;
+        }
+        Ok(())
+    }
+
+    /// Marks the events, meshing above impacts; with `both`, impacts before and after.
+    fn draw_markers(
+        &self,
+        canvas: &Canvas<'_>,
+        frame: &Frame,
+        both: bool,
+        at: impl Fn(f64, &State) -> (f64, f64),
+    ) -> Result<()> {
+        for kind in self.motion.kinds() {
+            for (t, event) in self.motion.events.iter().filter(|(_, event)| event.kind == kind) {
+                let marker = self.marker(kind, wall_color(event.side));
+                let [before, after] =
+                    [at(*t, &event.before), at(*t, &event.after)].map(|(x, y)| frame.at(x, y));
+                let twice = both && kind == EventKind::Impact;
+                if twice {
+                    canvas.marker(before, marker)?;
+                }
+                canvas.marker(after, Marker { hollow: twice, ..marker })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Smaller where there are many.
+    fn marker(&self, kind: EventKind, color: RGBColor) -> Marker {
+        let radius = match self.motion.events.len() {
+            0..=40 => 7.0,
+            41..=150 => 5.0,
+            _ => 3.5,
+        };
+        Marker { shape: Shape::of(kind), color, radius, hollow: false }
+    }
+
+    fn meshing_entry(&self) -> Option<Entry> {
+        self.motion.meshes().then(|| Entry::new(Key::Line { color: MESHING, width: MESHING_LINE }, "meshing"))
+    }
+
+    /// Legend of the events that occur; with `both`, of states before and after.
+    fn event_entries(&self, both: bool) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        for kind in self.motion.kinds() {
+            let marker = Marker { radius: 7.0, ..self.marker(kind, DARK) };
+            entries.push(match kind {
+                EventKind::Impact if both => Entry::new(Key::MarkerPair(marker), "impact: before, after"),
+                EventKind::Impact => Entry::new(Key::Marker(marker), "impact"),
+                EventKind::MeshStart => Entry::new(Key::Marker(marker), "meshing starts"),
+                EventKind::MeshEnd => Entry::new(Key::Marker(marker), "meshing ends"),
+            });
+        }
+        if both && !entries.is_empty() {
+            entries.push(Entry::new(Key::Dashes { color: FAINT }, "velocity jump"));
+        }
+        for side in self.motion.walls() {
+            let patch = Key::Patch { color: wall_color(side), opacity: 1.0 };
+            entries.push(Entry::new(patch, &format!("{} wall", name(side))));
+        }
+        entries
+    }
+
+    fn time_axis(&self) -> Axis {
+        let (first, last) = self.motion.points().fold((0f64, 0f64), |(a, b), (t, _)| (a.min(t), b.max(t)));
+        Axis::exact(TIME_LABEL, first, if last > first { last } else { first + 1.0 })
+    }
+
+    /// An axis for components of the state; `scale` is theirs relative to a displacement.
+    fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
+        let values = self.motion.points().flat_map(|(_, state)| components.iter().map(|i| state[*i]));
+        // A tenth of the half backlash is motion that has died down.
+        Axis::around(label, values, 0.1 * self.pair.b * scale)
+    }
+}
+
+fn name(side: Side) -> &'static str {
+    match side {
+        Side::Right => "right",
+        Side::Left => "left",
+    }
+}
+
+fn subscript(gear: usize) -> char {
+    if gear == 1 { '\u{2081}' } else { '\u{2082}' }
+}

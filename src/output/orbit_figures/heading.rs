@@ -1,0 +1,125 @@
+//! The words above an orbit's figures.
+
+use crate::model::{GearPair, Side};
+use crate::orbit::{Class, Event, EventKind, Orbit};
+
+/// Symbols of a word that a heading has room for.
+const WORD_SYMBOLS: usize = 32;
+
+/// The parameters that tell this cell from the paper's Table 1.
+pub(super) fn parameters(pair: &GearPair) -> String {
+    let mut text = format!("Gear pair: e = {}, \u{3c9} = {}", pair.e, pair.omega);
+    for parameter in GearPair::PARAMETERS.iter().filter(|p| p.name != "omega") {
+        let value = pair.get(parameter.name).expect("the name is from the model's own table");
+        if parameter.default.is_some_and(|default| default != value) {
+            text += &format!(", {} = {value}", parameter.name);
+        }
+    }
+    text.replace('-', "\u{2212}")
+}
+
+/// Class, word and Lyapunov exponent of the orbit.
+pub(super) fn character(orbit: &Orbit) -> String {
+    let class = match (orbit.class, orbit.symmetric) {
+        (Class::Periodic { period }, Some(true)) => format!("period {period}, symmetric"),
+        (Class::Periodic { period }, Some(false)) => format!("period {period}, not symmetric"),
+        (Class::Periodic { period }, None) => format!("period {period}"),
+        (Class::Chaotic, _) => "chaotic".to_owned(),
+        (Class::Undecided, _) => "undecided".to_owned(),
+        (Class::Failed, _) => "failed".to_owned(),
+    };
+    let mut parts = vec![class, flights(&shortened(&word(&orbit.events)), orbit.events.len())];
+    if orbit.lyapunov.is_finite() {
+        let error = orbit.lyapunov_error.map_or(String::new(), |error| format!(" \u{b1} {error:.4}"));
+        parts.push(format!("\u{3bb} = {:.4}{error}", orbit.lyapunov).replace('-', "\u{2212}"));
+    }
+    parts.join("  \u{b7}  ")
+}
+
+fn flights(word: &str, count: usize) -> String {
+    match count {
+        0 => "no contact".to_owned(),
+        n if n > WORD_SYMBOLS => format!("word {word} ({n} flights)"),
+        _ => format!("word {word}"),
+    }
+}
+
+/// The cyclic word of a series of events (18) to (23), in canonical rotation.
+fn word(events: &[Event]) -> String {
+    let symbols = events.iter().enumerate().map(|(i, end)| {
+        let start = events[(i + events.len() - 1) % events.len()];
+        match (start.kind == EventKind::MeshStart, start.side, end.side) {
+            (true, Side::Right, _) => '1',
+            (true, Side::Left, _) => '4',
+            (false, Side::Right, Side::Right) => '2',
+            (false, Side::Left, Side::Left) => '5',
+            (false, Side::Right, Side::Left) => '3',
+            (false, Side::Left, Side::Right) => '6',
+        }
+    });
+    let word: String = symbols.collect();
+    let rotation = |i: usize| word[i..].bytes().chain(word[..i].bytes());
+    let first = (0..word.len()).min_by(|a, b| rotation(*a).cmp(rotation(*b))).unwrap_or(0);
+    [&word[first..], &word[..first]].concat()
+}
+
+/// A long word with runs of a symbol as powers, cut where even that is too long.
+fn shortened(word: &str) -> String {
+    if word.len() <= WORD_SYMBOLS {
+        return word.to_owned();
+    }
+    let mut text = String::new();
+    for run in word.as_bytes().chunk_by(|a, b| a == b) {
+        let mut power = char::from(run[0]).to_string();
+        if run.len() > 1 {
+            power.extend(run.len().to_string().chars().map(superscript));
+        }
+        if text.chars().count() + power.chars().count() > WORD_SYMBOLS {
+            return text + "\u{2026}";
+        }
+        text += &power;
+    }
+    text
+}
+
+fn superscript(digit: char) -> char {
+    match digit {
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        _ => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn event(kind: EventKind, side: Side) -> Event {
+        Event { kind, side, t: 0.0, t_mod_period: 0.0, before: [0.0; 4], after: [0.0; 4] }
+    }
+
+    #[test]
+    fn the_paper_s_words_are_read_off_events() {
+        use EventKind::{Impact, MeshEnd, MeshStart};
+        let half = |side| [Impact, Impact, MeshStart, MeshEnd].map(|kind| event(kind, side));
+        // P_{1 2^2 6 4 5^2 3}, from right to left.
+        assert_eq!(word(&[half(Side::Right), half(Side::Left)].concat()), "13554622");
+        assert_eq!(word(&[event(Impact, Side::Left), event(Impact, Side::Right)]), "36");
+        assert_eq!(word(&[]), "");
+    }
+
+    #[test]
+    fn long_words_are_written_with_powers() {
+        assert_eq!(shortened("13554622"), "13554622");
+        assert_eq!(shortened(&format!("1{}36", "2".repeat(130))), "12\u{b9}\u{b3}\u{2070}36");
+        let long = shortened(&"36".repeat(40));
+        assert_eq!((long.chars().count(), long.ends_with('\u{2026}')), (33, true));
+    }
+
+    #[test]
+    fn only_parameters_off_the_table_are_named() {
+        let pair = GearPair { k: 500.0, force: -50.0, ..GearPair::paper(0.5) };
+        assert_eq!(parameters(&pair), "Gear pair: e = 0.5, \u{3c9} = 5.6, k = 500, F = \u{2212}50");
+    }
+}
