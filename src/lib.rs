@@ -1,12 +1,14 @@
 //! Parameter maps of vibro-impact oscillators.
 //!
-//! Modules in the order in which data flows through them: a model is described
-//! ([`model`]), its flow is solved in closed form ([`flow`]), the reference jumps from
-//! event to event on it ([`reference`]), and what it meets is read as an orbit
-//! ([`orbit`], [`word`], [`stability`]) or a bifurcation diagram ([`bifurcation`]),
+//! Modules in the order in which data flows through them: a scene says what is asked
+//! ([`scene`]), a model is described ([`model`]), its flow is solved in closed form (`flow`), the reference jumps from
+//! event to event on it (`reference`), and what it meets is read as an orbit
+//! ([`orbit`], [`word`], `stability`) or a bifurcation diagram ([`bifurcation`]),
 //! then written down ([`output`]).
 
 pub mod bifurcation;
 pub mod model;
 pub mod orbit;
+pub mod output;
+pub mod scene;
 pub mod word;

@@ -1,0 +1,1 @@
+//! What is written down: files in a guarded folder, and `--json`.
