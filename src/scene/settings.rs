@@ -4,6 +4,7 @@ use super::Purpose;
 use super::document::Value;
 use super::error::SceneError;
 use super::section::{Field, Section};
+use crate::bifurcation;
 use crate::model::State;
 use crate::orbit;
 
@@ -59,6 +60,20 @@ pub enum Start {
     Up,
     /// The attractor of the cell after, along the last axis from `max` to `min`.
     Down,
+}
+
+/// The state at rest.
+pub const REST: State = [0.0; 4];
+
+impl From<Start> for bifurcation::Policy {
+    fn from(start: Start) -> Self {
+        match start {
+            Start::Rest => bifurcation::Policy::From(REST),
+            Start::State(state) => bifurcation::Policy::From(state),
+            Start::Up => bifurcation::Policy::Up,
+            Start::Down => bifurcation::Policy::Down,
+        }
+    }
 }
 
 /// Bounds of an adaptive map.
