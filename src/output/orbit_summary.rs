@@ -14,7 +14,7 @@ pub(super) fn summary(pair: &GearPair, orbit: &Orbit) -> String {
     let mut text = String::new();
     for (label, value) in facts(pair, orbit) {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "{label:<20}{value}");
+        let _ = writeln!(text, "{label:<22}{value}");
     }
     let span = match orbit.cycle_periods {
         1 => "1 forcing period".to_owned(),
@@ -44,7 +44,7 @@ fn facts(pair: &GearPair, orbit: &Orbit) -> Vec<(&'static str, String)> {
     facts.extend([
         ("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period)),
         ("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction)),
-        ("strobe (x1,v1,x2,v2)", format!(" {}", numbers(orbit.strobe))),
+        ("strobe x1 v1 x2 v2", numbers(orbit.strobe).trim_start().to_owned()),
     ]);
     facts
 }
@@ -79,6 +79,7 @@ fn status(status: Status) -> &'static str {
 
 fn exponent(orbit: &Orbit) -> String {
     match orbit.lyapunov_error {
+        _ if orbit.lyapunov.is_nan() => "-".to_owned(),
         Some(error) => format!("{:.DECIMALS$} +- {error:.DECIMALS$}", orbit.lyapunov),
         None => format!("{:.DECIMALS$}", orbit.lyapunov),
     }
