@@ -1,7 +1,7 @@
 //! Section points against one parameter, as in Fig. 5 of the paper.
 
-use crate::model::{Side, State};
-use crate::orbit::{Class, EventKind, Status};
+use crate::model::{GearPair, Side, State};
+use crate::orbit::{Class, EventKind, Settings, Status};
 
 /// The attractor's section points at one value of the axis.
 #[derive(Clone, Debug)]
@@ -29,4 +29,25 @@ pub struct SectionPoint {
     pub before: State,
     /// State just after the event.
     pub after: State,
+}
+
+/// Where each column starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Policy {
+    /// Every column from the same state.
+    From(State),
+    /// Each column from the end of the one before, from the first to the last.
+    Up,
+    /// Each column from the end of the one after, from the last to the first.
+    Down,
+}
+
+/// Integrates every cell; `progress` is told how many columns are done so far.
+pub fn run(
+    _cells: &[(f64, GearPair)],
+    _policy: &Policy,
+    _settings: &Settings,
+    _progress: &(dyn Fn(usize) + Sync),
+) -> Vec<Column> {
+    todo!()
 }

@@ -1,10 +1,10 @@
 //! Parameter maps of vibro-impact oscillators.
 //!
-//! Modules in the order in which data flows through them: a model is described
-//! ([`model`]), its flow is solved in closed form ([`flow`]), the reference jumps from
-//! event to event on it ([`reference`]), and what it meets is read as an orbit
-//! ([`orbit`], [`word`], [`stability`]) or a bifurcation diagram ([`bifurcation`]),
-//! then written down ([`output`]).
+//! Modules in the order in which data flows through them: a scene says what is asked
+//! ([`scene`]), a model is described ([`model`]), its flow is solved in closed form
+//! ([`flow`]), the reference jumps from event to event on it ([`reference`]), and what it
+//! meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a bifurcation diagram
+//! ([`bifurcation`]), then written down ([`output`]).
 
 pub mod bifurcation;
 mod certificate;
@@ -13,4 +13,6 @@ pub mod model;
 pub mod orbit;
 pub mod output;
 pub mod reference;
+pub mod scene;
+pub mod stability;
 pub mod word;

@@ -1,6 +1,6 @@
 //! One trajectory, read: its class, its cycle and the events on it.
 
-use crate::model::{Side, State};
+use crate::model::{GearPair, Side, State};
 use crate::word::Word;
 
 pub use crate::reference::EventKind;
@@ -116,4 +116,14 @@ impl Default for Settings {
     fn default() -> Self {
         Settings { transient_periods: 400, observed_periods: 128, max_period: 64 }
     }
+}
+
+/// Integrates one cell from `start` and reads its orbit.
+pub fn analyse(_pair: &GearPair, _start: State, _settings: &Settings) -> Orbit {
+    todo!()
+}
+
+/// Samples a trajectory from `start` at phase 0 over `periods` forcing periods.
+pub fn trace(_pair: &GearPair, _start: State, _periods: u32, _samples_per_period: usize) -> Vec<Sample> {
+    todo!()
 }

@@ -1,0 +1,135 @@
+//! The command line: what can be asked, and its help.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Parser, Subcommand};
+use rattlemap::orbit::Settings;
+
+/// Restitution where `orbit` is not told any: the paper's last periodic motion before chaos.
+pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
+
+/// Motion of a gear pair with backlash: flights between the tooth surfaces in closed form, every
+/// contact located, cycles named by their word, and the Lyapunov exponent of each.
+///
+/// All quantities are dimensionless. Exit code 0: done; 1: the run failed; 2: bad usage or scene,
+/// and nothing was computed.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true)]
+#[command(after_help = "Examples:\n  \
+    rattlemap orbit --set e=0.06                     the paper's motion with meshing on both sides\n  \
+    rattlemap bifurcation scenes/paper_fig5.toml     section points against restitution")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Orbit(Orbit),
+    Bifurcation(Bifurcation),
+}
+
+/// One motion: its class, word, exponent, multipliers and every event on the cycle
+///
+/// Starts at rest at phase 0, lets the transient pass and reads what the motion settles on. A
+/// periodic motion is shown over one cycle, any other over its last 8 forcing periods.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the paper's meshing motion with its figures:\n  \
+    rattlemap orbit --set e=0.06 --out out/meshing")]
+pub(crate) struct Orbit {
+    /// Set a parameter; the others are the paper's Table 1, and e = 0.605. Any of m1 m2 r1 r2 k1 k2
+    /// r k F omega b e mesh_speed. May be repeated
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+
+    /// Forcing periods to observe, 2 or more; cycles of up to half as many are found (at most 64)
+    #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
+          value_parser = clap::value_parser!(u32).range(2..=1_000_000_000))]
+    pub(crate) periods: u32,
+
+    /// Forcing periods to let pass first, 1 or more
+    #[arg(long, value_name = "N", default_value_t = Settings::default().transient_periods,
+          value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    pub(crate) transient: u32,
+
+    /// Print one JSON object instead of a summary
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Also write orbit.json, phase portraits and time histories to this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Write even if the folder is not empty
+    #[arg(long, requires = "out")]
+    pub(crate) force: bool,
+}
+
+impl Orbit {
+    /// How long to integrate: a cycle counts once it has come round twice.
+    pub(crate) fn settings(&self) -> Settings {
+        Settings {
+            transient_periods: self.transient,
+            observed_periods: self.periods,
+            max_period: Settings::default().max_period.min(self.periods / 2),
+        }
+    }
+}
+
+/// Every contact and end of meshing against one parameter, as in the paper's Fig. 5
+///
+/// Integrates each value of the scene's one axis on the event-driven reference and writes
+/// bifurcation.csv (one row per event), bifurcation.png and manifest.json.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
+    rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200")]
+pub(crate) struct Bifurcation {
+    /// A scene with one [[axis]]
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+
+    /// Where to write [default: out/<scene's name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Replace the files of an earlier run; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Override the scene: a parameter by name (omega=6), anything else by its path
+    /// (integration.max_period=32, axis.0.count=200). May be repeated
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl Bifurcation {
+    /// The folder to write to.
+    pub(crate) fn out(&self) -> PathBuf {
+        let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
+        self.out.clone().unwrap_or_else(default)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_names_the_defaults_in_use() {
+        let help = Cli::command().find_subcommand_mut("orbit").unwrap().render_long_help().to_string();
+        assert!(help.contains(&format!("e = {DEFAULT_RESTITUTION}")), "{help}");
+        for parameter in rattlemap::model::GearPair::PARAMETERS {
+            assert!(help.contains(parameter.name), "{} is not in the help", parameter.name);
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Why a command stops, and the exit code that says so.
+
+use std::process::ExitCode;
+
+use rattlemap::output::FolderError;
+use rattlemap::scene::SceneError;
+
+/// A command that did not do what was asked.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The request itself is at fault and nothing was computed: exit code 2.
+    Usage(anyhow::Error),
+    /// The run or its output failed: exit code 1.
+    Run(anyhow::Error),
+}
+
+impl Failure {
+    /// Says on stderr what went wrong, causes included, and returns the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        let (code, error) = match self {
+            Failure::Usage(error) => (2, error),
+            Failure::Run(error) => (1, error),
+        };
+        // The alternate form is the whole chain of causes on one line.
+        eprintln!("error: {error:#}");
+        ExitCode::from(code)
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<FolderError> for Failure {
+    fn from(error: FolderError) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<anyhow::Error> for Failure {
+    fn from(error: anyhow::Error) -> Self {
+        Failure::Run(error)
+    }
+}

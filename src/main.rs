@@ -1,0 +1,58 @@
+//! The commands, each a pipeline: ask, check, compute, write.
+
+mod cli;
+mod error;
+mod progress;
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::anyhow;
+use clap::Parser;
+use rattlemap::orbit::Class;
+use rattlemap::output::{self, Folder};
+use rattlemap::{bifurcation, orbit, scene};
+
+use cli::{Cli, Command};
+use error::Failure;
+use progress::Progress;
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Orbit(ask) => run_orbit(&ask),
+        Command::Bifurcation(ask) => run_bifurcation(&ask),
+    };
+    done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
+}
+
+fn run_orbit(ask: &cli::Orbit) -> Result<(), Failure> {
+    let pair = scene::single_cell(cli::DEFAULT_RESTITUTION, &ask.set)?;
+    let folder = ask.out.as_ref().map(|dir| Folder::open(dir, ask.force)).transpose()?;
+    let orbit = orbit::analyse(&pair, scene::REST, &ask.settings());
+    output::orbit::print(&pair, &orbit, ask.json)?;
+    let failed = orbit.class == Class::Failed;
+    if let Some(folder) = folder {
+        let periods = if failed { 0 } else { orbit.cycle_periods };
+        let trace = orbit::trace(&pair, orbit.strobe, periods, output::orbit::SAMPLES_PER_PERIOD);
+        output::orbit::write(&folder, &pair, &orbit, &trace)?;
+    }
+    fail_if(failed, "the integration failed; `status` says why")
+}
+
+fn run_bifurcation(ask: &cli::Bifurcation) -> Result<(), Failure> {
+    let scene = scene::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
+    let folder = Folder::open(&ask.out(), ask.force)?;
+    let cells = scene.line();
+    let progress = Progress::new(cells.len(), ask.quiet);
+    let clock = Instant::now();
+    let report = |done| progress.report(done);
+    let columns = bifurcation::run(&cells, &scene.start().into(), &scene.orbit_settings(), &report);
+    let files = output::bifurcation::write(&folder, &scene, &ask.set, &columns, clock.elapsed())?;
+    progress.finish(&format!("{}: {}", folder.path().display(), files.join(", ")));
+    let all_failed = columns.iter().all(|column| column.class == Class::Failed);
+    fail_if(all_failed, "every column failed; the status column says why")
+}
+
+fn fail_if(failed: bool, message: &'static str) -> Result<(), Failure> {
+    if failed { Err(Failure::Run(anyhow!(message))) } else { Ok(()) }
+}

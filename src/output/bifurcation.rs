@@ -1,0 +1,44 @@
+//! The folder of a bifurcation diagram: table, figure and manifest.
+
+use std::fs;
+use std::time::Duration;
+
+use super::{Folder, bifurcation_csv, bifurcation_figure, manifest};
+use crate::bifurcation::Column;
+use crate::scene::{Format, Scene};
+
+const CSV: &str = "bifurcation.csv";
+const PNG: &str = "bifurcation.png";
+const MANIFEST: &str = "manifest.json";
+
+/// Writes the files that the scene asks for, and the manifest last: a folder that has one
+/// is complete. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(
+    folder: &Folder,
+    scene: &Scene,
+    sets: &[String],
+    columns: &[Column],
+    elapsed: Duration,
+) -> anyhow::Result<Vec<&'static str>> {
+    // Files of an earlier run must not stand beside a manifest that does not know them.
+    folder.remove(&[MANIFEST, CSV, PNG])?;
+    let parameter = scene.axes()[0].parameter();
+    let wanted = &scene.outputs().files;
+    let mut files = Vec::new();
+    if wanted.contains(&Format::Csv) {
+        folder.replace(CSV, |path| bifurcation_csv::write(path, parameter.name, columns))?;
+        files.push(CSV);
+    }
+    if wanted.contains(&Format::Png) {
+        let label = format!("{} {}", parameter.meaning, parameter.name);
+        folder.replace(PNG, |path| bifurcation_figure::write(path, scene.title(), &label, columns))?;
+        files.push(PNG);
+    }
+    files.push(MANIFEST);
+    let manifest = manifest::bifurcation(scene, sets, columns, elapsed, &files)?;
+    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    Ok(files)
+}

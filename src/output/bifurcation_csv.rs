@@ -1,0 +1,99 @@
+//! Section points as a table: one row per point.
+
+use std::path::Path;
+
+use super::names;
+use crate::bifurcation::{Column, SectionPoint};
+use crate::model::State;
+
+/// Point fields, in their order after `class`, `period` and `status`.
+const POINT_FIELDS: [&str; 11] = [
+    "side",
+    "kind",
+    "t_mod_period",
+    "x1_before",
+    "v1_before",
+    "x2_before",
+    "v2_before",
+    "x1",
+    "v1",
+    "x2",
+    "v2",
+];
+
+/// Writes the columns to `path`; the first field is named after the swept parameter.
+///
+/// A column without points (no contact at all) still has one row, with empty point fields,
+/// so that no value of the axis is missing from the table.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write(path: &Path, axis: &str, columns: &[Column]) -> anyhow::Result<()> {
+    let mut table = csv::Writer::from_path(path)?;
+    table.write_record([axis, "class", "period", "status"].iter().chain(&POINT_FIELDS))?;
+    for column in columns {
+        let head = head(column);
+        for point in &column.points {
+            table.write_record(head.iter().cloned().chain(fields(point)))?;
+        }
+        if column.points.is_empty() {
+            let empty = std::iter::repeat_n(String::new(), POINT_FIELDS.len());
+            table.write_record(head.into_iter().chain(empty))?;
+        }
+    }
+    Ok(table.flush()?)
+}
+
+fn head(column: &Column) -> [String; 4] {
+    let period = names::period(column.class).map(|period| period.to_string());
+    [
+        float(column.value),
+        names::class(column.class).to_owned(),
+        period.unwrap_or_default(),
+        names::status(column.status).to_owned(),
+    ]
+}
+
+fn fields(point: &SectionPoint) -> impl Iterator<Item = String> {
+    let head =
+        [names::side(point.side).to_string(), names::kind(point.kind).to_owned(), float(point.t_mod_period)];
+    let state = |state: State| state.into_iter().map(float);
+    head.into_iter().chain(state(point.before)).chain(state(point.after))
+}
+
+/// The shortest decimal that reads back as the same number; empty where there is none.
+fn float(x: f64) -> String {
+    if x.is_finite() { format!("{x:?}") } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Side;
+    use crate::orbit::{Class, EventKind, Status};
+
+    #[test]
+    fn one_row_per_point_and_one_for_none() {
+        let point = SectionPoint {
+            side: Side::Left,
+            kind: EventKind::MeshStart,
+            t_mod_period: 0.1,
+            before: [1.0, -2.0, 1.5, 1e-7],
+            after: [1.0, 0.1 + 0.2, 1.5, f64::NAN],
+        };
+        let column = |value, class, points| Column { value, class, status: Status::Ok, points };
+        let columns = [
+            column(0.25, Class::Periodic { period: 2 }, vec![point, point]),
+            column(1.0, Class::Chaotic, vec![]),
+        ];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        write(&path, "e", &columns).unwrap();
+        let row = "0.25,periodic,2,ok,-1,mesh_start,0.1,1.0,-2.0,1.5,1e-7,1.0,0.30000000000000004,1.5,";
+        let expected = format!(
+            "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2\n\
+             {row}\n{row}\n1.0,chaotic,,ok,,,,,,,,,,,\n"
+        );
+        assert_eq!(std::fs::read_to_string(path).unwrap(), expected);
+    }
+}

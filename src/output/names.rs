@@ -1,0 +1,53 @@
+//! The names that outputs use: part of the contract with scripts.
+
+use crate::model::Side;
+use crate::orbit::{Class, EventKind, Status};
+
+/// Every class name, in the order in which they are counted.
+pub(super) const CLASSES: [&str; 4] = ["periodic", "chaotic", "undecided", "failed"];
+
+pub(super) fn class(class: Class) -> &'static str {
+    match class {
+        Class::Periodic { .. } => CLASSES[0],
+        Class::Chaotic => CLASSES[1],
+        Class::Undecided => CLASSES[2],
+        Class::Failed => CLASSES[3],
+    }
+}
+
+/// Forcing periods per cycle, where the motion is periodic.
+pub(super) fn period(class: Class) -> Option<u32> {
+    match class {
+        Class::Periodic { period } => Some(period),
+        _ => None,
+    }
+}
+
+pub(super) fn status(status: Status) -> &'static str {
+    match status {
+        Status::Ok => "ok",
+        Status::Slow => "slow",
+        Status::NearGrazing => "near_grazing",
+        Status::StrobeOnEvent => "strobe_on_event",
+        Status::CapEvents => "cap_events",
+        Status::CapRoot => "cap_root",
+        Status::TooStiff => "too_stiff",
+        Status::NonFinite => "non_finite",
+    }
+}
+
+pub(super) fn kind(kind: EventKind) -> &'static str {
+    match kind {
+        EventKind::Impact => "impact",
+        EventKind::MeshStart => "mesh_start",
+        EventKind::MeshEnd => "mesh_end",
+    }
+}
+
+/// `1` right, `-1` left.
+pub(super) fn side(side: Side) -> i8 {
+    match side {
+        Side::Right => 1,
+        Side::Left => -1,
+    }
+}

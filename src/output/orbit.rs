@@ -1,0 +1,38 @@
+//! One orbit on the terminal and in its folder: `orbit.json` and figures.
+
+use std::fs;
+use std::io::Write;
+
+use anyhow::Context;
+
+use super::orbit_json::to_json;
+use super::orbit_summary::summary;
+use super::{Folder, orbit_figures};
+use crate::model::GearPair;
+use crate::orbit::{Class, Orbit, Sample};
+
+/// Samples per forcing period of the trajectory that figures draw.
+pub const SAMPLES_PER_PERIOD: usize = 400;
+
+/// Prints the orbit to stdout, as JSON or as a summary for the eye.
+///
+/// # Errors
+/// If stdout cannot be written.
+pub fn print(pair: &GearPair, orbit: &Orbit, json: bool) -> anyhow::Result<()> {
+    let text = if json { to_json(pair, orbit)? } else { summary(pair, orbit) };
+    writeln!(std::io::stdout(), "{}", text.trim_end()).context("cannot write to stdout")
+}
+
+/// Writes the orbit and, unless it failed, its figures. Returns the number of files.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(folder: &Folder, pair: &GearPair, orbit: &Orbit, trace: &[Sample]) -> anyhow::Result<usize> {
+    let json = to_json(pair, orbit)?;
+    folder.replace("orbit.json", |path| Ok(fs::write(path, json + "\n")?))?;
+    if orbit.class == Class::Failed {
+        return Ok(1);
+    }
+    let figures = orbit_figures::write(folder.path(), pair, orbit, trace)?;
+    Ok(1 + figures.len())
+}

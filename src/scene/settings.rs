@@ -1,0 +1,266 @@
+//! `[integration]`, `[start]`, `[refine]` and `[outputs]`.
+
+use super::Purpose;
+use super::document::Value;
+use super::error::SceneError;
+use super::section::{Field, Section};
+use crate::bifurcation;
+use crate::model::State;
+use crate::orbit;
+
+/// The most forcing periods that one field may ask for.
+const MAX_PERIODS: u32 = 1_000_000_000;
+/// The longest cycle, in forcing periods, that engines have memory for.
+const MAX_CYCLE: u32 = 64;
+/// The most steps per forcing period.
+const MAX_STEPS: u32 = 1_000_000;
+
+/// How fine the lanes' time grid is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Steps {
+    /// Chosen per cell from its fastest motion.
+    Auto,
+    /// The same number of steps per forcing period everywhere.
+    PerPeriod(u32),
+}
+
+/// How long each cell is integrated, and what for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Integration {
+    /// Grid of the lane engines; the event-driven reference has none.
+    pub steps_per_period: Steps,
+    /// Forcing periods before anything is looked at.
+    pub transient_periods: u32,
+    /// Forcing periods to observe.
+    pub observed_periods: u32,
+    /// Whether a lane may stop as soon as its class is certain.
+    pub early_stop: bool,
+    /// Longest cycle looked for, at most half the observed periods.
+    pub max_period: u32,
+}
+
+impl From<&Integration> for orbit::Settings {
+    fn from(integration: &Integration) -> Self {
+        orbit::Settings {
+            transient_periods: integration.transient_periods,
+            observed_periods: integration.observed_periods,
+            max_period: integration.max_period,
+        }
+    }
+}
+
+/// The state in which cells start at phase 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// At rest.
+    Rest,
+    /// The same given state in every cell.
+    State(State),
+    /// The attractor of the cell before, along the last axis from `min` to `max`.
+    Up,
+    /// The attractor of the cell after, along the last axis from `max` to `min`.
+    Down,
+}
+
+/// The state at rest.
+pub const REST: State = [0.0; 4];
+
+impl From<Start> for bifurcation::Policy {
+    fn from(start: Start) -> Self {
+        match start {
+            Start::Rest => bifurcation::Policy::From(REST),
+            Start::State(state) => bifurcation::Policy::From(state),
+            Start::Up => bifurcation::Policy::Up,
+            Start::Down => bifurcation::Policy::Down,
+        }
+    }
+}
+
+/// Bounds of an adaptive map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refine {
+    /// Every this many cells along an axis one is integrated in any case.
+    pub minimum_grid: u32,
+    /// Fraction of cells that may be filled wrongly.
+    pub max_error: f64,
+}
+
+/// What can be asked of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Periodic, chaotic, undecided or failed, and the period.
+    Class,
+    /// Largest Lyapunov exponent.
+    Lyapunov,
+    /// Impacts per forcing period.
+    Impacts,
+    /// Fraction of the time spent meshing.
+    Mesh,
+    /// Whether a periodic orbit is its own mirror image.
+    Symmetric,
+    /// Mapping word.
+    Word,
+}
+
+/// What can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Text table.
+    Csv,
+    /// Structured array.
+    Npy,
+    /// Figure.
+    Png,
+    /// Interactive report.
+    Html,
+}
+
+/// What is computed and written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outputs {
+    /// Quantities of a map's cells; a bifurcation diagram always has its section points.
+    pub quantities: Vec<Quantity>,
+    /// Kinds of file.
+    pub files: Vec<Format>,
+}
+
+const QUANTITIES: [(&str, Quantity); 6] = [
+    ("class", Quantity::Class),
+    ("lyapunov", Quantity::Lyapunov),
+    ("impacts", Quantity::Impacts),
+    ("mesh", Quantity::Mesh),
+    ("symmetric", Quantity::Symmetric),
+    ("word", Quantity::Word),
+];
+const FORMATS: [(&str, Format); 4] =
+    [("csv", Format::Csv), ("npy", Format::Npy), ("png", Format::Png), ("html", Format::Html)];
+
+pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneError> {
+    let known = ["steps_per_period", "transient_periods", "observed_periods", "early_stop", "max_period"];
+    let section = root.section("integration", &known)?;
+    let periods = |name, default| match section.get(name) {
+        Some(field) => field.whole(1..=MAX_PERIODS),
+        None => Ok(default),
+    };
+    let default = orbit::Settings::default();
+    let transient_periods = periods("transient_periods", default.transient_periods)?;
+    let observed_periods = match section.get("observed_periods") {
+        // A cycle counts only once it has come round twice.
+        Some(field) => field.whole(2..=MAX_PERIODS)?,
+        None => default.observed_periods,
+    };
+    Ok(Integration {
+        steps_per_period: read_steps(&section)?,
+        transient_periods,
+        observed_periods,
+        early_stop: section.get("early_stop").map_or(Ok(true), |field| field.flag())?,
+        max_period: read_max_period(&section, observed_periods)?,
+    })
+}
+
+fn read_steps(section: &Section<'_>) -> Result<Steps, SceneError> {
+    let Some(field) = section.get("steps_per_period") else { return Ok(Steps::Auto) };
+    match &field.node.value {
+        Value::Text(text) if text == "auto" => Ok(Steps::Auto),
+        Value::Integer(_) => Ok(Steps::PerPeriod(field.whole(1..=MAX_STEPS)?)),
+        _ => Err(field.wrong_type(&format!("\"auto\" or a whole number from 1 to {MAX_STEPS}"))),
+    }
+}
+
+fn read_max_period(section: &Section<'_>, observed_periods: u32) -> Result<u32, SceneError> {
+    let Some(field) = section.get("max_period") else {
+        return Ok(orbit::Settings::default().max_period.min(observed_periods / 2));
+    };
+    let max_period = field.whole(1..=MAX_CYCLE)?;
+    if max_period > observed_periods / 2 {
+        return Err(field.conflict(format!(
+            "a cycle has to come round twice, so `integration.observed_periods = {observed_periods}` must be at least {}",
+            2 * max_period
+        )));
+    }
+    Ok(max_period)
+}
+
+/// `start.policy` as written, before its state is known.
+#[derive(Clone, Copy, PartialEq)]
+enum Policy {
+    Rest,
+    State,
+    Up,
+    Down,
+}
+
+const POLICIES: [(&str, Policy); 4] =
+    [("rest", Policy::Rest), ("state", Policy::State), ("up", Policy::Up), ("down", Policy::Down)];
+
+pub(super) fn read_start(root: &Section<'_>) -> Result<Start, SceneError> {
+    let section = root.section("start", &["policy", "state"])?;
+    let policy = section.get("policy").map_or(Ok(Policy::Rest), |field| field.choice(&POLICIES))?;
+    match (policy, section.get("state")) {
+        (Policy::State, Some(field)) => read_state(&field).map(Start::State),
+        (Policy::State, None) => {
+            Err(section.missing("state", "policy = \"state\" needs state = [x1, v1, x2, v2]"))
+        }
+        (_, Some(field)) => Err(field.conflict(
+            "it is read with start.policy = \"state\" alone; set that or drop the state".to_owned(),
+        )),
+        (Policy::Rest, None) => Ok(Start::Rest),
+        (Policy::Up, None) => Ok(Start::Up),
+        (Policy::Down, None) => Ok(Start::Down),
+    }
+}
+
+fn read_state(field: &Field<'_>) -> Result<State, SceneError> {
+    let expected = "four finite numbers, [x1, v1, x2, v2]";
+    let mut numbers = Vec::new();
+    for item in field.list(expected)? {
+        let number = item.number()?;
+        if !number.is_finite() {
+            return Err(item.out_of_range("a finite number"));
+        }
+        numbers.push(number);
+    }
+    numbers.try_into().map_err(|_| field.out_of_range(expected))
+}
+
+pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option<Refine>, SceneError> {
+    let section = root.section("refine", &["minimum_grid", "max_error"])?;
+    if !section.is_present() {
+        return Ok(None);
+    }
+    if let (Purpose::Bifurcation, Some(field)) = (purpose, root.get("refine")) {
+        return Err(field.conflict("`bifurcation` integrates every column; drop [refine]".into()));
+    }
+    let max_error = match section.get("max_error") {
+        Some(field) => {
+            let value = field.number()?;
+            if !(value > 0.0 && value < 1.0) {
+                return Err(field.out_of_range("a fraction between 0 and 1, ends excluded"));
+            }
+            value
+        }
+        None => 0.003,
+    };
+    let minimum_grid = section.get("minimum_grid").map_or(Ok(8), |field| field.whole(1..=1024))?;
+    Ok(Some(Refine { minimum_grid, max_error }))
+}
+
+pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {
+    let section = root.section("outputs", &["quantities", "files"])?;
+    let quantities = match section.get("quantities") {
+        Some(field) => field.choices(&QUANTITIES)?,
+        None => vec![Quantity::Class, Quantity::Lyapunov],
+    };
+    // A diagram's points have no fixed number per column, so there is no array of it.
+    let writable = match purpose {
+        Purpose::Map => vec![Format::Csv, Format::Npy, Format::Png, Format::Html],
+        Purpose::Bifurcation => vec![Format::Csv, Format::Png],
+    };
+    let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: writable }) };
+    let files = field.choices(&FORMATS)?;
+    if let Some(i) = files.iter().position(|format| !writable.contains(format)) {
+        let name = FORMATS.iter().find(|(_, format)| *format == files[i]).map_or("", |&(name, _)| name);
+        return Err(field.conflict(format!("`bifurcation` writes csv and png; drop \"{name}\"")));
+    }
+    Ok(Outputs { quantities, files })
+}

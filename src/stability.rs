@@ -1,0 +1,1 @@
+//! Stability (placeholder until the next commit).
