@@ -1,7 +1,11 @@
 //! Section points against one parameter, as in Fig. 5 of the paper.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
 use crate::model::{GearPair, Side, State};
-use crate::orbit::{Class, EventKind, Settings, Status};
+use crate::orbit::{self, Class, EventKind, Settings, Status};
 
 /// The attractor's section points at one value of the axis.
 #[derive(Clone, Debug)]
@@ -43,11 +47,69 @@ pub enum Policy {
 }
 
 /// Integrates every cell; `progress` is told how many columns are done so far.
+///
+/// Columns that start from one state are independent and run in parallel; columns that
+/// follow the attractor run one after the other, the first of them from rest.
 pub fn run(
-    _cells: &[(f64, GearPair)],
-    _policy: &Policy,
-    _settings: &Settings,
-    _progress: &(dyn Fn(usize) + Sync),
+    cells: &[(f64, GearPair)],
+    policy: &Policy,
+    settings: &Settings,
+    progress: &(dyn Fn(usize) + Sync),
 ) -> Vec<Column> {
-    todo!()
+    match *policy {
+        Policy::From(start) => {
+            let done = AtomicUsize::new(0);
+            cells
+                .par_iter()
+                .map(|(value, pair)| {
+                    let column = column(*value, pair, start, settings).0;
+                    progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+                    column
+                })
+                .collect()
+        }
+        Policy::Up => follow(cells.iter(), settings, progress),
+        Policy::Down => {
+            let mut columns = follow(cells.iter().rev(), settings, progress);
+            columns.reverse();
+            columns
+        }
+    }
+}
+
+const REST: State = [0.0; 4];
+
+fn follow<'a>(
+    cells: impl Iterator<Item = &'a (f64, GearPair)>,
+    settings: &Settings,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Vec<Column> {
+    let mut start = REST;
+    cells
+        .enumerate()
+        .map(|(i, (value, pair))| {
+            let (column, end) = column(*value, pair, start, settings);
+            start = end;
+            progress(i + 1);
+            column
+        })
+        .collect()
+}
+
+/// One column, and a state on its attractor to start the next one from.
+fn column(value: f64, pair: &GearPair, start: State, settings: &Settings) -> (Column, State) {
+    let orbit = orbit::analyse_over(pair, start, settings, settings.observed_periods);
+    let end = if orbit.class == Class::Failed { REST } else { orbit.strobe };
+    let points = orbit
+        .events
+        .iter()
+        .map(|event| SectionPoint {
+            side: event.side,
+            kind: event.kind,
+            t_mod_period: event.t_mod_period,
+            before: event.before,
+            after: event.after,
+        })
+        .collect();
+    (Column { value, class: orbit.class, status: orbit.status, points }, end)
 }

@@ -79,6 +79,7 @@ pub struct Flow {
     pub(crate) kick: f64,
     gap: [f64; 2],
     masses: [f64; 2],
+    symmetric: bool,
     free: LinearFlow,
     meshing: [LinearFlow; 2],
 }
@@ -98,9 +99,15 @@ impl Flow {
             kick: -(g1 / m2) / compliance,
             gap: oscillator.gap,
             masses: oscillator.masses,
+            symmetric: oscillator.mirror_symmetric(),
             free: linear(&oscillator.free),
             meshing: [linear(&oscillator.meshing[0]), linear(&oscillator.meshing[1])],
         }
+    }
+
+    /// Whether `(y, t) -> (-y, t + T/2)` takes solutions to solutions.
+    pub fn mirror_symmetric(&self) -> bool {
+        self.symmetric
     }
 
     /// The linear flow of one domain.

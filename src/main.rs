@@ -33,7 +33,7 @@ fn run_orbit(ask: &cli::Orbit) -> Result<(), Failure> {
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
         let periods = if failed { 0 } else { orbit.cycle_periods };
-        let trace = orbit::trace(&pair, orbit.strobe, periods, output::orbit::SAMPLES_PER_PERIOD);
+        let trace = orbit::trace(&pair, orbit.strobe, periods, output::orbit::samples_per_period(&pair));
         output::orbit::write(&folder, &pair, &orbit, &trace)?;
     }
     fail_if(failed, "the integration failed; `status` says why")

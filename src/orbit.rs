@@ -1,6 +1,20 @@
 //! One trajectory, read: its class, its cycle and the events on it.
+//!
+//! [`analyse`] lets a transient pass, watches the strobe states for a recurrence, and has
+//! every candidate confirmed twice: Newton must find a stable cycle of that period close
+//! by, and the trajectory must be seen to approach it. Recurrence alone proves nothing,
+//! since decaying spirals come close to themselves at lags that are no period; on the
+//! refined cycle the period is simply its smallest divisor that closes.
 
-use crate::model::{GearPair, Side, State};
+mod analysis;
+mod reading;
+mod recurrence;
+mod trace;
+
+pub use analysis::{analyse, analyse_over};
+pub use trace::trace;
+
+use crate::model::{Side, State};
 use crate::word::Word;
 
 pub use crate::reference::EventKind;
@@ -116,14 +130,4 @@ impl Default for Settings {
     fn default() -> Self {
         Settings { transient_periods: 400, observed_periods: 128, max_period: 64 }
     }
-}
-
-/// Integrates one cell from `start` and reads its orbit.
-pub fn analyse(_pair: &GearPair, _start: State, _settings: &Settings) -> Orbit {
-    todo!()
-}
-
-/// Samples a trajectory from `start` at phase 0 over `periods` forcing periods.
-pub fn trace(_pair: &GearPair, _start: State, _periods: u32, _samples_per_period: usize) -> Vec<Sample> {
-    todo!()
 }

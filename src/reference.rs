@@ -212,6 +212,29 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         trajectory
     }
 
+    /// The same trajectory from here on with other tangent vectors.
+    pub fn carrying<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
+        Trajectory {
+            flow: self.flow,
+            law: self.law,
+            mode: self.mode,
+            origin: self.origin,
+            from_wall: self.from_wall,
+            pending: self.pending,
+            q: self.q,
+            phasor: self.phasor,
+            t: self.t,
+            period: self.period,
+            level: self.level,
+            tangents: tangents.map(|u| self.flow.to_gap(u)),
+            events_in_period: self.events_in_period,
+            steps_in_period: self.steps_in_period,
+            meshing_time: self.meshing_time,
+            near_grazing: self.near_grazing,
+            work: self.work,
+        }
+    }
+
     /// The present state.
     pub fn state(&self) -> State {
         self.flow.to_state(self.q)

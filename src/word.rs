@@ -1,17 +1,129 @@
-//! Mapping words: the cyclic sequence of flights.
+//! Mapping words: the cyclic sequence of flights, equations (18) to (23) of the paper.
+//!
+//! One symbol per flight, named when it ends: free right to right `2`, left to left `5`,
+//! right to left `3`, left to right `6`, meshing on the right `1`, on the left `4`.
 
-/// A cyclic mapping word in canonical rotation, symbols `b'1'..=b'6'`.
+use std::fmt;
+
+/// A cyclic word in canonical rotation: the smallest one in lexicographic order.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Default)]
 pub struct Word(Vec<u8>);
 
 impl Word {
-    /// The symbols in time order.
-    pub fn time_order(&self) -> String {
-        todo!()
+    /// The cyclic word of a sequence of symbols `b'1'..=b'6'` in time order.
+    pub fn cyclic(symbols: &[u8]) -> Word {
+        let mut canonical = symbols.to_vec();
+        canonical.rotate_left(smallest_rotation(symbols));
+        Word(canonical)
     }
 
-    /// The composition as the paper prints it.
+    /// Symbols in time order, canonical rotation.
+    pub fn symbols(&self) -> &[u8] {
+        &self.0
+    }
+
+    /// Number of flights in the cycle.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is no event in the cycle.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The word of the mirror image `(y, t) -> (-y, t + T/2)`: swaps 1-4, 2-5, 3-6.
+    pub fn mirrored(&self) -> Word {
+        Word::cyclic(&self.0.iter().map(|s| (s - b'1' + 3) % 6 + b'1').collect::<Vec<_>>())
+    }
+
+    /// The symbols in time order, such as `2356`.
+    pub fn time_order(&self) -> String {
+        self.0.iter().map(|&s| char::from(s)).collect()
+    }
+
+    /// The composition of maps as the paper prints it, last flight first and repeated ones
+    /// as powers: `2356` is `P_{6532}`, `13554622` is `P_{1 2^2 6 4 5^2 3}`.
+    ///
+    /// Where there is meshing on the right, the cycle ends with it, as in the paper.
     pub fn paper_notation(&self) -> String {
-        todo!()
+        let mut order = self.0.clone();
+        if order.first() == Some(&b'1') {
+            order.rotate_left(1);
+        }
+        order.reverse();
+        let runs: Vec<(char, usize)> =
+            order.chunk_by(|a, b| a == b).map(|run| (char::from(run[0]), run.len())).collect();
+        let powers = runs.iter().any(|&(_, count)| count > 1);
+        let parts: Vec<String> = runs
+            .iter()
+            .map(|&(symbol, count)| if count > 1 { format!("{symbol}^{count}") } else { symbol.to_string() })
+            .collect();
+        format!("P_{{{}}}", parts.join(if powers { " " } else { "" }))
+    }
+}
+
+impl fmt::Display for Word {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.time_order())
+    }
+}
+
+/// Start of the lexicographically smallest rotation (Booth's two-candidate comparison).
+fn smallest_rotation(s: &[u8]) -> usize {
+    let n = s.len();
+    let (mut i, mut j, mut k) = (0, 1, 0);
+    while i < n && j < n && k < n {
+        let (a, b) = (s[(i + k) % n], s[(j + k) % n]);
+        match a.cmp(&b) {
+            std::cmp::Ordering::Equal => k += 1,
+            order => {
+                if order.is_gt() {
+                    i += k + 1;
+                } else {
+                    j += k + 1;
+                }
+                if i == j {
+                    j += 1;
+                }
+                k = 0;
+            }
+        }
+    }
+    i.min(j)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_words() {
+        assert_eq!(Word::cyclic(b"35546221").paper_notation(), "P_{1 2^2 6 4 5^2 3}");
+        assert_eq!(Word::cyclic(b"5623").paper_notation(), "P_{6532}");
+        assert_eq!(Word::cyclic(b"63").paper_notation(), "P_{63}");
+        assert_eq!(Word::cyclic(b"63").time_order(), "36");
+        assert_eq!(Word::cyclic(b"").time_order(), "");
+    }
+
+    #[test]
+    fn rotation_is_the_smallest_of_all() {
+        for word in [&b"2356"[..], b"61213454", b"3636", b"222222", b"5", b"61213455", b"121121112"] {
+            let rotations = (0..word.len()).map(|r| {
+                let mut w = word.to_vec();
+                w.rotate_left(r);
+                w
+            });
+            let smallest = rotations.clone().min().unwrap();
+            for rotated in rotations {
+                assert_eq!(Word::cyclic(&rotated).symbols(), smallest);
+            }
+        }
+    }
+
+    #[test]
+    fn the_mirror_swaps_walls() {
+        assert_eq!(Word::cyclic(b"12345").mirrored(), Word::cyclic(b"45612"));
+        assert_eq!(Word::cyclic(b"36").mirrored(), Word::cyclic(b"36"));
     }
 }

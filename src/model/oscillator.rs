@@ -38,6 +38,15 @@ impl Oscillator {
     pub fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
     }
+
+    /// Whether the walls and what lies behind them are mirror images of each other, so that
+    /// `(y, t) -> (-y, t + T/2)` takes solutions to solutions.
+    pub fn mirror_symmetric(&self) -> bool {
+        let mirrored = |domain: &Domain| Domain { load: domain.load.map(|value| -value), ..*domain };
+        self.walls[0] == -self.walls[1]
+            && self.free == mirrored(&self.free)
+            && self.meshing[0] == mirrored(&self.meshing[1])
+    }
 }
 
 /// What happens at a wall: all that a cell needs beside its flow.

@@ -11,8 +11,12 @@ use super::{Folder, orbit_figures};
 use crate::model::GearPair;
 use crate::orbit::{Class, Orbit, Sample};
 
-/// Samples per forcing period of the trajectory that figures draw.
-pub const SAMPLES_PER_PERIOD: usize = 400;
+/// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
+/// in meshing where that is more.
+pub fn samples_per_period(pair: &GearPair) -> usize {
+    let ringing = (pair.k * (1.0 / pair.m1 + 1.0 / pair.m2)).sqrt() / pair.omega;
+    (20.0 * ringing).clamp(400.0, 50_000.0) as usize
+}
 
 /// Prints the orbit to stdout, as JSON or as a summary for the eye.
 ///

@@ -1,7 +1,7 @@
 //! The words above an orbit's figures.
 
-use crate::model::{GearPair, Side};
-use crate::orbit::{Class, Event, EventKind, Orbit};
+use crate::model::GearPair;
+use crate::orbit::{Class, Orbit};
 
 /// Symbols of a word that a heading has room for.
 const WORD_SYMBOLS: usize = 32;
@@ -28,7 +28,7 @@ pub(super) fn character(orbit: &Orbit) -> String {
         (Class::Undecided, _) => "undecided".to_owned(),
         (Class::Failed, _) => "failed".to_owned(),
     };
-    let mut parts = vec![class, flights(&shortened(&word(&orbit.events)), orbit.events.len())];
+    let mut parts = vec![class, flights(&shortened(&orbit.word.time_order()), orbit.word.len())];
     if orbit.lyapunov.is_finite() {
         let error = orbit.lyapunov_error.map_or(String::new(), |error| format!(" \u{b1} {error:.4}"));
         parts.push(format!("\u{3bb} = {:.4}{error}", orbit.lyapunov).replace('-', "\u{2212}"));
@@ -42,25 +42,6 @@ fn flights(word: &str, count: usize) -> String {
         n if n > WORD_SYMBOLS => format!("word {word} ({n} flights)"),
         _ => format!("word {word}"),
     }
-}
-
-/// The cyclic word of a series of events (18) to (23), in canonical rotation.
-fn word(events: &[Event]) -> String {
-    let symbols = events.iter().enumerate().map(|(i, end)| {
-        let start = events[(i + events.len() - 1) % events.len()];
-        match (start.kind == EventKind::MeshStart, start.side, end.side) {
-            (true, Side::Right, _) => '1',
-            (true, Side::Left, _) => '4',
-            (false, Side::Right, Side::Right) => '2',
-            (false, Side::Left, Side::Left) => '5',
-            (false, Side::Right, Side::Left) => '3',
-            (false, Side::Left, Side::Right) => '6',
-        }
-    });
-    let word: String = symbols.collect();
-    let rotation = |i: usize| word[i..].bytes().chain(word[..i].bytes());
-    let first = (0..word.len()).min_by(|a, b| rotation(*a).cmp(rotation(*b))).unwrap_or(0);
-    [&word[first..], &word[..first]].concat()
 }
 
 /// A long word with runs of a symbol as powers, cut where even that is too long.
@@ -94,20 +75,6 @@ fn superscript(digit: char) -> char {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn event(kind: EventKind, side: Side) -> Event {
-        Event { kind, side, t: 0.0, t_mod_period: 0.0, before: [0.0; 4], after: [0.0; 4] }
-    }
-
-    #[test]
-    fn the_paper_s_words_are_read_off_events() {
-        use EventKind::{Impact, MeshEnd, MeshStart};
-        let half = |side| [Impact, Impact, MeshStart, MeshEnd].map(|kind| event(kind, side));
-        // P_{1 2^2 6 4 5^2 3}, from right to left.
-        assert_eq!(word(&[half(Side::Right), half(Side::Left)].concat()), "13554622");
-        assert_eq!(word(&[event(Impact, Side::Left), event(Impact, Side::Right)]), "36");
-        assert_eq!(word(&[]), "");
-    }
 
     #[test]
     fn long_words_are_written_with_powers() {

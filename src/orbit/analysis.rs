@@ -1,0 +1,281 @@
+//! Deciding what a cell's motion is.
+
+use super::reading::Reading;
+use super::recurrence::{Candidate, Metric, candidates, lingers};
+use super::{Class, Orbit, Settings, Status};
+use crate::flow::Flow;
+use crate::model::{GearPair, Law, State};
+use crate::reference::{Stop, Trajectory};
+use crate::stability::{Cycle, Exponent, StrobeMap, refine};
+use crate::word::Word;
+
+/// Forcing periods whose events are shown where the motion is not periodic.
+const SHOWN_PERIODS: u32 = 8;
+
+/// Standard errors by which an exponent must exceed zero to be called chaos.
+const CHAOS_ERRORS: f64 = 3.0;
+
+/// An undecided motion is observed again, twice as long each time, until a window has this
+/// many forcing periods (or as many as were asked for, if that is more).
+const LONGEST_WINDOW: u32 = 32_768;
+
+/// Periods over which a fresh tangent vector turns to its direction.
+const TANGENT_PERIODS: u32 = 50;
+
+/// A trajectory this close to a cycle, relative to the motion, is on it.
+const ON_CYCLE: f64 = 1e-8;
+
+/// Share of its distance by which a trajectory must have come closer to be seen to approach.
+const APPROACH: f64 = 0.7;
+
+/// Most cycles that an approach is watched for.
+const APPROACH_CYCLES: f64 = 4000.0;
+
+/// Integrates one cell from `start` at phase 0 and reads its orbit.
+///
+/// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is
+/// confirmed, `chaotic` if it does not linger at any cycle and the exponent exceeds zero by
+/// three standard errors. Where neither holds after the observed periods, windows of twice
+/// the length follow, up to 32,768 periods, before it is called undecided.
+pub fn analyse(pair: &GearPair, start: State, settings: &Settings) -> Orbit {
+    analyse_over(pair, start, settings, SHOWN_PERIODS)
+}
+
+/// [`analyse`], showing the events of the last `shown_periods` of a motion that is not
+/// periodic.
+pub fn analyse_over(pair: &GearPair, start: State, settings: &Settings, shown_periods: u32) -> Orbit {
+    // A pair that was built by hand may be invalid: it has no motion.
+    let Ok(oscillator) = pair.oscillator() else { return failed(Status::NonFinite, start, f64::NAN) };
+    let flow = Flow::new(&oscillator);
+    let analysis = Analysis { flow: &flow, law: pair.law(), settings, shown_periods };
+    analysis.run(start).unwrap_or_else(|stop| failed(status_of(stop), start, flow.period))
+}
+
+fn status_of(stop: Stop) -> Status {
+    match stop {
+        Stop::CapEvents => Status::CapEvents,
+        Stop::CapRoot => Status::CapRoot,
+        Stop::NonFinite => Status::NonFinite,
+    }
+}
+
+fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
+    Orbit {
+        class: Class::Failed,
+        status,
+        lyapunov: f64::NAN,
+        lyapunov_error: None,
+        floquet: None,
+        symmetric: None,
+        word: Word::default(),
+        impacts_per_period: f64::NAN,
+        mesh_fraction: f64::NAN,
+        strobe,
+        events: Vec::new(),
+        cycle_periods: 0,
+        forcing_period,
+    }
+}
+
+/// What one window of observation showed.
+struct Window {
+    strobes: Vec<State>,
+    metric: Metric,
+    lyapunov: f64,
+    lyapunov_error: f64,
+    impacts_per_period: f64,
+    mesh_fraction: f64,
+}
+
+struct Analysis<'a> {
+    flow: &'a Flow,
+    law: Law,
+    settings: &'a Settings,
+    shown_periods: u32,
+}
+
+impl Analysis<'_> {
+    fn run(&self, start: State) -> Result<Orbit, Stop> {
+        let mut trajectory = Trajectory::new(self.flow, self.law, start);
+        for _ in 0..self.settings.transient_periods {
+            trajectory.advance_period(&mut ())?;
+        }
+        let mut length = self.settings.observed_periods.max(2);
+        let last = length.max(LONGEST_WINDOW);
+        loop {
+            let window = self.observe(&mut trajectory, length)?;
+            let found = candidates(&window.strobes, &window.metric, self.settings.max_period);
+            for candidate in &found {
+                if let Some(orbit) = self.confirm(&trajectory, &window, candidate)? {
+                    return Ok(orbit);
+                }
+            }
+            let grows = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error > 0.0;
+            if grows && !lingers(&window.strobes, &window.metric, self.settings.max_period) {
+                return self.aperiodic(trajectory, &window, Class::Chaotic, Status::Ok);
+            }
+            // Neither yet: a slow approach, a slow departure, or an average too short.
+            if length >= last {
+                return self.aperiodic(trajectory, &window, Class::Undecided, Status::Slow);
+            }
+            length = length.saturating_mul(2).min(last);
+        }
+    }
+
+    /// Watches strobe states, the exponent and the averages for `length` periods.
+    fn observe(&self, trajectory: &mut Trajectory<'_, 0>, length: u32) -> Result<Window, Stop> {
+        let mut carrier = trajectory.carrying([[0.5; 4]]);
+        let mut exponent = Exponent::default();
+        for _ in 0..TANGENT_PERIODS.min(length) {
+            carrier.advance_period(&mut ())?;
+            carrier.set_tangents(carrier.tangents().map(|u| exponent.renormalise(u)));
+        }
+        exponent.forget();
+        let (mesh_start, impacts_start) = (carrier.meshing_time(), carrier.work().impacts);
+        let mut strobes = vec![carrier.state()];
+        for _ in 0..length {
+            carrier.advance_period(&mut ())?;
+            carrier.set_tangents(carrier.tangents().map(|u| exponent.renormalise(u)));
+            strobes.push(carrier.state());
+        }
+        let (lyapunov, lyapunov_error) = exponent.estimate(self.flow.period);
+        let span = f64::from(length);
+        *trajectory = carrier.carrying([]);
+        Ok(Window {
+            metric: Metric::of(&strobes),
+            strobes,
+            lyapunov,
+            lyapunov_error,
+            impacts_per_period: (carrier.work().impacts - impacts_start) as f64 / span,
+            mesh_fraction: (carrier.meshing_time() - mesh_start) / (span * self.flow.period),
+        })
+    }
+
+    /// The orbit of a candidate, if Newton finds a stable cycle there that the trajectory is
+    /// seen to approach.
+    fn confirm(
+        &self,
+        trajectory: &Trajectory<'_, 0>,
+        window: &Window,
+        candidate: &Candidate,
+    ) -> Result<Option<Orbit>, Stop> {
+        let near = trajectory.state();
+        for map in self.maps(candidate.period) {
+            let Some(cycle) = refine(self.flow, self.law, near, map) else { continue };
+            let Some(cycle) = self.smallest(cycle, &window.metric) else { continue };
+            if cycle.spectral_radius() < 1.0
+                && let Some(distance) = self.approach(trajectory, &cycle, &window.metric)?
+            {
+                return self.periodic(&cycle, distance).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The maps that a cycle of this period may be a fixed point of. Only cycles of odd
+    /// period can be symmetric; those are found more surely by the half-period map.
+    fn maps(&self, period: u32) -> Vec<StrobeMap> {
+        let whole = StrobeMap::Periods(period);
+        if period % 2 == 1 && self.flow.mirror_symmetric() {
+            vec![StrobeMap::MirroredHalves(period), whole]
+        } else {
+            vec![whole]
+        }
+    }
+
+    /// The same orbit with its smallest period, and its symmetry looked at.
+    fn smallest(&self, cycle: Cycle, metric: &Metric) -> Option<Cycle> {
+        let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
+        for period in divisors {
+            for map in self.maps(period) {
+                let image = map.apply(self.flow, self.law, cycle.state).ok()?;
+                if metric.distance(&image.state, &cycle.state) < ON_CYCLE {
+                    return refine(self.flow, self.law, cycle.state, map);
+                }
+            }
+        }
+        Some(cycle)
+    }
+
+    /// The distance at which the trajectory is seen to approach the cycle, if it is.
+    fn approach(
+        &self,
+        trajectory: &Trajectory<'_, 0>,
+        cycle: &Cycle,
+        metric: &Metric,
+    ) -> Result<Option<f64>, Stop> {
+        let before = metric.distance(&trajectory.state(), &cycle.state);
+        if before < ON_CYCLE {
+            return Ok(Some(before));
+        }
+        if before > 1.0 {
+            return Ok(None);
+        }
+        // Long enough for the slowest direction to shrink to half.
+        let cycles = (0.5f64.ln() / cycle.spectral_radius().max(0.1).ln()).ceil().min(APPROACH_CYCLES);
+        let mut ahead = trajectory.clone();
+        for _ in 0..cycle.period * cycles.max(2.0) as u32 {
+            ahead.advance_period(&mut ())?;
+        }
+        let after = metric.distance(&ahead.state(), &cycle.state);
+        Ok((after < ON_CYCLE || after < APPROACH * before).then_some(after))
+    }
+
+    fn periodic(&self, cycle: &Cycle, distance: f64) -> Result<Orbit, Stop> {
+        let mut trajectory = Trajectory::new(self.flow, self.law, cycle.state);
+        // Once around, so that the first flight has its symbol.
+        for _ in 0..cycle.period {
+            trajectory.advance_period(&mut ())?;
+        }
+        let reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
+        let status = if reading.near_grazing || cycle.near_grazing {
+            Status::NearGrazing
+        } else if reading.on_strobe {
+            Status::StrobeOnEvent
+        } else if distance > ON_CYCLE {
+            Status::Slow
+        } else {
+            Status::Ok
+        };
+        Ok(Orbit {
+            class: Class::Periodic { period: cycle.period },
+            status,
+            lyapunov: cycle.exponent(self.flow.period),
+            lyapunov_error: None,
+            floquet: Some(cycle.multipliers.clone()),
+            symmetric: Some(cycle.symmetric),
+            word: reading.word,
+            impacts_per_period: reading.impacts_per_period,
+            mesh_fraction: reading.mesh_fraction,
+            strobe: cycle.state,
+            events: reading.events,
+            cycle_periods: cycle.period,
+            forcing_period: self.flow.period,
+        })
+    }
+
+    fn aperiodic(
+        &self,
+        mut trajectory: Trajectory<'_, 0>,
+        window: &Window,
+        class: Class,
+        status: Status,
+    ) -> Result<Orbit, Stop> {
+        let reading = Reading::take(self.flow, &mut trajectory, self.shown_periods)?;
+        Ok(Orbit {
+            class,
+            status: if reading.on_strobe { Status::StrobeOnEvent } else { status },
+            lyapunov: window.lyapunov,
+            lyapunov_error: Some(window.lyapunov_error),
+            floquet: None,
+            symmetric: None,
+            word: reading.word,
+            impacts_per_period: window.impacts_per_period,
+            mesh_fraction: window.mesh_fraction,
+            strobe: reading.strobe,
+            events: reading.events,
+            cycle_periods: self.shown_periods,
+            forcing_period: self.flow.period,
+        })
+    }
+}

@@ -1,0 +1,98 @@
+//! Recurrence of strobe states: which periods are worth a closer look.
+
+use crate::model::State;
+
+/// Recurrences farther apart than this, relative to the motion's size, are no candidates.
+const NEAR: f64 = 3e-2;
+
+/// Distances between strobe states in units of the motion's own size, positions and
+/// velocities apart.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Metric {
+    position: f64,
+    velocity: f64,
+}
+
+impl Metric {
+    /// The metric of a set of strobe states: the largest entries of each kind.
+    pub(super) fn of(strobes: &[State]) -> Metric {
+        let largest = |a: usize, b: usize| {
+            strobes.iter().flat_map(|y| [y[a].abs(), y[b].abs()]).fold(f64::MIN_POSITIVE, f64::max)
+        };
+        Metric { position: largest(0, 2), velocity: largest(1, 3) }
+    }
+
+    /// The distance of two states.
+    pub(super) fn distance(&self, a: &State, b: &State) -> f64 {
+        let apart = |i: usize| (a[i] - b[i]).abs();
+        (apart(0).max(apart(2)) / self.position).max(apart(1).max(apart(3)) / self.velocity)
+    }
+}
+
+/// A lag at which the strobe states recur.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    /// The lag, in forcing periods.
+    pub(super) period: u32,
+    /// How far apart the states are.
+    pub(super) distance: f64,
+}
+
+/// Whether the states have kept close to those of some lag for the last half of the window:
+/// they linger at a periodic orbit, attracting or not, and growth along them is no chaos.
+pub(super) fn lingers(strobes: &[State], metric: &Metric, max_period: u32) -> bool {
+    let half = strobes.len() / 2;
+    (1..=(max_period as usize).min(half))
+        .any(|lag| (half..strobes.len()).all(|i| metric.distance(&strobes[i], &strobes[i - lag]) < NEAR))
+}
+
+/// Lags up to `max_period` at which the last states recur, the most promising first: the
+/// smallest lag among those that come about as close as any.
+pub(super) fn candidates(strobes: &[State], metric: &Metric, max_period: u32) -> Vec<Candidate> {
+    let n = strobes.len();
+    let mut list: Vec<Candidate> = (1..=max_period as usize)
+        .take_while(|lag| 2 * lag <= n)
+        .map(|lag| Candidate {
+            period: lag as u32,
+            distance: (n - lag..n)
+                .map(|i| metric.distance(&strobes[i], &strobes[i - lag]))
+                .fold(0.0, f64::max),
+        })
+        .filter(|candidate| candidate.distance < NEAR)
+        .collect();
+    // A lag that recurs ten times as well as all shorter ones is worth its own look.
+    let mut best = f64::INFINITY;
+    list.retain(|candidate| {
+        let better = candidate.distance < 0.1 * best;
+        best = best.min(candidate.distance);
+        better
+    });
+    list.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decaying_spiral_offers_its_fixed_point_too() {
+        // Multipliers 0.9 exp(+- 2 pi i / 3.02): lag 3 comes closest at any time.
+        let strobes: Vec<State> = (0..100)
+            .map(|n| {
+                let (r, phi) = (0.9f64.powi(n), f64::from(n) * std::f64::consts::TAU / 3.02);
+                [1.0 + r * phi.cos(), r * phi.sin(), 0.5, 0.5]
+            })
+            .collect();
+        let metric = Metric::of(&strobes);
+        let found = candidates(&strobes, &metric, 8);
+        assert!(found.iter().any(|c| c.period == 1), "{found:?}");
+    }
+
+    #[test]
+    fn a_three_cycle_is_found_at_lag_three_alone() {
+        let strobes: Vec<State> = (0..60).map(|n| [f64::from(n % 3), 0.0, 0.0, 1.0]).collect();
+        let found = candidates(&strobes, &Metric::of(&strobes), 16);
+        assert_eq!(found, [Candidate { period: 3, distance: 0.0 }]);
+    }
+}

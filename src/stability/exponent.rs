@@ -1,0 +1,53 @@
+//! The largest Lyapunov exponent as an average, with its standard error.
+
+use crate::model::State;
+
+/// Blocks whose means give the standard error.
+const BLOCKS: usize = 16;
+
+/// Collects the growth of one tangent vector, period by period.
+#[derive(Clone, Debug, Default)]
+pub struct Exponent {
+    growth: Vec<f64>,
+}
+
+impl Exponent {
+    /// Takes the vector's growth since the last call and returns it with unit length; null
+    /// vectors, which a superstable orbit leaves, start anew.
+    pub fn renormalise(&mut self, u: State) -> State {
+        let length = u.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if length.is_nan() || length <= 1e-280 {
+            // Shrunk beyond f64: as large a loss as can be told.
+            self.growth.push(-280.0 * std::f64::consts::LN_10);
+            return [0.5; 4];
+        }
+        self.growth.push(length.ln());
+        u.map(|x| x / length)
+    }
+
+    /// Forgets what was collected: the vector needs a while to turn to its direction.
+    pub fn forget(&mut self) {
+        self.growth.clear();
+    }
+
+    /// Mean growth rate per unit time and its standard error, from the means of
+    /// 16 blocks; the error is infinite for fewer than 16 periods.
+    pub fn estimate(&self, forcing_period: f64) -> (f64, f64) {
+        let n = self.growth.len();
+        if n == 0 {
+            return (f64::NAN, f64::INFINITY);
+        }
+        let mean = self.growth.iter().sum::<f64>() / n as f64;
+        let block = n / BLOCKS;
+        if block == 0 {
+            return (mean / forcing_period, f64::INFINITY);
+        }
+        let means: Vec<f64> = self.growth[n - block * BLOCKS..]
+            .chunks(block)
+            .map(|chunk| chunk.iter().sum::<f64>() / block as f64)
+            .collect();
+        let centre = means.iter().sum::<f64>() / BLOCKS as f64;
+        let variance = means.iter().map(|m| (m - centre).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
+        (mean / forcing_period, (variance / BLOCKS as f64).sqrt() / forcing_period)
+    }
+}

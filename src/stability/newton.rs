@@ -1,0 +1,132 @@
+//! Newton's method on the strobe map, and the pitchfork where a symmetric orbit loses its
+//! stability.
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::{Cycle, Image, StrobeMap, multipliers};
+use crate::flow::Flow;
+use crate::model::{GearPair, Law, State};
+
+const NEWTON_CAP: u32 = 40;
+
+/// Halvings of a Newton step that does not reduce the residual.
+const DAMPING_CAP: u32 = 12;
+
+/// Singular values of `P' - I` below this, relative to the largest, are cut off: the
+/// direction along which a family of orbits runs near a saddle-node or pitchfork.
+const SINGULAR_CUTOFF: f64 = 1e-10;
+
+/// Residuals below this, relative to the state, are rounding.
+const CONVERGED: f64 = 1e-13;
+
+/// Refines a guess to a fixed point of `map`; none if Newton does not converge.
+///
+/// Nothing is said about stability: plain Newton likes unstable orbits as much.
+pub fn refine(flow: &Flow, law: Law, guess: State, map: StrobeMap) -> Option<Cycle> {
+    let mut y = Vector4::from(guess);
+    let mut image = map.apply(flow, law, guess).ok()?;
+    let mut residual = Vector4::from(image.state) - y;
+    for _ in 0..NEWTON_CAP {
+        let size = 1.0f64.max(y.amax());
+        if residual.amax() <= CONVERGED * size {
+            break;
+        }
+        let step = newton_step(&image.derivative, &residual)?;
+        match damped(flow, law, map, &y, &residual, &step) {
+            Some((next, next_image)) => {
+                residual = Vector4::from(next_image.state) - next;
+                (y, image) = (next, next_image);
+            }
+            // No step reduces the residual: rounding has been reached, or a dead end.
+            None => break,
+        }
+    }
+    let size = 1.0f64.max(y.amax());
+    (residual.amax() <= 1e3 * CONVERGED * size).then(|| cycle(map, y.into(), &image))
+}
+
+/// Solves `(P' - I) step = -residual` in the sense of least squares.
+fn newton_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<Vector4<f64>> {
+    let matrix = derivative - Matrix4::identity();
+    if !matrix.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let svd = matrix.svd(true, true);
+    let cutoff = SINGULAR_CUTOFF * svd.singular_values.max();
+    svd.solve(&-residual, cutoff).ok()
+}
+
+fn damped(
+    flow: &Flow,
+    law: Law,
+    map: StrobeMap,
+    y: &Vector4<f64>,
+    residual: &Vector4<f64>,
+    step: &Vector4<f64>,
+) -> Option<(Vector4<f64>, Image)> {
+    let mut share = 1.0;
+    for _ in 0..DAMPING_CAP {
+        let next = y + step * share;
+        if let Ok(image) = map.apply(flow, law, next.into())
+            && (Vector4::from(image.state) - next).amax() < residual.amax()
+        {
+            return Some((next, image));
+        }
+        share *= 0.5;
+    }
+    None
+}
+
+fn cycle(map: StrobeMap, state: State, image: &Image) -> Cycle {
+    let monodromy = map.monodromy(&image.derivative);
+    Cycle {
+        state,
+        period: map.cycle_periods(),
+        symmetric: matches!(map, StrobeMap::MirroredHalves(_)),
+        multipliers: multipliers(&monodromy),
+        monodromy,
+        near_grazing: image.near_grazing,
+    }
+}
+
+/// The value of `parameter` in `[lo, hi]` at which the symmetric period-1 orbit of `pair`
+/// loses its symmetry: where a multiplier of the half-period map crosses -1, that is
+/// `det(Q' + I) = 0`. The orbit is followed from `guess`, its state at `lo`.
+///
+/// None if the orbit is lost on the way or the determinant does not change sign.
+pub fn pitchfork(pair: &GearPair, parameter: &str, lo: f64, hi: f64, guess: State) -> Option<f64> {
+    let mut state = guess;
+    let mut test = |value: f64| -> Option<f64> {
+        let mut pair = *pair;
+        pair.set(parameter, value).ok()?;
+        let flow = Flow::new(&pair.oscillator().ok()?);
+        let map = StrobeMap::MirroredHalves(1);
+        let cycle = refine(&flow, pair.law(), state, map)?;
+        state = cycle.state;
+        let image = map.apply(&flow, pair.law(), state).ok()?;
+        Some((image.derivative + Matrix4::identity()).determinant())
+    };
+    let (mut a, mut b) = (lo, hi);
+    let (mut at_a, mut at_b) = (test(a)?, test(b)?);
+    if at_a * at_b > 0.0 {
+        return None;
+    }
+    // Regula falsi with the Illinois rule: a bracket at every step, superlinear.
+    for _ in 0..100 {
+        if (b - a).abs() <= 1e-12 * b.abs().max(1e-12) {
+            break;
+        }
+        let c = (a * at_b - b * at_a) / (at_b - at_a);
+        let at_c = test(c)?;
+        if at_c == 0.0 || (c - b).abs() <= 1e-13 {
+            return Some(c);
+        }
+        if at_c * at_b < 0.0 {
+            (a, at_a) = (b, at_b);
+        } else {
+            at_a *= 0.5;
+        }
+        (b, at_b) = (c, at_c);
+    }
+    Some(b)
+}
