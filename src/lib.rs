@@ -12,6 +12,7 @@ pub mod flow;
 pub mod model;
 pub mod orbit;
 pub mod output;
+pub mod record;
 pub mod reference;
 pub mod scene;
 pub mod stability;

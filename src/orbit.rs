@@ -73,6 +73,30 @@ pub enum Status {
     NonFinite,
 }
 
+impl Status {
+    /// Every status; its position is its code in records and tables.
+    pub const ALL: [Status; 8] = [
+        Status::Ok,
+        Status::Slow,
+        Status::NearGrazing,
+        Status::StrobeOnEvent,
+        Status::CapEvents,
+        Status::CapRoot,
+        Status::TooStiff,
+        Status::NonFinite,
+    ];
+
+    /// The number that stands for it in records and tables.
+    pub fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// The status that a number stands for.
+    pub fn from_code(code: u32) -> Option<Status> {
+        Status::ALL.get(code as usize).copied()
+    }
+}
+
 /// A trajectory's long-time behaviour.
 #[derive(Clone, Debug)]
 pub struct Orbit {
@@ -129,5 +153,19 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Settings { transient_periods: 400, observed_periods: 128, max_period: 64 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn status_codes_go_both_ways() {
+        for (code, status) in Status::ALL.into_iter().enumerate() {
+            assert_eq!(status.code(), code as u32);
+            assert_eq!(Status::from_code(code as u32), Some(status));
+        }
+        assert_eq!(Status::from_code(8), None);
     }
 }
