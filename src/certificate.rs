@@ -74,22 +74,38 @@ pub(crate) struct Bracket {
     pub(crate) hi: f64,
 }
 
-/// Whether a function stays strictly between two levels on a step, with how much room to
-/// spare; none if that is not certain. The quick test, for steps that start inside.
+/// Lowest and highest value that a function can take on a step, leaving out the first
+/// `order` coefficients: the quick test, good for both walls at once.
+///
+/// A start on a wall has a root of order `order` there; without its coefficients the range
+/// is that of the deflated function as far as signs go.
 #[inline(always)]
-pub(crate) fn stays_between(f: &Hermite, below: f64, above: f64, remainder: f64) -> Option<f64> {
+pub(crate) fn range(f: &Hermite, order: usize, remainder: f64) -> [f64; 2] {
     let [f0, s0, a0] = f.left;
     let [f1, s1, a1] = f.right;
     let (b2, b3) = (f0 + 0.4 * s0 + 0.05 * a0, f1 - 0.4 * s1 + 0.05 * a1);
-    let c1 = f0 + s0 * (1.0 / 6.0);
     let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
+    let c0 = if order > 0 { c2 } else { f0 };
+    let c1 = if order > 1 { c2 } else { f0 + s0 * (1.0 / 6.0) };
     let c3 = 0.5 * (b2 + b3);
     let c4 = f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0));
     let c5 = f1 - s1 * (1.0 / 6.0);
-    let highest = f0.max(f1).max(c1.max(c2)).max(c4.max(c5)).max(c3 + remainder);
-    let lowest = f0.min(f1).min(c1.min(c2)).min(c4.min(c5)).min(c3 - remainder);
-    let room = (above - highest).min(lowest - below) - ROUNDING * (f0.abs() + f1.abs());
-    (room > 0.0).then_some(room)
+    let lowest = lower(lower(lower(c0, f1), lower(c1, c2)), lower(lower(c4, c5), c3 - remainder));
+    let highest = upper(upper(upper(c0, f1), upper(c1, c2)), upper(upper(c4, c5), c3 + remainder));
+    let rounding = ROUNDING * (f0.abs() + f1.abs());
+    [lowest - rounding, highest + rounding]
+}
+
+/// The smaller of two numbers in one instruction; `f64::min` takes four to mind NaN.
+#[inline(always)]
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers.
+#[inline(always)]
+fn upper(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Rounding of a Bernstein coefficient, relative to the ends it is made of.
@@ -125,15 +141,15 @@ pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder:
     ];
     let eps = remainder + ROUNDING * (f.left[0].abs() + f.right[0].abs() + level.abs());
 
-    let right = c[4].min(c[5]).min(c[6]);
+    let right = lower(lower(c[4], c[5]), c[6]);
     let left = match order {
-        0 => c[0].min(c[1]).min(c[2]),
-        1 => c[1].min(c[2]),
+        0 => lower(lower(c[0], c[1]), c[2]),
+        1 => lower(c[1], c[2]),
         2 => c[2],
         _ => f64::INFINITY,
     };
     if left > 0.0 && right > 0.0 && c[3] > eps {
-        return Verdict::Clear { roomy: ROOMY * remainder < left.min(right).min(c[3]) };
+        return Verdict::Clear { roomy: ROOMY * remainder < lower(lower(left, right), c[3]) };
     }
     turn(&c, order.min(3), eps)
         .and_then(|turn| bracket(&quintic, [s0, a0, s1, a1], &c, order, turn, eps))
@@ -180,12 +196,12 @@ fn bracket(
     let s = -slope;
     let bend = second_difference_bound(b);
     let reach = 0.5 * s / bend;
-    let outer = (guess + reach).min(1.0);
-    let beta = (20.0 * outer * outer * outer).min(0.3125);
-    let steepness = 0.5 * s - 1.08 * eps * (60.0 * outer * outer).min(1.0);
+    let outer = lower(guess + reach, 1.0);
+    let beta = lower(20.0 * outer * outer * outer, 0.3125);
+    let steepness = 0.5 * s - 1.08 * eps * lower(60.0 * outer * outer, 1.0);
     (steepness > 0.0 && p.abs() + beta * eps < reach * steepness && s > 2.16 * eps).then_some(Bracket {
         guess,
-        lo: (guess - reach).max(0.0),
+        lo: upper(guess - reach, 0.0),
         hi: outer,
     })
 }
@@ -194,7 +210,7 @@ fn bracket(
 #[inline(always)]
 fn second_difference_bound(b: &[f64; 6]) -> f64 {
     let second = |i: usize| ((b[i + 2] - b[i + 1]) - (b[i + 1] - b[i])).abs();
-    20.0 * second(0).max(second(1)).max(second(2).max(second(3)))
+    20.0 * upper(upper(second(0), second(1)), upper(second(2), second(3)))
 }
 
 /// Where the control polygon crosses zero.
@@ -216,7 +232,7 @@ fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
         if !(u > 0.0 && u < 1.0 + 1e-6) {
             return None;
         }
-        if step.abs() < 3e-3 * u {
+        if step.abs() < 1e-2 * u {
             return Some(u);
         }
     }

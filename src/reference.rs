@@ -19,7 +19,7 @@ mod contact;
 mod landing;
 mod tangent;
 
-use crate::certificate::{Bracket, Hermite, ROOMY, Verdict, judge, stays_between};
+use crate::certificate::{Bracket, Hermite, ROOMY, Verdict, judge, range};
 use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, add};
 use crate::model::{Law, Side, State};
 
@@ -140,6 +140,12 @@ enum Crossing {
     PressingEnds(Side),
     /// Meshing falls back through the wall.
     MeshEnds(Side),
+}
+
+/// Where a step would end.
+struct Ahead {
+    q: Gap,
+    phasor: Phasor,
 }
 
 /// What a step holds, over all that is watched.
@@ -336,13 +342,16 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             if self.steps_in_period > STEPS_PER_PERIOD_CAP {
                 return Err(Stop::CapRoot);
             }
-            match self.outlook(linear, level) {
+            let columns = &linear.steps[level].columns;
+            let ahead =
+                Ahead { q: columns.apply(&self.q, &self.phasor), phasor: columns.rotate(&self.phasor) };
+            match self.outlook(linear, level, &ahead) {
                 Outlook::Clear { roomy } => {
                     self.level[slot] = if roomy && level > 0 { level - 1 } else { level };
-                    self.clear_step(linear, level, until);
+                    self.clear_step(linear, level, &ahead, until);
                     return Ok(());
                 }
-                Outlook::Crossing(crossing, bracket) if level >= linear.taylor_level => {
+                Outlook::Crossing(crossing, bracket) => {
                     self.level[slot] = level;
                     return self.cross(linear, linear.steps[level].u, crossing, bracket, until, observer);
                 }
@@ -351,7 +360,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                     self.settle_graze(linear, level, until, observer);
                     return Ok(());
                 }
-                Outlook::Crossing(..) | Outlook::Unclear => {
+                Outlook::Unclear => {
                     self.work.halvings += 1;
                     level += 1;
                 }
@@ -359,62 +368,81 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Judges everything that could end the flight within one step.
+    /// Judges everything that could end the flight within one step to `ahead`.
     #[inline(always)]
-    fn outlook(&self, linear: &LinearFlow, level: usize) -> Outlook {
+    fn outlook(&self, linear: &LinearFlow, level: usize, ahead: &Ahead) -> Outlook {
         let step = &linear.steps[level];
-        let (q0, p0) = (&self.q, &self.phasor);
-        let (q1, p1) = (step.columns.apply(q0, p0), step.columns.rotate(p0));
         let jet = |q: &Gap, p: &Phasor| [q[0], q[1], linear.acceleration(q, p)];
-        let gap = Hermite::new(jet(q0, p0), jet(&q1, &p1), step.h);
-        let remainder = step.u6 * linear.gap_bound.remainder(q0, p0, step.u);
-        if self.from_wall.is_none() && self.mode == Mode::Free {
-            let [above, below] = self.flow.walls;
-            if let Some(room) = stays_between(&gap, below, above, remainder) {
-                return Outlook::Clear { roomy: ROOMY * remainder < room };
-            }
+        let gap = Hermite::new(jet(&self.q, &self.phasor), jet(&ahead.q, &ahead.phasor), step.h);
+        let remainder = step.u6 * linear.gap_bound.remainder(&self.q, &self.phasor, step.u);
+        let order = self.from_wall.map_or(0, |(_, order)| order);
+        let [lowest, highest] = range(&gap, order, remainder);
+        let [right, left] = self.flow.walls;
+        let room = match self.mode {
+            Mode::Free => (right - highest).min(lowest - left),
+            Mode::Pressed(Side::Right) => lowest - right,
+            Mode::Pressed(Side::Left) => left - highest,
+            Mode::Dip(_) => 0.0,
+        };
+        if room > 0.0 {
+            return Outlook::Clear { roomy: ROOMY * remainder < room };
         }
-        if level < linear.taylor_level && self.mode == Mode::Free && self.from_wall.is_none() {
+        if level < linear.taylor_level {
             return Outlook::Unclear;
         }
-        let distance = |side: Side, inwards: f64| {
-            let order = self.from_wall.map_or(0, |(from, order)| if from == side { order } else { 0 });
-            judge(&gap, self.flow.wall(side), inwards * side.sign(), order, remainder)
-        };
         match self.mode {
-            Mode::Free => {
-                let right = (distance(Side::Right, -1.0), Crossing::Contact(Side::Right));
-                let left = (distance(Side::Left, -1.0), Crossing::Contact(Side::Left));
-                first_of(right, left)
-            }
-            Mode::Pressed(side) => match distance(side, 1.0) {
-                Verdict::Clear { roomy } => Outlook::Clear { roomy },
-                Verdict::Crossing(bracket) => Outlook::Crossing(Crossing::MeshEnds(side), bracket),
-                Verdict::Unclear => Outlook::Unclear,
-            },
-            Mode::Dip(side) => {
-                let rates = |q: &Gap, p: &Phasor| linear.acceleration_rates(q, p);
-                let pressing = Hermite::new(rates(q0, p0), rates(&q1, &p1), step.h);
-                let remainder = step.u6 * linear.pressing_bound.remainder(q0, p0, step.u);
-                let ceases = judge(&pressing, 0.0, side.sign(), 0, remainder);
-                first_of(
-                    (distance(side, -1.0), Crossing::Emerge(side)),
-                    (ceases, Crossing::PressingEnds(side)),
-                )
-            }
+            Mode::Free if highest < right => self.wall_ahead(&gap, Side::Left, remainder),
+            Mode::Free if lowest > left => self.wall_ahead(&gap, Side::Right, remainder),
+            Mode::Free => first_of(
+                self.wall_ahead(&gap, Side::Right, remainder),
+                self.wall_ahead(&gap, Side::Left, remainder),
+            ),
+            Mode::Pressed(side) => self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
+            Mode::Dip(side) => first_of(
+                self.judge(&gap, side, -1.0, remainder, Crossing::Emerge(side)),
+                self.pressing_ahead(linear, level, ahead, side),
+            ),
+        }
+    }
+
+    #[inline(always)]
+    fn wall_ahead(&self, gap: &Hermite, side: Side, remainder: f64) -> Outlook {
+        self.judge(gap, side, -1.0, remainder, Crossing::Contact(side))
+    }
+
+    /// Judges the distance of the gap from a wall; `inwards` is -1 on the free side of it.
+    #[inline(always)]
+    fn judge(&self, gap: &Hermite, side: Side, inwards: f64, remainder: f64, crossing: Crossing) -> Outlook {
+        let order = self.from_wall.map_or(0, |(from, order)| if from == side { order } else { 0 });
+        match judge(gap, self.flow.wall(side), inwards * side.sign(), order, remainder) {
+            Verdict::Clear { roomy } => Outlook::Clear { roomy },
+            Verdict::Crossing(bracket) => Outlook::Crossing(crossing, bracket),
+            Verdict::Unclear => Outlook::Unclear,
+        }
+    }
+
+    /// Judges whether pressing ceases inside the dip.
+    fn pressing_ahead(&self, linear: &LinearFlow, level: usize, ahead: &Ahead, side: Side) -> Outlook {
+        let step = &linear.steps[level];
+        let rates = |q: &Gap, p: &Phasor| linear.acceleration_rates(q, p);
+        let pressing = Hermite::new(rates(&self.q, &self.phasor), rates(&ahead.q, &ahead.phasor), step.h);
+        let remainder = step.u6 * linear.pressing_bound.remainder(&self.q, &self.phasor, step.u);
+        match judge(&pressing, 0.0, side.sign(), 0, remainder) {
+            Verdict::Clear { roomy } => Outlook::Clear { roomy },
+            Verdict::Crossing(bracket) => Outlook::Crossing(Crossing::PressingEnds(side), bracket),
+            Verdict::Unclear => Outlook::Unclear,
         }
     }
 
     /// Takes a step that is clear, cut at `until`.
     #[inline(always)]
-    fn clear_step(&mut self, linear: &LinearFlow, level: usize, until: f64) {
+    fn clear_step(&mut self, linear: &LinearFlow, level: usize, ahead: &Ahead, until: f64) {
         let step = &linear.steps[level];
         let remaining = until - self.t;
         self.from_wall = None;
         if step.h < remaining {
-            let q = step.columns.apply(&self.q, &self.phasor);
-            self.phasor = step.columns.rotate(&self.phasor);
-            self.q = q;
+            self.q = ahead.q;
+            self.phasor = ahead.phasor;
             self.t += step.h;
             if N > 0 {
                 self.tangents = self.tangents.map(|u| step.columns.apply_tangent(&u));
@@ -455,13 +483,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
 /// The earlier of two things that may happen on a step.
 #[inline(always)]
-fn first_of((a, crossing_a): (Verdict, Crossing), (b, crossing_b): (Verdict, Crossing)) -> Outlook {
+fn first_of(a: Outlook, b: Outlook) -> Outlook {
     match (a, b) {
-        (Verdict::Clear { roomy: a }, Verdict::Clear { roomy: b }) => Outlook::Clear { roomy: a && b },
-        (Verdict::Crossing(bracket), Verdict::Clear { .. }) => Outlook::Crossing(crossing_a, bracket),
-        (Verdict::Clear { .. }, Verdict::Crossing(bracket)) => Outlook::Crossing(crossing_b, bracket),
-        (Verdict::Crossing(a), Verdict::Crossing(b)) if a.hi < b.lo => Outlook::Crossing(crossing_a, a),
-        (Verdict::Crossing(a), Verdict::Crossing(b)) if b.hi < a.lo => Outlook::Crossing(crossing_b, b),
+        (Outlook::Clear { roomy: a }, Outlook::Clear { roomy: b }) => Outlook::Clear { roomy: a && b },
+        (crossing @ Outlook::Crossing(..), Outlook::Clear { .. })
+        | (Outlook::Clear { .. }, crossing @ Outlook::Crossing(..)) => crossing,
+        (Outlook::Crossing(what, a), Outlook::Crossing(_, b)) if a.hi < b.lo => Outlook::Crossing(what, a),
+        (Outlook::Crossing(_, a), Outlook::Crossing(what, b)) if b.hi < a.lo => Outlook::Crossing(what, b),
         _ => Outlook::Unclear,
     }
 }

@@ -40,7 +40,8 @@ impl Columns {
         matrix
     }
 
-    /// `u (t_0 + u (t_1 + u (t_2 + ...)))`.
+    /// `u (t_0 + u (t_1 + u (t_2 + ...)))`. Seven chains side by side keep both multipliers
+    /// busy; splitting even and odd terms was tried and only spilled registers.
     #[inline(always)]
     pub(super) fn horner(terms: &[Columns], u: f64) -> Columns {
         let wide = f64x4::splat(u);

@@ -8,7 +8,7 @@ use crate::flow::{Gap, LinearFlow, Phasor, add};
 const ROOT_CAP: u32 = 60;
 
 /// The last correction, in Taylor units, below which four terms of the local Taylor series
-/// reach rounding: `(1.25 * 5e-4)^5 / 5! < 1e-18`.
+/// reach rounding: `(1.6 * 5e-4)^5 / 5! < 3e-18`.
 const LAST_CORRECTION: f64 = 5e-4;
 
 /// Largest share of the last correction that curvature may account for: reversion of the
@@ -39,9 +39,22 @@ impl<const N: usize> Trajectory<'_, N> {
         observer: &mut impl Observer,
     ) -> Result<(), Stop> {
         let remaining = until - self.t;
-        if bracket.lo * h * linear.unit > remaining {
-            self.move_to(linear, remaining, until);
-            return Ok(());
+        if bracket.guess * h * linear.unit > remaining {
+            // Probably after `until`. It is if what lies there is still before the one root.
+            let partial = linear.partial(remaining / linear.unit);
+            let q = add(&self.q, &partial.increment(&self.q, &self.phasor));
+            let phasor = partial.rotate(&self.phasor);
+            if self.before(crossing, linear, &q, &phasor) {
+                self.q = q;
+                self.phasor = phasor;
+                if N > 0 {
+                    self.tangents = self.tangents.map(|u| partial.apply_tangent(&u));
+                }
+                self.count_meshing(remaining);
+                self.from_wall = None;
+                self.t = until;
+                return Ok(());
+            }
         }
         let landing = self.land(linear, h, crossing, bracket).ok_or(Stop::CapRoot)?;
         if landing.s > remaining {
@@ -60,6 +73,18 @@ impl<const N: usize> Trajectory<'_, N> {
         self.from_wall = None;
         self.act(crossing, observer);
         if self.events_in_period > EVENTS_PER_PERIOD_CAP { Err(Stop::CapEvents) } else { Ok(()) }
+    }
+
+    /// Whether a point lies clearly before a crossing, given that there is only one.
+    #[inline(always)]
+    fn before(&self, crossing: Crossing, linear: &LinearFlow, q: &Gap, phasor: &Phasor) -> bool {
+        match crossing {
+            Crossing::Contact(side) | Crossing::Emerge(side) => {
+                side.sign() * (q[0] - self.flow.wall(side)) < 0.0
+            }
+            Crossing::MeshEnds(side) => side.sign() * (q[0] - self.flow.wall(side)) > 0.0,
+            Crossing::PressingEnds(side) => side.sign() * linear.acceleration(q, phasor) > 0.0,
+        }
     }
 
     /// The one root in a bracket, converged to rounding.
