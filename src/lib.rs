@@ -17,3 +17,8 @@ pub mod reference;
 pub mod scene;
 pub mod stability;
 pub mod word;
+
+/// Compiles and runs the README's example as a doctest.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

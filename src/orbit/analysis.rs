@@ -19,6 +19,9 @@ const CHAOS_ERRORS: f64 = 3.0;
 /// many forcing periods (or as many as were asked for, if that is more).
 const LONGEST_WINDOW: u32 = 32_768;
 
+/// Growth, as a logarithm, that takes a departure from rounding to the size of the motion.
+const DEPARTURE: f64 = 40.0;
+
 /// Periods over which a fresh tangent vector turns to its direction.
 const TANGENT_PERIODS: u32 = 50;
 
@@ -110,8 +113,7 @@ impl Analysis<'_> {
                     return Ok(orbit);
                 }
             }
-            let grows = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error > 0.0;
-            if grows && !lingers(&window.strobes, &window.metric, self.settings.max_period) {
+            if self.is_chaotic(&window) {
                 return self.aperiodic(trajectory, &window, Class::Chaotic, Status::Ok);
             }
             // Neither yet: a slow approach, a slow departure, or an average too short.
@@ -120,6 +122,17 @@ impl Analysis<'_> {
             }
             length = length.saturating_mul(2).min(last);
         }
+    }
+
+    /// Whether nearby motions separate for good, and not merely while the motion leaves an
+    /// unstable cycle. Banded chaos keeps close to a cycle for ever; then the growth over
+    /// the time it was watched tells, which no departure could have lasted through.
+    fn is_chaotic(&self, window: &Window) -> bool {
+        let surely = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;
+        let watched = 0.5 * window.strobes.len() as f64 * self.flow.period;
+        surely > 0.0
+            && (surely * watched > DEPARTURE
+                || !lingers(&window.strobes, &window.metric, self.settings.max_period))
     }
 
     /// Watches strobe states, the exponent and the averages for `length` periods.
