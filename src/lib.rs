@@ -2,12 +2,12 @@
 //!
 //! Modules in the order in which data flows through them: a scene says what is asked
 //! ([`scene`]), a model is described ([`model`]), its flow is solved in closed form
-//! ([`flow`]), the reference jumps from event to event on it ([`reference`]), and what it
+//! ([`flow`]), the reference jumps from event to event on it ([`mod@reference`]), and what it
 //! meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a bifurcation diagram
 //! ([`bifurcation`]), then written down ([`output`]).
 
 pub mod bifurcation;
-mod certificate;
+pub mod certificate;
 pub mod flow;
 pub mod model;
 pub mod orbit;
