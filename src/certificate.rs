@@ -16,10 +16,10 @@
 //! `eps = h^6 max|f^(6)| / 14400` the function lies between the polynomials that have
 //! `c_3 - eps` and `c_3 + eps` in the middle. So:
 //!
-//! * All coefficients positive, `c_3 - eps` too: no root, the step is [`Verdict::Clear`].
+//! * All coefficients positive, `c_3 - eps` too: no root, the step is clear.
 //! * Both bounding polynomials change sign once along their coefficients, from `+` to `-`:
 //!   each has exactly one root (Descartes), and all roots of `f` lie between the two. If
-//!   in addition `f' < 0` there, `f` has exactly one root: [`Verdict::Crossing`].
+//!   in addition `f' < 0` there, `f` has exactly one root: a crossing.
 //! * Else, double crossings and grazing among it, the step is halved. That divides `eps`
 //!   by 64, so it ends: at the latest where what remains open is below rounding.
 //!
