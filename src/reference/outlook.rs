@@ -1,0 +1,113 @@
+//! What a step ahead holds: nothing, one crossing, or not decided at this length.
+
+use super::{Mode, Trajectory};
+use crate::certificate::{Bracket, Hermite, ROOMY, Verdict, judge, range};
+use crate::flow::{Gap, LinearFlow, Phasor};
+use crate::model::Side;
+
+/// What ends a flight, as seen by the certificate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Crossing {
+    /// Free motion reaches a wall.
+    Contact(Side),
+    /// The dip at the start of meshing is over; no event.
+    Emerge(Side),
+    /// Pressing ceases inside the dip.
+    PressingEnds(Side),
+    /// Meshing falls back through the wall.
+    MeshEnds(Side),
+}
+
+/// Where a step would end.
+pub(super) struct Ahead {
+    pub(super) q: Gap,
+    pub(super) phasor: Phasor,
+}
+
+/// What a step holds, over all that is watched.
+pub(super) enum Outlook {
+    Clear { roomy: bool },
+    Crossing(Crossing, Bracket),
+    Unclear,
+}
+
+impl<const N: usize> Trajectory<'_, N> {
+    /// Judges everything that could end the flight within one step to `ahead`.
+    #[inline(always)]
+    pub(super) fn outlook(&self, linear: &LinearFlow, level: usize, ahead: &Ahead) -> Outlook {
+        let step = &linear.steps[level];
+        let jet = |q: &Gap, p: &Phasor| [q[0], q[1], linear.acceleration(q, p)];
+        let gap = Hermite::new(jet(&self.q, &self.phasor), jet(&ahead.q, &ahead.phasor), step.h);
+        let remainder = step.u6 * linear.gap_bound.remainder(&self.q, &self.phasor, step.u);
+        let order = self.from_wall.map_or(0, |(_, order)| order);
+        let [lowest, highest] = range(&gap, order, remainder);
+        let [right, left] = self.flow.walls;
+        let room = match self.mode {
+            Mode::Free => (right - highest).min(lowest - left),
+            Mode::Pressed(Side::Right) => lowest - right,
+            Mode::Pressed(Side::Left) => left - highest,
+            Mode::Dip(_) => 0.0,
+        };
+        if room > 0.0 {
+            return Outlook::Clear { roomy: ROOMY * remainder < room };
+        }
+        if level < linear.taylor_level {
+            return Outlook::Unclear;
+        }
+        match self.mode {
+            Mode::Free if highest < right => self.wall_ahead(&gap, Side::Left, remainder),
+            Mode::Free if lowest > left => self.wall_ahead(&gap, Side::Right, remainder),
+            Mode::Free => first_of(
+                self.wall_ahead(&gap, Side::Right, remainder),
+                self.wall_ahead(&gap, Side::Left, remainder),
+            ),
+            Mode::Pressed(side) => self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
+            Mode::Dip(side) => first_of(
+                self.judge(&gap, side, -1.0, remainder, Crossing::Emerge(side)),
+                self.pressing_ahead(linear, level, ahead, side),
+            ),
+        }
+    }
+
+    #[inline(always)]
+    fn wall_ahead(&self, gap: &Hermite, side: Side, remainder: f64) -> Outlook {
+        self.judge(gap, side, -1.0, remainder, Crossing::Contact(side))
+    }
+
+    /// Judges the distance of the gap from a wall; `inwards` is -1 on the free side of it.
+    #[inline(always)]
+    fn judge(&self, gap: &Hermite, side: Side, inwards: f64, remainder: f64, crossing: Crossing) -> Outlook {
+        let order = self.from_wall.map_or(0, |(from, order)| if from == side { order } else { 0 });
+        match judge(gap, self.flow.wall(side), inwards * side.sign(), order, remainder) {
+            Verdict::Clear { roomy } => Outlook::Clear { roomy },
+            Verdict::Crossing(bracket) => Outlook::Crossing(crossing, bracket),
+            Verdict::Unclear => Outlook::Unclear,
+        }
+    }
+
+    /// Judges whether pressing ceases inside the dip.
+    fn pressing_ahead(&self, linear: &LinearFlow, level: usize, ahead: &Ahead, side: Side) -> Outlook {
+        let step = &linear.steps[level];
+        let rates = |q: &Gap, p: &Phasor| linear.acceleration_rates(q, p);
+        let pressing = Hermite::new(rates(&self.q, &self.phasor), rates(&ahead.q, &ahead.phasor), step.h);
+        let remainder = step.u6 * linear.pressing_bound.remainder(&self.q, &self.phasor, step.u);
+        match judge(&pressing, 0.0, side.sign(), 0, remainder) {
+            Verdict::Clear { roomy } => Outlook::Clear { roomy },
+            Verdict::Crossing(bracket) => Outlook::Crossing(Crossing::PressingEnds(side), bracket),
+            Verdict::Unclear => Outlook::Unclear,
+        }
+    }
+}
+
+/// The earlier of two things that may happen on a step.
+#[inline(always)]
+fn first_of(a: Outlook, b: Outlook) -> Outlook {
+    match (a, b) {
+        (Outlook::Clear { roomy: a }, Outlook::Clear { roomy: b }) => Outlook::Clear { roomy: a && b },
+        (crossing @ Outlook::Crossing(..), Outlook::Clear { .. })
+        | (Outlook::Clear { .. }, crossing @ Outlook::Crossing(..)) => crossing,
+        (Outlook::Crossing(what, a), Outlook::Crossing(_, b)) if a.hi < b.lo => Outlook::Crossing(what, a),
+        (Outlook::Crossing(_, a), Outlook::Crossing(what, b)) if b.hi < a.lo => Outlook::Crossing(what, b),
+        _ => Outlook::Unclear,
+    }
+}
