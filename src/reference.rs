@@ -2,7 +2,8 @@
 //!
 //! A [`Trajectory`] jumps along one oscillator. Between events it takes the longest steps
 //! that [`crate::certificate`] can show to be free of events, whatever the forcing does;
-//! a step that crosses is cut at the event, converged to rounding on the exact flow. There is no time-stepping error and no event is missed.
+//! a step that crosses is cut at the event, converged to rounding on the exact flow. There
+//! is no time-stepping error and no event is missed.
 //!
 //! # What it costs
 //!
