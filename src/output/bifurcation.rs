@@ -34,7 +34,8 @@ pub fn write(
     }
     if wanted.contains(&Format::Png) {
         let label = format!("{} {}", parameter.meaning, parameter.name);
-        folder.replace(PNG, |path| bifurcation_figure::write(path, scene.title(), &label, columns))?;
+        let title = format!("{}, {}", scene.title(), scene.start().in_words());
+        folder.replace(PNG, |path| bifurcation_figure::write(path, &title, &label, columns))?;
         files.push(PNG);
     }
     files.push(MANIFEST);

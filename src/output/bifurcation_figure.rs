@@ -23,6 +23,9 @@ const MARKS: f64 = 16.0;
 const SINGLE: f64 = 0.6;
 /// Radius of a dot: the larger where columns lie apart, the smaller where they touch.
 const DOT: (f64, f64) = (0.7, 2.2);
+/// Columns of at most this many points are curves: their dots are large enough to join.
+const CURVE_POINTS: usize = 24;
+const CURVE_DOT: f64 = 1.3;
 
 /// Draws the displacement of both gears at every section point `|z| = b` as a PNG.
 ///
@@ -95,15 +98,16 @@ fn value_axis(label: &str, columns: &[Column]) -> Axis {
 fn draw_points(canvas: &Canvas<'_>, frame: &Frame, component: usize, columns: &[Column]) -> Result<()> {
     let (left, top, width, height) = Canvas::fine_rect(frame.rect);
     let mut counts = vec![[0u32; 2]; width * height];
-    let dot = dot(frame, columns);
+    let [fine, joined] = [DOT.0, CURVE_DOT].map(|least| dot(frame, columns, least));
     for column in columns {
+        let dot = if column.points.len() <= CURVE_POINTS { &joined } else { &fine };
         for point in &column.points {
             let (x, y) = frame.at(column.value, point.before[component]);
             if !(x.is_finite() && y.is_finite()) {
                 continue;
             }
             let (x, y) = Canvas::fine_pixel((x, y));
-            for (dx, dy) in &dot {
+            for (dx, dy) in dot {
                 let (column, row) = (x + dx - left, y + dy - top);
                 if (0..width as i32).contains(&column) && (0..height as i32).contains(&row) {
                     counts[row as usize * width + column as usize][point.side as usize] += 1;
@@ -121,10 +125,10 @@ fn draw_points(canvas: &Canvas<'_>, frame: &Frame, component: usize, columns: &[
     Ok(())
 }
 
-/// The canvas pixels of one dot around its centre.
-fn dot(frame: &Frame, columns: &[Column]) -> Vec<(i32, i32)> {
+/// The canvas pixels of one dot of radius `least` or more around its centre.
+fn dot(frame: &Frame, columns: &[Column], least: f64) -> Vec<(i32, i32)> {
     let spacing = (frame.rect.right - frame.rect.left) / columns.len().max(1) as f64;
-    let radius = Canvas::fine_length((0.4 * spacing).clamp(DOT.0, DOT.1));
+    let radius = Canvas::fine_length((0.4 * spacing).clamp(least, DOT.1));
     let reach = radius.ceil() as i32;
     let all = (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy)));
     all.filter(|(dx, dy)| f64::from(*dx).hypot(f64::from(*dy)) <= radius).collect()

@@ -1,7 +1,7 @@
 //! One orbit on the terminal and in its folder: `orbit.json` and figures.
 
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 
 use anyhow::Context;
 
@@ -21,10 +21,14 @@ pub fn samples_per_period(pair: &GearPair) -> usize {
 /// Prints the orbit to stdout, as JSON or as a summary for the eye.
 ///
 /// # Errors
-/// If stdout cannot be written.
+/// If stdout cannot be written, unless its reader has closed it.
 pub fn print(pair: &GearPair, orbit: &Orbit, json: bool) -> anyhow::Result<()> {
     let text = if json { to_json(pair, orbit)? } else { summary(pair, orbit) };
-    writeln!(std::io::stdout(), "{}", text.trim_end()).context("cannot write to stdout")
+    match writeln!(std::io::stdout(), "{}", text.trim_end()) {
+        // A reader that has seen enough, `head` say, is no reason to leave the rest undone.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.context("cannot write to stdout"),
+    }
 }
 
 /// Writes the orbit and, unless it failed, its figures. Returns the number of files.

@@ -62,6 +62,18 @@ pub enum Start {
     Down,
 }
 
+impl Start {
+    /// How cells start, to end a title with: which attractor is shown depends on it.
+    pub fn in_words(&self) -> &'static str {
+        match self {
+            Start::Rest => "from rest",
+            Start::State(_) => "from one given state",
+            Start::Up => "attractor followed upwards",
+            Start::Down => "attractor followed downwards",
+        }
+    }
+}
+
 /// The state at rest.
 pub const REST: State = [0.0; 4];
 
