@@ -217,6 +217,25 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// A trajectory from another state at phase 0, in the domain that this one is in.
+    ///
+    /// A state alone does not say whether a gap just short of a wall is free or in the dip
+    /// at the start of meshing; neighbours of a motion that is have to be told.
+    pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
+        Trajectory {
+            mode: self.mode,
+            origin: self.origin,
+            from_wall: None,
+            pending: None,
+            ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
+        }
+    }
+
+    /// The flow it follows.
+    pub fn flow(&self) -> &'f Flow {
+        self.flow
+    }
+
     /// The present state.
     pub fn state(&self) -> State {
         self.flow.to_state(self.q)

@@ -15,8 +15,7 @@ pub use newton::{pitchfork, refine};
 
 use nalgebra::{Matrix4, Vector4};
 
-use crate::flow::Flow;
-use crate::model::{Law, State};
+use crate::model::State;
 use crate::reference::{Stop, Trajectory};
 
 /// The unit vectors: tangents that become the columns of a derivative.
@@ -44,15 +43,15 @@ pub struct Image {
 }
 
 impl StrobeMap {
-    /// Applies the map to a state at phase 0.
+    /// Applies the map to a state at phase 0 in the domain that `seed` is in.
     ///
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
-    pub fn apply(self, flow: &Flow, law: Law, y: State) -> Result<Image, Stop> {
+    pub fn apply(self, seed: &Trajectory<'_>, y: State) -> Result<Image, Stop> {
         let mut image = Image { state: y, derivative: Matrix4::identity(), near_grazing: false };
         match self {
             StrobeMap::Periods(p) => {
-                let mut trajectory = Trajectory::with_tangents(flow, law, y, UNIT);
+                let mut trajectory = seed.at(y, UNIT);
                 for _ in 0..p {
                     trajectory.advance_period(&mut ())?;
                 }
@@ -60,8 +59,8 @@ impl StrobeMap {
             }
             StrobeMap::MirroredHalves(p) => {
                 for _ in 0..p {
-                    let mut half = Trajectory::with_tangents(flow, law, image.state, UNIT);
-                    half.advance_to(0.5 * flow.period, &mut ())?;
+                    let mut half = seed.at(image.state, UNIT);
+                    half.advance_to(0.5 * seed.flow().period, &mut ())?;
                     let step = read(&half, -1.0);
                     image = Image {
                         state: step.state,

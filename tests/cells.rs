@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use rattlemap::flow::Flow;
 use rattlemap::model::{GearPair, State};
 use rattlemap::orbit::{Class, Orbit, Settings, analyse};
+use rattlemap::reference::Trajectory;
 use rattlemap::stability::StrobeMap;
 use rattlemap::word::Word;
 use rayon::prelude::*;
@@ -62,13 +63,14 @@ fn apart(a: &State, b: &State) -> f64 {
 /// Distance of the table's strobe from the orbit or its mirror twin, whichever is nearer.
 fn strobe_error(orbit: &Orbit, pair: &GearPair, strobe: &State) -> f64 {
     let flow = Flow::new(&pair.oscillator().unwrap());
+    let seed = Trajectory::new(&flow, pair.law(), orbit.strobe);
     let mut nearest = f64::INFINITY;
     let mut y = orbit.strobe;
-    let mut twin = StrobeMap::MirroredHalves(1).apply(&flow, pair.law(), y).unwrap().state;
+    let mut twin = StrobeMap::MirroredHalves(1).apply(&seed, y).unwrap().state;
     for _ in 0..orbit.cycle_periods {
         nearest = nearest.min(apart(&y, strobe)).min(apart(&twin, strobe));
-        y = StrobeMap::Periods(1).apply(&flow, pair.law(), y).unwrap().state;
-        twin = StrobeMap::Periods(1).apply(&flow, pair.law(), twin).unwrap().state;
+        y = StrobeMap::Periods(1).apply(&seed, y).unwrap().state;
+        twin = StrobeMap::Periods(1).apply(&seed, twin).unwrap().state;
     }
     nearest
 }

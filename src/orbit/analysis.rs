@@ -172,14 +172,13 @@ impl Analysis<'_> {
         window: &Window,
         candidate: &Candidate,
     ) -> Result<Option<Orbit>, Stop> {
-        let near = trajectory.state();
         for map in self.maps(candidate.period) {
-            let Some(cycle) = refine(self.flow, self.law, near, map) else { continue };
-            let Some(cycle) = self.smallest(cycle, &window.metric) else { continue };
+            let Some(cycle) = refine(trajectory, map) else { continue };
+            let Some(cycle) = self.smallest(trajectory, cycle, &window.metric) else { continue };
             if cycle.spectral_radius() < 1.0
                 && let Some(distance) = self.approach(trajectory, &cycle, &window.metric)?
             {
-                return self.periodic(&cycle, distance).map(Some);
+                return self.periodic(trajectory, &cycle, distance).map(Some);
             }
         }
         Ok(None)
@@ -197,13 +196,13 @@ impl Analysis<'_> {
     }
 
     /// The same orbit with its smallest period, and its symmetry looked at.
-    fn smallest(&self, cycle: Cycle, metric: &Metric) -> Option<Cycle> {
+    fn smallest(&self, seed: &Trajectory<'_>, cycle: Cycle, metric: &Metric) -> Option<Cycle> {
         let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
         for period in divisors {
             for map in self.maps(period) {
-                let image = map.apply(self.flow, self.law, cycle.state).ok()?;
+                let image = map.apply(seed, cycle.state).ok()?;
                 if metric.distance(&image.state, &cycle.state) < ON_CYCLE {
-                    return refine(self.flow, self.law, cycle.state, map);
+                    return refine(&seed.at(cycle.state, []), map);
                 }
             }
         }
@@ -234,8 +233,8 @@ impl Analysis<'_> {
         Ok((after < ON_CYCLE || after < APPROACH * before).then_some(after))
     }
 
-    fn periodic(&self, cycle: &Cycle, distance: f64) -> Result<Orbit, Stop> {
-        let mut trajectory = Trajectory::new(self.flow, self.law, cycle.state);
+    fn periodic(&self, seed: &Trajectory<'_>, cycle: &Cycle, distance: f64) -> Result<Orbit, Stop> {
+        let mut trajectory = seed.at(cycle.state, []);
         // Once around, so that the first flight has its symbol.
         for _ in 0..cycle.period {
             trajectory.advance_period(&mut ())?;

@@ -5,7 +5,8 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::{Cycle, Image, StrobeMap, multipliers};
 use crate::flow::Flow;
-use crate::model::{GearPair, Law, State};
+use crate::model::{GearPair, State};
+use crate::reference::Trajectory;
 
 const NEWTON_CAP: u32 = 40;
 
@@ -19,12 +20,13 @@ const SINGULAR_CUTOFF: f64 = 1e-10;
 /// Residuals below this, relative to the state, are rounding.
 const CONVERGED: f64 = 1e-13;
 
-/// Refines a guess to a fixed point of `map`; none if Newton does not converge.
+/// Refines the state of `seed`, a trajectory at phase 0, to a fixed point of `map`; none if
+/// Newton does not converge.
 ///
 /// Nothing is said about stability: plain Newton likes unstable orbits as much.
-pub fn refine(flow: &Flow, law: Law, guess: State, map: StrobeMap) -> Option<Cycle> {
-    let mut y = Vector4::from(guess);
-    let mut image = map.apply(flow, law, guess).ok()?;
+pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
+    let mut y = Vector4::from(seed.state());
+    let mut image = map.apply(seed, seed.state()).ok()?;
     let mut residual = Vector4::from(image.state) - y;
     for _ in 0..NEWTON_CAP {
         let size = 1.0f64.max(y.amax());
@@ -32,7 +34,7 @@ pub fn refine(flow: &Flow, law: Law, guess: State, map: StrobeMap) -> Option<Cyc
             break;
         }
         let step = newton_step(&image.derivative, &residual)?;
-        match damped(flow, law, map, &y, &residual, &step) {
+        match damped(seed, map, &y, &residual, &step) {
             Some((next, next_image)) => {
                 residual = Vector4::from(next_image.state) - next;
                 (y, image) = (next, next_image);
@@ -57,8 +59,7 @@ fn newton_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<Vec
 }
 
 fn damped(
-    flow: &Flow,
-    law: Law,
+    seed: &Trajectory<'_>,
     map: StrobeMap,
     y: &Vector4<f64>,
     residual: &Vector4<f64>,
@@ -67,7 +68,7 @@ fn damped(
     let mut share = 1.0;
     for _ in 0..DAMPING_CAP {
         let next = y + step * share;
-        if let Ok(image) = map.apply(flow, law, next.into())
+        if let Ok(image) = map.apply(seed, next.into())
             && (Vector4::from(image.state) - next).amax() < residual.amax()
         {
             return Some((next, image));
@@ -101,9 +102,10 @@ pub fn pitchfork(pair: &GearPair, parameter: &str, lo: f64, hi: f64, guess: Stat
         pair.set(parameter, value).ok()?;
         let flow = Flow::new(&pair.oscillator().ok()?);
         let map = StrobeMap::MirroredHalves(1);
-        let cycle = refine(&flow, pair.law(), state, map)?;
+        let seed = Trajectory::new(&flow, pair.law(), state);
+        let cycle = refine(&seed, map)?;
         state = cycle.state;
-        let image = map.apply(&flow, pair.law(), state).ok()?;
+        let image = map.apply(&seed, state).ok()?;
         Some((image.derivative + Matrix4::identity()).determinant())
     };
     let (mut a, mut b) = (lo, hi);
