@@ -223,3 +223,30 @@ fn nothing_moves_what_nothing_acts_on() {
     assert_eq!(trajectory.state(), REST);
     assert_eq!(trajectory.work().events, 0);
 }
+
+/// A series of impacts closed in one jump must not carry the motion past its goal.
+#[test]
+fn closing_a_series_stops_where_it_was_asked_to() {
+    let flow = Flow::new(&ball(2.0));
+    let law = Law { restitution: 0.5, mesh_speed: 0.0 };
+    // The series ends at 2.
+    for short in [1e-3, 1e-4, 1e-5, 1e-6] {
+        let mut trajectory = Trajectory::new(&flow, law, [0.5, -1.0, 0.0, 0.0]);
+        trajectory.advance_to(2.0 - short, &mut ()).expect("an ordinary cell");
+        assert_eq!(trajectory.time_in_period(), 2.0 - short, "{short:e} before the end of the series");
+    }
+}
+
+/// A goal that lies one of the longest steps ahead exactly.
+#[test]
+fn a_step_may_end_on_its_goal() {
+    // The fastest rate is 1, so that steps are 1.25, 2.5, 5 and 10, each twice the last.
+    let stops = Stops { m: 1.0, k: 1.0, omega: 0.05, ..stops(0.5) };
+    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    for goal in [1.25, 2.5, 3.75, 5.0, 8.75, 10.0, 18.75, 28.75, 38.75, 48.75] {
+        let mut trajectory = Trajectory::new(&flow, stops.law(), [0.1, 0.0, 0.0, 0.0]);
+        trajectory.advance_to(goal, &mut ()).expect("an ordinary cell");
+        let off = (trajectory.state()[0] - 0.1 * goal.cos()).abs();
+        assert!(off < 1e-14, "off by {off:.1e} at {goal}");
+    }
+}
