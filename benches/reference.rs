@@ -85,10 +85,11 @@ fn run<const N: usize>(
     work(&mut counted);
     let events: u64 = counted.iter().map(|trajectory| trajectory.work().events).sum();
     let periods = cells.len() as u64 * size.periods;
+    println!("{group}: {} cells, {periods} periods, {events} events", cells.len());
     let mut group = c.benchmark_group(group);
     group.throughput(Throughput::Elements(if per_event { events.max(1) } else { periods }));
     group.sample_size(10);
-    group.bench_function(format!("{} cells, {periods} periods, {events} events", cells.len()), |b| {
+    group.bench_function(format!("{} cells", cells.len()), |b| {
         b.iter_batched_ref(|| start.clone(), work, BatchSize::LargeInput);
     });
     group.finish();
@@ -111,5 +112,10 @@ fn flow(c: &mut Criterion) {
     c.bench_function("flow of one frequency", |b| b.iter(|| Flow::new(black_box(&oscillator))));
 }
 
-criterion_group!(benches, per_period, per_period_with_tangent, per_event, flow);
+criterion_group! {
+    name = benches;
+    // Its plots want fonts of the system, which the figures do without.
+    config = Criterion::default().without_plots();
+    targets = per_period, per_period_with_tangent, per_event, flow
+}
 criterion_main!(benches);

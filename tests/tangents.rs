@@ -19,7 +19,7 @@ const UNITS: [State; 4] =
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
 fn matrix(columns: [State; 4]) -> Matrix4<f64> {
-    Matrix4::from_columns(&columns.map(|c| nalgebra::Vector4::from(c)))
+    Matrix4::from_columns(&columns.map(nalgebra::Vector4::from))
 }
 
 /// The derivative of the strobe map over some periods, carried along, with its events.
