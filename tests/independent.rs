@@ -140,11 +140,28 @@ fn end_of(motion: Motion, leg: &Leg) -> State {
     integrate(motion, leg, OutputType::Sparse).last().expect("at least the start").1
 }
 
+/// Pairs far from Table 1.
+fn strangers() -> Vec<(GearPair, &'static str)> {
+    let p = paper(0.3, 5.6);
+    vec![
+        (GearPair { m1: 10.0, m2: 0.1, ..p }, "heavy against light"),
+        (GearPair { m1: 0.1, m2: 10.0, e: 0.0, ..p }, "light against heavy"),
+        (GearPair { k: 1e5, e: 0.0, ..p }, "stiff mesh"),
+        (GearPair { r: 20.0, e: 0.0, ..p }, "damped mesh"),
+        (GearPair { r1: 0.0, r2: 0.0, r: 0.0, ..p }, "nothing damped"),
+        (GearPair { k1: 0.0, r1: 2.0, ..p }, "one gear without a spring"),
+        (GearPair { b: 1e-3, e: 0.8, ..p }, "narrow backlash"),
+        (GearPair { mesh_speed: 1.0, omega: 2.0, ..p }, "deep dips"),
+        (GearPair { force: 1e3, e: 0.9, ..p }, "strong force"),
+    ]
+}
+
 /// All cells, from rest: the first periods and those after a transient.
 fn every_leg(mut check: impl FnMut(&GearPair, &Leg, &str)) {
-    for &(e, omega, what) in CELLS {
-        let pair = paper(e, omega);
+    let cells = CELLS.iter().map(|&(e, omega, what)| (paper(e, omega), what));
+    for (pair, what) in cells.chain(strangers()) {
         let flow = flow_of(&pair);
+        let (e, omega) = (pair.e, pair.omega);
         for skip in [0, 20] {
             let legs = legs(&flow, &pair, REST, skip, 4);
             for (i, leg) in legs.iter().enumerate() {
