@@ -39,16 +39,18 @@
 /// `(f, h f', h^2 f'')`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hermite {
-    pub(crate) left: [f64; 3],
-    pub(crate) right: [f64; 3],
+    left: [f64; 3],
+    right: [f64; 3],
+    /// Difference of the two values, to its own relative accuracy.
+    rise: f64,
 }
 
 impl Hermite {
-    /// From values, slopes and curvatures per unit time.
+    /// From values, slopes and curvatures per unit time, and the difference of the values.
     #[inline(always)]
-    pub(crate) fn new(left: [f64; 3], right: [f64; 3], h: f64) -> Hermite {
+    pub(crate) fn new(left: [f64; 3], right: [f64; 3], h: f64, rise: f64) -> Hermite {
         let scale = |[f, s, a]: [f64; 3]| [f, h * s, h * h * a];
-        Hermite { left: scale(left), right: scale(right) }
+        Hermite { left: scale(left), right: scale(right), rise }
     }
 }
 
@@ -119,9 +121,15 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder: f64) -> Verdict {
     let [_, s0, a0] = f.left.map(|value| sign * value);
     let [_, s1, a1] = f.right.map(|value| sign * value);
-    // From the wall, coefficients are departures: a tiny one keeps its sign.
-    let start = if order > 0 { 0.0 } else { sign * (f.left[0] - level) };
-    let end = sign * (f.right[0] - level);
+    // From the wall, coefficients are departures and carry their own rounding only: a flight
+    // far shorter than an ulp of the wall's position keeps its shape.
+    let (start, end, rounding) = if order > 0 {
+        let size = s0.abs() + a0.abs() + s1.abs() + a1.abs();
+        (0.0, sign * f.rise, ROUNDING * (f.rise.abs() + size))
+    } else {
+        let size = f.left[0].abs() + f.right[0].abs() + level.abs();
+        (sign * (f.left[0] - level), sign * (f.right[0] - level), ROUNDING * size)
+    };
     let quintic = [
         start,
         start + 0.2 * s0,
@@ -139,7 +147,7 @@ pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder:
         end - s1 * (1.0 / 6.0),
         end,
     ];
-    let eps = remainder + ROUNDING * (f.left[0].abs() + f.right[0].abs() + level.abs());
+    let eps = remainder + rounding;
 
     let right = lower(lower(c[4], c[5]), c[6]);
     let left = match order {
@@ -148,7 +156,7 @@ pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder:
         2 => c[2],
         _ => f64::INFINITY,
     };
-    if left > 0.0 && right > 0.0 && c[3] > eps {
+    if left > 0.0 && right > rounding && c[3] > eps {
         return Verdict::Clear { roomy: ROOMY * remainder < lower(lower(left, right), c[3]) };
     }
     turn(&c, order.min(3), eps)
@@ -257,7 +265,7 @@ mod tests {
     fn cubic([a, b, c, d]: [f64; 4]) -> Hermite {
         let at =
             |u: f64| [a + u * (b + u * (c + u * d)), b + u * (2.0 * c + 3.0 * d * u), 2.0 * c + 6.0 * d * u];
-        Hermite::new(at(0.0), at(1.0), 1.0)
+        Hermite::new(at(0.0), at(1.0), 1.0, b + c + d)
     }
 
     fn distance(f: [f64; 4], order: usize, remainder: f64) -> Verdict {
@@ -297,7 +305,8 @@ mod tests {
         // Leaves for good.
         assert!(matches!(distance([0.0, 0.25, 1.0, 0.0], 1, 1e-9), Verdict::Clear { .. }));
         // A departure far below the rounding of the wall's position.
-        let near = judge(&Hermite::new([0.5, -1e-19, -1.0], [0.0, -1.0, -1.0], 1.0), 0.5, -1.0, 1, 1e-9);
+        let near =
+            judge(&Hermite::new([0.5, -1e-19, -1.0], [0.0, -1.0, -1.0], 1.0, -0.5), 0.5, -1.0, 1, 1e-9);
         assert!(matches!(near, Verdict::Clear { .. }));
     }
 }

@@ -147,6 +147,8 @@ pub struct Trajectory<'f, const N: usize = 0> {
     q: Gap,
     phasor: Phasor,
     t: f64,
+    /// Where the present call ends; no jump may lead beyond.
+    goal: f64,
     period: u64,
     level: [usize; 2],
     tangents: [Gap; N],
@@ -181,6 +183,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             q: flow.to_gap(y),
             phasor: [1.0, 0.0],
             t: 0.0,
+            goal: 0.0,
             period: 0,
             level: levels,
             tangents: tangents.map(|u| flow.to_gap(u)),
@@ -206,6 +209,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             q: self.q,
             phasor: self.phasor,
             t: self.t,
+            goal: self.goal,
             period: self.period,
             level: self.level,
             tangents: tangents.map(|u| self.flow.to_gap(u)),
@@ -309,12 +313,17 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        self.goal = until;
         if let Some(side) = self.pending.take() {
             self.contact(side, observer);
         }
         while self.t < until {
             self.step(until, observer)?;
         }
+        self.check_finite()
+    }
+
+    fn check_finite(&self) -> Result<(), Stop> {
         let finite = self.q.iter().all(|x| x.abs() < HUGE);
         if finite { Ok(()) } else { Err(Stop::NonFinite) }
     }
@@ -328,7 +337,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let slot = usize::from(self.mode != Mode::Free);
         let mut level = self.level[slot];
         // Steps beyond the Taylor table cannot be cut, so they must end before `until`.
-        while level < linear.taylor_level && linear.steps[level].h > remaining {
+        while level < linear.taylor_level && linear.steps[level].h >= remaining {
             level += 1;
         }
         loop {
@@ -337,12 +346,21 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             if self.steps_in_period > STEPS_PER_PERIOD_CAP {
                 return Err(Stop::CapRoot);
             }
-            let columns = &linear.steps[level].columns;
-            let ahead =
-                Ahead { q: columns.apply(&self.q, &self.phasor), phasor: columns.rotate(&self.phasor) };
+            let propagator = &linear.steps[level].propagator;
+            let increment = propagator.increment(&self.q, &self.phasor);
+            let ahead = Ahead {
+                q: add(&self.q, &increment),
+                rise: increment[0],
+                phasor: propagator.rotate(&self.phasor),
+            };
             match self.outlook(linear, level, &ahead) {
                 Outlook::Clear { roomy } => {
                     self.level[slot] = if roomy && level > 0 { level - 1 } else { level };
+                    self.clear_step(linear, level, &ahead, until);
+                    return Ok(());
+                }
+                Outlook::Rests => {
+                    self.near_grazing = true;
                     self.clear_step(linear, level, &ahead, until);
                     return Ok(());
                 }
@@ -352,6 +370,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 }
                 Outlook::Unclear if self.settle_start(observer) => return Ok(()),
                 Outlook::Unclear if level + 1 == linear.steps.len() => {
+                    // What is not a number is never clear.
+                    self.check_finite()?;
                     self.settle_graze(linear, level, until, observer);
                     return Ok(());
                 }
@@ -374,7 +394,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.phasor = ahead.phasor;
             self.t += step.h;
             if N > 0 {
-                self.tangents = self.tangents.map(|u| step.columns.apply_tangent(&u));
+                self.tangents = self.tangents.map(|u| step.propagator.apply_tangent(&u));
             }
             self.count_meshing(step.h);
         } else {

@@ -59,14 +59,21 @@ impl<const N: usize> Trajectory<'_, N> {
         }
         let bend = side.sign() * sliding.acceleration_rate / (3.0 * pressing) + sliding.damping / 6.0;
         let duration = whole * (1.0 - bend * whole);
-        // A series cut by the strobe goes on bouncing until it lies within one period.
-        if duration <= 0.0 || self.t + duration >= flow.period {
+        // A series cut by the strobe goes on bouncing until it lies within one stretch.
+        if duration <= 0.0 || self.t + duration >= self.goal {
             return;
         }
         let v = closed[3];
         self.q =
             [z, 0.0, x + duration * (v + 0.5 * duration * sliding.v_rate), v + duration * sliding.v_rate];
-        self.tangents = self.tangents.map(|u| [0.0, 0.0, u[2] + kick * u[0], u[3] + kick * u[1]]);
+        let s = side.sign();
+        self.tangents = self.tangents.map(|u| {
+            // A neighbour leaves at another time and speed, so its series ends `late`; until
+            // then it misses the pressing acceleration. Momentum is the same either way.
+            let late = -s * (2.0 * u[1] / pressing + (1.0 + e) * u[0] / leaving) / (1.0 - e);
+            let behind = -s * pressing * late;
+            [0.0, behind, u[2] + kick * u[0], u[3] + kick * (u[1] - behind)]
+        });
         self.t += duration;
         let (sin, cos) = (flow.omega * self.t).sin_cos();
         self.phasor = [cos, sin];

@@ -5,6 +5,9 @@ use crate::certificate::{Bracket, Hermite, ROOMY, Verdict, judge, range};
 use crate::flow::{Gap, LinearFlow, Phasor};
 use crate::model::Side;
 
+/// Departures from a wall that are rounding, relative to its position.
+const REST: f64 = 32.0 * f64::EPSILON;
+
 /// What ends a flight, as seen by the certificate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Crossing {
@@ -21,12 +24,15 @@ pub(super) enum Crossing {
 /// Where a step would end.
 pub(super) struct Ahead {
     pub(super) q: Gap,
+    /// What is added to the gap on the way, to its own relative accuracy.
+    pub(super) rise: f64,
     pub(super) phasor: Phasor,
 }
 
 /// What a step holds, over all that is watched.
 pub(super) enum Outlook {
     Clear { roomy: bool },
+    Rests,
     Crossing(Crossing, Bracket),
     Unclear,
 }
@@ -37,7 +43,7 @@ impl<const N: usize> Trajectory<'_, N> {
     pub(super) fn outlook(&self, linear: &LinearFlow, level: usize, ahead: &Ahead) -> Outlook {
         let step = &linear.steps[level];
         let jet = |q: &Gap, p: &Phasor| [q[0], q[1], linear.acceleration(q, p)];
-        let gap = Hermite::new(jet(&self.q, &self.phasor), jet(&ahead.q, &ahead.phasor), step.h);
+        let gap = Hermite::new(jet(&self.q, &self.phasor), jet(&ahead.q, &ahead.phasor), step.h, ahead.rise);
         let remainder = step.u6 * linear.gap_bound.remainder(&self.q, &self.phasor, step.u);
         let order = self.from_wall.map_or(0, |(_, order)| order);
         let [lowest, highest] = range(&gap, order, remainder);
@@ -50,6 +56,9 @@ impl<const N: usize> Trajectory<'_, N> {
         };
         if room > 0.0 {
             return Outlook::Clear { roomy: ROOMY * remainder < room };
+        }
+        if self.rests(lowest, highest) {
+            return Outlook::Rests;
         }
         if level < linear.taylor_level {
             return Outlook::Unclear;
@@ -67,6 +76,17 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.pressing_ahead(linear, level, ahead, side),
             ),
         }
+    }
+
+    /// Whether the gap stays within rounding of a wall: teeth that rest there neither part
+    /// nor press, and no step is short enough to tell which.
+    #[inline(always)]
+    fn rests(&self, lowest: f64, highest: f64) -> bool {
+        let within = |wall: f64| {
+            let rounding = REST * wall.abs();
+            highest - wall < rounding && wall - lowest < rounding
+        };
+        self.flow.walls.into_iter().any(within)
     }
 
     #[inline(always)]
@@ -89,7 +109,8 @@ impl<const N: usize> Trajectory<'_, N> {
     fn pressing_ahead(&self, linear: &LinearFlow, level: usize, ahead: &Ahead, side: Side) -> Outlook {
         let step = &linear.steps[level];
         let rates = |q: &Gap, p: &Phasor| linear.acceleration_rates(q, p);
-        let pressing = Hermite::new(rates(&self.q, &self.phasor), rates(&ahead.q, &ahead.phasor), step.h);
+        let (left, right) = (rates(&self.q, &self.phasor), rates(&ahead.q, &ahead.phasor));
+        let pressing = Hermite::new(left, right, step.h, right[0] - left[0]);
         let remainder = step.u6 * linear.pressing_bound.remainder(&self.q, &self.phasor, step.u);
         match judge(&pressing, 0.0, side.sign(), 0, remainder) {
             Verdict::Clear { roomy } => Outlook::Clear { roomy },
