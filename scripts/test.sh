@@ -71,4 +71,6 @@ say "docs: cargo doc --no-deps, warnings denied"
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 say "tests: cargo test"
 cargo test
+say "benchmarks: tiny sizes, so that they cannot rot"
+cargo test --quiet --bench reference
 say "all passed"

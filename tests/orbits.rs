@@ -1,0 +1,100 @@
+//! Deciding what a motion is, where that is not straightforward.
+
+use rattlemap::flow::Flow;
+use rattlemap::model::{GearPair, State};
+use rattlemap::orbit::{Class, Orbit, Settings, Status, analyse};
+use rattlemap::reference::Trajectory;
+
+const REST: State = [0.0; 4];
+
+fn cell(e: f64, omega: f64) -> GearPair {
+    GearPair { omega, ..GearPair::paper(e) }
+}
+
+fn orbit(pair: &GearPair) -> Orbit {
+    analyse(pair, REST, &Settings::default())
+}
+
+/// State at half a period after the strobe, mirrored: a point of the twin at phase 0.
+fn twin(pair: &GearPair, strobe: State) -> State {
+    let flow = Flow::new(&pair.oscillator().unwrap());
+    let mut half = Trajectory::new(&flow, pair.law(), strobe);
+    half.advance_to(0.5 * flow.period, &mut ()).unwrap();
+    half.state().map(|value| -value)
+}
+
+#[test]
+fn a_strobe_inside_the_dip_of_meshing_is_decided() {
+    // At phase 0 the teeth mesh although the gap is still short of the wall by 1e-6: the
+    // state alone would be taken for free motion.
+    for (e, omega) in [(0.44, 2.05875), (0.27, 3.14375), (0.02, 3.96625)] {
+        let pair = cell(e, omega);
+        let orbit = orbit(&pair);
+        let gap = (orbit.strobe[0] - orbit.strobe[2]).abs();
+        assert!(gap < pair.b && pair.b - gap < 1e-5, "the strobe is not in a dip any more: {gap}");
+        assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e} {omega}");
+        assert_eq!(orbit.status, Status::Ok, "{e} {omega}");
+    }
+}
+
+#[test]
+fn mirror_twins_share_everything_but_the_side() {
+    let pair = cell(0.56, 5.6);
+    let one = orbit(&pair);
+    let other = analyse(&pair, twin(&pair, one.strobe), &Settings::default());
+    assert_eq!((one.class, other.class), (Class::Periodic { period: 1 }, Class::Periodic { period: 1 }));
+    assert_eq!((one.symmetric, other.symmetric), (Some(false), Some(false)));
+    assert!((one.strobe[0] - other.strobe[0]).abs() > 1e-3, "the same orbit twice");
+    assert!((one.lyapunov - other.lyapunov).abs() < 1e-9);
+    assert_eq!(one.word.mirrored(), other.word);
+    // A symmetric orbit is its own twin.
+    let alone = orbit(&cell(0.2, 5.6));
+    let mirrored = twin(&cell(0.2, 5.6), alone.strobe);
+    assert!((0..4).all(|i| (mirrored[i] - alone.strobe[i]).abs() < 1e-12), "{mirrored:?}");
+}
+
+#[test]
+fn banded_chaos_beyond_a_grazing_is_chaos() {
+    // Close to a period-10 cycle for ever, yet nearby motions separate.
+    for e in [0.6054, 0.6058] {
+        let orbit = orbit(&GearPair::paper(e));
+        assert_eq!((orbit.class, orbit.status), (Class::Chaotic, Status::Ok), "{e}");
+        assert!(orbit.lyapunov > 3.0 * orbit.lyapunov_error.unwrap(), "{e}");
+    }
+}
+
+#[test]
+fn a_departure_from_an_unstable_cycle_is_not_chaos() {
+    // Start on the symmetric orbit, which is unstable here: nearby motions separate for
+    // hundreds of periods before the unsymmetric orbit is reached.
+    let below = orbit(&GearPair::paper(0.541));
+    let pair = GearPair::paper(0.545);
+    let symmetric = below.strobe;
+    let orbit = analyse(&pair, symmetric, &Settings { transient_periods: 1, ..Settings::default() });
+    assert_eq!(orbit.class, Class::Periodic { period: 1 });
+    assert_eq!(orbit.symmetric, Some(false));
+}
+
+#[test]
+fn undamped_motion_is_undecided_and_says_so() {
+    let pair = GearPair { r1: 0.0, r2: 0.0, force: 1e-3, ..cell(0.5, 11.0) };
+    let orbit = analyse(&pair, REST, &Settings { transient_periods: 10, ..Settings::default() });
+    assert_eq!((orbit.class, orbit.status), (Class::Undecided, Status::Slow));
+}
+
+#[test]
+fn what_cannot_be_finished_is_failed_by_name() {
+    let pair = GearPair { b: 1e-9, ..cell(1.0, 5.6) };
+    let orbit = orbit(&pair);
+    assert_eq!((orbit.class, orbit.status), (Class::Failed, Status::CapEvents));
+    assert!(orbit.events.is_empty());
+}
+
+#[test]
+fn no_force_means_no_motion() {
+    let orbit = orbit(&GearPair { force: 0.0, ..cell(0.5, 5.6) });
+    assert_eq!(orbit.class, Class::Periodic { period: 1 });
+    assert_eq!(orbit.strobe, REST);
+    assert!(orbit.word.is_empty());
+    assert!((orbit.lyapunov + 0.15).abs() < 1e-9, "{}", orbit.lyapunov);
+}
