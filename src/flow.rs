@@ -39,6 +39,7 @@
 
 mod columns;
 mod energy;
+mod generator;
 mod linear;
 
 use nalgebra::{Matrix2, Matrix4};

@@ -3,7 +3,7 @@
 
 use wide::f64x4;
 
-use super::linear::Generator;
+use super::generator::Generator;
 use super::{Gap, Phasor};
 
 /// Seven columns of `(z, w, x, v)`, one wide register each, and the phasor's rotation.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::columns::Columns;
-use super::linear::Generator;
+use super::generator::Generator;
 use super::{Gap, Phasor, displacement_matrix};
 use crate::model::{Domain, Oscillator};
 

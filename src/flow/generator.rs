@@ -1,0 +1,45 @@
+//! The linear system `a' = G a` of a domain, from its equations of motion.
+
+use nalgebra::{Matrix2, SMatrix, Vector2};
+
+use super::displacement_matrix;
+use crate::model::{Domain, Oscillator};
+
+/// Generator and propagators of `a = (z, w, x, v, cos, sin, 1)`.
+pub(super) type Generator = SMatrix<f64, 7, 7>;
+
+/// `a' = G a`, from the equations of motion in the coordinates `(z, x2)`.
+pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
+    let d = displacement_matrix(oscillator);
+    let d_inverse = d.try_inverse().expect("the first entry of the gap row is not zero");
+    let by_mass = Matrix2::from_diagonal(&Vector2::from(oscillator.masses).map(f64::recip));
+    let matrix =
+        |m: [[f64; 2]; 2]| d * by_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * d_inverse;
+    let (damping, stiffness) = (matrix(domain.damping), matrix(domain.stiffness));
+    let force = d * by_mass * Vector2::from(oscillator.force);
+    let load = d * by_mass * Vector2::from(domain.load);
+    let mut g = Generator::zeros();
+    for i in 0..2 {
+        g[(2 * i, 2 * i + 1)] = 1.0;
+        for j in 0..2 {
+            g[(2 * i + 1, 2 * j)] = -stiffness[(i, j)];
+            g[(2 * i + 1, 2 * j + 1)] = -damping[(i, j)];
+        }
+        g[(2 * i + 1, 4)] = force[i];
+        g[(2 * i + 1, 6)] = load[i];
+    }
+    g[(4, 5)] = -oscillator.omega;
+    g[(5, 4)] = oscillator.omega;
+    g
+}
+
+/// A bound on all rates of the domain: forcing, and the norm of the mass-scaled system.
+pub(super) fn rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
+    let root = Vector2::from(oscillator.masses).map(|m| m.sqrt().recip());
+    let norm = |m: [[f64; 2]; 2]| {
+        let scaled =
+            Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]).component_mul(&(root * root.transpose()));
+        scaled.symmetric_eigenvalues().abs().max()
+    };
+    (norm(domain.damping) + norm(domain.stiffness).sqrt()).max(oscillator.omega)
+}
