@@ -98,3 +98,11 @@ fn no_force_means_no_motion() {
     assert!(orbit.word.is_empty());
     assert!((orbit.lyapunov + 0.15).abs() < 1e-9, "{}", orbit.lyapunov);
 }
+
+#[test]
+fn a_strobe_at_the_turning_point_is_no_noise() {
+    // Quasi-static: at phase 0 the gears stand still, and their velocities are rounding.
+    let orbit = orbit(&cell(0.5, 0.001));
+    assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 1 }, Some(true)));
+    assert_eq!(orbit.word.time_order(), "121213454546");
+}

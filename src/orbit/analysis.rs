@@ -155,7 +155,7 @@ impl Analysis<'_> {
         let span = f64::from(length);
         *trajectory = carrier.carrying([]);
         Ok(Window {
-            metric: Metric::of(&strobes),
+            metric: Metric::of(&strobes, self.flow),
             strobes,
             lyapunov,
             lyapunov_error,

@@ -1,5 +1,6 @@
 //! Recurrence of strobe states: which periods are worth a closer look.
 
+use crate::flow::Flow;
 use crate::model::State;
 
 /// Recurrences farther apart than this, relative to the motion's size, are no candidates.
@@ -14,12 +15,15 @@ pub(super) struct Metric {
 }
 
 impl Metric {
-    /// The metric of a set of strobe states: the largest entries of each kind.
-    pub(super) fn of(strobes: &[State]) -> Metric {
-        let largest = |a: usize, b: usize| {
-            strobes.iter().flat_map(|y| [y[a].abs(), y[b].abs()]).fold(f64::MIN_POSITIVE, f64::max)
-        };
-        Metric { position: largest(0, 2), velocity: largest(1, 3) }
+    /// The metric of a set of strobe states: the largest entries of each kind, but never
+    /// less than the walls' distance from the middle and what that is as a velocity. Where
+    /// the strobe catches the motion at its turning point, velocities are all rounding.
+    pub(super) fn of(strobes: &[State], flow: &Flow) -> Metric {
+        let largest =
+            |a: usize, b: usize| strobes.iter().flat_map(|y| [y[a].abs(), y[b].abs()]).fold(0.0, f64::max);
+        let reach = 0.5 * (flow.walls[0] - flow.walls[1]);
+        let position = largest(0, 2).max(reach);
+        Metric { position, velocity: largest(1, 3).max(flow.omega * position) }
     }
 
     /// The distance of two states.
@@ -84,7 +88,7 @@ mod tests {
                 [1.0 + r * phi.cos(), r * phi.sin(), 0.5, 0.5]
             })
             .collect();
-        let metric = Metric::of(&strobes);
+        let metric = Metric { position: 1.0, velocity: 1.0 };
         let found = candidates(&strobes, &metric, 8);
         assert!(found.iter().any(|c| c.period == 1), "{found:?}");
     }
@@ -92,7 +96,7 @@ mod tests {
     #[test]
     fn a_three_cycle_is_found_at_lag_three_alone() {
         let strobes: Vec<State> = (0..60).map(|n| [f64::from(n % 3), 0.0, 0.0, 1.0]).collect();
-        let found = candidates(&strobes, &Metric::of(&strobes), 16);
+        let found = candidates(&strobes, &Metric { position: 2.0, velocity: 1.0 }, 16);
         assert_eq!(found, [Candidate { period: 3, distance: 0.0 }]);
     }
 }
