@@ -44,7 +44,7 @@ pub(crate) struct Orbit {
 
     /// Forcing periods to observe, 2 or more; cycles of up to half as many are found (at most 64)
     #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
-          value_parser = clap::value_parser!(u32).range(2..=1_000_000_000))]
+          value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     pub(crate) periods: u32,
 
     /// Forcing periods to let pass first, 1 or more
@@ -79,7 +79,8 @@ impl Orbit {
 /// Every contact and end of meshing against one parameter, as in the paper's Fig. 5
 ///
 /// Integrates each value of the scene's one axis on the event-driven reference and writes
-/// bifurcation.csv (one row per event), bifurcation.png and manifest.json.
+/// bifurcation.csv (one row per event), bifurcation.png and manifest.json. Each value is
+/// integrated until it is decided; steps_per_period, early_stop and quantities are for maps.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
     rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200")]

@@ -42,7 +42,7 @@ mod energy;
 mod generator;
 mod linear;
 
-use nalgebra::{Matrix2, Matrix4};
+use nalgebra::Matrix2;
 
 pub(crate) use columns::add;
 pub use linear::LinearFlow;
@@ -76,6 +76,8 @@ pub struct Flow {
     pub omega: f64,
     /// Positions of the right and the left wall.
     pub walls: [f64; 2],
+    /// Half the walls' distance times the rate of free motion: what speeds are measured by.
+    pub(crate) speed: f64,
     /// Change of `v` per unit of approach speed removed by the contact impulse.
     pub(crate) kick: f64,
     gap: [f64; 2],
@@ -93,15 +95,17 @@ impl Flow {
         let [m1, m2] = oscillator.masses;
         let compliance = g0 * g0 / m1 + g1 * g1 / m2;
         let linear = |domain| LinearFlow::new(oscillator, domain);
+        let free = linear(&oscillator.free);
         Flow {
             period: oscillator.period(),
             omega: oscillator.omega,
             walls: oscillator.walls,
+            speed: 0.5 * (oscillator.walls[0] - oscillator.walls[1]) * free.rate,
             kick: -(g1 / m2) / compliance,
             gap: oscillator.gap,
             masses: oscillator.masses,
             symmetric: oscillator.mirror_symmetric(),
-            free: linear(&oscillator.free),
+            free,
             meshing: [linear(&oscillator.meshing[0]), linear(&oscillator.meshing[1])],
         }
     }
@@ -140,17 +144,6 @@ impl Flow {
     pub fn to_state(&self, q: Gap) -> State {
         let [g0, g1] = self.gap;
         [(q[0] - g1 * q[2]) / g0, (q[1] - g1 * q[3]) / g0, q[2], q[3]]
-    }
-
-    /// The matrix of [`to_gap`](Self::to_gap).
-    pub fn gap_matrix(&self) -> Matrix4<f64> {
-        let [g0, g1] = self.gap;
-        Matrix4::new(
-            g0, 0.0, g1, 0.0, //
-            0.0, g0, 0.0, g1, //
-            0.0, 0.0, 1.0, 0.0, //
-            0.0, 0.0, 0.0, 1.0,
-        )
     }
 
     /// Kinetic energy of a state.

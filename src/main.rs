@@ -32,9 +32,7 @@ fn run_orbit(ask: &cli::Orbit) -> Result<(), Failure> {
     output::orbit::print(&pair, &orbit, ask.json)?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
-        let periods = if failed { 0 } else { orbit.cycle_periods };
-        let trace = orbit::trace(&pair, orbit.strobe, periods, output::orbit::samples_per_period(&pair));
-        output::orbit::write(&folder, &pair, &orbit, &trace)?;
+        output::orbit::write(&folder, &pair, &orbit)?;
     }
     fail_if(failed, "the integration failed; `status` says why")
 }

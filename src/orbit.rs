@@ -120,6 +120,8 @@ pub struct Orbit {
     pub mesh_fraction: f64,
     /// State at the phase 0 that precedes the first of `events`.
     pub strobe: State,
+    /// The wall the teeth mesh on at that instant, if they do.
+    pub strobe_meshing: Option<Side>,
     /// The events of one cycle, or of the last periods looked at, in order of time.
     pub events: Vec<Event>,
     /// Forcing periods that `events` and `word` span.

@@ -31,6 +31,9 @@ pub const EVENTS_PER_PERIOD_CAP: u64 = 1_000_000;
 /// Steps allowed in one forcing period, halved ones included.
 pub const STEPS_PER_PERIOD_CAP: u64 = 200_000_000;
 
+/// Steps between looks at the tangents' size: a step changes it by less than `e^13`.
+const RESCALE_STEPS: u64 = 16;
+
 /// States beyond this are taken for a loss of finiteness.
 const HUGE: f64 = 1e150;
 
@@ -43,6 +46,9 @@ pub enum Stop {
     /// A root that does not converge, or more than [`STEPS_PER_PERIOD_CAP`] steps in one period.
     #[error("more than {STEPS_PER_PERIOD_CAP} steps in one forcing period, or a root that does not converge")]
     CapRoot,
+    /// More steps in all than the caller allows one cell.
+    #[error("too stiff: more steps than one cell is allowed")]
+    TooStiff,
     /// The state is not finite any more.
     #[error("the state is not finite any more")]
     NonFinite,
@@ -152,6 +158,8 @@ pub struct Trajectory<'f, const N: usize = 0> {
     period: u64,
     level: [usize; 2],
     tangents: [Gap; N],
+    /// Logarithm of the factor that was taken out of the tangents to keep them in range.
+    log_scale: f64,
     events_in_period: u64,
     steps_in_period: u64,
     meshing_time: f64,
@@ -165,6 +173,19 @@ impl<'f> Trajectory<'f, 0> {
     /// A start beyond a wall is meshing on it; on a wall and closing it is a contact.
     pub fn new(flow: &'f Flow, law: Law, y: State) -> Self {
         Self::with_tangents(flow, law, y, [])
+    }
+
+    /// The same where the teeth are known to mesh, or not: a gap just short of a wall may be
+    /// in the dip at the start of meshing.
+    pub fn meshing_from(flow: &'f Flow, law: Law, y: State, meshing: Option<Side>) -> Self {
+        let mut trajectory = Self::new(flow, law, y);
+        if let (Mode::Free, Some(side)) = (trajectory.mode, meshing) {
+            trajectory.mode = Mode::Dip(side);
+            trajectory.origin = Some(side);
+            trajectory.from_wall = None;
+            trajectory.pending = None;
+        }
+        trajectory
     }
 }
 
@@ -187,6 +208,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             period: 0,
             level: levels,
             tangents: tangents.map(|u| flow.to_gap(u)),
+            log_scale: 0.0,
             events_in_period: 0,
             steps_in_period: 0,
             meshing_time: 0.0,
@@ -213,6 +235,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             period: self.period,
             level: self.level,
             tangents: tangents.map(|u| self.flow.to_gap(u)),
+            log_scale: 0.0,
             events_in_period: self.events_in_period,
             steps_in_period: self.steps_in_period,
             meshing_time: self.meshing_time,
@@ -245,13 +268,21 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.flow.to_state(self.q)
     }
 
-    /// The tangent vectors, in the coordinates of [`State`].
+    /// The tangent vectors, in the coordinates of [`State`], to be multiplied by the
+    /// exponential of [`log_scale`](Self::log_scale).
     pub fn tangents(&self) -> [State; N] {
         self.tangents.map(|u| self.flow.to_state(u))
     }
 
-    /// Replaces the tangent vectors, to keep them within range.
+    /// Logarithm of a common factor of all tangent vectors: over a long period they leave the
+    /// range of f64, so it is taken out on the way.
+    pub fn log_scale(&self) -> f64 {
+        self.log_scale
+    }
+
+    /// Replaces the tangent vectors.
     pub fn set_tangents(&mut self, tangents: [State; N]) {
+        self.log_scale = 0.0;
         self.tangents = tangents.map(|u| self.flow.to_gap(u));
     }
 
@@ -395,6 +426,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.t += step.h;
             if N > 0 {
                 self.tangents = self.tangents.map(|u| step.propagator.apply_tangent(&u));
+                if self.steps_in_period % RESCALE_STEPS == 0 {
+                    self.rescale_tangents();
+                }
             }
             self.count_meshing(step.h);
         } else {

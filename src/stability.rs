@@ -13,6 +13,7 @@ mod newton;
 pub use exponent::Exponent;
 pub use newton::{pitchfork, refine};
 
+use nalgebra::linalg::Schur;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::model::State;
@@ -36,10 +37,19 @@ pub enum StrobeMap {
 pub struct Image {
     /// The image.
     pub state: State,
-    /// The derivative.
-    pub derivative: Matrix4<f64>,
+    /// The derivative, but for the factor `exp(log_scale)`.
+    pub scaled: Matrix4<f64>,
+    /// Logarithm of the factor: over a long cycle derivatives leave the range of f64.
+    pub log_scale: f64,
     /// Whether an event on the way was too near to grazing for the derivative to mean much.
     pub near_grazing: bool,
+}
+
+impl Image {
+    /// The derivative of the map, zero or infinite where f64 cannot hold it.
+    pub fn derivative(&self) -> Matrix4<f64> {
+        self.scaled * self.log_scale.exp()
+    }
 }
 
 impl StrobeMap {
@@ -48,7 +58,7 @@ impl StrobeMap {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn apply(self, seed: &Trajectory<'_>, y: State) -> Result<Image, Stop> {
-        let mut image = Image { state: y, derivative: Matrix4::identity(), near_grazing: false };
+        let mut image = Image { state: y, scaled: Matrix4::identity(), log_scale: 0.0, near_grazing: false };
         match self {
             StrobeMap::Periods(p) => {
                 let mut trajectory = seed.at(y, UNIT);
@@ -62,9 +72,12 @@ impl StrobeMap {
                     let mut half = seed.at(image.state, UNIT);
                     half.advance_to(0.5 * seed.flow().period, &mut ())?;
                     let step = read(&half, -1.0);
+                    let (scaled, log_scale) =
+                        unit_size(step.scaled * image.scaled, step.log_scale + image.log_scale);
                     image = Image {
                         state: step.state,
-                        derivative: step.derivative * image.derivative,
+                        scaled,
+                        log_scale,
                         near_grazing: image.near_grazing || step.near_grazing,
                     };
                 }
@@ -73,11 +86,12 @@ impl StrobeMap {
         Ok(image)
     }
 
-    /// The monodromy matrix over the whole cycle, from the derivative of this map.
-    fn monodromy(self, derivative: &Matrix4<f64>) -> Matrix4<f64> {
+    /// The monodromy matrix over the whole cycle and the logarithm of its factor, from the
+    /// derivative of this map.
+    fn monodromy(self, image: &Image) -> (Matrix4<f64>, f64) {
         match self {
-            StrobeMap::Periods(_) => *derivative,
-            StrobeMap::MirroredHalves(_) => derivative * derivative,
+            StrobeMap::Periods(_) => (image.scaled, image.log_scale),
+            StrobeMap::MirroredHalves(_) => unit_size(image.scaled * image.scaled, 2.0 * image.log_scale),
         }
     }
 
@@ -89,11 +103,20 @@ impl StrobeMap {
     }
 }
 
+/// Takes the size of a matrix out of it, so that products and eigenvalues, which square its
+/// entries, stay in range.
+fn unit_size(matrix: Matrix4<f64>, log_scale: f64) -> (Matrix4<f64>, f64) {
+    let size = matrix.amax();
+    if size > 0.0 && size.is_finite() { (matrix / size, log_scale + size.ln()) } else { (matrix, log_scale) }
+}
+
 fn read(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
     let columns = trajectory.tangents().map(|u| sign * Vector4::from(u));
+    let (scaled, log_scale) = unit_size(Matrix4::from_columns(&columns), trajectory.log_scale());
     Image {
         state: trajectory.state().map(|value| sign * value),
-        derivative: Matrix4::from_columns(&columns),
+        scaled,
+        log_scale,
         near_grazing: trajectory.near_grazing(),
     }
 }
@@ -111,6 +134,9 @@ pub struct Cycle {
     pub monodromy: Matrix4<f64>,
     /// Floquet multipliers `[re, im]`, largest modulus first.
     pub multipliers: Vec<[f64; 2]>,
+    /// `ln |mu1|`, also where `mu1` itself is below the range of f64; minus infinity where
+    /// the orbit is superstable.
+    pub log_radius: f64,
     /// Whether an event on it is too near to grazing for these to mean much.
     pub near_grazing: bool,
 }
@@ -118,12 +144,12 @@ pub struct Cycle {
 impl Cycle {
     /// Modulus of the largest multiplier: below 1 the orbit attracts.
     pub fn spectral_radius(&self) -> f64 {
-        self.multipliers.first().map_or(0.0, |m| modulus(*m))
+        self.log_radius.exp()
     }
 
     /// `ln |mu1| / (p T)`, the largest Lyapunov exponent.
     pub fn exponent(&self, forcing_period: f64) -> f64 {
-        self.spectral_radius().ln() / (f64::from(self.period) * forcing_period)
+        self.log_radius / (f64::from(self.period) * forcing_period)
     }
 }
 
@@ -131,10 +157,17 @@ fn modulus([re, im]: [f64; 2]) -> f64 {
     re.hypot(im)
 }
 
+/// Sweeps of the QR iteration allowed.
+const EIGEN_CAP: usize = 1000;
+
 /// Eigenvalues `[re, im]`, largest modulus first, a conjugate pair with positive imaginary
-/// part first.
-pub fn multipliers(monodromy: &Matrix4<f64>) -> Vec<[f64; 2]> {
-    let mut list: Vec<[f64; 2]> = monodromy.complex_eigenvalues().iter().map(|m| [m.re, m.im]).collect();
+/// part first; none if the matrix is not finite or the iteration does not converge.
+pub fn multipliers(monodromy: &Matrix4<f64>) -> Option<Vec<[f64; 2]>> {
+    if !monodromy.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let schur = Schur::try_new(*monodromy, f64::EPSILON, EIGEN_CAP)?;
+    let mut list: Vec<[f64; 2]> = schur.complex_eigenvalues().iter().map(|m| [m.re, m.im]).collect();
     list.sort_by(|a, b| modulus(*b).total_cmp(&modulus(*a)).then(b[1].total_cmp(&a[1])));
-    list
+    Some(list)
 }

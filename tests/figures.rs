@@ -43,6 +43,7 @@ fn orbit(events: Vec<Event>) -> Orbit {
         impacts_per_period: 1.0,
         mesh_fraction: 0.1,
         strobe: state(0.0),
+        strobe_meshing: None,
         events,
         cycle_periods: 1,
         forcing_period: PERIOD,

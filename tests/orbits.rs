@@ -106,3 +106,20 @@ fn a_strobe_at_the_turning_point_is_no_noise() {
     assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 1 }, Some(true)));
     assert_eq!(orbit.word.time_order(), "121213454546");
 }
+
+#[test]
+fn neutral_motion_is_not_chaos() {
+    // Unsupported and undamped gears: nearby motions separate in proportion to time.
+    let pair = GearPair { k1: 0.0, k2: 0.0, r1: 0.0, r2: 0.0, ..cell(0.605, 5.6) };
+    assert_ne!(orbit(&pair).class, Class::Chaotic);
+}
+
+#[test]
+fn exponents_survive_periods_in_which_tangents_leave_the_range_of_f64() {
+    // Without contact the largest is that of the slower support, -0.15, however long the period.
+    for omega in [1.0, 0.01, 0.001] {
+        let orbit = orbit(&GearPair { b: 1e6, ..cell(0.5, omega) });
+        assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{omega}");
+        assert!((orbit.lyapunov + 0.15).abs() < 1e-9, "{omega}: {}", orbit.lyapunov);
+    }
+}

@@ -5,6 +5,7 @@ mod common;
 
 use common::{REST, flow_of, negated, paper, sign, strobe, work_since};
 use rattlemap::model::{GearPair, Side, State};
+use rattlemap::orbit::{Class, Settings, Status, analyse};
 use rattlemap::reference::{EVENTS_PER_PERIOD_CAP, Happening, Stop, Trajectory, Work};
 
 /// Steps a period may take, besides those for its events: several per radian of the fastest
@@ -270,5 +271,37 @@ fn a_million_periods_do_not_drift() {
         let drift = early.iter().zip(&late).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         println!("e = {e}, omega = {omega}: drift {drift:.1e} in {:.1?}", clock.elapsed());
         assert!(drift < 1e-12, "e = {e}, omega = {omega}: {early:?} became {late:?}");
+    }
+}
+
+#[test]
+fn every_extreme_is_analysed() {
+    let settings = Settings { transient_periods: 20, observed_periods: 32, max_period: 16 };
+    for (what, pair) in extremes() {
+        let orbit = analyse(&pair, REST, &settings);
+        let failed = orbit.class == Class::Failed;
+        assert_eq!(orbit.status.code() >= Status::CapEvents.code(), failed, "{what}: {:?}", orbit.status);
+        // A superstable cycle has minus infinity; nothing else is without an exponent.
+        let superstable = orbit.lyapunov == f64::NEG_INFINITY && orbit.class == Class::Periodic { period: 1 };
+        assert!(failed || orbit.lyapunov.is_finite() || superstable, "{what}: {orbit:?}");
+        assert!(failed || orbit.strobe.iter().all(|x| x.is_finite()), "{what}");
+    }
+}
+
+#[test]
+fn answers_do_not_depend_on_the_unit_of_length() {
+    for e in [0.06, 0.605, 0.7] {
+        let plain = analyse(&paper(e, 5.6), REST, &Settings::default());
+        for scale in [1e-100, 1e-17, 1e9] {
+            let p = paper(e, 5.6);
+            let pair =
+                GearPair { force: scale * p.force, b: scale * p.b, mesh_speed: scale * p.mesh_speed, ..p };
+            let scaled = analyse(&pair, REST, &Settings::default());
+            assert_eq!((scaled.class, scaled.status), (plain.class, plain.status), "{e} {scale:e}");
+            if plain.class != Class::Chaotic {
+                assert_eq!(scaled.word, plain.word, "{e} {scale:e}");
+                assert!((scaled.lyapunov - plain.lyapunov).abs() < 1e-9, "{e} {scale:e}");
+            }
+        }
     }
 }

@@ -7,6 +7,9 @@ use super::generator::Generator;
 use super::{Gap, Phasor, displacement_matrix};
 use crate::model::{Domain, Oscillator};
 
+/// Energies below this are not told from zero by squaring.
+const TINY: f64 = 1e-280;
+
 /// Bounds `|z^(n+1)|` over a step by the energy of `y^(n)` at its left end, scaled so that
 /// it is the remainder of a two-point Hermite quintic in Bernstein form.
 ///
@@ -52,7 +55,13 @@ impl EnergyBound {
     pub(crate) fn remainder(&self, q: &Gap, phasor: &Phasor, u: f64) -> f64 {
         let sum = self.columns.apply(q, phasor);
         let energy = (sum[0] * sum[0] + sum[1] * sum[1]) + (sum[2] * sum[2] + sum[3] * sum[3]);
-        energy.sqrt() + self.growth * u
+        // Squares of states this small underflow.
+        let root = if energy < TINY {
+            2.0 * sum.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
+        } else {
+            energy.sqrt()
+        };
+        root + self.growth * u
     }
 }
 

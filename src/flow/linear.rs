@@ -68,7 +68,8 @@ pub(crate) struct Step {
 pub struct LinearFlow {
     generator: Generator,
     omega: f64,
-    rate: f64,
+    /// A bound on all rates of the domain.
+    pub(crate) rate: f64,
     /// The Taylor step: the unit of time of the series below.
     pub(crate) unit: f64,
     /// Propagators, coarsest first, each half as long as the one before.

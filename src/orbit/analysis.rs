@@ -1,7 +1,7 @@
 //! Deciding what a cell's motion is.
 
 use super::reading::Reading;
-use super::recurrence::{Candidate, Metric, candidates, lingers};
+use super::recurrence::{Candidate, Metric, candidates};
 use super::{Class, Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{GearPair, Law, State};
@@ -31,15 +31,27 @@ const ON_CYCLE: f64 = 1e-8;
 /// Share of its distance by which a trajectory must have come closer to be seen to approach.
 const APPROACH: f64 = 0.7;
 
+/// A trajectory farther from a cycle than this, relative to the motion, is elsewhere.
+const WITHIN_REACH: f64 = 0.3;
+
+/// Looks at an approach on the way; at each the trajectory must have come nearer.
+const APPROACH_LOOKS: u32 = 4;
+
+/// Steps that one cell may take before it ends as too stiff: about a minute.
+const STEPS_CAP: u64 = 1_000_000_000;
+
+/// An undecided motion that has taken this many steps is not observed for longer.
+const EXTENSION_STEPS: u64 = 100_000_000;
+
 /// Most cycles that an approach is watched for.
 const APPROACH_CYCLES: f64 = 4000.0;
 
 /// Integrates one cell from `start` at phase 0 and reads its orbit.
 ///
 /// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is
-/// confirmed, `chaotic` if it does not linger at any cycle and the exponent exceeds zero by
-/// three standard errors. Where neither holds after the observed periods, windows of twice
-/// the length follow, up to 32,768 periods, before it is called undecided.
+/// confirmed, `chaotic` if the exponent exceeds zero by three standard errors and nearby
+/// motions have separated by `e^40` or more. Where neither holds after the observed periods,
+/// windows of twice the length follow, up to 32,768 periods, before it is called undecided.
 pub fn analyse(pair: &GearPair, start: State, settings: &Settings) -> Orbit {
     analyse_over(pair, start, settings, SHOWN_PERIODS)
 }
@@ -58,6 +70,7 @@ fn status_of(stop: Stop) -> Status {
     match stop {
         Stop::CapEvents => Status::CapEvents,
         Stop::CapRoot => Status::CapRoot,
+        Stop::TooStiff => Status::TooStiff,
         Stop::NonFinite => Status::NonFinite,
     }
 }
@@ -74,6 +87,7 @@ fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
         impacts_per_period: f64::NAN,
         mesh_fraction: f64::NAN,
         strobe,
+        strobe_meshing: None,
         events: Vec::new(),
         cycle_periods: 0,
         forcing_period,
@@ -101,7 +115,7 @@ impl Analysis<'_> {
     fn run(&self, start: State) -> Result<Orbit, Stop> {
         let mut trajectory = Trajectory::new(self.flow, self.law, start);
         for _ in 0..self.settings.transient_periods {
-            trajectory.advance_period(&mut ())?;
+            self.advance(&mut trajectory)?;
         }
         let mut length = self.settings.observed_periods.max(2);
         let last = length.max(LONGEST_WINDOW);
@@ -117,22 +131,27 @@ impl Analysis<'_> {
                 return self.aperiodic(trajectory, &window, Class::Chaotic, Status::Ok);
             }
             // Neither yet: a slow approach, a slow departure, or an average too short.
-            if length >= last {
+            if length >= last || trajectory.work().steps > EXTENSION_STEPS {
                 return self.aperiodic(trajectory, &window, Class::Undecided, Status::Slow);
             }
             length = length.saturating_mul(2).min(last);
         }
     }
 
-    /// Whether nearby motions separate for good, and not merely while the motion leaves an
-    /// unstable cycle. Banded chaos keeps close to a cycle for ever; then the growth over
-    /// the time it was watched tells, which no departure could have lasted through.
+    /// Whether nearby motions separate for good: by more than a departure from an unstable
+    /// cycle could last through, and by far more than the growth in proportion to time that
+    /// neutral motion shows.
     fn is_chaotic(&self, window: &Window) -> bool {
         let surely = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;
-        let watched = 0.5 * window.strobes.len() as f64 * self.flow.period;
-        surely > 0.0
-            && (surely * watched > DEPARTURE
-                || !lingers(&window.strobes, &window.metric, self.settings.max_period))
+        surely * window.strobes.len() as f64 * self.flow.period > DEPARTURE
+    }
+
+    /// One forcing period, within the cell's cap.
+    fn advance<const N: usize>(&self, trajectory: &mut Trajectory<'_, N>) -> Result<(), Stop> {
+        if trajectory.work().steps > STEPS_CAP {
+            return Err(Stop::TooStiff);
+        }
+        trajectory.advance_period(&mut ())
     }
 
     /// Watches strobe states, the exponent and the averages for `length` periods.
@@ -140,15 +159,15 @@ impl Analysis<'_> {
         let mut carrier = trajectory.carrying([[0.5; 4]]);
         let mut exponent = Exponent::default();
         for _ in 0..TANGENT_PERIODS.min(length) {
-            carrier.advance_period(&mut ())?;
-            carrier.set_tangents(carrier.tangents().map(|u| exponent.renormalise(u)));
+            self.advance(&mut carrier)?;
+            exponent.renormalise(&mut carrier);
         }
         exponent.forget();
         let (mesh_start, impacts_start) = (carrier.meshing_time(), carrier.work().impacts);
         let mut strobes = vec![carrier.state()];
         for _ in 0..length {
-            carrier.advance_period(&mut ())?;
-            carrier.set_tangents(carrier.tangents().map(|u| exponent.renormalise(u)));
+            self.advance(&mut carrier)?;
+            exponent.renormalise(&mut carrier);
             strobes.push(carrier.state());
         }
         let (lyapunov, lyapunov_error) = exponent.estimate(self.flow.period);
@@ -201,8 +220,10 @@ impl Analysis<'_> {
         for period in divisors {
             for map in self.maps(period) {
                 let image = map.apply(seed, cycle.state).ok()?;
-                if metric.distance(&image.state, &cycle.state) < ON_CYCLE {
-                    return refine(&seed.at(cycle.state, []), map);
+                if metric.distance(&image.state, &cycle.state) < ON_CYCLE
+                    && let Some(shorter) = refine(&seed.at(cycle.state, []), map)
+                {
+                    return Some(shorter);
                 }
             }
         }
@@ -220,17 +241,24 @@ impl Analysis<'_> {
         if before < ON_CYCLE {
             return Ok(Some(before));
         }
-        if before > 1.0 {
+        if before > WITHIN_REACH {
             return Ok(None);
         }
         // Long enough for the slowest direction to shrink to half.
         let cycles = (0.5f64.ln() / cycle.spectral_radius().max(0.1).ln()).ceil().min(APPROACH_CYCLES);
         let mut ahead = trajectory.clone();
-        for _ in 0..cycle.period * cycles.max(2.0) as u32 {
-            ahead.advance_period(&mut ())?;
+        let mut last = before;
+        for _ in 0..APPROACH_LOOKS {
+            for _ in 0..cycle.period * (cycles / f64::from(APPROACH_LOOKS)).ceil() as u32 {
+                self.advance(&mut ahead)?;
+            }
+            let now = metric.distance(&ahead.state(), &cycle.state);
+            if now >= last && now > ON_CYCLE {
+                return Ok(None);
+            }
+            last = now;
         }
-        let after = metric.distance(&ahead.state(), &cycle.state);
-        Ok((after < ON_CYCLE || after < APPROACH * before).then_some(after))
+        Ok((last < ON_CYCLE || last < APPROACH * before).then_some(last))
     }
 
     fn periodic(&self, seed: &Trajectory<'_>, cycle: &Cycle, distance: f64) -> Result<Orbit, Stop> {
@@ -260,6 +288,7 @@ impl Analysis<'_> {
             impacts_per_period: reading.impacts_per_period,
             mesh_fraction: reading.mesh_fraction,
             strobe: cycle.state,
+            strobe_meshing: reading.strobe_meshing,
             events: reading.events,
             cycle_periods: cycle.period,
             forcing_period: self.flow.period,
@@ -276,7 +305,7 @@ impl Analysis<'_> {
         let reading = Reading::take(self.flow, &mut trajectory, self.shown_periods)?;
         Ok(Orbit {
             class,
-            status: if reading.on_strobe { Status::StrobeOnEvent } else { status },
+            status: if status == Status::Ok && reading.on_strobe { Status::StrobeOnEvent } else { status },
             lyapunov: window.lyapunov,
             lyapunov_error: Some(window.lyapunov_error),
             floquet: None,
@@ -285,6 +314,7 @@ impl Analysis<'_> {
             impacts_per_period: window.impacts_per_period,
             mesh_fraction: window.mesh_fraction,
             strobe: reading.strobe,
+            strobe_meshing: reading.strobe_meshing,
             events: reading.events,
             cycle_periods: self.shown_periods,
             forcing_period: self.flow.period,

@@ -2,7 +2,7 @@
 
 use super::Event;
 use crate::flow::Flow;
-use crate::model::State;
+use crate::model::{Side, State};
 use crate::reference::{EventKind, Happening, Stop, Trajectory};
 use crate::word::Word;
 
@@ -13,6 +13,7 @@ const ON_STROBE_TURNS: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) struct Reading {
     pub(super) strobe: State,
+    pub(super) strobe_meshing: Option<Side>,
     pub(super) events: Vec<Event>,
     pub(super) word: Word,
     pub(super) impacts_per_period: f64,
@@ -31,7 +32,8 @@ impl Reading {
         trajectory: &mut Trajectory<'_, 0>,
         periods: u32,
     ) -> Result<Reading, Stop> {
-        let (strobe, start) = (trajectory.state(), trajectory.period());
+        let (strobe, strobe_meshing) = (trajectory.state(), trajectory.meshing());
+        let start = trajectory.period();
         let (mesh_start, impacts_start) = (trajectory.meshing_time(), trajectory.work().impacts);
         trajectory.clear_near_grazing();
         let mut met: Vec<Happening> = Vec::new();
@@ -42,6 +44,7 @@ impl Reading {
         let span = f64::from(periods);
         Ok(Reading {
             strobe,
+            strobe_meshing,
             word: Word::cyclic(&symbols),
             impacts_per_period: (trajectory.work().impacts - impacts_start) as f64 / span,
             mesh_fraction: (trajectory.meshing_time() - mesh_start) / (span * flow.period),

@@ -2,15 +2,22 @@
 
 use super::Sample;
 use crate::flow::Flow;
-use crate::model::{GearPair, State};
+use crate::model::{GearPair, Side, State};
 use crate::reference::Trajectory;
 
 /// Samples a trajectory from `start` at phase 0 over `periods` forcing periods, evenly, first
-/// and last instant included. Ends early where the trajectory cannot be continued.
-pub fn trace(pair: &GearPair, start: State, periods: u32, samples_per_period: usize) -> Vec<Sample> {
+/// and last instant included. `meshing` says whether the teeth mesh at the start, which a gap
+/// just short of a wall does not tell. Ends early where the trajectory cannot be continued.
+pub fn trace(
+    pair: &GearPair,
+    start: State,
+    meshing: Option<Side>,
+    periods: u32,
+    samples_per_period: usize,
+) -> Vec<Sample> {
     let (Ok(oscillator), true) = (pair.oscillator(), periods > 0) else { return Vec::new() };
     let flow = Flow::new(&oscillator);
-    let mut trajectory = Trajectory::new(&flow, pair.law(), start);
+    let mut trajectory = Trajectory::meshing_from(&flow, pair.law(), start, meshing);
     let mut samples = vec![Sample { t: 0.0, state: start, meshing: trajectory.meshing() }];
     for period in 0..periods {
         for i in 1..=samples_per_period {

@@ -17,6 +17,8 @@ use super::plot_style::{
 use crate::model::{GearPair, Side, State};
 use crate::orbit::{EventKind, Orbit, Sample};
 
+/// The files that [`write`] makes.
+pub(super) const NAMES: [&str; 3] = ["phase_plane.png", "time_history.png", "gap.png"];
 const WIDTH: u32 = 1600;
 /// Panels' distance from the left and right edge of a figure.
 const LEFT: f64 = 130.0;
@@ -47,8 +49,7 @@ pub fn write(dir: &Path, pair: &GearPair, orbit: &Orbit, trace: &[Sample]) -> Re
         title: heading::parameters(pair),
         subtitle: heading::character(orbit),
     };
-    let [phase_plane, time_history, gap] =
-        ["phase_plane.png", "time_history.png", "gap.png"].map(|name| dir.join(name));
+    let [phase_plane, time_history, gap] = NAMES.map(|name| dir.join(name));
     save_figure(&phase_plane, (WIDTH, 980), |canvas| scene.draw_phase_planes(canvas))?;
     save_figure(&time_history, (WIDTH, 1150), |canvas| scene.draw_time_history(canvas))?;
     save_figure(&gap, (WIDTH, 1050), |canvas| scene.draw_gap(canvas))?;

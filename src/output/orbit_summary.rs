@@ -16,6 +16,9 @@ pub(super) fn summary(pair: &GearPair, orbit: &Orbit) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{label:<22}{value}");
     }
+    if orbit.class == Class::Failed {
+        return text;
+    }
     let span = match orbit.cycle_periods {
         1 => "1 forcing period".to_owned(),
         periods => format!("{periods} forcing periods"),
@@ -30,10 +33,15 @@ fn facts(pair: &GearPair, orbit: &Orbit) -> Vec<(&'static str, String)> {
         ("parameters", parameters(pair)),
         ("class", class(orbit)),
         ("status", status(orbit.status).to_owned()),
+    ];
+    if orbit.class == Class::Failed {
+        return facts;
+    }
+    facts.extend([
         ("word, in time", or_dash(orbit.word.time_order())),
         ("word, as printed", or_dash(orbit.word.paper_notation())),
         ("Lyapunov exponent", exponent(orbit)),
-    ];
+    ]);
     if let Some(multipliers) = &orbit.floquet {
         let listed: Vec<String> = multipliers.iter().copied().map(complex).collect();
         facts.push(("Floquet multipliers", listed.join(", ")));
@@ -51,7 +59,7 @@ fn facts(pair: &GearPair, orbit: &Orbit) -> Vec<(&'static str, String)> {
 
 fn parameters(pair: &GearPair) -> String {
     let named = GearPair::PARAMETERS.iter();
-    let listed = named.filter_map(|p| Some(format!("{}={}", p.name, pair.get(p.name).ok()?)));
+    let listed = named.filter_map(|p| Some(format!("{}={:?}", p.name, pair.get(p.name).ok()?)));
     listed.collect::<Vec<_>>().join(" ")
 }
 
@@ -94,7 +102,7 @@ fn or_dash(text: String) -> String {
 }
 
 fn numbers(state: State) -> String {
-    state.map(|x| format!("{x:>10.DECIMALS$}")).concat()
+    state.map(|x| format!(" {x:>9.DECIMALS$}")).concat()
 }
 
 fn events(events: &[Event]) -> String {
@@ -102,14 +110,14 @@ fn events(events: &[Event]) -> String {
         return "none: the walls are not reached\n".to_owned();
     }
     let mut text = format!(
-        "{:<11}{:<6}{:>10}{:>10}  {:<40}  {}\n",
+        "{:<11}{:<6} {:>10} {:>10}  {:<40}  {}\n",
         "kind", "side", "t", "t mod T", " before (x1, v1, x2, v2)", " after (x1, v1, x2, v2)"
     );
     for event in events {
         let side = if event.side == Side::Right { "right" } else { "left" };
         let _ = writeln!(
             text,
-            "{:<11}{side:<6}{:>10.DECIMALS$}{:>10.DECIMALS$}  {}  {}",
+            "{:<11}{side:<6} {:>10.DECIMALS$} {:>10.DECIMALS$}  {}  {}",
             names::kind(event.kind),
             event.t,
             event.t_mod_period,

@@ -8,6 +8,10 @@ use crate::model::Side;
 /// motion, is this short: what the closed form leaves out is of third order in it.
 const CLOSING_DURATION: f64 = 1e-4;
 
+/// A threshold below this, relative to the walls' distance and the rate of free motion, is
+/// none: the series is infinite for all that f64 can tell.
+const NO_THRESHOLD: f64 = 1e-10;
+
 /// Motion with the gap held closed: the wall takes up the relative acceleration.
 struct Sliding {
     /// Relative acceleration that the wall takes up, and its rate of change.
@@ -35,8 +39,8 @@ impl Sliding {
 }
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Closes an infinite series of impacts (`mesh_speed = 0`, `0 < e < 1`): one jump to
-    /// the moment at which the gap rests on the wall and meshing starts.
+    /// Closes an infinite series of impacts (`mesh_speed = 0`, or so small that it makes no
+    /// difference; `0 < e < 1`): one jump to the moment at which the gap rests on the wall and meshing starts.
     ///
     /// With the leaving speed `u`, the pressing acceleration `G`, its rate of change `J`
     /// while the gap stays closed, and the relative damping `gamma`, the series lasts
@@ -44,7 +48,7 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Meanwhile the centre of mass moves as it does with the gap closed.
     pub(super) fn close_chatter(&mut self, side: Side, leaving: f64, observer: &mut impl Observer) {
         let e = self.law.restitution;
-        if self.law.mesh_speed > 0.0 || leaving == 0.0 || e >= 1.0 {
+        if self.law.mesh_speed > NO_THRESHOLD * self.flow.speed || leaving == 0.0 || e >= 1.0 {
             return;
         }
         let (flow, kick) = (self.flow, self.flow.kick);

@@ -4,9 +4,10 @@ use super::{Crossing, EventKind, Happening, Mode, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow};
 use crate::model::Side;
 
-/// Approach speeds below this, with the load pulling away, count as near grazing: the
-/// saltation matrix grows like its inverse.
-pub(super) const GRAZING_SPEED: f64 = 1e-4;
+/// Approach speeds below this, relative to the walls' distance and the rate of free motion
+/// and with the load pulling away, count as near grazing: the saltation matrix grows like
+/// its inverse.
+const GRAZING_SPEED: f64 = 4e-5;
 
 /// The gradient of the gap in gap coordinates.
 const ALONG_GAP: Gap = [1.0, 0.0, 0.0, 0.0];
@@ -75,7 +76,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let meshes = leaving <= self.law.mesh_speed
             && pressed
             && self.presses(DomainKind::Meshing(side), side, &after);
-        if approach < GRAZING_SPEED && !pressed {
+        if approach < GRAZING_SPEED * self.flow.speed && !pressed {
             self.near_grazing = true;
         }
         let (kind, next) = if meshes {

@@ -3,10 +3,23 @@
 use super::Trajectory;
 use crate::flow::Gap;
 
-/// Speeds below this at an event leave the linearisation without meaning.
+/// Speeds below this at an event, relative to the walls' distance and the rate of free
+/// motion, leave the linearisation without meaning.
 const NO_SPEED: f64 = 1e-14;
 
+/// Tangents larger than this or smaller than its inverse are rescaled.
+const LARGE: f64 = 1e100;
+
 impl<const N: usize> Trajectory<'_, N> {
+    /// Takes a common factor out of the tangents where they leave the middle of the range.
+    pub(super) fn rescale_tangents(&mut self) {
+        let size = self.tangents.iter().flatten().fold(0.0f64, |size, x| size.max(x.abs()));
+        if size > 0.0 && size.is_finite() && !(1.0 / LARGE..LARGE).contains(&size) {
+            self.log_scale += size.ln();
+            self.tangents = self.tangents.map(|u| u.map(|x| x / size));
+        }
+    }
+
     /// `S u = R u + (f+ - R f-) (n . u) / (n . f-)` for every tangent vector.
     ///
     /// `reset` is the jump matrix R, `normal` the gradient n of the event function, `rate`
@@ -19,7 +32,8 @@ impl<const N: usize> Trajectory<'_, N> {
         field_before: &Gap,
         field_after: &Gap,
     ) {
-        if rate.abs() < NO_SPEED {
+        self.rescale_tangents();
+        if rate.abs() < NO_SPEED * self.flow.speed {
             self.near_grazing = true;
             self.tangents = self.tangents.map(|u| reset(&u));
             return;

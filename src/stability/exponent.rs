@@ -1,6 +1,6 @@
 //! The largest Lyapunov exponent as an average, with its standard error.
 
-use crate::model::State;
+use crate::reference::Trajectory;
 
 /// Blocks whose means give the standard error.
 const BLOCKS: usize = 16;
@@ -12,17 +12,13 @@ pub struct Exponent {
 }
 
 impl Exponent {
-    /// Takes the vector's growth since the last call and returns it with unit length; null
-    /// vectors, which a superstable orbit leaves, start anew.
-    pub fn renormalise(&mut self, u: State) -> State {
+    /// Takes the growth of a trajectory's tangent vector since the last call and gives it
+    /// unit length again; a null vector, which a superstable orbit leaves, starts anew.
+    pub fn renormalise(&mut self, trajectory: &mut Trajectory<'_, 1>) {
+        let [u] = trajectory.tangents();
         let length = u.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if length.is_nan() || length <= 1e-280 {
-            // Shrunk beyond f64: as large a loss as can be told.
-            self.growth.push(-280.0 * std::f64::consts::LN_10);
-            return [0.5; 4];
-        }
-        self.growth.push(length.ln());
-        u.map(|x| x / length)
+        self.growth.push(length.max(f64::MIN_POSITIVE).ln() + trajectory.log_scale());
+        trajectory.set_tangents([if length > 0.0 { u.map(|x| x / length) } else { [0.5; 4] }]);
     }
 
     /// Forgets what was collected: the vector needs a while to turn to its direction.

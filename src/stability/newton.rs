@@ -17,6 +17,9 @@ const DAMPING_CAP: u32 = 12;
 /// direction along which a family of orbits runs near a saddle-node or pitchfork.
 const SINGULAR_CUTOFF: f64 = 1e-10;
 
+/// Sweeps of the singular value iteration allowed.
+const SVD_CAP: usize = 1000;
+
 /// Residuals below this, relative to the state, are rounding.
 const CONVERGED: f64 = 1e-13;
 
@@ -29,11 +32,11 @@ pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
     let mut image = map.apply(seed, seed.state()).ok()?;
     let mut residual = Vector4::from(image.state) - y;
     for _ in 0..NEWTON_CAP {
-        let size = 1.0f64.max(y.amax());
+        let size = size_of(seed, &y);
         if residual.amax() <= CONVERGED * size {
             break;
         }
-        let step = newton_step(&image.derivative, &residual)?;
+        let step = newton_step(&image.derivative(), &residual)?;
         match damped(seed, map, &y, &residual, &step) {
             Some((next, next_image)) => {
                 residual = Vector4::from(next_image.state) - next;
@@ -43,8 +46,14 @@ pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
             None => break,
         }
     }
-    let size = 1.0f64.max(y.amax());
-    (residual.amax() <= 1e3 * CONVERGED * size).then(|| cycle(map, y.into(), &image))
+    let size = size_of(seed, &y);
+    if residual.amax() <= 1e3 * CONVERGED * size { cycle(map, y.into(), &image) } else { None }
+}
+
+/// What residuals are measured by: the state, or the walls' distance where it is small.
+fn size_of(seed: &Trajectory<'_>, y: &Vector4<f64>) -> f64 {
+    let flow = seed.flow();
+    y.amax().max(0.5 * (flow.walls[0] - flow.walls[1]) * flow.omega.max(1.0))
 }
 
 /// Solves `(P' - I) step = -residual` in the sense of least squares.
@@ -53,7 +62,7 @@ fn newton_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<Vec
     if !matrix.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let svd = matrix.svd(true, true);
+    let svd = matrix.try_svd(true, true, f64::EPSILON, SVD_CAP)?;
     let cutoff = SINGULAR_CUTOFF * svd.singular_values.max();
     svd.solve(&-residual, cutoff).ok()
 }
@@ -78,16 +87,20 @@ fn damped(
     None
 }
 
-fn cycle(map: StrobeMap, state: State, image: &Image) -> Cycle {
-    let monodromy = map.monodromy(&image.derivative);
-    Cycle {
+fn cycle(map: StrobeMap, state: State, image: &Image) -> Option<Cycle> {
+    let (scaled, log_scale) = map.monodromy(image);
+    let scaled_multipliers = multipliers(&scaled)?;
+    let [re, im] = scaled_multipliers[0];
+    let scale = log_scale.exp();
+    Some(Cycle {
         state,
         period: map.cycle_periods(),
         symmetric: matches!(map, StrobeMap::MirroredHalves(_)),
-        multipliers: multipliers(&monodromy),
-        monodromy,
+        multipliers: scaled_multipliers.iter().map(|m| m.map(|x| x * scale)).collect(),
+        log_radius: re.hypot(im).ln() + log_scale,
+        monodromy: scaled * scale,
         near_grazing: image.near_grazing,
-    }
+    })
 }
 
 /// The value of `parameter` in `[lo, hi]` at which the symmetric period-1 orbit of `pair`
@@ -106,7 +119,7 @@ pub fn pitchfork(pair: &GearPair, parameter: &str, lo: f64, hi: f64, guess: Stat
         let cycle = refine(&seed, map)?;
         state = cycle.state;
         let image = map.apply(&seed, state).ok()?;
-        Some((image.derivative + Matrix4::identity()).determinant())
+        Some((image.derivative() + Matrix4::identity()).determinant())
     };
     let (mut a, mut b) = (lo, hi);
     let (mut at_a, mut at_b) = (test(a)?, test(b)?);

@@ -134,6 +134,7 @@ mod tests {
             impacts_per_period: 0.0,
             mesh_fraction: 0.0,
             strobe: [0.0; 4],
+            strobe_meshing: None,
             events,
             cycle_periods: 1,
             forcing_period: 2.0,
