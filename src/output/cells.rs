@@ -18,7 +18,7 @@ pub(super) enum Source {
 /// Every source; its position is its code in tables.
 pub(super) const SOURCES: [Source; 2] = [Source::Integrated, Source::Filled];
 
-/// One row. What the scene does not ask for, and what the cell does not have, is absent.
+/// One row, less the word, which takes an allocation. What the scene does not ask for, and what the cell does not have, is absent.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Row {
     pub(super) indices: [usize; 2],
@@ -30,7 +30,6 @@ pub(super) struct Row {
     pub(super) impacts_per_period: Option<f64>,
     pub(super) mesh_fraction: Option<f64>,
     pub(super) symmetric: Option<bool>,
-    pub(super) word: Option<Spelling>,
     pub(super) status: Status,
     pub(super) periods_run: u32,
     pub(super) source: Source,
@@ -82,7 +81,20 @@ impl<'a> Cells<'a> {
         self.scene.outputs().quantities.contains(&quantity)
     }
 
-    /// The row of the cell `id`.
+    pub(super) fn plan(&self) -> &'a Plan {
+        self.plan
+    }
+
+    pub(super) fn record(&self, id: usize) -> &'a Record {
+        &self.records[id]
+    }
+
+    /// The word of the cell `id`, if it was asked for and there is one.
+    pub(super) fn word(&self, id: usize) -> Option<Spelling> {
+        if self.asks(Quantity::Word) { self.records[id].spelling() } else { None }
+    }
+
+    /// The row of the cell `id`, less its word.
     pub(super) fn row(&self, id: usize) -> Row {
         let record = &self.records[id];
         let indices = self.plan.indices(id as u32);
@@ -108,7 +120,6 @@ impl<'a> Cells<'a> {
             mesh_fraction: asked(Quantity::Mesh, valid::MESH, record.mesh_fraction),
             symmetric: (self.asks(Quantity::Symmetric) && record.valid & valid::SYMMETRIC != 0)
                 .then_some(record.symmetric != 0),
-            word: record.spelling().filter(|_| self.asks(Quantity::Word)),
             status: status(record),
             periods_run: record.periods_run,
             source: if record.periods_run == 0 { Source::Filled } else { Source::Integrated },

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
 use super::names;
+use crate::record::Spelling;
 
 /// Cells whose rows are formatted at a time, all cores together.
 const BLOCK: usize = 1 << 16;
@@ -55,12 +56,12 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
 fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> anyhow::Result<Vec<u8>> {
     let mut table = csv::Writer::from_writer(Vec::with_capacity(160 * ids.len()));
     for id in ids {
-        table.write_record(fields(&cells.row(id)))?;
+        table.write_record(fields(&cells.row(id), cells.word(id)))?;
     }
     Ok(table.into_inner()?)
 }
 
-fn fields(row: &Row) -> [String; 15] {
+fn fields(row: &Row, word: Option<Spelling>) -> [String; 15] {
     let float = |value: Option<f64>| value.map_or(String::new(), |x| format!("{x:?}"));
     [
         row.indices[0].to_string(),
@@ -74,7 +75,7 @@ fn fields(row: &Row) -> [String; 15] {
         float(row.impacts_per_period),
         float(row.mesh_fraction),
         row.symmetric.map_or(String::new(), |symmetric| symmetric.to_string()),
-        row.word.as_ref().map_or(String::new(), |word| word.text()),
+        word.map_or(String::new(), |word| word.text()),
         names::status(row.status).to_owned(),
         row.periods_run.to_string(),
         names::source(row.source).to_owned(),

@@ -9,6 +9,7 @@ use npyz::{DType, Field, TypeStr, TypeWrite, WriterBuilder};
 use super::cells::{Cells, Row};
 use super::cells_csv::FIELDS;
 use super::names;
+use crate::record::Spelling;
 
 /// What stands for an absent class or an absent symmetry.
 pub(super) const ABSENT: i8 = -1;
@@ -41,13 +42,13 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
         .writer(BufWriter::new(File::create(path)?))
         .begin_nd()?;
     for id in 0..count {
-        array.push(&Packed(cells.row(id)))?;
+        array.push(&Packed(cells.row(id), cells.word(id)))?;
     }
     Ok(array.finish()?)
 }
 
 /// A row as bytes in the order of [`TYPES`].
-struct Packed(Row);
+struct Packed(Row, Option<Spelling>);
 
 struct PackedWriter;
 
@@ -63,7 +64,7 @@ impl npyz::Serialize for Packed {
 impl TypeWrite for PackedWriter {
     type Value = Packed;
 
-    fn write_one<W: Write>(&self, mut to: W, Packed(row): &Packed) -> io::Result<()> {
+    fn write_one<W: Write>(&self, mut to: W, Packed(row, word): &Packed) -> io::Result<()> {
         let mut bytes = Vec::with_capacity(WORD_BYTES + 64);
         row.indices.iter().for_each(|&index| bytes.extend((index as u32).to_le_bytes()));
         row.values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
@@ -73,7 +74,7 @@ impl TypeWrite for PackedWriter {
             bytes.extend(value.unwrap_or(f64::NAN).to_le_bytes());
         }
         bytes.extend(row.symmetric.map_or(ABSENT, i8::from).to_le_bytes());
-        let word = row.word.as_ref().map_or(String::new(), |word| word.text());
+        let word = word.as_ref().map_or(String::new(), |word| word.text());
         bytes.extend(word.as_bytes());
         bytes.resize(bytes.len() + WORD_BYTES - word.len(), 0);
         bytes.push(row.status.code() as u8);

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use super::{Cells, Folder, cells_csv, cells_npy, map_manifest};
+use rayon::prelude::*;
+
+use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest};
 use crate::scene::Format;
 
 pub use super::map_manifest::Run;
@@ -40,6 +42,15 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Resul
     if wanted.contains(&Format::Npy) {
         folder.replace(NPY, |path| cells_npy::write(path, cells))?;
         files.push(NPY.to_owned());
+    }
+    let words = layers::read_words(cells);
+    let layers = layers::of(cells, words.as_ref());
+    if wanted.contains(&Format::Png) {
+        let names: Vec<String> = layers.iter().map(|layer| format!("{}.png", layer.name)).collect();
+        layers.par_iter().zip(&names).try_for_each(|(layer, name)| {
+            folder.replace(name, |path| map_figure::write(path, cells, layer))
+        })?;
+        files.extend(names);
     }
     files.push(MANIFEST.to_owned());
     let manifest = map_manifest::map(cells, run, &files)?;

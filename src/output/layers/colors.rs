@@ -1,0 +1,120 @@
+//! Colours: one per period, greys for chaos, ramps for numbers.
+
+/// Red, green and blue.
+pub(in crate::output) type Color = [u8; 3];
+
+const fn hex(rgb: u32) -> Color {
+    [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]
+}
+
+/// Period 1 without any contact, its own mirror image, and one of a pair of mirror images.
+pub(super) const NO_CONTACT: Color = hex(0xeef2f6);
+pub(super) const SYMMETRIC: Color = hex(0xc0d9ee);
+pub(super) const UNSYMMETRIC: Color = hex(0x7fb0da);
+
+/// Periods 2 to 12: Okabe and Ito's colour-blind safe set first, then colours that stand
+/// apart from it and from each other in lightness, too.
+const PERIODS: [Color; 11] = [
+    hex(0xe69f00),
+    hex(0x009e73),
+    hex(0xd55e00),
+    hex(0xf0e442),
+    hex(0x0072b2),
+    hex(0xcc79a7),
+    hex(0x8c510a),
+    hex(0x35d0c0),
+    hex(0x6a3d9a),
+    hex(0xa6d854),
+    hex(0xffb3c8),
+];
+
+/// The least and the largest exponent of chaos.
+pub(super) const CHAOS: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
+/// Meant to catch the eye: they are exceptions.
+pub(super) const UNDECIDED: Color = hex(0xff00d4);
+pub(super) const FAILED: Color = hex(0xff1010);
+/// Cells without a value of a continuous layer.
+pub(super) const NO_VALUE: Color = hex(0x8f8f8f);
+
+/// Viridis in nine steps.
+pub(super) const SEQUENTIAL: [Color; 9] = [
+    hex(0x440154),
+    hex(0x472d7b),
+    hex(0x3b528b),
+    hex(0x2c728e),
+    hex(0x21918c),
+    hex(0x28ae80),
+    hex(0x5ec962),
+    hex(0xaddc30),
+    hex(0xfde725),
+];
+
+/// ColorBrewer's RdBu, blue below zero.
+pub(super) const DIVERGING: [Color; 11] = [
+    hex(0x053061),
+    hex(0x2166ac),
+    hex(0x4393c3),
+    hex(0x92c5de),
+    hex(0xd1e5f0),
+    hex(0xf7f7f7),
+    hex(0xfddbc7),
+    hex(0xf4a582),
+    hex(0xd6604d),
+    hex(0xb2182b),
+    hex(0x67001f),
+];
+
+/// The colour of a period of 2 or more.
+pub(super) fn period(period: u32) -> Color {
+    match PERIODS.get(period as usize - 2) {
+        Some(color) => *color,
+        None => distinct(period as usize),
+    }
+}
+
+/// A colour for the `n`th of many things: hues a golden angle apart, in three lightnesses.
+pub(super) fn distinct(n: usize) -> Color {
+    let hue = (n as f64 * 0.618_033_988_75).fract() * 6.0;
+    let lightness = [0.42, 0.62, 0.78][n % 3];
+    let chroma = 0.6 * (1.0 - (2.0f64 * lightness - 1.0).abs());
+    [0.0, 4.0, 2.0].map(|shift| {
+        let distance = ((hue + shift) % 6.0 - 3.0f64).abs() - 1.0;
+        let value = lightness + chroma * (distance.clamp(0.0, 1.0) - 0.5);
+        (value * 255.0).round() as u8
+    })
+}
+
+/// `count` colours evenly along a chain of anchors.
+pub(super) fn ramp(anchors: &[Color], count: usize) -> Vec<Color> {
+    let at = |i: usize| {
+        let place = i as f64 / (count - 1).max(1) as f64 * (anchors.len() - 1) as f64;
+        let first = (place as usize).min(anchors.len() - 2);
+        let share = place - first as f64;
+        let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
+        let ([a, b, c], [d, e, f]) = (anchors[first], anchors[first + 1]);
+        [mix(a, d), mix(b, e), mix(c, f)]
+    };
+    (0..count).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn periods_have_colours_of_their_own() {
+        let mut colors: Vec<Color> = (2..=64).map(period).collect();
+        colors.extend([NO_CONTACT, SYMMETRIC, UNSYMMETRIC, UNDECIDED, FAILED]);
+        let count = colors.len();
+        colors.sort_unstable();
+        colors.dedup();
+        assert_eq!(colors.len(), count);
+    }
+
+    #[test]
+    fn ramps_begin_and_end_with_their_anchors() {
+        let colors = ramp(&SEQUENTIAL, 255);
+        assert_eq!((colors.len(), colors[0], colors[254]), (255, SEQUENTIAL[0], SEQUENTIAL[8]));
+        assert_eq!(ramp(&DIVERGING, 255)[127], DIVERGING[5]);
+    }
+}
