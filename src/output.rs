@@ -19,6 +19,7 @@ mod orbit_json;
 mod orbit_summary;
 mod plot_style;
 mod record_file;
+mod report;
 
 pub use cells::Cells;
 pub use folder::{Folder, FolderError};

@@ -81,10 +81,6 @@ impl<'a> Cells<'a> {
         self.scene.outputs().quantities.contains(&quantity)
     }
 
-    pub(super) fn plan(&self) -> &'a Plan {
-        self.plan
-    }
-
     pub(super) fn record(&self, id: usize) -> &'a Record {
         &self.records[id]
     }

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
 use crate::scene::Quantity;
-use colors::{DIVERGING, NO_VALUE, SEQUENTIAL, ramp};
+use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
 
 /// One view of a map.
@@ -23,6 +23,8 @@ use scale::nice_bound;
 pub(super) struct Layer {
     /// Name of its file and in the report.
     pub(super) name: &'static str,
+    /// What it shows, in a word.
+    pub(super) short: &'static str,
     /// What it shows, for headings.
     pub(super) title: &'static str,
     /// A place in the palette for every cell, by id.
@@ -60,63 +62,80 @@ pub(super) fn of(cells: &Cells<'_>, words: Option<&Words>) -> Vec<Layer> {
     if cells.asks(Quantity::Class) {
         layers.push(classes::layer(cells));
     }
-    let kinds = [
-        (
-            Quantity::Lyapunov,
-            "lyapunov",
-            "largest Lyapunov exponent",
-            Kind::Signed,
-            (|r| r.lyapunov) as Field,
-        ),
-        (Quantity::Impacts, "impacts", "impacts per forcing period", Kind::Positive, |r| {
-            r.impacts_per_period
-        }),
-        (Quantity::Mesh, "mesh", "fraction of time in meshing", Kind::Positive, |r| r.mesh_fraction),
-    ];
-    for (quantity, name, title, kind, field) in kinds {
-        if cells.asks(quantity) {
-            layers.push(continuous(cells, name, title, kind, field));
-        }
-    }
+    layers.extend(SCALES.iter().filter(|scale| cells.asks(scale.quantity)).map(|scale| scale.layer(cells)));
     layers.extend(words.map(words::layer));
     layers
 }
 
-type Field = fn(&Row) -> Option<f64>;
-
-#[derive(Clone, Copy)]
-enum Kind {
-    /// About zero, which is white.
-    Signed,
-    /// From zero up.
-    Positive,
+/// A quantity whose numbers become colours.
+struct Scale {
+    quantity: Quantity,
+    name: &'static str,
+    short: &'static str,
+    title: &'static str,
+    field: fn(&Row) -> Option<f64>,
+    colors: fn(f64) -> Color,
 }
 
-/// Levels of a continuous layer; the next palette place is for cells without a value.
+const SCALES: [Scale; 3] = [
+    Scale {
+        quantity: Quantity::Lyapunov,
+        name: "lyapunov",
+        short: "exponent",
+        title: "largest Lyapunov exponent",
+        field: |row| row.lyapunov,
+        colors: diverging,
+    },
+    Scale {
+        quantity: Quantity::Impacts,
+        name: "impacts",
+        short: "impacts",
+        title: "impacts per forcing period",
+        field: |row| row.impacts_per_period,
+        colors: sequential,
+    },
+    Scale {
+        quantity: Quantity::Mesh,
+        name: "mesh",
+        short: "meshing",
+        title: "fraction of time in meshing",
+        field: |row| row.mesh_fraction,
+        colors: sequential,
+    },
+];
+
+/// Levels of a scale; the next palette place is for cells without a value.
 const LEVELS: u8 = 255;
 
-fn continuous(cells: &Cells<'_>, name: &'static str, title: &'static str, kind: Kind, field: Field) -> Layer {
-    let values: Vec<Option<f64>> = ids(cells).map(|id| field(&cells.row(id))).collect();
-    let high = nice_bound(values.iter().flatten().map(|value| value.abs()));
-    let (low, anchors) = match kind {
-        Kind::Signed => (-high, &DIVERGING[..]),
-        Kind::Positive => (0.0, &SEQUENTIAL[..]),
-    };
-    let level = |value: f64| {
-        let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
-        (share * f64::from(LEVELS - 1)).round() as u8
-    };
-    let indices: Vec<u8> = values.par_iter().map(|value| value.map_or(LEVELS, level)).collect();
-    let colors = ramp(anchors, LEVELS.into());
-    let absent = values.iter().filter(|value| value.is_none()).count();
-    let entry = Entry { color: NO_VALUE, text: "no value".to_owned(), cells: absent };
-    Layer {
-        name,
-        title,
-        indices,
-        palette: colors.iter().copied().chain([NO_VALUE]).collect(),
-        entries: if absent > 0 { vec![entry] } else { Vec::new() },
-        bar: Some(Bar { label: title, colors, low, high }),
+impl Scale {
+    fn layer(&self, cells: &Cells<'_>) -> Layer {
+        let values: Vec<Option<f64>> = ids(cells).map(|id| (self.field)(&cells.row(id))).collect();
+        let sizes =
+            |sign: f64| values.iter().flatten().map(move |value| sign * value).filter(|size| *size > 0.0);
+        let high = nice_bound(sizes(1.0));
+        let low = if sizes(-1.0).next().is_some() { -nice_bound(sizes(-1.0)) } else { 0.0 };
+        let value_of = |share: f64| low + share * (high - low);
+        let level = |value: f64| {
+            let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+            (share * f64::from(LEVELS - 1)).round() as u8
+        };
+        let color = |level: u8| {
+            let value = value_of(f64::from(level) / f64::from(LEVELS - 1));
+            // In units of its own side's end, so that both sides use all their colours.
+            (self.colors)(if value < 0.0 { value / -low } else { value / high })
+        };
+        let colors: Vec<Color> = (0..LEVELS).map(color).collect();
+        let absent = values.iter().filter(|value| value.is_none()).count();
+        let entry = Entry { color: NO_VALUE, text: "no value".to_owned(), cells: absent };
+        Layer {
+            name: self.name,
+            short: self.short,
+            title: self.title,
+            indices: values.par_iter().map(|value| value.map_or(LEVELS, level)).collect(),
+            palette: colors.iter().copied().chain([NO_VALUE]).collect(),
+            entries: if absent > 0 { vec![entry] } else { Vec::new() },
+            bar: Some(Bar { label: self.title, colors, low, high }),
+        }
     }
 }
 

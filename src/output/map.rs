@@ -4,13 +4,14 @@ use std::fs;
 
 use rayon::prelude::*;
 
-use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest};
+use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest, report};
 use crate::scene::Format;
 
 pub use super::map_manifest::Run;
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
+const HTML: &str = "report.html";
 const MANIFEST: &str = "manifest.json";
 
 /// Every file that a map may have beside its records.
@@ -51,6 +52,10 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Resul
             folder.replace(name, |path| map_figure::write(path, cells, layer))
         })?;
         files.extend(names);
+    }
+    if wanted.contains(&Format::Html) {
+        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref()))?;
+        files.push(HTML.to_owned());
     }
     files.push(MANIFEST.to_owned());
     let manifest = map_manifest::map(cells, run, &files)?;

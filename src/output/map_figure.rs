@@ -47,7 +47,7 @@ fn side(count: usize) -> f64 {
 
 fn draw(canvas: &Canvas<'_>, cells: &Cells<'_>, layer: &Layer, [width, height]: [f64; 2]) -> Result<()> {
     let scene = cells.scene();
-    draw_head(canvas, scene.title(), &subtitle(scene, layer), &[])?;
+    draw_head(canvas, scene.title(), &format!("{}; {}", layer.title, subtitle(scene)), &[])?;
     let rect = Rect { left: LEFT, top: TOP, right: LEFT + width, bottom: TOP + height };
     let [columns, _] = cells.counts();
     canvas
@@ -65,19 +65,17 @@ fn draw(canvas: &Canvas<'_>, cells: &Cells<'_>, layer: &Layer, [width, height]: 
     Ok(())
 }
 
-fn subtitle(scene: &Scene, layer: &Layer) -> String {
-    let title = layer.title;
-    let settings = scene.orbit_settings();
+/// Where cells start and how long they run: what a map means depends on it.
+pub(super) fn subtitle(scene: &Scene) -> String {
     let start = match scene.start() {
         Start::Rest => "from rest".to_owned(),
-        Start::State(state) if state == scene::REST => "from rest".to_owned(),
-        Start::State([a, b, c, d]) => format!("from ({a}, {b}, {c}, {d})"),
+        Start::State([x1, v1, x2, v2]) => format!("from ({x1}, {v1}, {x2}, {v2})"),
         Start::Up | Start::Down => "following the attractor".to_owned(),
     };
-    format!(
-        "{title}; every cell {start}, {} + {} forcing periods",
-        settings.transient_periods, settings.observed_periods
-    )
+    let settings = scene.orbit_settings();
+    let upper = if scene.integration().early_stop { "at most " } else { "" };
+    let (transient, observed) = (settings.transient_periods, settings.observed_periods);
+    format!("every cell {start}, {upper}{transient} + {observed} forcing periods")
 }
 
 /// An axis on which cells lie at their values: it reaches half a cell further.
@@ -116,7 +114,11 @@ fn draw_entries(
 
 fn share(entry: &Entry, total: usize) -> String {
     let percent = 100.0 * entry.cells as f64 / total as f64;
-    if percent < 0.1 { format!("{} cells", entry.cells) } else { format!("{percent:.1} %") }
+    match entry.cells {
+        _ if percent >= 0.1 => format!("{percent:.1} %"),
+        1 => "1 cell".to_owned(),
+        cells => format!("{cells} cells"),
+    }
 }
 
 /// A text cut to a width.

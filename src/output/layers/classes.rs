@@ -48,6 +48,7 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
     Layer {
         name: "map",
+        short: "period and chaos",
         title: "period, and chaos by exponent",
         entries,
         bar: (has_chaos && shows_chaos).then_some(bar),

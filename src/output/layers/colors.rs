@@ -37,7 +37,7 @@ pub(super) const FAILED: Color = hex(0xff1010);
 pub(super) const NO_VALUE: Color = hex(0x8f8f8f);
 
 /// Viridis in nine steps.
-pub(super) const SEQUENTIAL: [Color; 9] = [
+const SEQUENTIAL: [Color; 9] = [
     hex(0x440154),
     hex(0x472d7b),
     hex(0x3b528b),
@@ -50,7 +50,7 @@ pub(super) const SEQUENTIAL: [Color; 9] = [
 ];
 
 /// ColorBrewer's RdBu, blue below zero.
-pub(super) const DIVERGING: [Color; 11] = [
+const DIVERGING: [Color; 11] = [
     hex(0x053061),
     hex(0x2166ac),
     hex(0x4393c3),
@@ -84,17 +84,30 @@ pub(super) fn distinct(n: usize) -> Color {
     })
 }
 
+/// The colour of a share, 0 to 1, of what is counted from zero. The root leaves more colours
+/// to small numbers, which are the most.
+pub(super) fn sequential(share: f64) -> Color {
+    between(&SEQUENTIAL, share.max(0.0).sqrt())
+}
+
+/// The colour of a number from -1 to 1; zero is white.
+pub(super) fn diverging(value: f64) -> Color {
+    between(&DIVERGING, 0.5 * (value + 1.0))
+}
+
 /// `count` colours evenly along a chain of anchors.
 pub(super) fn ramp(anchors: &[Color], count: usize) -> Vec<Color> {
-    let at = |i: usize| {
-        let place = i as f64 / (count - 1).max(1) as f64 * (anchors.len() - 1) as f64;
-        let first = (place as usize).min(anchors.len() - 2);
-        let share = place - first as f64;
-        let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
-        let ([a, b, c], [d, e, f]) = (anchors[first], anchors[first + 1]);
-        [mix(a, d), mix(b, e), mix(c, f)]
-    };
-    (0..count).map(at).collect()
+    (0..count).map(|i| between(anchors, i as f64 / (count - 1).max(1) as f64)).collect()
+}
+
+/// The colour at a share, 0 to 1, of the way along a chain of anchors.
+fn between(anchors: &[Color], share: f64) -> Color {
+    let place = share.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
+    let first = (place as usize).min(anchors.len() - 2);
+    let share = place - first as f64;
+    let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
+    let ([a, b, c], [d, e, f]) = (anchors[first], anchors[first + 1]);
+    [mix(a, d), mix(b, e), mix(c, f)]
 }
 
 #[cfg(test)]
@@ -113,8 +126,9 @@ mod tests {
 
     #[test]
     fn ramps_begin_and_end_with_their_anchors() {
-        let colors = ramp(&SEQUENTIAL, 255);
-        assert_eq!((colors.len(), colors[0], colors[254]), (255, SEQUENTIAL[0], SEQUENTIAL[8]));
-        assert_eq!(ramp(&DIVERGING, 255)[127], DIVERGING[5]);
+        let colors = ramp(&CHAOS, 64);
+        assert_eq!((colors.len(), colors[0], colors[63]), (64, CHAOS[0], CHAOS[1]));
+        assert_eq!([-1.0, 0.0, 1.0].map(diverging), [DIVERGING[0], DIVERGING[5], DIVERGING[10]]);
+        assert_eq!([0.0, 0.25, 2.0].map(sequential), [SEQUENTIAL[0], SEQUENTIAL[4], SEQUENTIAL[8]]);
     }
 }

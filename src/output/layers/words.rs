@@ -18,6 +18,7 @@ const NONE: u8 = 1;
 const FIRST_WORD: u8 = 2;
 
 const WITHOUT_EVENTS: Color = [0xf2, 0xf2, 0xf2];
+const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
 const RARE: Color = [0x5a, 0x5a, 0x5a];
 
 /// Every word on a map, the most frequent first, and which one each cell has.
@@ -87,10 +88,13 @@ pub(super) fn layer(words: &Words) -> Layer {
     let places: Vec<u8> = (0..words.list.len()).map(place).collect();
     let index = |&number: &u32| places.get(number as usize).copied().unwrap_or(NONE);
     let mut palette = vec![WITHOUT_EVENTS, NO_VALUE];
-    palette.extend((0..COLORED).map(distinct));
+    // The word that covers most of the map should not shout.
+    palette.push(COMMONEST);
+    palette.extend((1..COLORED).map(distinct));
     palette.push(RARE);
     Layer {
         name: "word",
+        short: "word",
         title: "word: cyclic sequence of flights",
         indices: words.numbers.iter().map(index).collect(),
         entries: entries(words, &places, &palette),
