@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::colors::{self, CHAOS, FAILED, NO_CONTACT, SYMMETRIC, UNDECIDED, UNSYMMETRIC, ramp};
+use super::colors::{self, FAILED, NO_CONTACT, SYMMETRIC, UNDECIDED, UNSYMMETRIC, chaos};
 use super::scale::nice_bound;
 use super::{Bar, Color, Entry, Layer, ids};
 use crate::classify::classify;
@@ -75,7 +75,7 @@ fn palette() -> Vec<Color> {
     let mut palette = vec![NO_CONTACT, SYMMETRIC, UNSYMMETRIC];
     palette.extend((2..=64).map(colors::period));
     palette.extend([UNDECIDED, FAILED]);
-    palette.extend(ramp(&CHAOS, SHADES.into()));
+    palette.extend((0..SHADES).map(|shade| chaos(f64::from(shade) / f64::from(SHADES - 1))));
     palette
 }
 

@@ -29,7 +29,7 @@ const PERIODS: [Color; 11] = [
 ];
 
 /// The least and the largest exponent of chaos.
-pub(super) const CHAOS: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
+const CHAOS: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
 /// Meant to catch the eye: they are exceptions.
 pub(super) const UNDECIDED: Color = hex(0xff00d4);
 pub(super) const FAILED: Color = hex(0xff1010);
@@ -90,14 +90,16 @@ pub(super) fn sequential(share: f64) -> Color {
     between(&SEQUENTIAL, share.max(0.0).sqrt())
 }
 
-/// The colour of a number from -1 to 1; zero is white.
+/// The colour of a number from -1 to 1; zero is white. Positive ones are spread by the root,
+/// for most exponents of chaos are far below the largest.
 pub(super) fn diverging(value: f64) -> Color {
-    between(&DIVERGING, 0.5 * (value + 1.0))
+    let spread = if value > 0.0 { value.sqrt() } else { value };
+    between(&DIVERGING, 0.5 * (spread + 1.0))
 }
 
-/// `count` colours evenly along a chain of anchors.
-pub(super) fn ramp(anchors: &[Color], count: usize) -> Vec<Color> {
-    (0..count).map(|i| between(anchors, i as f64 / (count - 1).max(1) as f64)).collect()
+/// The grey of chaos with a share, 0 to 1, of the largest exponent.
+pub(super) fn chaos(share: f64) -> Color {
+    between(&CHAOS, share.max(0.0).sqrt())
 }
 
 /// The colour at a share, 0 to 1, of the way along a chain of anchors.
@@ -126,8 +128,7 @@ mod tests {
 
     #[test]
     fn ramps_begin_and_end_with_their_anchors() {
-        let colors = ramp(&CHAOS, 64);
-        assert_eq!((colors.len(), colors[0], colors[63]), (64, CHAOS[0], CHAOS[1]));
+        assert_eq!([0.0, 1.0].map(chaos), CHAOS);
         assert_eq!([-1.0, 0.0, 1.0].map(diverging), [DIVERGING[0], DIVERGING[5], DIVERGING[10]]);
         assert_eq!([0.0, 0.25, 2.0].map(sequential), [SEQUENTIAL[0], SEQUENTIAL[4], SEQUENTIAL[8]]);
     }

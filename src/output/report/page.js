@@ -206,7 +206,10 @@ function choose(cell) {
   if (cell) {
     const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
     const [first, second] = map.axes.map((axis) => axis.parameter);
-    byId("command").textContent = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${map.replay}`;
+    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${map.replay}`.split(" --");
+    // Lines break between arguments, never inside one.
+    byId("command").replaceChildren(...words.flatMap((word, k) =>
+      k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
     history.replaceState(null, "", `#${cell.i},${cell.j},${map.layers[layer].name}`);
   }
   tell();
@@ -224,8 +227,10 @@ function showLayer(index) {
     ramp.style.background = `linear-gradient(to right, ${shown.bar.colors.map((c) => `#${c}`).join(",")})`;
     const scale = element("div", undefined, "ticks");
     const { low, high, label } = shown.bar;
-    for (const part of [0, 0.25, 0.5, 0.75, 1]) {
-      scale.append(element("span", Number((low + part * (high - low)).toPrecision(3)).toString()));
+    for (const [value, text] of ticks(low, high, 6)) {
+      const tick = element("span", text);
+      tick.style.left = `${(100 * (value - low)) / (high - low)}%`;
+      scale.append(tick);
     }
     byId("bar").append(...(label === shown.title ? [] : [element("div", label)]), ramp, scale);
   }
