@@ -121,9 +121,8 @@ pub(crate) struct Orbit {
     pub(crate) set: Vec<String>,
 
     /// State at phase 0 to start from; at rest unless given
-    #[arg(long, value_name = "X1,V1,X2,V2", value_delimiter = ',', num_args = 4,
-          allow_hyphen_values = true, value_parser = finite)]
-    pub(crate) start: Option<Vec<f64>>,
+    #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
+    pub(crate) start: Option<State>,
 
     /// Forcing periods to observe, 2 or more; cycles of up to half as many are found (at most 64)
     #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
@@ -148,18 +147,19 @@ pub(crate) struct Orbit {
     pub(crate) force: bool,
 }
 
-fn finite(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(number) if number.is_finite() => Ok(number),
-        _ => Err("four finite numbers are needed, such as 0.1,0,-0.2,1.5".to_owned()),
-    }
+/// A state as `--start` takes it.
+fn state(text: &str) -> Result<State, String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| "it must be four finite numbers, such as 0.1,0,-0.2,1.5".to_owned())
 }
 
 impl Orbit {
     /// The state to start from.
     pub(crate) fn start(&self) -> State {
-        let given = self.start.as_ref().and_then(|start| <State>::try_from(start.as_slice()).ok());
-        given.unwrap_or(REST)
+        self.start.unwrap_or(REST)
     }
 
     /// How long to integrate: a cycle counts once it has come round twice.

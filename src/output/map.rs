@@ -1,6 +1,7 @@
 //! The folder of a map: tables, figures, report and manifest.
 
 use std::fs;
+use std::path::Path;
 
 use rayon::prelude::*;
 
@@ -34,31 +35,50 @@ pub fn clear(folder: &Folder) -> anyhow::Result<()> {
 /// If a file cannot be written.
 pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Result<Vec<String>> {
     clear(folder)?;
-    let wanted = &cells.scene().outputs().files;
+    // Side by side, for each of them has parts that one core must do alone.
+    let (tables, pictures) = rayon::join(|| write_tables(folder, cells), || write_pictures(folder, cells));
+    let mut files = tables?;
+    files.extend(pictures?);
+    files.push(MANIFEST.to_owned());
+    let manifest = map_manifest::map(cells, run, &files)?;
+    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    Ok(files)
+}
+
+fn write_tables(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String>> {
+    let wants = |format| cells.scene().outputs().files.contains(&format);
+    let write_if = |wanted: bool, name: &str, write: fn(&Path, &Cells<'_>) -> anyhow::Result<()>| {
+        if wanted {
+            folder.replace(name, |path| write(path, cells)).map(|()| Some(name.to_owned()))
+        } else {
+            Ok(None)
+        }
+    };
+    let (csv, npy) = rayon::join(
+        || write_if(wants(Format::Csv), CSV, cells_csv::write),
+        || write_if(wants(Format::Npy), NPY, cells_npy::write),
+    );
+    Ok([csv?, npy?].into_iter().flatten().collect())
+}
+
+fn write_pictures(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String>> {
+    let wants = |format| cells.scene().outputs().files.contains(&format);
     let mut files = Vec::new();
-    if wanted.contains(&Format::Csv) {
-        folder.replace(CSV, |path| cells_csv::write(path, cells))?;
-        files.push(CSV.to_owned());
-    }
-    if wanted.contains(&Format::Npy) {
-        folder.replace(NPY, |path| cells_npy::write(path, cells))?;
-        files.push(NPY.to_owned());
+    if !wants(Format::Png) && !wants(Format::Html) {
+        return Ok(files);
     }
     let words = layers::read_words(cells);
     let layers = layers::of(cells, words.as_ref());
-    if wanted.contains(&Format::Png) {
+    if wants(Format::Png) {
         let names: Vec<String> = layers.iter().map(|layer| format!("{}.png", layer.name)).collect();
         layers.par_iter().zip(&names).try_for_each(|(layer, name)| {
             folder.replace(name, |path| map_figure::write(path, cells, layer))
         })?;
         files.extend(names);
     }
-    if wanted.contains(&Format::Html) {
+    if wants(Format::Html) {
         folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref()))?;
         files.push(HTML.to_owned());
     }
-    files.push(MANIFEST.to_owned());
-    let manifest = map_manifest::map(cells, run, &files)?;
-    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
     Ok(files)
 }

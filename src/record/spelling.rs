@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn words_survive_packing() {
-        let long: Vec<u8> = (0..64u8).map(|i| b'1' + i * 5 % 6).collect();
+        let long: Vec<u8> = (0..64u32).map(|i| b'1' + (i * 5 % 6) as u8).collect();
         for symbols in [&b""[..], b"36", b"2356", &long[..21], &long[..22], &long] {
             let word = Word::cyclic(symbols);
             let mut record = Record::default();
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn longer_words_are_hashed_whatever_their_start() {
-        let mut symbols: Vec<u8> = (0..100u8).map(|i| b'1' + i * i % 6).collect();
+        let mut symbols: Vec<u8> = (0..100u32).map(|i| b'1' + (i * i % 6) as u8).collect();
         let hash = word_hash(&symbols);
         symbols.rotate_left(37);
         assert_eq!(word_hash(&symbols), hash);

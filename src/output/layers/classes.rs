@@ -106,7 +106,7 @@ fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool) -> Vec<Entry> {
         let rest: usize = list[LISTED..].iter().map(|entry| entry.cells).sum();
         let color = list[LISTED].color;
         list.truncate(LISTED);
-        list.push(Entry { color, text: "longer periods".to_owned(), cells: rest });
+        list.push(Entry { color, text: "longer, a colour each".to_owned(), cells: rest });
     }
     let chaos = counts[FIRST_SHADE.into()..].iter().sum();
     let middle = if shows_chaos { usize::from(FIRST_SHADE + SHADES / 2) } else { palette.len() - 1 };
