@@ -20,9 +20,10 @@ const EXPONENT_FROM: u32 = 100;
 /// Periods after which an early stop is first considered; then every half as many more.
 const FIRST_LOOK: u32 = 16;
 
-/// A cell stops early only this close to its cycle, relative to the motion: well inside the
-/// region where the multipliers tell what happens next.
-const SETTLED: f64 = 1e-3;
+/// A cell stops early only this close to its cycle, relative to the motion: inside the region
+/// where the multipliers tell what happens next. A leaving speed near `mesh_speed` makes that
+/// region small: at 1e-3 one cell in 10,000 was taken for a period that it then left.
+const SETTLED: f64 = 1e-6;
 
 /// Cycles, at least, over which an approach must have been seen.
 const APPROACH_CYCLES: usize = 4;
