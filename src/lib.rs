@@ -2,7 +2,7 @@
 //!
 //! Modules in the order in which data flows through them: a scene says what is asked
 //! ([`scene`]) and becomes numbered cells ([`plan`]), a model is described ([`model`]), its flow is solved in closed form
-//! ([`flow`]), the reference jumps from event to event on it ([`reference`]), and what it
+//! ([`flow`]), the reference jumps from event to event on it ([`mod@reference`]), and what it
 //! meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a bifurcation diagram
 //! ([`bifurcation`]). A map's cells go through an engine ([`engine`], [`sweep`]) and come back
 //! as records ([`record`], [`classify`]). All of it is then written down ([`output`]).

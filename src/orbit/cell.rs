@@ -17,7 +17,7 @@ use crate::word::Word;
 /// The exponent accumulates from this period on, or from the end of a shorter transient.
 const EXPONENT_FROM: u32 = 100;
 
-/// Periods after which an early stop is first considered; then every half as many more.
+/// Periods after which an early stop is first considered; then every quarter as many more.
 const FIRST_LOOK: u32 = 16;
 
 /// A cell stops early only this close to its cycle, relative to the motion: inside the region
@@ -83,6 +83,7 @@ pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measured
 struct Found {
     cycle: Cycle,
     at: usize,
+    distance: f64,
 }
 
 struct Watch<'a> {
@@ -142,7 +143,7 @@ impl Watch<'_> {
         if now < *look {
             return Ok(None);
         }
-        *look = (now + now.div_ceil(2)).min(last);
+        *look = (now + now.div_ceil(4)).min(last);
         match self.settled(now == last)? {
             Some(orbit) => Ok(Some(self.periodic(orbit))),
             None if now == last => Ok(Some(self.aperiodic(counts))),
@@ -156,16 +157,27 @@ impl Watch<'_> {
         let window = &self.strobes[self.strobes.len().saturating_sub(2 * max_period as usize + 1)..];
         let metric = Metric::of(window);
         let near = if is_last { NEAR } else { SETTLED };
+        if is_last {
+            // Judged as if it were the only look: a cell that runs its whole budget has the
+            // same class with and without early stops.
+            self.cycle = None;
+        }
         if let Some(orbit) = self.approached(&metric, near)? {
             return Ok(Some(orbit));
+        }
+        // One that is being approached needs no second look.
+        if !is_last && self.cycle.as_ref().is_some_and(|found| self.present(found, &metric) < found.distance)
+        {
+            return Ok(None);
         }
         for candidate in candidates(window, &metric, max_period) {
             let state = self.strobes[self.strobes.len() - 1];
             for map in self.analysis.maps(candidate.period) {
                 let Some(cycle) = refine(self.analysis.flow, self.analysis.law, state, map) else { continue };
                 let Some(cycle) = self.analysis.smallest(cycle, &metric) else { continue };
-                if cycle.spectral_radius() < 1.0 && metric.distance(&state, &cycle.state) < NEAR {
-                    self.cycle = Some(Found { cycle, at: self.strobes.len() - 1 });
+                let distance = metric.distance(&state, &cycle.state);
+                if cycle.spectral_radius() < 1.0 && distance < NEAR {
+                    self.cycle = Some(Found { cycle, at: self.strobes.len() - 1, distance });
                     if let Some(orbit) = self.approached(&metric, near)? {
                         return Ok(Some(orbit));
                     }
@@ -178,10 +190,8 @@ impl Watch<'_> {
     /// The orbit of the cycle found last, if the strobe states have come within `near` of it
     /// and nearer all the time.
     fn approached(&self, metric: &Metric, near: f64) -> Result<Option<Orbit>, Stop> {
-        let Some(Found { cycle, at }) = &self.cycle else { return Ok(None) };
-        let period = cycle.period as usize;
-        // The cycle's state belongs to one strobe; others compare every `period` away from it.
-        let now = at + (self.strobes.len() - 1 - at) / period * period;
+        let Some(found) = &self.cycle else { return Ok(None) };
+        let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_beside(found));
         let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
         let present = distance(0);
         let left = f64::from(self.budget.settings.transient_periods + self.budget.settings.observed_periods)
@@ -203,6 +213,18 @@ impl Watch<'_> {
         let nearer = present < APPROACH.max(promised) * before;
         let steady = (1..back).all(|k| distance(k) < 2.0 * before);
         if nearer && steady { self.analysis.periodic(cycle, at_last).map(Some) } else { Ok(None) }
+    }
+
+    /// The last strobe that the cycle's state belongs to: the others, unless the period is 1,
+    /// are other points of the cycle.
+    fn last_beside(&self, found: &Found) -> usize {
+        let period = found.cycle.period as usize;
+        found.at + (self.strobes.len() - 1 - found.at) / period * period
+    }
+
+    /// How far the motion is from a cycle.
+    fn present(&self, found: &Found, metric: &Metric) -> f64 {
+        metric.distance(&self.strobes[self.last_beside(found)], &found.cycle.state)
     }
 
     fn periodic(&self, orbit: Orbit) -> Measured {
