@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
+use rattlemap::model::State;
 use rattlemap::orbit::Settings;
+use rattlemap::scene::REST;
 
 /// Restitution where `orbit` is not told any: the paper's last periodic motion before chaos.
 pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
@@ -16,6 +18,7 @@ pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
+    rattlemap map scenes/e_omega.toml                periods and chaos over restitution and frequency\n  \
     rattlemap orbit --set e=0.06                     the paper's motion with meshing on both sides\n  \
     rattlemap bifurcation scenes/paper_fig5.toml     section points against restitution")]
 pub(crate) struct Cli {
@@ -25,14 +28,89 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    Map(Map),
     Orbit(Orbit),
     Bifurcation(Bifurcation),
 }
 
+/// A map over two parameters: what every cell's motion is
+///
+/// Integrates each cell of the scene's two axes and writes tables (cells.csv, cells.npy), figures
+/// (map.png and others), an interactive page (report.html) and manifest.json. Records go to
+/// records.bin as they are computed: after Ctrl-C (exit code 1) or a crash, --resume goes on from
+/// there, and every table and figure comes out byte for byte as if nothing had happened.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the main map with fewer cells:\n  \
+    rattlemap map scenes/e_omega.toml --set axis.0.count=128 --set axis.1.count=128")]
+pub(crate) struct Map {
+    /// A scene with two [[axis]] tables
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+
+    /// Who computes
+    #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
+    pub(crate) engine: EngineChoice,
+
+    /// Where to write [default: out/<scene's name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Go on with an interrupted run of the same scene
+    #[arg(long, conflicts_with = "force")]
+    pub(crate) resume: bool,
+
+    /// Replace the files of an earlier run; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Override the scene: a parameter by name (k=800), anything else by its path
+    /// (integration.max_period=32, axis.0.count=200). May be repeated
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Engines by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum EngineChoice {
+    /// The best there is: today the CPU
+    Auto,
+    /// The event-driven reference on all processor cores, f64
+    Cpu,
+}
+
+impl Map {
+    /// The folder to write to.
+    pub(crate) fn out(&self) -> PathBuf {
+        out_folder(self.out.as_deref(), &self.scene)
+    }
+
+    /// The command that goes on with this run.
+    pub(crate) fn resume_command(&self) -> String {
+        let quoted =
+            |text: String| if text.contains([' ', '"', '*', '$', '[']) { format!("'{text}'") } else { text };
+        let mut words = vec!["rattlemap map".to_owned(), quoted(self.scene.display().to_string())];
+        if let Some(out) = &self.out {
+            words.push(format!("--out {}", quoted(out.display().to_string())));
+        }
+        words.extend(self.set.iter().map(|set| format!("--set {}", quoted(set.clone()))));
+        words.push("--resume".to_owned());
+        words.join(" ")
+    }
+}
+
+fn out_folder(out: Option<&Path>, scene: &Path) -> PathBuf {
+    let default = || Path::new("out").join(scene.file_stem().unwrap_or_default());
+    out.map_or_else(default, Path::to_owned)
+}
+
 /// One motion: its class, word, exponent, multipliers and every event on the cycle
 ///
-/// Starts at rest at phase 0, lets the transient pass and reads what the motion settles on. A
-/// periodic motion is shown over one cycle, any other over its last 8 forcing periods.
+/// Starts at phase 0, lets the transient pass and reads what the motion settles on. A periodic
+/// motion is shown over one cycle, any other over its last 8 forcing periods.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the paper's meshing motion with its figures:\n  \
     rattlemap orbit --set e=0.06 --out out/meshing")]
@@ -41,6 +119,10 @@ pub(crate) struct Orbit {
     /// r k F omega b e mesh_speed. May be repeated
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
+
+    /// State at phase 0 to start from; at rest unless given
+    #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
+    pub(crate) start: Option<State>,
 
     /// Forcing periods to observe, 2 or more; cycles of up to half as many are found (at most 64)
     #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
@@ -65,7 +147,21 @@ pub(crate) struct Orbit {
     pub(crate) force: bool,
 }
 
+/// A state as `--start` takes it.
+fn state(text: &str) -> Result<State, String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| "it must be four finite numbers, such as 0.1,0,-0.2,1.5".to_owned())
+}
+
 impl Orbit {
+    /// The state to start from.
+    pub(crate) fn start(&self) -> State {
+        self.start.unwrap_or(REST)
+    }
+
     /// How long to integrate: a cycle counts once it has come round twice.
     pub(crate) fn settings(&self) -> Settings {
         Settings {
@@ -110,8 +206,7 @@ pub(crate) struct Bifurcation {
 impl Bifurcation {
     /// The folder to write to.
     pub(crate) fn out(&self) -> PathBuf {
-        let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
-        self.out.clone().unwrap_or_else(default)
+        out_folder(self.out.as_deref(), &self.scene)
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::process::ExitCode;
 
-use rattlemap::output::FolderError;
+use anyhow::anyhow;
+use rattlemap::output::{FolderError, RecordFileError};
 use rattlemap::scene::SceneError;
 
 /// A command that did not do what was asked.
@@ -27,6 +28,11 @@ impl Failure {
     }
 }
 
+/// A run that went through but came to nothing.
+pub(crate) fn fail_if(failed: bool, message: &'static str) -> Result<(), Failure> {
+    if failed { Err(Failure::Run(anyhow!(message))) } else { Ok(()) }
+}
+
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         Failure::Usage(error.into())
@@ -35,6 +41,12 @@ impl From<SceneError> for Failure {
 
 impl From<FolderError> for Failure {
     fn from(error: FolderError) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<RecordFileError> for Failure {
+    fn from(error: RecordFileError) -> Self {
         Failure::Usage(error.into())
     }
 }

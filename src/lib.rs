@@ -1,21 +1,26 @@
 //! Parameter maps of vibro-impact oscillators.
 //!
 //! Modules in the order in which data flows through them: a scene says what is asked
-//! ([`scene`]), a model is described ([`model`]), its flow is solved in closed form
-//! ([`flow`]), the reference jumps from event to event on it ([`mod@reference`]), and what it
+//! ([`scene`]) and becomes numbered cells ([`plan`]), a model is described ([`model`]), its
+//! flow is solved in closed form ([`flow`]), the reference jumps from event to event on it ([`mod@reference`]), and what it
 //! meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a bifurcation diagram
-//! ([`bifurcation`]), then written down ([`output`]).
+//! ([`bifurcation`]). A map's cells go through an engine ([`engine`], [`sweep`]) and come back
+//! as records ([`record`], [`classify`]). All of it is then written down ([`output`]).
 
 pub mod bifurcation;
 pub mod certificate;
+pub mod classify;
+pub mod engine;
 pub mod flow;
 pub mod model;
 pub mod orbit;
 pub mod output;
+pub mod plan;
 pub mod record;
 pub mod reference;
 pub mod scene;
 pub mod stability;
+pub mod sweep;
 pub mod word;
 
 /// Compiles and runs the README's example as a doctest.

@@ -1,24 +1,26 @@
 //! The commands, each a pipeline: ask, check, compute, write.
 
+mod capacity;
 mod cli;
 mod error;
+mod map_command;
 mod progress;
 
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::anyhow;
 use clap::Parser;
 use rattlemap::orbit::Class;
 use rattlemap::output::{self, Folder};
 use rattlemap::{bifurcation, orbit, scene};
 
 use cli::{Cli, Command};
-use error::Failure;
+use error::{Failure, fail_if};
 use progress::Progress;
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
+        Command::Map(ask) => map_command::run(&ask),
         Command::Orbit(ask) => run_orbit(&ask),
         Command::Bifurcation(ask) => run_bifurcation(&ask),
     };
@@ -28,7 +30,7 @@ fn main() -> ExitCode {
 fn run_orbit(ask: &cli::Orbit) -> Result<(), Failure> {
     let pair = scene::single_cell(cli::DEFAULT_RESTITUTION, &ask.set)?;
     let folder = ask.out.as_ref().map(|dir| Folder::open(dir, ask.force)).transpose()?;
-    let orbit = orbit::analyse(&pair, scene::REST, &ask.settings());
+    let orbit = orbit::analyse(&pair, ask.start(), &ask.settings());
     output::orbit::print(&pair, &orbit, ask.json)?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
@@ -41,7 +43,7 @@ fn run_bifurcation(ask: &cli::Bifurcation) -> Result<(), Failure> {
     let scene = scene::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
     let folder = Folder::open(&ask.out(), ask.force)?;
     let cells = scene.line();
-    let progress = Progress::new(cells.len(), ask.quiet);
+    let progress = Progress::new(cells.len(), 0, "columns", ask.quiet);
     let clock = Instant::now();
     let report = |done| progress.report(done);
     let columns = bifurcation::run(&cells, &scene.start().into(), &scene.orbit_settings(), &report);
@@ -49,8 +51,4 @@ fn run_bifurcation(ask: &cli::Bifurcation) -> Result<(), Failure> {
     progress.finish(&format!("{}: {}", folder.path().display(), files.join(", ")));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
     fail_if(all_failed, "every column failed; the status column says why")
-}
-
-fn fail_if(failed: bool, message: &'static str) -> Result<(), Failure> {
-    if failed { Err(Failure::Run(anyhow!(message))) } else { Ok(()) }
 }

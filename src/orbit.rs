@@ -7,11 +7,13 @@
 //! refined cycle the period is simply its smallest divisor that closes.
 
 mod analysis;
+mod cell;
 mod reading;
 mod recurrence;
 mod trace;
 
-pub use analysis::{analyse, analyse_over};
+pub use analysis::{CHAOS_ERRORS, analyse, analyse_flow, analyse_over};
+pub use cell::{Budget, Measured, measure};
 pub use trace::trace;
 
 use crate::model::{Side, State};
@@ -85,6 +87,11 @@ impl Status {
         Status::TooStiff,
         Status::NonFinite,
     ];
+
+    /// Whether the integration could not be continued.
+    pub fn is_failure(self) -> bool {
+        matches!(self, Status::CapEvents | Status::CapRoot | Status::TooStiff | Status::NonFinite)
+    }
 
     /// The number that stands for it in records and tables.
     pub fn code(self) -> u32 {

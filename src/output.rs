@@ -3,13 +3,24 @@
 pub mod bifurcation;
 mod bifurcation_csv;
 pub mod bifurcation_figure;
+mod cells;
+mod cells_csv;
+mod cells_npy;
 pub mod folder;
+mod layers;
 mod manifest;
+pub mod map;
+mod map_figure;
+mod map_manifest;
 mod names;
 pub mod orbit;
 pub mod orbit_figures;
 mod orbit_json;
 mod orbit_summary;
 mod plot_style;
+mod record_file;
+mod report;
 
+pub use cells::Cells;
 pub use folder::{Folder, FolderError};
+pub use record_file::{Identity, RECORDS, RecordFile, RecordFileError};

@@ -2,6 +2,7 @@
 
 use std::io::{IsTerminal, stderr};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -12,24 +13,37 @@ const LINES: usize = 10;
 pub(crate) enum Progress {
     Quiet,
     Bar(ProgressBar),
-    Lines { total: usize, said: AtomicUsize },
+    Lines(Lines),
+}
+
+/// Plain lines, for pipes and logs.
+pub(crate) struct Lines {
+    total: usize,
+    unit: &'static str,
+    /// What was done before this run, and when this run began.
+    from: usize,
+    clock: Instant,
+    said: AtomicUsize,
 }
 
 impl Progress {
-    /// Progress over `total` columns, at least one.
-    pub(crate) fn new(total: usize, quiet: bool) -> Progress {
+    /// Progress over `total` columns or other units, at least one, of which `from` are done.
+    pub(crate) fn new(total: usize, from: usize, unit: &'static str, quiet: bool) -> Progress {
         if quiet {
             return Progress::Quiet;
         }
         if !stderr().is_terminal() {
-            return Progress::Lines { total, said: AtomicUsize::new(0) };
+            let (clock, said) = (Instant::now(), AtomicUsize::new(from * LINES / total));
+            return Progress::Lines(Lines { total, unit, from, clock, said });
         }
-        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} columns, {eta} left");
-        let bar = ProgressBar::new(total as u64);
+        let template = format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{per_sec}}, {{eta}} left");
+        let style = ProgressStyle::with_template(&template);
+        let bar = ProgressBar::new(total as u64).with_position(from as u64);
+        bar.reset_eta();
         Progress::Bar(bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())))
     }
 
-    /// Says that `done` columns are done so far; calls may come from any thread, in any order.
+    /// Says that `done` units are done so far; calls may come from any thread, in any order.
     pub(crate) fn report(&self, done: usize) {
         match self {
             Progress::Quiet => {}
@@ -38,10 +52,10 @@ impl Progress {
                     bar.set_position(done as u64);
                 }
             }
-            Progress::Lines { total, said } => {
-                let part = done * LINES / total;
-                if said.fetch_max(part, Ordering::Relaxed) < part {
-                    eprintln!("{done} of {total} columns");
+            Progress::Lines(lines) => {
+                let part = done * LINES / lines.total;
+                if lines.said.fetch_max(part, Ordering::Relaxed) < part {
+                    eprintln!("{}", lines.text(done));
                 }
             }
         }
@@ -55,7 +69,20 @@ impl Progress {
                 bar.finish_and_clear();
                 eprintln!("{line}");
             }
-            Progress::Lines { .. } => eprintln!("{line}"),
+            Progress::Lines(_) => eprintln!("{line}"),
         }
+    }
+}
+
+impl Lines {
+    fn text(&self, done: usize) -> String {
+        let Lines { total, unit, .. } = self;
+        let seconds = self.clock.elapsed().as_secs_f64();
+        let rate = (done - self.from.min(done)) as f64 / seconds.max(1e-9);
+        let left = (total - done) as f64 / rate.max(1e-9);
+        if done == *total || seconds < 1.0 {
+            return format!("{done} of {total} {unit}");
+        }
+        format!("{done} of {total} {unit}, {rate:.0} per second, {left:.0} s left")
     }
 }

@@ -1,5 +1,9 @@
 //! What one lane measured: the only thing that travels from an engine to the host's tables.
 
+mod spelling;
+
+pub use spelling::{Spelling, word_hash};
+
 use bytemuck::{Pod, Zeroable};
 
 /// Layout version of [`Record`]; files that hold records carry it.

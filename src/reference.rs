@@ -426,7 +426,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             self.t += step.h;
             if N > 0 {
                 self.tangents = self.tangents.map(|u| step.propagator.apply_tangent(&u));
-                if self.steps_in_period % RESCALE_STEPS == 0 {
+                if self.steps_in_period.is_multiple_of(RESCALE_STEPS) {
                     self.rescale_tangents();
                 }
             }

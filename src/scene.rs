@@ -8,6 +8,7 @@
 mod axis;
 mod document;
 mod error;
+mod identity;
 mod overrides;
 mod section;
 mod settings;
@@ -84,7 +85,7 @@ impl Scene {
             Some(title) => title.text()?.to_owned(),
             None => default_title(&axes),
         };
-        Ok(Scene {
+        let scene = Scene {
             text: text.to_owned(),
             title,
             base: axis::read_parameters(&root, &axes)?,
@@ -93,7 +94,11 @@ impl Scene {
             refine: settings::read_refine(&root, purpose)?,
             outputs: settings::read_outputs(&root, purpose)?,
             axes,
-        })
+        };
+        if purpose == Purpose::Map {
+            settings::refuse_unbuilt(&root, scene.start)?;
+        }
+        Ok(scene)
     }
 
     /// The text that was parsed, without the `--set` arguments.

@@ -91,7 +91,7 @@ fn empty_axis_is_refused() {
 fn scene_for_another_command_is_refused() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/e_omega.toml");
     let run = rattlemap(&folder()).args(["bifurcation", scene]).assert();
-    run.code(2).stderr(says(&["e_omega.toml:15:1", "`axis = 2 of them`", "needs 1 axis"]));
+    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 of them`", "needs 1 axis"]));
 }
 
 #[test]
@@ -119,7 +119,9 @@ fn bad_set_is_refused_and_names_itself() {
 
 #[test]
 fn bad_orbit_requests_are_refused() {
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 7] = [
+        (&["--start", "0,0,0"], "it must be four finite numbers"),
+        (&["--start", "0,0,0,inf"], "it must be four finite numbers"),
         (
             &["--set", "e=1.5"],
             "--set e=1.5: `parameters.e = 1.5` is out of range: it must be between 0 and 1",
@@ -180,9 +182,11 @@ fn read_only_output_folders_are_refused() {
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    for (command, example) in
-        [("orbit", "rattlemap orbit --set"), ("bifurcation", "rattlemap bifurcation scenes/")]
-    {
+    for (command, example) in [
+        ("orbit", "rattlemap orbit --set"),
+        ("bifurcation", "rattlemap bifurcation scenes/"),
+        ("map", "rattlemap map scenes/"),
+    ] {
         let run = rattlemap(&folder()).args([command, "--help"]).assert();
         run.success().stdout(says(&["Example", example]));
     }

@@ -13,23 +13,23 @@ use crate::word::Word;
 const SHOWN_PERIODS: u32 = 8;
 
 /// Standard errors by which an exponent must exceed zero to be called chaos.
-const CHAOS_ERRORS: f64 = 3.0;
+pub const CHAOS_ERRORS: f64 = 3.0;
 
 /// An undecided motion is observed again, twice as long each time, until a window has this
 /// many forcing periods (or as many as were asked for, if that is more).
 const LONGEST_WINDOW: u32 = 32_768;
 
 /// Growth, as a logarithm, that takes a departure from rounding to the size of the motion.
-const DEPARTURE: f64 = 40.0;
+pub(super) const DEPARTURE: f64 = 40.0;
 
 /// Periods over which a fresh tangent vector turns to its direction.
-const TANGENT_PERIODS: u32 = 50;
+pub(super) const TANGENT_PERIODS: u32 = 50;
 
 /// A trajectory this close to a cycle, relative to the motion, is on it.
-const ON_CYCLE: f64 = 1e-8;
+pub(super) const ON_CYCLE: f64 = 1e-8;
 
 /// Share of its distance by which a trajectory must have come closer to be seen to approach.
-const APPROACH: f64 = 0.7;
+pub(super) const APPROACH: f64 = 0.7;
 
 /// A trajectory farther from a cycle than this, relative to the motion, is elsewhere.
 const WITHIN_REACH: f64 = 0.3;
@@ -61,12 +61,16 @@ pub fn analyse(pair: &GearPair, start: State, settings: &Settings) -> Orbit {
 pub fn analyse_over(pair: &GearPair, start: State, settings: &Settings, shown_periods: u32) -> Orbit {
     // A pair that was built by hand may be invalid: it has no motion.
     let Ok(oscillator) = pair.oscillator() else { return failed(Status::NonFinite, start, f64::NAN) };
-    let flow = Flow::new(&oscillator);
-    let analysis = Analysis { flow: &flow, law: pair.law(), settings, shown_periods };
+    analyse_flow(&Flow::new(&oscillator), pair.law(), start, settings, shown_periods)
+}
+
+/// [`analyse_over`] on a flow that is at hand: maps share one among many cells.
+pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, shown_periods: u32) -> Orbit {
+    let analysis = Analysis { flow, law, settings, shown_periods };
     analysis.run(start).unwrap_or_else(|stop| failed(status_of(stop), start, flow.period))
 }
 
-fn status_of(stop: Stop) -> Status {
+pub(super) fn status_of(stop: Stop) -> Status {
     match stop {
         Stop::CapEvents => Status::CapEvents,
         Stop::CapRoot => Status::CapRoot,
@@ -104,11 +108,11 @@ struct Window {
     mesh_fraction: f64,
 }
 
-struct Analysis<'a> {
-    flow: &'a Flow,
-    law: Law,
-    settings: &'a Settings,
-    shown_periods: u32,
+pub(super) struct Analysis<'a> {
+    pub(super) flow: &'a Flow,
+    pub(super) law: Law,
+    pub(super) settings: &'a Settings,
+    pub(super) shown_periods: u32,
 }
 
 impl Analysis<'_> {
@@ -205,7 +209,7 @@ impl Analysis<'_> {
 
     /// The maps that a cycle of this period may be a fixed point of. Only cycles of odd
     /// period can be symmetric; those are found more surely by the half-period map.
-    fn maps(&self, period: u32) -> Vec<StrobeMap> {
+    pub(super) fn maps(&self, period: u32) -> Vec<StrobeMap> {
         let whole = StrobeMap::Periods(period);
         if period % 2 == 1 && self.flow.mirror_symmetric() {
             vec![StrobeMap::MirroredHalves(period), whole]
@@ -215,7 +219,7 @@ impl Analysis<'_> {
     }
 
     /// The same orbit with its smallest period, and its symmetry looked at.
-    fn smallest(&self, seed: &Trajectory<'_>, cycle: Cycle, metric: &Metric) -> Option<Cycle> {
+    pub(super) fn smallest(&self, seed: &Trajectory<'_>, cycle: Cycle, metric: &Metric) -> Option<Cycle> {
         let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
         for period in divisors {
             for map in self.maps(period) {
@@ -261,7 +265,12 @@ impl Analysis<'_> {
         Ok((last < ON_CYCLE || last < APPROACH * before).then_some(last))
     }
 
-    fn periodic(&self, seed: &Trajectory<'_>, cycle: &Cycle, distance: f64) -> Result<Orbit, Stop> {
+    pub(super) fn periodic(
+        &self,
+        seed: &Trajectory<'_>,
+        cycle: &Cycle,
+        distance: f64,
+    ) -> Result<Orbit, Stop> {
         let mut trajectory = seed.at(cycle.state, []);
         // Once around, so that the first flight has its symbol.
         for _ in 0..cycle.period {

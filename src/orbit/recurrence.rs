@@ -4,7 +4,7 @@ use crate::flow::Flow;
 use crate::model::State;
 
 /// Recurrences farther apart than this, relative to the motion's size, are no candidates.
-const NEAR: f64 = 3e-2;
+pub(super) const NEAR: f64 = 3e-2;
 
 /// Distances between strobe states in units of the motion's own size, positions and
 /// velocities apart.

@@ -9,10 +9,10 @@ use super::names;
 use super::orbit_json::Parameters;
 use crate::bifurcation::Column;
 use crate::model::State;
-use crate::scene::{Scene, Start};
+use crate::scene::{Axis, Scene, Start};
 
 /// Raised whenever a field changes its meaning.
-const FORMAT: u32 = 1;
+pub(super) const FORMAT: u32 = 1;
 
 #[derive(Serialize)]
 struct Manifest<'a> {
@@ -33,15 +33,21 @@ struct Manifest<'a> {
 }
 
 #[derive(Serialize)]
-struct AxisObject {
+pub(super) struct AxisObject {
     parameter: &'static str,
     min: f64,
     max: f64,
     count: usize,
 }
 
+impl From<&Axis> for AxisObject {
+    fn from(axis: &Axis) -> Self {
+        AxisObject { parameter: axis.parameter().name, min: axis.min(), max: axis.max(), count: axis.count() }
+    }
+}
+
 #[derive(Serialize)]
-struct StartObject {
+pub(super) struct StartObject {
     policy: &'static str,
     state: Option<State>,
 }
@@ -75,13 +81,8 @@ pub(super) fn bifurcation(
         title: scene.title(),
         scene: scene.text(),
         set: sets,
-        axis: AxisObject {
-            parameter: axis.parameter().name,
-            min: axis.min(),
-            max: axis.max(),
-            count: axis.count(),
-        },
-        parameters: Parameters { pair: &scene.base(), except: Some(axis.parameter().name) },
+        axis: axis.into(),
+        parameters: Parameters { pair: &scene.base(), except: &[axis.parameter().name] },
         start: start(scene.start()),
         integration: IntegrationObject {
             transient_periods: settings.transient_periods,
@@ -94,7 +95,7 @@ pub(super) fn bifurcation(
     })
 }
 
-fn start(start: Start) -> StartObject {
+pub(super) fn start(start: Start) -> StartObject {
     let (policy, state) = match start {
         Start::Rest => ("rest", None),
         Start::State(state) => ("state", Some(state)),

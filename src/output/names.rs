@@ -1,5 +1,6 @@
 //! The names that outputs use: part of the contract with scripts.
 
+use super::cells::Source;
 use crate::model::Side;
 use crate::orbit::{Class, EventKind, Status};
 
@@ -12,6 +13,16 @@ pub(super) fn class(class: Class) -> &'static str {
         Class::Chaotic => CLASSES[1],
         Class::Undecided => CLASSES[2],
         Class::Failed => CLASSES[3],
+    }
+}
+
+/// The number that stands for a class in tables: its place in [`CLASSES`].
+pub(super) fn class_code(class: Class) -> i8 {
+    match class {
+        Class::Periodic { .. } => 0,
+        Class::Chaotic => 1,
+        Class::Undecided => 2,
+        Class::Failed => 3,
     }
 }
 
@@ -49,5 +60,12 @@ pub(super) fn side(side: Side) -> i8 {
     match side {
         Side::Right => 1,
         Side::Left => -1,
+    }
+}
+
+pub(super) fn source(source: Source) -> &'static str {
+    match source {
+        Source::Integrated => "integrated",
+        Source::Filled => "filled",
     }
 }

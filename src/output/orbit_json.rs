@@ -10,13 +10,13 @@ use crate::orbit::{Event, Orbit};
 #[derive(Clone, Copy)]
 pub(super) struct Parameters<'a> {
     pub(super) pair: &'a GearPair,
-    /// A parameter to leave out because it is swept.
-    pub(super) except: Option<&'a str>,
+    /// Parameters to leave out because they are swept.
+    pub(super) except: &'a [&'a str],
 }
 
 impl Serialize for Parameters<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let named = GearPair::PARAMETERS.iter().filter(|p| Some(p.name) != self.except);
+        let named = GearPair::PARAMETERS.iter().filter(|p| !self.except.contains(&p.name));
         serializer.collect_map(named.map(|p| (p.name, self.pair.get(p.name).ok())))
     }
 }
@@ -73,7 +73,7 @@ pub(super) fn to_json(pair: &GearPair, orbit: &Orbit) -> serde_json::Result<Stri
     serde_json::to_string_pretty(&OrbitObject {
         e: pair.e,
         omega: pair.omega,
-        parameters: Parameters { pair, except: None },
+        parameters: Parameters { pair, except: &[] },
         class: names::class(orbit.class),
         period: names::period(orbit.class),
         lyapunov: orbit.lyapunov,

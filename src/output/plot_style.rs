@@ -7,6 +7,7 @@
 
 pub(super) mod axes;
 pub(super) mod legend;
+mod raster;
 
 use std::path::Path;
 use std::sync::Once;

@@ -98,7 +98,7 @@ pub struct Refine {
 }
 
 /// What can be asked of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Periodic, chaotic, undecided or failed, and the period.
     Class,
@@ -255,6 +255,21 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
     };
     let minimum_grid = section.get("minimum_grid").map_or(Ok(8), |field| field.whole(1..=1024))?;
     Ok(Some(Refine { minimum_grid, max_error }))
+}
+
+/// Refuses what maps cannot do yet, though scenes can say it: better than ignoring it.
+pub(super) fn refuse_unbuilt(root: &Section<'_>, start: Start) -> Result<(), SceneError> {
+    if let Some(field) = root.get("refine") {
+        return Err(field.conflict("`map` integrates every cell so far; drop [refine]".to_owned()));
+    }
+    let section = root.section("start", &["policy", "state"])?;
+    match (start, section.get("policy")) {
+        (Start::Up | Start::Down, Some(field)) => Err(field.conflict(
+            "`map` starts every cell from one state so far; use \"rest\", or \"state\" with a state"
+                .to_owned(),
+        )),
+        _ => Ok(()),
+    }
 }
 
 pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {

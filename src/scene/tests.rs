@@ -93,14 +93,41 @@ fn axis_values_are_inclusive_and_stay_in_range() {
 
 #[test]
 fn a_map_takes_two_axes_in_their_order() {
-    let text =
-        format!("{}{SECOND_AXIS}\n[refine]\nmax_error = 0.01\n", GOOD.replacen("\"csv\"", "\"npy\"", 1));
+    let text = format!("{}{SECOND_AXIS}", GOOD.replacen("\"csv\"", "\"npy\"", 1));
     let scene = Scene::parse(&text, "s.toml", &[], Purpose::Map).unwrap();
     let pair = scene.cell(&[3, 1]);
     assert_eq!((pair.e, pair.omega, pair.force), (1.0, 6.5, 50.0));
-    assert_eq!(scene.refine(), Some(Refine { minimum_grid: 8, max_error: 0.01 }));
     let message = Scene::parse(GOOD, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
     assert_says(&message, &["s.toml:7:", "axis = 1 of them", "`map` needs 2 axes"]);
+}
+
+#[test]
+fn a_map_refuses_what_it_would_ignore() {
+    let text = format!("{GOOD}{SECOND_AXIS}");
+    let refused = |text: &str| Scene::parse(text, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
+    let refine = refused(&format!("{text}\n[refine]\nmax_error = 0.01\n"));
+    assert_says(&refine, &["s.toml:33:", "`refine = { ... }` does not fit", "drop [refine]"]);
+    for policy in ["up", "down"] {
+        let message = refused(&text.replace("\"rest\"", &format!("\"{policy}\"")));
+        assert_says(&message, &["s.toml:21:10", &format!("`start.policy = \"{policy}\"`"), "\"rest\""]);
+    }
+}
+
+#[test]
+fn the_identity_tells_scenes_apart_that_compute_otherwise() {
+    let scene = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+        Scene::parse(&format!("{GOOD}{SECOND_AXIS}"), "s", &sets, Purpose::Map).unwrap().identity()
+    };
+    let original = scene(&[]);
+    assert_eq!(original, scene(&["title=Other", "outputs.files=[\"png\"]", "F=50"]));
+    for set in ["F=51", "axis.1.count=4", "axis.0.max=0.9", "integration.early_stop=true"] {
+        let other = scene(&[set]);
+        let differing: Vec<_> = original.iter().zip(&other).filter(|(a, b)| a != b).collect();
+        assert_eq!(differing.len(), 1, "{set}: {differing:?}");
+    }
+    assert_ne!(original, scene(&["start.policy=state", "start.state=[0,0,1,0]"]));
+    assert_ne!(original, scene(&["outputs.quantities=[\"class\"]"]));
 }
 
 #[test]

@@ -12,13 +12,16 @@ pub struct Exponent {
 }
 
 impl Exponent {
-    /// Takes the growth of a trajectory's tangent vector since the last call and gives it
-    /// unit length again; a null vector, which a superstable orbit leaves, starts anew.
-    pub fn renormalise(&mut self, trajectory: &mut Trajectory<'_, 1>) {
-        let [u] = trajectory.tangents();
+    /// Takes the growth of a trajectory's first tangent vector since the last call and gives
+    /// it unit length again; a null vector, which a superstable orbit leaves, starts anew. A
+    /// trajectory without one is left alone.
+    pub fn renormalise<const N: usize>(&mut self, trajectory: &mut Trajectory<'_, N>) {
+        let tangents = trajectory.tangents();
+        let Some(u) = tangents.first() else { return };
         let length = u.iter().map(|x| x * x).sum::<f64>().sqrt();
         self.growth.push(length.max(f64::MIN_POSITIVE).ln() + trajectory.log_scale());
-        trajectory.set_tangents([if length > 0.0 { u.map(|x| x / length) } else { [0.5; 4] }]);
+        trajectory
+            .set_tangents(tangents.map(|u| if length > 0.0 { u.map(|x| x / length) } else { [0.5; 4] }));
     }
 
     /// Forgets what was collected: the vector needs a while to turn to its direction.

@@ -131,6 +131,17 @@ impl Frame {
         Ok(())
     }
 
+    /// Draws ticks and labels of the y axis on the right: the scale of a colour bar.
+    pub(in crate::output) fn draw_scale(&self, canvas: &Canvas<'_>) -> Result<()> {
+        let right = self.rect.right;
+        for (value, text) in self.y.ticks((self.rect.bottom - self.rect.top) / 45.0) {
+            let y = self.at(0.0, value).1;
+            canvas.stroke(&[(right, y), (right + TICK, y)], 1.5, DARK)?;
+            canvas.text(&text, (right + TICK + 7.0, y), SMALL, Align::Left, DARK)?;
+        }
+        Ok(())
+    }
+
     fn x_ticks(&self) -> Vec<(f64, String)> {
         self.x.ticks((self.rect.right - self.rect.left) / 90.0)
     }

@@ -1,0 +1,90 @@
+//! Who computes: one seam between what is asked and what measures it.
+//!
+//! An [`Engine`] takes batches of a plan's cells and returns one record per cell, in the
+//! batch's order. A record depends on its cell and the plan alone: not on the batch, its
+//! size, the neighbours, or the number of threads.
+
+mod cpu;
+mod fake;
+
+use thiserror::Error;
+
+pub use cpu::Cpu;
+pub use fake::Fake;
+
+use crate::plan::Batch;
+use crate::record::Record;
+
+/// Why a batch was not computed.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum EngineError {
+    /// The batch does not fit the engine's memory; a smaller one may.
+    #[error("no memory on {device} for a batch of {cells} cells")]
+    OutOfMemory {
+        /// The engine's device.
+        device: String,
+        /// Cells in the batch.
+        cells: usize,
+    },
+    /// The engine is gone and computes nothing any more.
+    #[error("{device} was lost ({reason})")]
+    Lost {
+        /// The engine's device.
+        device: String,
+        /// What its driver says.
+        reason: String,
+    },
+}
+
+/// What computes cells.
+pub enum Engine<'p> {
+    /// The event-driven reference on all processor cores, in f64.
+    Cpu(Cpu<'p>),
+    /// Records by rule, and failures on demand: for tests of everything around an engine.
+    Fake(Fake),
+}
+
+impl Engine<'_> {
+    /// The name in manifests and record files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Engine::Cpu(_) => "cpu",
+            Engine::Fake(_) => "fake",
+        }
+    }
+
+    /// The precision in manifests and record files.
+    pub fn precision(&self) -> &'static str {
+        match self {
+            Engine::Cpu(_) | Engine::Fake(_) => "f64",
+        }
+    }
+
+    /// What it runs on, in words: part of a record file's identity, since results are
+    /// bitwise the same on one device only.
+    pub fn device(&self) -> String {
+        match self {
+            Engine::Cpu(_) => "event-driven reference".to_owned(),
+            Engine::Fake(_) => "fake".to_owned(),
+        }
+    }
+
+    /// The fewest cells that keep the engine busy: the size of the first batch.
+    pub fn least_batch(&self) -> usize {
+        match self {
+            Engine::Cpu(cpu) => cpu.least_batch(),
+            Engine::Fake(_) => 16,
+        }
+    }
+
+    /// Computes a batch: one record per cell, in the batch's order.
+    ///
+    /// # Errors
+    /// [`EngineError`], with nothing of the batch computed.
+    pub async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
+        match self {
+            Engine::Cpu(cpu) => Ok(cpu.run(batch)),
+            Engine::Fake(fake) => fake.run(batch),
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The reference as an engine: one cell per task on all processor cores.
+
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use crate::flow::Flow;
+use crate::orbit::{Measured, measure};
+use crate::plan::{Batch, Cell, Needs, Plan};
+use crate::record::{Record, valid};
+
+/// Most flows that are kept for later batches; each takes about 20 kB.
+const KEPT_FLOWS: usize = 16_384;
+
+/// The event-driven reference.
+pub struct Cpu<'p> {
+    plan: &'p Plan,
+    /// Solved when first needed; empty where every cell has its own.
+    flows: Vec<OnceLock<Box<Flow>>>,
+}
+
+impl<'p> Cpu<'p> {
+    /// An engine for the cells of a plan.
+    pub fn new(plan: &'p Plan) -> Cpu<'p> {
+        let shared = plan.flow_count() < plan.cell_count() && plan.flow_count() <= KEPT_FLOWS;
+        let kept = if shared { plan.flow_count() } else { 0 };
+        Cpu { plan, flows: (0..kept).map(|_| OnceLock::new()).collect() }
+    }
+
+    pub(super) fn least_batch(&self) -> usize {
+        64 * rayon::current_num_threads()
+    }
+
+    pub(super) fn run(&self, batch: &Batch) -> Vec<Record> {
+        // Cells differ a thousandfold in cost: no task holds more than one.
+        batch.cells.par_iter().with_max_len(1).map(|cell| self.cell(cell)).collect()
+    }
+
+    fn cell(&self, cell: &Cell) -> Record {
+        let solve = || Box::new(Flow::new(&self.plan.oscillator(cell.flow)));
+        let measured =
+            |flow: &Flow| measure(flow, self.plan.law(cell.law), self.plan.start(), self.plan.budget());
+        let measured = match self.flows.get(cell.flow as usize) {
+            Some(kept) => measured(kept.get_or_init(solve)),
+            None => measured(&solve()),
+        };
+        record(&measured, self.plan.needs())
+    }
+}
+
+/// What somebody asked for of what was measured.
+fn record(measured: &Measured, needs: &Needs) -> Record {
+    let mut record = Record {
+        strobe: measured.strobe,
+        periods_run: measured.periods_run,
+        status: measured.status.code(),
+        valid: valid::STROBE,
+        ..Record::default()
+    };
+    if measured.status.is_failure() {
+        return record;
+    }
+    record.valid |= valid::PERIOD;
+    record.period = measured.period.unwrap_or(0);
+    if let (true, Some([lyapunov, error])) = (needs.exponent, measured.lyapunov) {
+        record.valid |= valid::LYAPUNOV;
+        (record.lyapunov, record.lyapunov_error) = (lyapunov, error);
+    }
+    if needs.impacts {
+        record.valid |= valid::IMPACTS;
+        record.impacts_per_period = measured.impacts_per_period;
+    }
+    if needs.mesh {
+        record.valid |= valid::MESH;
+        record.mesh_fraction = measured.mesh_fraction;
+    }
+    if let (true, Some(symmetric)) = (needs.symmetric, measured.symmetric) {
+        record.valid |= valid::SYMMETRIC;
+        record.symmetric = symmetric.into();
+    }
+    if let (true, Some(word)) = (needs.word, &measured.word) {
+        record.set_word(word);
+    }
+    record
+}

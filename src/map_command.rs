@@ -1,0 +1,163 @@
+//! `rattlemap map`: a scene into a folder, resumable at every batch.
+
+use std::ops::ControlFlow;
+use std::process;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, anyhow};
+use rattlemap::engine::{Cpu, Engine};
+use rattlemap::orbit::Class;
+use rattlemap::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
+use rattlemap::plan::{Plan, count_classes};
+use rattlemap::record::Record;
+use rattlemap::scene::{self, Purpose, Scene};
+use rattlemap::sweep::{self, SweepError};
+
+use crate::capacity;
+use crate::cli::{EngineChoice, Map};
+use crate::error::{Failure, fail_if};
+use crate::progress::Progress;
+
+/// Exit code after a second Ctrl-C, as shells count it.
+const KILLED: i32 = 130;
+
+/// Asks, checks, computes, writes.
+pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
+    let scene = scene::load(&ask.scene, &ask.set, Purpose::Map)?;
+    capacity::check(&scene, &ask.out())?;
+    let folder = open_folder(ask)?;
+    let plan = Plan::new(&scene);
+    let mut engine = match ask.engine {
+        EngineChoice::Auto | EngineChoice::Cpu => Engine::Cpu(Cpu::new(&plan)),
+    };
+    let (mut file, mut records) = open_records(ask, &folder, &scene, &plan, &engine)?;
+    let resumed_cells = file.places();
+    let clock = Instant::now();
+    let progress = Progress::new(plan.cell_count(), resumed_cells, "cells", ask.quiet);
+    integrate(ask, &plan, &mut engine, &mut file, &mut records, &progress)?;
+    let elapsed = clock.elapsed();
+    let cells = Cells::new(&scene, &plan, &records);
+    let device = engine.device();
+    let (engine, precision) = (engine.name(), engine.precision());
+    let run = output::map::Run { sets: &ask.set, engine, precision, device: &device, elapsed, resumed_cells };
+    let files = output::map::write(&folder, &cells, &run)?;
+    progress.finish(&format!(
+        "{}\n{}: {}",
+        summary(&cells, &run, clock.elapsed().as_secs_f64()),
+        folder.path().display(),
+        files.join(", ")
+    ));
+    let all_failed = cells.classes().all(|class| class == Class::Failed);
+    fail_if(all_failed, "every cell failed; the status column says why")
+}
+
+/// A new folder, an earlier run's with `--force`, an interrupted one's with `--resume`.
+fn open_folder(ask: &Map) -> Result<Folder, Failure> {
+    let out = ask.out();
+    let is_new = out.read_dir().map_or(true, |mut entries| entries.next().is_none());
+    if ask.resume && !is_new && !out.join(RECORDS).is_file() {
+        return Err(RecordFileError::NothingToResume { folder: out }.into());
+    }
+    Ok(Folder::open(&out, ask.force || ask.resume)?)
+}
+
+/// The record file, and what it holds already, by cell id.
+fn open_records(
+    ask: &Map,
+    folder: &Folder,
+    scene: &Scene,
+    plan: &Plan,
+    engine: &Engine<'_>,
+) -> Result<(RecordFile, Vec<Record>), Failure> {
+    let path = folder.path().join(RECORDS);
+    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
+    let mut records = vec![Record::default(); plan.cell_count()];
+    let file = if ask.resume && path.is_file() {
+        RecordFile::resume(&path, &identity, plan.cell_count(), |place, batch| {
+            store(plan, &mut records, place, batch);
+        })?
+    } else {
+        RecordFile::create(&path, &identity)?
+    };
+    output::map::clear(folder)?;
+    Ok((file, records))
+}
+
+/// Puts a batch that begins at `place` of the plan's order where its cells belong.
+fn store(plan: &Plan, records: &mut [Record], place: usize, batch: &[Record]) {
+    for (&id, record) in plan.order()[place..].iter().zip(batch) {
+        records[id as usize] = *record;
+    }
+}
+
+/// Integrates what is left. Ctrl-C ends it after the batch at hand.
+fn integrate(
+    ask: &Map,
+    plan: &Plan,
+    engine: &mut Engine<'_>,
+    file: &mut RecordFile,
+    records: &mut [Record],
+    progress: &Progress,
+) -> Result<(), Failure> {
+    let stop = stop_on_interrupt(ask.quiet)?;
+    let from = file.places();
+    let swept = pollster::block_on(sweep::run(plan, engine, from, |batch, computed| {
+        file.append(computed)?;
+        store(plan, records, batch.places.start, computed);
+        progress.report(batch.places.end);
+        let stopped = stop.load(Ordering::Relaxed);
+        Ok(if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    }));
+    let go_on = || {
+        let (done, total, command) = (file.places(), plan.cell_count(), ask.resume_command());
+        format!("{done} of {total} cells are kept; go on with: {command}")
+    };
+    match swept {
+        Ok(place) if place == plan.cell_count() => Ok(()),
+        Ok(_) => Err(Failure::Run(anyhow!("interrupted; {}", go_on()))),
+        Err(error @ SweepError::Engine(_)) => Err(Failure::Run(anyhow!("{error}; {}", go_on()))),
+        Err(error) => Err(Failure::Run(anyhow!("{error}; make room there; {}", go_on()))),
+    }
+}
+
+/// A flag that the first Ctrl-C raises; the second one ends the process at once, which the
+/// record file survives, too.
+fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            process::exit(KILLED);
+        }
+        if !quiet {
+            eprintln!("finishing the batch at hand; Ctrl-C again ends at once");
+        }
+    })
+    .context("cannot listen for Ctrl-C")?;
+    Ok(stop)
+}
+
+/// What was done, how fast, and what came out.
+fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, seconds: f64) -> String {
+    let [columns, rows] = cells.counts();
+    let count = columns * rows;
+    let integrating = run.elapsed.as_secs_f64().max(1e-9);
+    let here = (count - run.resumed_cells) as f64;
+    let periods = cells.periods() as f64 * here / count as f64;
+    let [periodic, chaotic, undecided, failed] = count_classes(cells.classes());
+    let resumed = match run.resumed_cells {
+        0 => String::new(),
+        cells => format!(", {cells} of them before"),
+    };
+    format!(
+        "{count} cells{resumed} on {} ({}) in {integrating:.1} s: {:.0} cells/s, {:.0} periods/s; outputs {:.1} s\n\
+         {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
+        run.engine,
+        run.precision,
+        here / integrating,
+        periods / integrating,
+        seconds - integrating,
+    )
+}

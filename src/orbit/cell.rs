@@ -1,0 +1,287 @@
+//! One cell of a map: the same decisions within a fixed number of forcing periods.
+//!
+//! [`analyse`](super::analyse) goes on until it knows; a map cannot. Here a cell has
+//! `transient_periods + observed_periods` and no more, and an approach is looked for in the
+//! strobe states that have passed, so that nothing is integrated ahead of the budget.
+
+use super::CHAOS_ERRORS;
+use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, TANGENT_PERIODS, status_of};
+use super::recurrence::{Metric, NEAR, candidates, lingers};
+use super::{Orbit, Settings, Status};
+use crate::flow::Flow;
+use crate::model::{Law, State};
+use crate::reference::{Stop, Trajectory};
+use crate::stability::{Cycle, Exponent, refine};
+use crate::word::Word;
+
+/// The exponent accumulates from this period on, or from the end of a shorter transient.
+const EXPONENT_FROM: u32 = 100;
+
+/// Periods after which an early stop is first considered; then every quarter as many more.
+const FIRST_LOOK: u32 = 16;
+
+/// A cell stops early only this close to its cycle, relative to the motion: inside the region
+/// where the multipliers tell what happens next. A leaving speed near `mesh_speed` makes that
+/// region small: at 1e-3 one cell in 10,000 was taken for a period that it then left.
+const SETTLED: f64 = 1e-6;
+
+/// Cycles, at least, over which an approach must have been seen.
+const APPROACH_CYCLES: usize = 4;
+
+/// How long one cell is integrated, and what for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Budget {
+    /// Periods of transient and observation, and the longest cycle.
+    pub settings: Settings,
+    /// Whether the cell may stop as soon as its cycle is certain; otherwise exactly
+    /// `transient_periods + observed_periods` are integrated.
+    pub early_stop: bool,
+    /// Whether motion that is not periodic gets an exponent. It costs a tangent vector.
+    pub exponent: bool,
+}
+
+/// What one cell showed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Confirmed period, in forcing periods.
+    pub period: Option<u32>,
+    /// How the integration ended; `Slow` without a period says that the motion lingers at
+    /// some cycle, or grows by less than three standard errors: no chaos.
+    pub status: Status,
+    /// Largest Lyapunov exponent per unit time and its standard error, zero for a cycle.
+    pub lyapunov: Option<[f64; 2]>,
+    /// Impacts per forcing period, over the cycle or the observed periods.
+    pub impacts_per_period: f64,
+    /// Fraction of time spent meshing, over the same.
+    pub mesh_fraction: f64,
+    /// Whether the cycle is its own mirror image.
+    pub symmetric: Option<bool>,
+    /// The cycle's word.
+    pub word: Option<Word>,
+    /// The last strobe state.
+    pub strobe: State,
+    /// Forcing periods integrated; what Newton's method needs beside them is not counted.
+    pub periods_run: u32,
+}
+
+/// Integrates one cell from `start` at phase 0 within its budget.
+pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measured {
+    let settings = &budget.settings;
+    let analysis = Analysis { flow, law, settings, shown_periods: 0 };
+    let mut watch = Watch {
+        analysis: &analysis,
+        budget,
+        strobes: vec![start],
+        exponent: Exponent::default(),
+        cycle: None,
+        observed_from: [0.0; 2],
+    };
+    watch.run(start).unwrap_or_else(|stop| watch.stopped(stop))
+}
+
+/// A cycle that Newton found, and the strobe at which it was found.
+struct Found<'a> {
+    cycle: Cycle,
+    /// The trajectory there: a state alone does not tell its domain.
+    seed: Trajectory<'a>,
+    at: usize,
+    distance: f64,
+}
+
+struct Watch<'a> {
+    analysis: &'a Analysis<'a>,
+    budget: &'a Budget,
+    /// Strobe states from the start on; entry `n` after `n` periods.
+    strobes: Vec<State>,
+    exponent: Exponent,
+    cycle: Option<Found<'a>>,
+    /// Impacts and meshing time when observation began.
+    observed_from: [f64; 2],
+}
+
+impl<'a> Watch<'a> {
+    fn run(&mut self, start: State) -> Result<Measured, Stop> {
+        let settings = &self.budget.settings;
+        let last = settings.transient_periods.saturating_add(settings.observed_periods);
+        let exponent_from = EXPONENT_FROM.min(settings.transient_periods);
+        let turning_from =
+            if self.budget.exponent { exponent_from.saturating_sub(TANGENT_PERIODS) } else { last };
+        let mut look = if self.budget.early_stop { FIRST_LOOK.min(last) } else { last };
+        let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start);
+        while bare.period() < u64::from(turning_from) {
+            if let Some(measured) = self.period(&mut bare, &mut look, last)? {
+                return Ok(measured);
+            }
+        }
+        let mut carrier = bare.carrying([[0.5; 4]]);
+        while carrier.period() < u64::from(last) {
+            if carrier.period() == u64::from(exponent_from) {
+                self.exponent.forget();
+            }
+            if let Some(measured) = self.period(&mut carrier, &mut look, last)? {
+                return Ok(measured);
+            }
+        }
+        unreachable!("the last period is looked at")
+    }
+
+    /// One forcing period, and a look at what has passed where one is due.
+    fn period<const N: usize>(
+        &mut self,
+        trajectory: &mut Trajectory<'a, N>,
+        look: &mut u32,
+        last: u32,
+    ) -> Result<Option<Measured>, Stop> {
+        trajectory.advance_period(&mut ())?;
+        self.exponent.renormalise(trajectory);
+        self.strobes.push(trajectory.state());
+        let now = self.strobes.len() as u32 - 1;
+        let counts = [trajectory.work().impacts as f64, trajectory.meshing_time()];
+        if now == self.budget.settings.transient_periods {
+            self.observed_from = counts;
+        }
+        if now < *look {
+            return Ok(None);
+        }
+        *look = (now + now.div_ceil(4)).min(last);
+        match self.settled(&trajectory.carrying([]), now == last)? {
+            Some(orbit) => Ok(Some(self.periodic(orbit))),
+            None if now == last => Ok(Some(self.aperiodic(counts))),
+            None => Ok(None),
+        }
+    }
+
+    /// The orbit of a cycle that the strobe states are seen to approach.
+    fn settled(&mut self, seed: &Trajectory<'a>, is_last: bool) -> Result<Option<Orbit>, Stop> {
+        let max_period = self.budget.settings.max_period;
+        let window = &self.strobes[self.strobes.len().saturating_sub(2 * max_period as usize + 1)..];
+        let metric = Metric::of(window, self.analysis.flow);
+        let near = if is_last { NEAR } else { SETTLED };
+        if is_last {
+            // Judged as if it were the only look: a cell that runs its whole budget has the
+            // same class with and without early stops.
+            self.cycle = None;
+        }
+        if let Some(orbit) = self.approached(&metric, near)? {
+            return Ok(Some(orbit));
+        }
+        // One that is being approached needs no second look.
+        if !is_last && self.cycle.as_ref().is_some_and(|found| self.present(found, &metric) < found.distance)
+        {
+            return Ok(None);
+        }
+        for candidate in candidates(window, &metric, max_period) {
+            let state = self.strobes[self.strobes.len() - 1];
+            for map in self.analysis.maps(candidate.period) {
+                let Some(cycle) = refine(seed, map) else { continue };
+                let Some(cycle) = self.analysis.smallest(seed, cycle, &metric) else { continue };
+                let distance = metric.distance(&state, &cycle.state);
+                if cycle.spectral_radius() < 1.0 && distance < NEAR {
+                    let at = self.strobes.len() - 1;
+                    self.cycle = Some(Found { cycle, seed: seed.clone(), at, distance });
+                    if let Some(orbit) = self.approached(&metric, near)? {
+                        return Ok(Some(orbit));
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The orbit of the cycle found last, if the strobe states have come within `near` of it
+    /// and nearer all the time.
+    fn approached(&self, metric: &Metric, near: f64) -> Result<Option<Orbit>, Stop> {
+        let Some(found) = &self.cycle else { return Ok(None) };
+        let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_beside(found));
+        let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
+        let present = distance(0);
+        let left = f64::from(self.budget.settings.transient_periods + self.budget.settings.observed_periods)
+            - (self.strobes.len() - 1) as f64;
+        // Where it would stand at the end of the budget: the same status for early stops.
+        let radius = cycle.spectral_radius();
+        let at_last = present * radius.powf(left / f64::from(cycle.period));
+        if present < ON_CYCLE {
+            return self.analysis.periodic(&found.seed, cycle, at_last).map(Some);
+        }
+        let halving = (0.5f64.ln() / radius.max(0.1).ln()).ceil();
+        let back = (halving.min(1e6) as usize).max(APPROACH_CYCLES).min(now / 2 / period);
+        if present > near || back < 2 {
+            return Ok(None);
+        }
+        // A multiplier near 1 shrinks little; half of what it promises must be seen.
+        let promised = 1.0 - 0.5 * (1.0 - radius.powf(back as f64));
+        let before = distance(back);
+        let nearer = present < APPROACH.max(promised) * before;
+        let steady = (1..back).all(|k| distance(k) < 2.0 * before);
+        if nearer && steady {
+            self.analysis.periodic(&found.seed, cycle, at_last).map(Some)
+        } else {
+            Ok(None)
+        }
+    }
+
+    /// The last strobe that the cycle's state belongs to: the others, unless the period is 1,
+    /// are other points of the cycle.
+    fn last_beside(&self, found: &Found) -> usize {
+        let period = found.cycle.period as usize;
+        found.at + (self.strobes.len() - 1 - found.at) / period * period
+    }
+
+    /// How far the motion is from a cycle.
+    fn present(&self, found: &Found, metric: &Metric) -> f64 {
+        metric.distance(&self.strobes[self.last_beside(found)], &found.cycle.state)
+    }
+
+    fn periodic(&self, orbit: Orbit) -> Measured {
+        Measured {
+            period: Some(orbit.cycle_periods),
+            status: orbit.status,
+            lyapunov: Some([orbit.lyapunov, 0.0]),
+            impacts_per_period: orbit.impacts_per_period,
+            mesh_fraction: orbit.mesh_fraction,
+            symmetric: orbit.symmetric,
+            word: Some(orbit.word),
+            strobe: self.strobes[self.strobes.len() - 1],
+            periods_run: self.strobes.len() as u32 - 1,
+        }
+    }
+
+    fn aperiodic(&self, [impacts, meshing_time]: [f64; 2]) -> Measured {
+        let max_period = self.budget.settings.max_period;
+        let window = &self.strobes[self.budget.settings.transient_periods as usize..];
+        let period = self.analysis.flow.period;
+        let span = f64::from(self.budget.settings.observed_periods);
+        let lyapunov = self.budget.exponent.then(|| self.exponent.estimate(period));
+        let surely = lyapunov.map(|(mean, error)| mean - CHAOS_ERRORS * error);
+        // Banded chaos lingers at a cycle for ever, but no departure lasts through such growth.
+        let lasting = surely.is_some_and(|rate| rate * span * period > DEPARTURE);
+        let lingers = || lingers(window, &Metric::of(window, self.analysis.flow), max_period);
+        let slow = surely.is_some_and(|rate| rate <= 0.0) || !lasting && lingers();
+        Measured {
+            period: None,
+            status: if slow { Status::Slow } else { Status::Ok },
+            lyapunov: lyapunov.map(|(mean, error)| [mean, error]),
+            impacts_per_period: (impacts - self.observed_from[0]) / span,
+            mesh_fraction: (meshing_time - self.observed_from[1]) / (span * period),
+            symmetric: None,
+            word: None,
+            strobe: self.strobes[self.strobes.len() - 1],
+            periods_run: self.strobes.len() as u32 - 1,
+        }
+    }
+
+    /// A cell that could not be continued: nothing was measured but how far it came.
+    fn stopped(&self, stop: Stop) -> Measured {
+        Measured {
+            period: None,
+            status: status_of(stop),
+            lyapunov: None,
+            impacts_per_period: 0.0,
+            mesh_fraction: 0.0,
+            symmetric: None,
+            word: None,
+            strobe: self.strobes[self.strobes.len() - 1],
+            periods_run: self.strobes.len() as u32 - 1,
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! A finished map as rows: the one view that tables, figures and reports are made from.
+
+use crate::classify::{classify, status};
+use crate::orbit::{Class, Status};
+use crate::plan::Plan;
+use crate::record::{Record, Spelling, valid};
+use crate::scene::{Quantity, Scene};
+
+/// Where a cell's values come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    /// The cell was integrated.
+    Integrated,
+    /// It was filled from its neighbours, which agree.
+    Filled,
+}
+
+/// Every source; its position is its code in tables.
+pub(super) const SOURCES: [Source; 2] = [Source::Integrated, Source::Filled];
+
+/// One row, less the word, which takes an allocation. What the scene does not ask for, and what the cell does not have, is absent.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Row {
+    pub(super) indices: [usize; 2],
+    pub(super) values: [f64; 2],
+    pub(super) class: Option<Class>,
+    pub(super) period: Option<u32>,
+    pub(super) lyapunov: Option<f64>,
+    pub(super) lyapunov_error: Option<f64>,
+    pub(super) impacts_per_period: Option<f64>,
+    pub(super) mesh_fraction: Option<f64>,
+    pub(super) symmetric: Option<bool>,
+    pub(super) status: Status,
+    pub(super) periods_run: u32,
+    pub(super) source: Source,
+}
+
+/// A scene, its plan, and one record per cell by id.
+#[derive(Clone, Copy, Debug)]
+pub struct Cells<'a> {
+    scene: &'a Scene,
+    plan: &'a Plan,
+    records: &'a [Record],
+}
+
+impl<'a> Cells<'a> {
+    /// A finished map.
+    ///
+    /// # Panics
+    /// If there are not as many records as cells.
+    pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a [Record]) -> Cells<'a> {
+        assert_eq!(plan.cell_count(), records.len(), "one record per cell");
+        Cells { scene, plan, records }
+    }
+
+    /// Cells along the two axes.
+    pub fn counts(&self) -> [usize; 2] {
+        self.plan.axes().map(|axis| axis.count())
+    }
+
+    /// The class of every cell, by id.
+    pub fn classes(&self) -> impl Iterator<Item = Class> + '_ {
+        self.records.iter().map(classify)
+    }
+
+    /// The status of every cell, by id.
+    pub fn statuses(&self) -> impl Iterator<Item = Status> + '_ {
+        self.records.iter().map(status)
+    }
+
+    /// Forcing periods integrated, over all cells.
+    pub fn periods(&self) -> u64 {
+        self.records.iter().map(|record| u64::from(record.periods_run)).sum()
+    }
+
+    pub(super) fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
+    pub(super) fn asks(&self, quantity: Quantity) -> bool {
+        self.scene.outputs().quantities.contains(&quantity)
+    }
+
+    pub(super) fn record(&self, id: usize) -> &'a Record {
+        &self.records[id]
+    }
+
+    /// The word of the cell `id`, if it was asked for and there is one.
+    pub(super) fn word(&self, id: usize) -> Option<Spelling> {
+        if self.asks(Quantity::Word) { self.records[id].spelling() } else { None }
+    }
+
+    /// The row of the cell `id`, less its word.
+    pub(super) fn row(&self, id: usize) -> Row {
+        let record = &self.records[id];
+        let indices = self.plan.indices(id as u32);
+        let [first, second] = self.plan.axes();
+        let class = classify(record);
+        let periodic = matches!(class, Class::Periodic { .. });
+        let asked = |quantity, bit, value: f64| {
+            (self.asks(quantity) && record.valid & bit != 0 && value.is_finite()).then_some(value)
+        };
+        let asks_class = self.asks(Quantity::Class);
+        let lyapunov = asked(Quantity::Lyapunov, valid::LYAPUNOV, record.lyapunov);
+        Row {
+            indices,
+            values: [first.value(indices[0]), second.value(indices[1])],
+            class: asks_class.then_some(class),
+            period: (asks_class && periodic).then_some(record.period),
+            lyapunov,
+            // The exponent of a cycle comes from its multipliers: there is no average.
+            lyapunov_error: lyapunov
+                .filter(|_| !periodic && record.lyapunov_error.is_finite())
+                .map(|_| record.lyapunov_error),
+            impacts_per_period: asked(Quantity::Impacts, valid::IMPACTS, record.impacts_per_period),
+            mesh_fraction: asked(Quantity::Mesh, valid::MESH, record.mesh_fraction),
+            symmetric: (self.asks(Quantity::Symmetric) && record.valid & valid::SYMMETRIC != 0)
+                .then_some(record.symmetric != 0),
+            status: status(record),
+            periods_run: record.periods_run,
+            source: if record.periods_run == 0 { Source::Filled } else { Source::Integrated },
+        }
+    }
+}

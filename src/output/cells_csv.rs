@@ -1,0 +1,83 @@
+//! `cells.csv`: one row per cell.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::cells::{Cells, Row};
+use super::names;
+use crate::record::Spelling;
+
+/// Cells whose rows are formatted at a time, all cores together.
+const BLOCK: usize = 1 << 16;
+/// Cells per task.
+const PART: usize = 1 << 12;
+
+/// Fields after the indices and the axes.
+pub(super) const FIELDS: [&str; 11] = [
+    "class",
+    "period",
+    "lyapunov",
+    "lyapunov_error",
+    "impacts_per_period",
+    "mesh_fraction",
+    "symmetric",
+    "word",
+    "status",
+    "periods_run",
+    "source",
+];
+
+/// Writes the table to `path`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
+    let mut header = csv::Writer::from_writer(Vec::new());
+    header.write_record(["i", "j"].into_iter().chain(axes).chain(FIELDS))?;
+    file.write_all(&header.into_inner()?)?;
+    let [columns, rows] = cells.counts();
+    let count = columns * rows;
+    for block in (0..count).step_by(BLOCK) {
+        let end = count.min(block + BLOCK);
+        let starts: Vec<usize> = (block..end).step_by(PART).collect();
+        let parts = starts.par_iter().map(|&start| part(cells, start..end.min(start + PART)));
+        for part in parts.collect::<anyhow::Result<Vec<_>>>()? {
+            file.write_all(&part)?;
+        }
+    }
+    Ok(file.flush()?)
+}
+
+fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> anyhow::Result<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::with_capacity(160 * ids.len()));
+    for id in ids {
+        table.write_record(fields(&cells.row(id), cells.word(id)))?;
+    }
+    Ok(table.into_inner()?)
+}
+
+fn fields(row: &Row, word: Option<Spelling>) -> [String; 15] {
+    let float = |value: Option<f64>| value.map_or(String::new(), |x| format!("{x:?}"));
+    [
+        row.indices[0].to_string(),
+        row.indices[1].to_string(),
+        format!("{:?}", row.values[0]),
+        format!("{:?}", row.values[1]),
+        row.class.map_or(String::new(), |class| names::class(class).to_owned()),
+        row.period.map_or(String::new(), |period| period.to_string()),
+        float(row.lyapunov),
+        float(row.lyapunov_error),
+        float(row.impacts_per_period),
+        float(row.mesh_fraction),
+        row.symmetric.map_or(String::new(), |symmetric| symmetric.to_string()),
+        word.map_or(String::new(), |word| word.text()),
+        names::status(row.status).to_owned(),
+        row.periods_run.to_string(),
+        names::source(row.source).to_owned(),
+    ]
+}

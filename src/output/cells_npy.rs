@@ -1,0 +1,85 @@
+//! `cells.npy`: the same rows as a structured array for `numpy.load`.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use npyz::{DType, Field, TypeStr, TypeWrite, WriterBuilder};
+
+use super::cells::{Cells, Row};
+use super::cells_csv::FIELDS;
+use super::names;
+use crate::record::Spelling;
+
+/// What stands for an absent class or an absent symmetry.
+pub(super) const ABSENT: i8 = -1;
+
+/// NumPy's types of `i`, `j` and the axes, then of [`FIELDS`].
+const TYPES: [&str; 15] = [
+    "<u4", "<u4", "<f8", "<f8", "|i1", "<u2", "<f8", "<f8", "<f8", "<f8", "|i1", "|S64", "|i1", "<u4", "|i1",
+];
+const WORD_BYTES: usize = 64;
+
+/// Writes the array to `path`: one dimension, the fields of `cells.csv` by name. Classes,
+/// statuses and sources are their codes; an absent period is 0, an absent float NaN, an
+/// absent class or symmetry -1, an absent word empty.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
+    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
+    let names = ["i", "j"].into_iter().chain(axes).chain(FIELDS);
+    let fields = names.zip(TYPES).map(|(name, kind)| {
+        let kind: TypeStr = kind.parse()?;
+        Ok(Field { name: name.to_owned(), dtype: DType::Plain(kind) })
+    });
+    let fields = fields.collect::<Result<Vec<_>, npyz::ParseTypeStrError>>()?;
+    let [columns, rows] = cells.counts();
+    let count = columns * rows;
+    let mut array = npyz::WriteOptions::<Packed>::new()
+        .dtype(DType::Record(fields))
+        .shape(&[count as u64])
+        .writer(BufWriter::new(File::create(path)?))
+        .begin_nd()?;
+    for id in 0..count {
+        array.push(&Packed(cells.row(id), cells.word(id)))?;
+    }
+    Ok(array.finish()?)
+}
+
+/// A row as bytes in the order of [`TYPES`].
+struct Packed(Row, Option<Spelling>);
+
+struct PackedWriter;
+
+impl npyz::Serialize for Packed {
+    type TypeWriter = PackedWriter;
+
+    fn writer(_: &DType) -> Result<PackedWriter, npyz::DTypeError> {
+        // The one type that this module asks for.
+        Ok(PackedWriter)
+    }
+}
+
+impl TypeWrite for PackedWriter {
+    type Value = Packed;
+
+    fn write_one<W: Write>(&self, mut to: W, Packed(row, word): &Packed) -> io::Result<()> {
+        let mut bytes = Vec::with_capacity(WORD_BYTES + 64);
+        row.indices.iter().for_each(|&index| bytes.extend((index as u32).to_le_bytes()));
+        row.values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        bytes.extend(row.class.map_or(ABSENT, names::class_code).to_le_bytes());
+        bytes.extend((row.period.unwrap_or(0) as u16).to_le_bytes());
+        for value in [row.lyapunov, row.lyapunov_error, row.impacts_per_period, row.mesh_fraction] {
+            bytes.extend(value.unwrap_or(f64::NAN).to_le_bytes());
+        }
+        bytes.extend(row.symmetric.map_or(ABSENT, i8::from).to_le_bytes());
+        let word = word.as_ref().map_or(String::new(), |word| word.text());
+        bytes.extend(word.as_bytes());
+        bytes.resize(bytes.len() + WORD_BYTES - word.len(), 0);
+        bytes.push(row.status.code() as u8);
+        bytes.extend(row.periods_run.to_le_bytes());
+        bytes.push(row.source as u8);
+        to.write_all(&bytes)
+    }
+}

@@ -1,0 +1,146 @@
+//! A map as coloured layers: what its figures and its report show.
+//!
+//! A layer gives every cell an index into a palette of at most 256 colours, and says what
+//! the colours mean: by name, on a bar, or both.
+
+mod classes;
+mod colors;
+mod scale;
+mod words;
+
+pub(super) use colors::Color;
+pub(super) use words::{Words, read as read_words};
+
+use rayon::prelude::*;
+
+use super::cells::{Cells, Row};
+use crate::scene::Quantity;
+use colors::{NO_VALUE, diverging, sequential};
+use scale::nice_bound;
+
+/// One view of a map.
+#[derive(Clone, Debug)]
+pub(super) struct Layer {
+    /// Name of its file and in the report.
+    pub(super) name: &'static str,
+    /// What it shows, in a word.
+    pub(super) short: &'static str,
+    /// What it shows, for headings.
+    pub(super) title: &'static str,
+    /// A place in the palette for every cell, by id.
+    pub(super) indices: Vec<u8>,
+    /// The colours.
+    pub(super) palette: Vec<Color>,
+    /// Colours that have a name, in the order in which a legend lists them.
+    pub(super) entries: Vec<Entry>,
+    /// Colours that stand for numbers.
+    pub(super) bar: Option<Bar>,
+}
+
+/// A colour with a name.
+#[derive(Clone, Debug)]
+pub(super) struct Entry {
+    pub(super) color: Color,
+    pub(super) text: String,
+    /// Cells of this colour.
+    pub(super) cells: usize,
+}
+
+/// A range of the palette that stands for a range of numbers.
+#[derive(Clone, Debug)]
+pub(super) struct Bar {
+    pub(super) label: &'static str,
+    pub(super) colors: Vec<Color>,
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+/// The layers that the scene asks for, the first being the map itself. Words are read once,
+/// for the report needs them, too.
+pub(super) fn of(cells: &Cells<'_>, words: Option<&Words>) -> Vec<Layer> {
+    let mut layers = Vec::new();
+    if cells.asks(Quantity::Class) {
+        layers.push(classes::layer(cells));
+    }
+    layers.extend(SCALES.iter().filter(|scale| cells.asks(scale.quantity)).map(|scale| scale.layer(cells)));
+    layers.extend(words.map(words::layer));
+    layers
+}
+
+/// A quantity whose numbers become colours.
+struct Scale {
+    quantity: Quantity,
+    name: &'static str,
+    short: &'static str,
+    title: &'static str,
+    field: fn(&Row) -> Option<f64>,
+    colors: fn(f64) -> Color,
+}
+
+const SCALES: [Scale; 3] = [
+    Scale {
+        quantity: Quantity::Lyapunov,
+        name: "lyapunov",
+        short: "exponent",
+        title: "largest Lyapunov exponent",
+        field: |row| row.lyapunov,
+        colors: diverging,
+    },
+    Scale {
+        quantity: Quantity::Impacts,
+        name: "impacts",
+        short: "impacts",
+        title: "impacts per forcing period",
+        field: |row| row.impacts_per_period,
+        colors: sequential,
+    },
+    Scale {
+        quantity: Quantity::Mesh,
+        name: "mesh",
+        short: "meshing",
+        title: "fraction of time in meshing",
+        field: |row| row.mesh_fraction,
+        colors: sequential,
+    },
+];
+
+/// Levels of a scale; the next palette place is for cells without a value.
+const LEVELS: u8 = 255;
+
+impl Scale {
+    fn layer(&self, cells: &Cells<'_>) -> Layer {
+        let values: Vec<Option<f64>> = ids(cells).map(|id| (self.field)(&cells.row(id))).collect();
+        let sizes =
+            |sign: f64| values.iter().flatten().map(move |value| sign * value).filter(|size| *size > 0.0);
+        let high = nice_bound(sizes(1.0));
+        let low = if sizes(-1.0).next().is_some() { -nice_bound(sizes(-1.0)) } else { 0.0 };
+        let value_of = |share: f64| low + share * (high - low);
+        let level = |value: f64| {
+            let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+            (share * f64::from(LEVELS - 1)).round() as u8
+        };
+        let color = |level: u8| {
+            let value = value_of(f64::from(level) / f64::from(LEVELS - 1));
+            // In units of its own side's end, so that both sides use all their colours.
+            (self.colors)(if value < 0.0 { value / -low } else { value / high })
+        };
+        let colors: Vec<Color> = (0..LEVELS).map(color).collect();
+        let absent = values.iter().filter(|value| value.is_none()).count();
+        let entry = Entry { color: NO_VALUE, text: "no value".to_owned(), cells: absent };
+        Layer {
+            name: self.name,
+            short: self.short,
+            title: self.title,
+            indices: values.par_iter().map(|value| value.map_or(LEVELS, level)).collect(),
+            palette: colors.iter().copied().chain([NO_VALUE]).collect(),
+            entries: if absent > 0 { vec![entry] } else { Vec::new() },
+            bar: Some(Bar { label: self.title, colors, low, high }),
+        }
+    }
+}
+
+/// Every cell id, to be mapped in parallel and in order.
+fn ids(cells: &Cells<'_>) -> rayon::range::Iter<usize> {
+    let [columns, rows] = cells.counts();
+    (0..columns * rows).into_par_iter()
+}

@@ -1,0 +1,84 @@
+//! The folder of a map: tables, figures, report and manifest.
+
+use std::fs;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest, report};
+use crate::scene::Format;
+
+pub use super::map_manifest::Run;
+
+const CSV: &str = "cells.csv";
+const NPY: &str = "cells.npy";
+const HTML: &str = "report.html";
+const MANIFEST: &str = "manifest.json";
+
+/// Every file that a map may have beside its records.
+const ALL: [&str; 9] =
+    [MANIFEST, CSV, NPY, "map.png", "lyapunov.png", "impacts.png", "mesh.png", "word.png", "report.html"];
+
+/// Removes what an earlier run left, but for its records: files must not stand beside a
+/// manifest that does not know them.
+///
+/// # Errors
+/// If a file cannot be removed.
+pub fn clear(folder: &Folder) -> anyhow::Result<()> {
+    folder.remove(&ALL)
+}
+
+/// Writes the files that the scene asks for, and the manifest last: a folder that has one is
+/// complete. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Result<Vec<String>> {
+    clear(folder)?;
+    // Side by side, for each of them has parts that one core must do alone.
+    let (tables, pictures) = rayon::join(|| write_tables(folder, cells), || write_pictures(folder, cells));
+    let mut files = tables?;
+    files.extend(pictures?);
+    files.push(MANIFEST.to_owned());
+    let manifest = map_manifest::map(cells, run, &files)?;
+    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    Ok(files)
+}
+
+fn write_tables(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String>> {
+    let wants = |format| cells.scene().outputs().files.contains(&format);
+    let write_if = |wanted: bool, name: &str, write: fn(&Path, &Cells<'_>) -> anyhow::Result<()>| {
+        if wanted {
+            folder.replace(name, |path| write(path, cells)).map(|()| Some(name.to_owned()))
+        } else {
+            Ok(None)
+        }
+    };
+    let (csv, npy) = rayon::join(
+        || write_if(wants(Format::Csv), CSV, cells_csv::write),
+        || write_if(wants(Format::Npy), NPY, cells_npy::write),
+    );
+    Ok([csv?, npy?].into_iter().flatten().collect())
+}
+
+fn write_pictures(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String>> {
+    let wants = |format| cells.scene().outputs().files.contains(&format);
+    let mut files = Vec::new();
+    if !wants(Format::Png) && !wants(Format::Html) {
+        return Ok(files);
+    }
+    let words = layers::read_words(cells);
+    let layers = layers::of(cells, words.as_ref());
+    if wants(Format::Png) {
+        let names: Vec<String> = layers.iter().map(|layer| format!("{}.png", layer.name)).collect();
+        layers.par_iter().zip(&names).try_for_each(|(layer, name)| {
+            folder.replace(name, |path| map_figure::write(path, cells, layer))
+        })?;
+        files.extend(names);
+    }
+    if wants(Format::Html) {
+        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref()))?;
+        files.push(HTML.to_owned());
+    }
+    Ok(files)
+}

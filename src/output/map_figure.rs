@@ -1,0 +1,148 @@
+//! A layer of a map as a picture: axes, legend, colour bar.
+
+use std::path::Path;
+
+use anyhow::Result;
+use plotters::style::RGBColor;
+
+use super::cells::Cells;
+use super::layers::{Bar, Entry, Layer};
+use super::plot_style::axes::{Axis, Frame};
+use super::plot_style::legend::draw_head;
+use super::plot_style::{Align, Canvas, DARK, MEDIUM, Rect, SMALL, save_figure};
+use crate::scene::{self, Scene, Start};
+
+const LEFT: f64 = 140.0;
+const TOP: f64 = 130.0;
+const BELOW: f64 = 105.0;
+/// Room for the legend beside the map.
+const BESIDE: f64 = 460.0;
+/// Between map and legend.
+const GAP: f64 = 36.0;
+/// A map's side in pixels: as many whole pixels per cell as fit the first, cells left out
+/// beyond the second.
+const SIDE: usize = 1024;
+const LONGEST_SIDE: usize = 2048;
+
+const ROW: f64 = 33.0;
+const PATCH: (f64, f64) = (34.0, 20.0);
+const BAR_WIDTH: f64 = 34.0;
+const BAR_HEIGHT: f64 = 260.0;
+
+/// Draws a layer as a PNG.
+///
+/// # Errors
+/// A file that cannot be written, by name.
+pub(super) fn write(path: &Path, cells: &Cells<'_>, layer: &Layer) -> Result<()> {
+    let [width, height] = cells.counts().map(side);
+    let size = (LEFT + width + GAP + BESIDE, TOP + height.max(700.0) + BELOW);
+    save_figure(path, (size.0 as u32, size.1 as u32), |canvas| draw(canvas, cells, layer, [width, height]))
+}
+
+/// Pixels for a number of cells.
+fn side(count: usize) -> f64 {
+    let pixels = if count <= SIDE { count * (SIDE / count) } else { count.min(LONGEST_SIDE) };
+    pixels as f64
+}
+
+fn draw(canvas: &Canvas<'_>, cells: &Cells<'_>, layer: &Layer, [width, height]: [f64; 2]) -> Result<()> {
+    let scene = cells.scene();
+    draw_head(canvas, scene.title(), &format!("{}; {}", layer.title, subtitle(scene)), &[])?;
+    let rect = Rect { left: LEFT, top: TOP, right: LEFT + width, bottom: TOP + height };
+    let [columns, _] = cells.counts();
+    canvas
+        .raster(rect, cells.counts(), |[i, j]| layer.palette[usize::from(layer.indices[j * columns + i])])?;
+    let [x, y] = [0, 1].map(|i| axis(&scene.axes()[i]));
+    Frame { rect, x, y }.draw_axes(canvas, true)?;
+    let left = rect.right + GAP;
+    let mut top = draw_entries(canvas, layer, (left, TOP), cells)?;
+    if let Some(bar) = &layer.bar {
+        if !layer.entries.is_empty() {
+            top += 26.0;
+        }
+        draw_bar(canvas, bar, (left, top))?;
+    }
+    Ok(())
+}
+
+/// Where cells start and how long they run: what a map means depends on it.
+pub(super) fn subtitle(scene: &Scene) -> String {
+    let start = match scene.start() {
+        Start::Rest => "from rest".to_owned(),
+        Start::State([x1, v1, x2, v2]) => format!("from ({x1}, {v1}, {x2}, {v2})"),
+        Start::Up | Start::Down => "following the attractor".to_owned(),
+    };
+    let settings = scene.orbit_settings();
+    let upper = if scene.integration().early_stop { "at most " } else { "" };
+    let (transient, observed) = (settings.transient_periods, settings.observed_periods);
+    format!("every cell {start}, {upper}{transient} + {observed} forcing periods")
+}
+
+/// An axis on which cells lie at their values: it reaches half a cell further.
+fn axis(axis: &scene::Axis) -> Axis {
+    let half = (axis.max() - axis.min()) / (axis.count() - 1) as f64 / 2.0;
+    let label = format!("{} {}", axis.parameter().meaning, axis.parameter().name);
+    Axis::exact(&label, axis.min() - half, axis.max() + half)
+}
+
+fn rgb([r, g, b]: [u8; 3]) -> RGBColor {
+    RGBColor(r, g, b)
+}
+
+/// Draws a list of colours with their names and shares; returns where it ends.
+fn draw_entries(
+    canvas: &Canvas<'_>,
+    layer: &Layer,
+    (left, top): (f64, f64),
+    cells: &Cells<'_>,
+) -> Result<f64> {
+    let total: usize = cells.counts().iter().product();
+    let right = left + BESIDE - GAP - 20.0;
+    for (row, entry) in layer.entries.iter().enumerate() {
+        let y = top + ROW * (row as f64 + 0.5);
+        let patch = Rect { left, top: y - PATCH.1 / 2.0, right: left + PATCH.0, bottom: y + PATCH.1 / 2.0 };
+        canvas.fill(patch, rgb(entry.color), 1.0)?;
+        outline(canvas, patch)?;
+        let share = share(entry, total);
+        let room = right - left - PATCH.0 - 14.0 - canvas.text_width(&share, SMALL)? - 16.0;
+        let text = fitted(canvas, &entry.text, room)?;
+        canvas.text(&text, (left + PATCH.0 + 14.0, y), SMALL, Align::Left, DARK)?;
+        canvas.text(&share, (right, y), SMALL, Align::Right, DARK)?;
+    }
+    Ok(top + ROW * layer.entries.len() as f64)
+}
+
+fn share(entry: &Entry, total: usize) -> String {
+    let percent = 100.0 * entry.cells as f64 / total as f64;
+    match entry.cells {
+        _ if percent >= 0.1 => format!("{percent:.1} %"),
+        1 => "1 cell".to_owned(),
+        cells => format!("{cells} cells"),
+    }
+}
+
+/// A text cut to a width.
+fn fitted(canvas: &Canvas<'_>, text: &str, room: f64) -> Result<String> {
+    let mut text = text.to_owned();
+    while text.chars().count() > 2 && canvas.text_width(&text, SMALL)? > room {
+        text.truncate(text.char_indices().nth_back(1).map_or(0, |(i, _)| i));
+        text.push('\u{2026}');
+    }
+    Ok(text)
+}
+
+fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64)) -> Result<()> {
+    canvas.text(bar.label, (left, top + 12.0), SMALL.min(MEDIUM), Align::Left, DARK)?;
+    let top = top + 44.0;
+    let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
+    canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row])?;
+    outline(canvas, rect)?;
+    let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact("", bar.low, bar.high) };
+    frame.draw_scale(canvas)
+}
+
+fn outline(canvas: &Canvas<'_>, rect: Rect) -> Result<()> {
+    let Rect { left, top, right, bottom } = rect;
+    let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
+    canvas.stroke(&corners, 1.0, DARK)
+}

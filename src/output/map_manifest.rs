@@ -1,0 +1,143 @@
+//! `manifest.json` of a map: what makes its folder again, and what the codes mean.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::cells::{Cells, SOURCES};
+use super::cells_npy::ABSENT;
+use super::manifest::{AxisObject, FORMAT, StartObject, start};
+use super::names;
+use super::orbit_json::Parameters;
+use crate::orbit::Status;
+use crate::plan::count_classes;
+use crate::scene::{Scene, Steps};
+
+/// Who computed a map and in what time.
+#[derive(Clone, Debug)]
+pub struct Run<'a> {
+    /// The `--set` arguments.
+    pub sets: &'a [String],
+    /// The engine's name.
+    pub engine: &'a str,
+    /// Its precision.
+    pub precision: &'a str,
+    /// What it ran on.
+    pub device: &'a str,
+    /// Time spent integrating in this run; less than the whole where it was resumed.
+    pub elapsed: Duration,
+    /// Cells of an earlier run that this one went on from.
+    pub resumed_cells: usize,
+}
+
+#[derive(Serialize)]
+struct Manifest<'a> {
+    format: u32,
+    command: &'static str,
+    crate_version: &'static str,
+    engine: &'a str,
+    precision: &'a str,
+    device: &'a str,
+    title: &'a str,
+    scene: &'a str,
+    set: &'a [String],
+    axes: Vec<AxisObject>,
+    parameters: Parameters<'a>,
+    start: StartObject,
+    integration: IntegrationObject,
+    quantities: Vec<String>,
+    cells: usize,
+    classes: BTreeMap<&'static str, usize>,
+    statuses: BTreeMap<&'static str, usize>,
+    periods: u64,
+    codes: Codes,
+    elapsed_seconds: f64,
+    resumed_cells: usize,
+    files: &'a [String],
+}
+
+#[derive(Serialize)]
+struct IntegrationObject {
+    steps_per_period: Option<u32>,
+    transient_periods: u32,
+    observed_periods: u32,
+    early_stop: bool,
+    max_period: u32,
+}
+
+/// What small integers in `cells.npy` stand for.
+#[derive(Serialize)]
+struct Codes {
+    class: BTreeMap<&'static str, i8>,
+    status: BTreeMap<&'static str, i8>,
+    source: BTreeMap<&'static str, i8>,
+    symmetric: BTreeMap<&'static str, i8>,
+}
+
+/// The manifest as JSON. It names neither the machine's paths nor its users.
+///
+/// # Errors
+/// None that a run can cause; serialisation is fallible by signature.
+pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, files: &[String]) -> serde_json::Result<String> {
+    let scene = cells.scene();
+    let swept: Vec<&str> = scene.axes().iter().map(|axis| axis.parameter().name).collect();
+    serde_json::to_string_pretty(&Manifest {
+        format: FORMAT,
+        command: "map",
+        crate_version: env!("CARGO_PKG_VERSION"),
+        engine: run.engine,
+        precision: run.precision,
+        device: run.device,
+        title: scene.title(),
+        scene: scene.text(),
+        set: run.sets,
+        axes: scene.axes().iter().map(AxisObject::from).collect(),
+        parameters: Parameters { pair: &scene.base(), except: &swept },
+        start: start(scene.start()),
+        integration: integration(scene),
+        quantities: scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect(),
+        cells: cells.counts().iter().product(),
+        classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
+        statuses: statuses(cells),
+        periods: cells.periods(),
+        codes: codes(),
+        elapsed_seconds: run.elapsed.as_secs_f64(),
+        resumed_cells: run.resumed_cells,
+        files,
+    })
+}
+
+fn integration(scene: &Scene) -> IntegrationObject {
+    let settings = scene.integration();
+    IntegrationObject {
+        steps_per_period: match settings.steps_per_period {
+            Steps::Auto => None,
+            Steps::PerPeriod(steps) => Some(steps),
+        },
+        transient_periods: settings.transient_periods,
+        observed_periods: settings.observed_periods,
+        early_stop: settings.early_stop,
+        max_period: settings.max_period,
+    }
+}
+
+fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
+    let mut counts: BTreeMap<_, _> = Status::ALL.iter().map(|&s| (names::status(s), 0)).collect();
+    for status in cells.statuses() {
+        *counts.entry(names::status(status)).or_default() += 1;
+    }
+    counts
+}
+
+fn codes() -> Codes {
+    let numbered = |names: Vec<&'static str>| names.into_iter().zip(0..).collect::<BTreeMap<_, _>>();
+    let mut class = numbered(names::CLASSES.to_vec());
+    class.insert("absent", ABSENT);
+    Codes {
+        class,
+        status: numbered(Status::ALL.iter().map(|&status| names::status(status)).collect()),
+        source: numbered(SOURCES.iter().map(|&source| names::source(source)).collect()),
+        symmetric: [("false", 0), ("true", 1), ("absent", ABSENT)].into_iter().collect(),
+    }
+}

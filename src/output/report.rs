@@ -1,0 +1,240 @@
+//! `report.html`: one page that needs nothing else, not even a network.
+//!
+//! The page's own code is in `report/`. Its data are JSON; arrays over the cells are little
+//! endian numbers, compressed with gzip (browsers unpack that themselves) and written in
+//! base64.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use bytemuck::NoUninit;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::cells::{Cells, Row};
+use super::layers::{Color, Layer, Words};
+use super::map_figure::subtitle;
+use super::names;
+use crate::model::GearPair;
+use crate::orbit::{Settings, Status};
+use crate::scene::{Quantity, Scene, Start};
+
+const PAGE: &str = include_str!("report/page.html");
+const STYLE: &str = include_str!("report/page.css");
+const SCRIPT: &str = include_str!("report/page.js");
+
+#[derive(Serialize)]
+struct Data {
+    title: String,
+    subtitle: String,
+    axes: Vec<AxisData>,
+    /// What follows the two `--set` of the axes in the command that replays a cell.
+    replay: String,
+    layers: Vec<LayerData>,
+    values: serde_json::Map<String, serde_json::Value>,
+    classes: [&'static str; 4],
+    statuses: Vec<&'static str>,
+    words: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct AxisData {
+    parameter: &'static str,
+    meaning: &'static str,
+    min: f64,
+    max: f64,
+    count: usize,
+}
+
+#[derive(Serialize)]
+struct LayerData {
+    name: &'static str,
+    short: &'static str,
+    title: &'static str,
+    palette: Vec<String>,
+    entries: Vec<EntryData>,
+    bar: Option<BarData>,
+    #[serde(flatten)]
+    indices: Packed,
+}
+
+#[derive(Serialize)]
+struct EntryData {
+    color: String,
+    text: String,
+    cells: usize,
+}
+
+#[derive(Serialize)]
+struct BarData {
+    label: &'static str,
+    colors: Vec<String>,
+    low: f64,
+    high: f64,
+}
+
+/// An array over the cells.
+#[derive(Serialize)]
+struct Packed {
+    #[serde(rename = "type")]
+    kind: &'static str,
+    data: String,
+}
+
+/// Writes the page.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write(
+    path: &Path,
+    cells: &Cells<'_>,
+    layers: &[Layer],
+    words: Option<&Words>,
+) -> anyhow::Result<()> {
+    let scene = cells.scene();
+    let data = Data {
+        title: scene.title().to_owned(),
+        subtitle: subtitle(scene),
+        axes: scene.axes().iter().map(AxisData::from).collect(),
+        replay: replay(scene),
+        layers: layers.par_iter().map(LayerData::from).collect(),
+        values: values(cells, words)?,
+        classes: names::CLASSES,
+        statuses: Status::ALL.iter().map(|&status| names::status(status)).collect(),
+        words: words.map_or(Vec::new(), |words| words.list.iter().map(|(text, _)| text.clone()).collect()),
+    };
+    // `<` could end the script that holds the data.
+    let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
+    let title = scene.title().replace('&', "&amp;").replace('<', "&lt;");
+    // One pass: data must not be searched for marks.
+    let mut page = String::with_capacity(PAGE.len() + STYLE.len() + SCRIPT.len() + json.len());
+    let mut rest = PAGE;
+    for (mark, text) in
+        [("@TITLE@", title.as_str()), ("@STYLE@", STYLE), ("@DATA@", &json), ("@SCRIPT@", SCRIPT)]
+    {
+        let Some((before, after)) = rest.split_once(mark) else { unreachable!("the page has {mark}") };
+        page.push_str(before);
+        page.push_str(text);
+        rest = after;
+    }
+    page.push_str(rest);
+    Ok(fs::write(path, page)?)
+}
+
+/// Parameters that differ from `orbit`'s own defaults, the start, and how long to integrate.
+fn replay(scene: &Scene) -> String {
+    let mut words = Vec::new();
+    let base = scene.base();
+    for parameter in GearPair::PARAMETERS {
+        let swept = scene.axes().iter().any(|axis| axis.parameter().name == parameter.name);
+        match base.get(parameter.name) {
+            Ok(value) if !swept && parameter.default != Some(value) => {
+                words.push(format!(" --set {}={value:?}", parameter.name));
+            }
+            _ => {}
+        }
+    }
+    if let Start::State([x1, v1, x2, v2]) = scene.start() {
+        words.push(format!(" --start {x1:?},{v1:?},{x2:?},{v2:?}"));
+    }
+    let (settings, default) = (scene.orbit_settings(), Settings::default());
+    if settings.transient_periods != default.transient_periods {
+        words.push(format!(" --transient {}", settings.transient_periods));
+    }
+    if settings.observed_periods != default.observed_periods {
+        words.push(format!(" --periods {}", settings.observed_periods));
+    }
+    words.concat()
+}
+
+/// What the page reads out for a cell, one array per quantity that the scene asks for.
+fn values(
+    cells: &Cells<'_>,
+    words: Option<&Words>,
+) -> serde_json::Result<serde_json::Map<String, serde_json::Value>> {
+    let [columns, rows] = cells.counts();
+    let all = || (0..columns * rows).into_par_iter().map(|id| cells.row(id));
+    let floats = |field: fn(&Row) -> Option<f64>| {
+        packed("f32", &all().map(|row| field(&row).unwrap_or(f64::NAN) as f32).collect::<Vec<_>>())
+    };
+    let integers = |field: fn(&Row) -> u32| packed("u32", &all().map(|row| field(&row)).collect::<Vec<_>>());
+    let bytes = |field: fn(&Row) -> u8| packed("u8", &all().map(|row| field(&row)).collect::<Vec<_>>());
+    let mut list = vec![
+        ("status", bytes(|row| row.status.code() as u8)),
+        ("periods_run", integers(|row| row.periods_run)),
+    ];
+    if cells.asks(Quantity::Class) {
+        list.push(("class", bytes(|row| row.class.map_or(u8::MAX, |class| names::class_code(class) as u8))));
+        list.push(("period", bytes(|row| row.period.unwrap_or(0) as u8)));
+    }
+    if cells.asks(Quantity::Lyapunov) {
+        list.push(("lyapunov", floats(|row| row.lyapunov)));
+        list.push(("lyapunov_error", floats(|row| row.lyapunov_error)));
+    }
+    if cells.asks(Quantity::Impacts) {
+        list.push(("impacts_per_period", floats(|row| row.impacts_per_period)));
+    }
+    if cells.asks(Quantity::Mesh) {
+        list.push(("mesh_fraction", floats(|row| row.mesh_fraction)));
+    }
+    if cells.asks(Quantity::Symmetric) {
+        list.push(("symmetric", bytes(|row| row.symmetric.map_or(u8::MAX, u8::from))));
+    }
+    if let Some(words) = words {
+        list.push(("word", packed("u32", &words.numbers)));
+    }
+    list.into_iter().map(|(name, values)| Ok((name.to_owned(), serde_json::to_value(values)?))).collect()
+}
+
+fn packed<T: NoUninit>(kind: &'static str, values: &[T]) -> Packed {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    // Memory takes whatever is written to it.
+    let bytes = encoder.write_all(bytemuck::cast_slice(values)).and_then(|()| encoder.finish());
+    Packed { kind, data: STANDARD.encode(bytes.unwrap_or_default()) }
+}
+
+impl From<&crate::scene::Axis> for AxisData {
+    fn from(axis: &crate::scene::Axis) -> Self {
+        let parameter = axis.parameter();
+        AxisData {
+            parameter: parameter.name,
+            meaning: parameter.meaning,
+            min: axis.min(),
+            max: axis.max(),
+            count: axis.count(),
+        }
+    }
+}
+
+impl From<&Layer> for LayerData {
+    fn from(layer: &Layer) -> Self {
+        let entry = |entry: &super::layers::Entry| EntryData {
+            color: hex(&entry.color),
+            text: entry.text.clone(),
+            cells: entry.cells,
+        };
+        LayerData {
+            name: layer.name,
+            short: layer.short,
+            title: layer.title,
+            palette: layer.palette.iter().map(hex).collect(),
+            entries: layer.entries.iter().map(entry).collect(),
+            bar: layer.bar.as_ref().map(|bar| BarData {
+                label: bar.label,
+                colors: bar.colors.iter().step_by(6).map(hex).collect(),
+                low: bar.low,
+                high: bar.high,
+            }),
+            indices: packed("u8", &layer.indices),
+        }
+    }
+}
+
+fn hex([r, g, b]: &Color) -> String {
+    format!("{r:02x}{g:02x}{b:02x}")
+}

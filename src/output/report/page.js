@@ -1,0 +1,379 @@
+"use strict";
+const map = JSON.parse(document.getElementById("map").textContent);
+const [columns, rows] = map.axes.map((axis) => axis.count);
+const byId = (id) => document.getElementById(id);
+const canvas = byId("canvas");
+const pen = canvas.getContext("2d");
+const MARGIN = { left: 78, right: 14, top: 10, bottom: 58 };
+
+let values = {};
+let layer = 0;
+// What is shown, in cells: the lower left corner and the extent.
+let view = { left: 0, bottom: 0, width: columns, height: rows };
+let hovered = null;
+let chosen = null;
+
+async function unpack({ data, type }) {
+  const packed = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const types = { u8: Uint8Array, i8: Int8Array, u32: Uint32Array, f32: Float32Array };
+  return new types[type](buffer);
+}
+
+// ---- axes and cells
+
+const axisValue = ({ min, max, count }, i) =>
+  i >= count - 1 ? max : Math.min(min + ((max - min) * i) / (count - 1), max);
+const panel = () => {
+  const { width, height } = canvas.getBoundingClientRect();
+  return { x: MARGIN.left, y: MARGIN.top, width: width - MARGIN.left - MARGIN.right,
+    height: height - MARGIN.top - MARGIN.bottom };
+};
+
+function cellAt(x, y) {
+  const p = panel();
+  const i = Math.floor(view.left + ((x - p.x) / p.width) * view.width);
+  const j = Math.floor(view.bottom + ((p.y + p.height - y) / p.height) * view.height);
+  const inside = x >= p.x && x <= p.x + p.width && y >= p.y && y <= p.y + p.height;
+  return inside && i >= 0 && i < columns && j >= 0 && j < rows ? { i, j } : null;
+}
+
+// Pixel of a place in cells; cell i spans i to i + 1.
+function pixel(i, j) {
+  const p = panel();
+  return [p.x + ((i - view.left) / view.width) * p.width,
+    p.y + p.height - ((j - view.bottom) / view.height) * p.height];
+}
+
+function ticks(low, high, most) {
+  const rough = (high - low) / Math.max(most, 1);
+  const decade = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((m) => m * decade).find((s) => s >= rough * (1 - 1e-9));
+  const digits = Math.min(12, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)));
+  const list = [];
+  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n++) {
+    list.push([n * step, (n * step).toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "\u2212")]);
+  }
+  return list;
+}
+
+// ---- drawing
+
+function paint(layer) {
+  const picture = document.createElement("canvas");
+  [picture.width, picture.height] = [columns, rows];
+  const brush = picture.getContext("2d");
+  const image = brush.createImageData(columns, rows);
+  const pixels = new Uint32Array(image.data.buffer);
+  const palette = Uint32Array.from(layer.palette, (c) => {
+    const rgb = parseInt(c, 16);
+    return (0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;
+  });
+  for (let j = 0; j < rows; j++) {
+    const [from, to] = [j * columns, (rows - 1 - j) * columns];
+    for (let i = 0; i < columns; i++) pixels[to + i] = palette[layer.indices[from + i]];
+  }
+  brush.putImageData(image, 0, 0);
+  return picture;
+}
+
+function draw() {
+  const ratio = window.devicePixelRatio || 1;
+  const { width, height } = canvas.getBoundingClientRect();
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+  }
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  const p = panel();
+  const shown = map.layers[layer];
+  if (!shown.indices) return;
+  shown.picture ??= paint(shown);
+  pen.save();
+  pen.beginPath();
+  pen.rect(p.x, p.y, p.width, p.height);
+  pen.clip();
+  // Fewer pixels than cells: averaging would invent colours that mean something else.
+  pen.imageSmoothingEnabled = false;
+  const [x, y] = pixel(0, rows);
+  const [right, bottom] = pixel(columns, 0);
+  pen.drawImage(shown.picture, x, y, right - x, bottom - y);
+  for (const [cell, color] of [[hovered, "#0008"], [chosen, "#000"]]) if (cell) frame(cell, color);
+  pen.restore();
+  drawAxes(p);
+}
+
+function frame({ i, j }, color) {
+  const [x, y] = pixel(i, j + 1);
+  const [right, bottom] = pixel(i + 1, j);
+  // Small cells get a frame that is larger than they are.
+  const grow = Math.max(0, (8 - (right - x)) / 2);
+  const box = [x - grow, y - grow, right - x + 2 * grow, bottom - y + 2 * grow];
+  pen.lineWidth = 3.5;
+  pen.strokeStyle = "#fff";
+  pen.strokeRect(...box);
+  pen.lineWidth = 1.5;
+  pen.strokeStyle = color;
+  pen.strokeRect(...box);
+}
+
+function drawAxes(p) {
+  pen.strokeStyle = pen.fillStyle = "#262626";
+  pen.lineWidth = 1;
+  pen.strokeRect(p.x + 0.5, p.y + 0.5, p.width - 1, p.height - 1);
+  pen.font = "13px system-ui, sans-serif";
+  const ends = (axis, from, extent) => {
+    const step = (axis.max - axis.min) / (axis.count - 1);
+    return [axis.min + (from - 0.5) * step, axis.min + (from + extent - 0.5) * step];
+  };
+  const [xLow, xHigh] = ends(map.axes[0], view.left, view.width);
+  const [yLow, yHigh] = ends(map.axes[1], view.bottom, view.height);
+  pen.textAlign = "center";
+  pen.textBaseline = "top";
+  for (const [value, text] of ticks(xLow, xHigh, p.width / 90)) {
+    const x = p.x + ((value - xLow) / (xHigh - xLow)) * p.width;
+    pen.fillRect(Math.round(x), p.y + p.height, 1, 6);
+    pen.fillText(text, x, p.y + p.height + 9);
+  }
+  pen.textAlign = "right";
+  pen.textBaseline = "middle";
+  for (const [value, text] of ticks(yLow, yHigh, p.height / 55)) {
+    const y = p.y + p.height - ((value - yLow) / (yHigh - yLow)) * p.height;
+    pen.fillRect(p.x - 6, Math.round(y), 6, 1);
+    pen.fillText(text, p.x - 9, y);
+  }
+  pen.font = "14px system-ui, sans-serif";
+  pen.textAlign = "center";
+  const name = ({ meaning, parameter }) => `${meaning} ${parameter}`;
+  pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44);
+  pen.save();
+  pen.translate(14, p.y + p.height / 2);
+  pen.rotate(-Math.PI / 2);
+  pen.fillText(name(map.axes[1]), 0, 0);
+  pen.restore();
+}
+
+// ---- the panel beside the map
+
+const element = (tag, text, className) => {
+  const made = document.createElement(tag);
+  if (text !== undefined) made.textContent = text;
+  if (className) made.className = className;
+  return made;
+};
+
+function facts({ i, j }) {
+  const id = j * columns + i;
+  const at = (name) => values[name]?.[id];
+  const number = (name) => {
+    const value = at(name);
+    return value === undefined || Number.isNaN(value) ? undefined : Number(value.toPrecision(5)).toString();
+  };
+  const [a, b] = [axisValue(map.axes[0], i), axisValue(map.axes[1], j)];
+  const kind = map.classes[at("class")];
+  const error = number("lyapunov_error");
+  const exponent = number("lyapunov");
+  const symmetric = { 0: "no", 1: "yes" }[at("symmetric")];
+  return [
+    [map.axes[0].parameter, a], [map.axes[1].parameter, b],
+    ["class", kind === "periodic" ? `period ${at("period")}` : kind],
+    ["exponent", error && exponent ? `${exponent} \u00b1 ${error}` : exponent],
+    ["impacts per period", number("impacts_per_period")],
+    ["meshing", number("mesh_fraction")],
+    ["symmetric", symmetric],
+    ["word", at("word") === undefined || at("word") === 0xffffffff ? undefined : map.words[at("word")] || "no events"],
+    ["status", map.statuses[at("status")]],
+    ["periods run", at("periods_run")],
+    ["cell", `${i}, ${j}`],
+  ];
+}
+
+function tell() {
+  const cell = hovered ?? chosen;
+  byId("which").textContent = !hovered && chosen ? "The chosen cell" : "Under the pointer";
+  const shown = facts(cell ?? { i: 0, j: 0 }).map(([name, value]) => {
+    const row = element("tr");
+    row.append(element("th", name), element("td", cell ? String(value ?? "\u2013") : "\u2013"));
+    return row;
+  });
+  byId("readout").replaceChildren(...shown);
+}
+
+function choose(cell) {
+  chosen = cell;
+  byId("replay").hidden = !cell;
+  if (cell) {
+    const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
+    const [first, second] = map.axes.map((axis) => axis.parameter);
+    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${map.replay}`.split(" --");
+    // Lines break between arguments, never inside one.
+    byId("command").replaceChildren(...words.flatMap((word, k) =>
+      k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
+    history.replaceState(null, "", `#${cell.i},${cell.j},${map.layers[layer].name}`);
+  }
+  tell();
+  draw();
+}
+
+function showLayer(index) {
+  layer = index;
+  const shown = map.layers[layer];
+  [...byId("layers").children].forEach((button, k) => button.setAttribute("aria-checked", k === layer));
+  byId("legend-title").textContent = shown.title;
+  byId("bar").replaceChildren();
+  if (shown.bar) {
+    const ramp = element("div", undefined, "ramp");
+    ramp.style.background = `linear-gradient(to right, ${shown.bar.colors.map((c) => `#${c}`).join(",")})`;
+    const scale = element("div", undefined, "ticks");
+    const { low, high, label } = shown.bar;
+    for (const [value, text] of ticks(low, high, 6)) {
+      const tick = element("span", text);
+      tick.style.left = `${(100 * (value - low)) / (high - low)}%`;
+      scale.append(tick);
+    }
+    byId("bar").append(...(label === shown.title ? [] : [element("div", label)]), ramp, scale);
+  }
+  byId("legend").replaceChildren(...shown.entries.map(({ color, text, cells }) => {
+    const patch = element("span", undefined, "patch");
+    patch.style.background = `#${color}`;
+    const share = (100 * cells) / (columns * rows);
+    const item = element("li");
+    const name = element("span", text);
+    name.title = text;
+    const few = cells === 1 ? "1 cell" : `${cells} cells`;
+    item.append(patch, name, element("span", share < 0.1 ? few : `${share.toFixed(1)} %`));
+    return item;
+  }));
+  draw();
+}
+
+// ---- zooming, panning, choosing
+
+function zoom(factor, x, y) {
+  const p = panel();
+  const [u, v] = [(x - p.x) / p.width, (p.y + p.height - y) / p.height];
+  const width = Math.min(columns, Math.max(4, view.width * factor));
+  const height = Math.min(rows, Math.max(4, view.height * factor));
+  view = { left: view.left + u * (view.width - width), bottom: view.bottom + v * (view.height - height), width, height };
+  keepInside();
+}
+
+function keepInside() {
+  view.left = Math.min(Math.max(view.left, 0), columns - view.width);
+  view.bottom = Math.min(Math.max(view.bottom, 0), rows - view.height);
+  draw();
+}
+
+const pointers = new Map();
+let moved = 0;
+
+canvas.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  zoom(Math.exp(0.0015 * event.deltaY), event.offsetX, event.offsetY);
+}, { passive: false });
+
+canvas.addEventListener("pointerdown", (event) => {
+  canvas.setPointerCapture(event.pointerId);
+  pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
+  moved = 0;
+});
+
+canvas.addEventListener("pointermove", (event) => {
+  const here = [event.offsetX, event.offsetY];
+  const before = pointers.get(event.pointerId);
+  if (!before) {
+    hovered = cellAt(...here);
+    tell();
+    draw();
+    return;
+  }
+  const others = [...pointers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
+  pointers.set(event.pointerId, here);
+  moved += Math.hypot(here[0] - before[0], here[1] - before[1]);
+  if (moved < 4) return;
+  canvas.classList.add("dragging");
+  const p = panel();
+  if (others.length === 1) {
+    const apart = (at) => Math.max(Math.hypot(at[0] - others[0][0], at[1] - others[0][1]), 1);
+    zoom(apart(before) / apart(here), (here[0] + others[0][0]) / 2, (here[1] + others[0][1]) / 2);
+  } else {
+    view.left -= ((here[0] - before[0]) / p.width) * view.width;
+    view.bottom += ((here[1] - before[1]) / p.height) * view.height;
+    keepInside();
+  }
+});
+
+canvas.addEventListener("pointerup", (event) => {
+  pointers.delete(event.pointerId);
+  canvas.classList.remove("dragging");
+  const cell = cellAt(event.offsetX, event.offsetY);
+  if (moved < 4 && cell) choose(cell);
+});
+canvas.addEventListener("pointercancel", (event) => pointers.delete(event.pointerId));
+canvas.addEventListener("pointerleave", () => {
+  hovered = null;
+  tell();
+  draw();
+});
+
+function showAll() {
+  view = { left: 0, bottom: 0, width: columns, height: rows };
+  draw();
+}
+canvas.addEventListener("dblclick", showAll);
+
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const p = panel();
+  const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  const number = Number(event.key);
+  if (event.key === "+" || event.key === "=") zoom(0.7, p.x + p.width / 2, p.y + p.height / 2);
+  else if (event.key === "-") zoom(1 / 0.7, p.x + p.width / 2, p.y + p.height / 2);
+  else if (event.key === "0") showAll();
+  else if (number >= 1 && number <= map.layers.length) showLayer(number - 1);
+  else if (steps[event.key] && chosen) {
+    event.preventDefault();
+    hovered = null;
+    const [di, dj] = steps[event.key];
+    choose({ i: Math.min(Math.max(chosen.i + di, 0), columns - 1), j: Math.min(Math.max(chosen.j + dj, 0), rows - 1) });
+  }
+});
+
+byId("copy").addEventListener("click", async () => {
+  const command = byId("command");
+  try {
+    await navigator.clipboard.writeText(command.textContent);
+    byId("copy").textContent = "Copied";
+  } catch {
+    // A page opened from a disk may not write to the clipboard: mark the text instead.
+    getSelection().selectAllChildren(command);
+    byId("copy").textContent = "Marked: press Ctrl-C";
+  }
+  setTimeout(() => { byId("copy").textContent = "Copy"; }, 1500);
+});
+
+// ---- start
+
+async function start() {
+  byId("title").textContent = map.title;
+  byId("subtitle").textContent = map.subtitle;
+  byId("layers").append(...map.layers.map(({ short }, k) => {
+    const button = element("button", short);
+    button.type = "button";
+    button.setAttribute("role", "radio");
+    button.addEventListener("click", () => showLayer(k));
+    return button;
+  }));
+  const names = Object.keys(map.values);
+  const unpacked = await Promise.all(names.map((name) => unpack(map.values[name])));
+  values = Object.fromEntries(names.map((name, k) => [name, unpacked[k]]));
+  await Promise.all(map.layers.map(async (shown) => { shown.indices = await unpack(shown); }));
+  byId("wait").remove();
+  // A link may name a cell and a layer.
+  const [i, j, name] = location.hash.slice(1).split(",");
+  showLayer(Math.max(map.layers.findIndex((shown) => shown.name === name), 0));
+  choose(i < columns && j < rows ? { i: Number(i), j: Number(j) } : null);
+}
+new ResizeObserver(draw).observe(canvas);
+start().catch((error) => { byId("wait").textContent = `The map cannot be shown: ${error}`; });

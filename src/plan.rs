@@ -1,0 +1,274 @@
+//! What has to be computed: a scene as numbered cells. Pure.
+//!
+//! Cell `id = j * count0 + i` has index `i` on the first axis and `j` on the second. It
+//! needs a flow, which depends on everything but the contact law, and a law; cells that
+//! differ in restitution or meshing speed alone share their flow. Engines get cells in
+//! Morton order: whatever the batch, its cells are neighbours and behave alike.
+
+mod morton;
+mod size;
+
+use std::ops::Range;
+
+pub use size::Size;
+
+use crate::model::{GearPair, Law, Oscillator, State};
+use crate::orbit::{Budget, Class};
+use crate::scene::{Axis, Quantity, REST, Scene, Start};
+
+/// The parameters that a contact law is made of; all others belong to the flow.
+const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
+
+/// What a cell is made of: indices of its flow and its law in the plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cell {
+    /// `j * count0 + i`.
+    pub id: u32,
+    /// Which flow it moves on, below [`Plan::flow_count`].
+    pub flow: u32,
+    /// Which contact law it obeys, below [`Plan::law_count`].
+    pub law: u32,
+}
+
+/// Cells that an engine computes in one go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Batch {
+    /// Places in the plan's order that it covers.
+    pub places: Range<usize>,
+    /// Its cells, in that order.
+    pub cells: Vec<Cell>,
+}
+
+/// Which quantities somebody asks for; nothing else is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// An exponent for motion that is not periodic: for its own sake or for the class.
+    pub exponent: bool,
+    /// Impacts per forcing period.
+    pub impacts: bool,
+    /// Fraction of the time spent meshing.
+    pub mesh: bool,
+    /// Whether a cycle is its own mirror image.
+    pub symmetric: bool,
+    /// The cycle's word.
+    pub word: bool,
+}
+
+/// A scene as cells, flows and laws.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    base: GearPair,
+    axes: [Axis; 2],
+    is_law: [bool; 2],
+    start: State,
+    budget: Budget,
+    needs: Needs,
+    order: Vec<u32>,
+}
+
+impl Plan {
+    /// Plans a map. The scene must have been read for a map, and its [`Size`] accepted.
+    ///
+    /// # Panics
+    /// If the scene has not two axes, more cells than a `u32` numbers, or a start policy
+    /// that maps do not have: reading a scene for a map rules all of that out.
+    pub fn new(scene: &Scene) -> Plan {
+        let &[first, second] = scene.axes() else { panic!("a map has two axes") };
+        assert!(Size::of(scene).is_countable(), "cells are numbered by u32");
+        let start = match scene.start() {
+            Start::Rest => REST,
+            Start::State(state) => state,
+            Start::Up | Start::Down => panic!("a map's cells start from one state"),
+        };
+        let needs = needs(&scene.outputs().quantities);
+        let integration = scene.integration();
+        Plan {
+            base: scene.base(),
+            axes: [first, second],
+            is_law: [first, second].map(|axis| LAW_PARAMETERS.contains(&axis.parameter().name)),
+            start,
+            budget: Budget {
+                settings: scene.orbit_settings(),
+                early_stop: integration.early_stop,
+                exponent: needs.exponent,
+            },
+            needs,
+            order: morton::order(first.count(), second.count()),
+        }
+    }
+
+    /// The two axes.
+    pub fn axes(&self) -> &[Axis; 2] {
+        &self.axes
+    }
+
+    /// How many cells there are.
+    pub fn cell_count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Cell ids in the order in which engines get them.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// The state in which every cell starts at phase 0.
+    pub fn start(&self) -> State {
+        self.start
+    }
+
+    /// How long each cell is integrated.
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// What is asked for.
+    pub fn needs(&self) -> &Needs {
+        &self.needs
+    }
+
+    /// Indices on the two axes of a cell.
+    pub fn indices(&self, id: u32) -> [usize; 2] {
+        let count = self.axes[0].count();
+        [id as usize % count, id as usize / count]
+    }
+
+    /// What the cell `id` is made of.
+    pub fn cell(&self, id: u32) -> Cell {
+        let ids = self.indices(id);
+        let index = |is_law: bool| match [self.is_law[0] == is_law, self.is_law[1] == is_law] {
+            [true, true] => id,
+            [true, false] => ids[0] as u32,
+            [false, true] => ids[1] as u32,
+            [false, false] => 0,
+        };
+        Cell { id, flow: index(false), law: index(true) }
+    }
+
+    /// How many distinct flows there are.
+    pub fn flow_count(&self) -> usize {
+        self.count(false)
+    }
+
+    /// How many distinct laws there are.
+    pub fn law_count(&self) -> usize {
+        self.count(true)
+    }
+
+    fn count(&self, is_law: bool) -> usize {
+        let counts =
+            self.axes.iter().zip(self.is_law).map(|(axis, law)| if law == is_law { axis.count() } else { 1 });
+        counts.product()
+    }
+
+    /// The oscillator of flow `index`.
+    pub fn oscillator(&self, index: u32) -> Oscillator {
+        match self.pair(self.is_law.map(|law| !law), index).oscillator() {
+            Ok(oscillator) => oscillator,
+            Err(error) => unreachable!("a checked scene: {error}"),
+        }
+    }
+
+    /// The contact law `index`.
+    pub fn law(&self, index: u32) -> Law {
+        self.pair(self.is_law, index).law()
+    }
+
+    /// The base with the axes in `which` set to flat index `index` among them.
+    fn pair(&self, which: [bool; 2], index: u32) -> GearPair {
+        let mut pair = self.base;
+        let mut rest = index as usize;
+        for (axis, _) in self.axes.iter().zip(which).filter(|(_, chosen)| *chosen) {
+            // Cannot fail: axis values lie in the parameter's range.
+            let set = pair.set(axis.parameter().name, axis.value(rest % axis.count()));
+            debug_assert_eq!(set, Ok(()));
+            rest /= axis.count();
+        }
+        pair
+    }
+
+    /// The gear pair of the cell `id`.
+    pub fn gear_pair(&self, id: u32) -> GearPair {
+        self.pair([true; 2], id)
+    }
+
+    /// The batch of up to `count` cells from place `from` of the order on.
+    pub fn batch(&self, from: usize, count: usize) -> Batch {
+        let places = from..from.saturating_add(count).min(self.order.len());
+        let cells = self.order[places.clone()].iter().map(|&id| self.cell(id)).collect();
+        Batch { places, cells }
+    }
+}
+
+fn needs(quantities: &[Quantity]) -> Needs {
+    let asked = |quantity| quantities.contains(&quantity);
+    Needs {
+        // Without it chaos cannot be told from a cycle that was not found.
+        exponent: asked(Quantity::Lyapunov) || asked(Quantity::Class),
+        impacts: asked(Quantity::Impacts),
+        mesh: asked(Quantity::Mesh),
+        symmetric: asked(Quantity::Symmetric),
+        word: asked(Quantity::Word),
+    }
+}
+
+/// How many cells are in each class: periodic, chaotic, undecided, failed.
+pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
+    let mut counts = [0; 4];
+    for class in classes {
+        counts[match class {
+            Class::Periodic { .. } => 0,
+            Class::Chaotic => 1,
+            Class::Undecided => 2,
+            Class::Failed => 3,
+        }] += 1;
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Purpose;
+
+    fn plan(first: &str, second: &str, counts: [usize; 2]) -> Plan {
+        let axis = |name, count| {
+            format!("[[axis]]\nparameter = '{name}'\nmin = 0.25\nmax = 0.75\ncount = {count}\n")
+        };
+        let text = axis(first, counts[0]) + &axis(second, counts[1]);
+        let e = if first == "e" || second == "e" { vec![] } else { vec!["e=0.5".to_owned()] };
+        Plan::new(&Scene::parse(&text, "s", &e, Purpose::Map).unwrap())
+    }
+
+    #[test]
+    fn every_cell_has_the_flow_and_law_of_its_gear_pair() {
+        for (first, second, flows, laws) in
+            [("e", "omega", 5, 3), ("omega", "e", 3, 5), ("e", "mesh_speed", 1, 15), ("k", "omega", 15, 1)]
+        {
+            let plan = plan(first, second, [3, 5]);
+            assert_eq!((plan.flow_count(), plan.law_count()), (flows, laws), "{first} {second}");
+            for id in 0..15 {
+                let (cell, pair) = (plan.cell(id), plan.gear_pair(id));
+                let [i, j] = plan.indices(id);
+                assert_eq!(pair.get(first).unwrap(), plan.axes()[0].value(i));
+                assert_eq!(pair.get(second).unwrap(), plan.axes()[1].value(j));
+                assert_eq!(plan.oscillator(cell.flow), pair.oscillator().unwrap());
+                assert_eq!(plan.law(cell.law), pair.law());
+            }
+        }
+    }
+
+    #[test]
+    fn batches_of_any_size_cover_every_cell_once() {
+        let plan = plan("e", "omega", [7, 5]);
+        for size in [1, 4, 34, 35, 1000] {
+            let mut ids = Vec::new();
+            while ids.len() < plan.cell_count() {
+                ids.extend(plan.batch(ids.len(), size).cells.iter().map(|cell| cell.id));
+            }
+            assert_eq!(ids, plan.order());
+            ids.sort_unstable();
+            assert!(ids.iter().copied().eq(0..35));
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Words inside records: 64 symbols spelled out, longer ones as hash and length.
+
+use super::{Record, WORD_SYMBOLS, valid};
+use crate::word::Word;
+
+/// Symbols that one `u64` holds.
+const PER_WORD: usize = 21;
+
+/// Consecutive symbols that the hash looks at together.
+const HASH_WINDOW: usize = 8;
+
+/// A word as a record keeps it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Spelling {
+    /// All its symbols.
+    Whole(Word),
+    /// More than 64 symbols: their hash and number.
+    Hashed {
+        /// [`word_hash`] of the symbols.
+        hash: u64,
+        /// How many there are.
+        length: u32,
+    },
+}
+
+impl Spelling {
+    /// What tables show: the symbols in time order, or `#hash/length`. Never more than 64
+    /// characters.
+    pub fn text(&self) -> String {
+        match self {
+            Spelling::Whole(word) => word.time_order(),
+            Spelling::Hashed { hash, length } => format!("#{hash:016x}/{length}"),
+        }
+    }
+}
+
+/// A hash of a cyclic word that does not depend on where it starts.
+///
+/// The sum over all places of a mix of the eight symbols that begin there, in two halves of
+/// 32 bits: an engine without 64-bit integers can build it symbol by symbol, closing the
+/// circle with the first seven.
+pub fn word_hash(symbols: &[u8]) -> u64 {
+    let n = symbols.len();
+    let mut halves = [0u32; 2];
+    for start in 0..n {
+        let code = (0..HASH_WINDOW).fold(0, |code, k| code << 3 | u32::from(symbols[(start + k) % n] - b'0'));
+        halves[0] = halves[0].wrapping_add(mix(code));
+        halves[1] = halves[1].wrapping_add(mix(code ^ 0x9e37_79b9));
+    }
+    u64::from(halves[1]) << 32 | u64::from(halves[0])
+}
+
+/// MurmurHash3's finaliser: every input bit moves every output bit.
+fn mix(mut x: u32) -> u32 {
+    x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
+    x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
+    x ^ (x >> 16)
+}
+
+impl Record {
+    /// Packs a word and marks it valid.
+    pub fn set_word(&mut self, word: &Word) {
+        let symbols = word.symbols();
+        self.valid |= valid::WORD;
+        self.word_length = symbols.len() as u32;
+        self.word_hash = word_hash(symbols);
+        self.word = [0; 4];
+        if symbols.len() <= WORD_SYMBOLS {
+            for (i, symbol) in symbols.iter().enumerate() {
+                self.word[i / PER_WORD] |= u64::from(symbol - b'0') << (3 * (i % PER_WORD));
+            }
+        }
+    }
+
+    /// The word, if the record has one.
+    pub fn spelling(&self) -> Option<Spelling> {
+        if self.valid & valid::WORD == 0 {
+            return None;
+        }
+        let length = self.word_length as usize;
+        if length > WORD_SYMBOLS {
+            return Some(Spelling::Hashed { hash: self.word_hash, length: self.word_length });
+        }
+        let symbol = |i: usize| (self.word[i / PER_WORD] >> (3 * (i % PER_WORD)) & 7) as u8 + b'0';
+        // An engine need not know the canonical rotation; tables do.
+        Some(Spelling::Whole(Word::cyclic(&(0..length).map(symbol).collect::<Vec<_>>())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_survive_packing() {
+        let long: Vec<u8> = (0..64u32).map(|i| b'1' + (i * 5 % 6) as u8).collect();
+        for symbols in [&b""[..], b"36", b"2356", &long[..21], &long[..22], &long] {
+            let word = Word::cyclic(symbols);
+            let mut record = Record::default();
+            record.set_word(&word);
+            assert_eq!(record.spelling(), Some(Spelling::Whole(word)));
+        }
+        assert_eq!(Record::default().spelling(), None);
+    }
+
+    #[test]
+    fn longer_words_are_hashed_whatever_their_start() {
+        let mut symbols: Vec<u8> = (0..100u32).map(|i| b'1' + (i * i % 6) as u8).collect();
+        let hash = word_hash(&symbols);
+        symbols.rotate_left(37);
+        assert_eq!(word_hash(&symbols), hash);
+        symbols.swap(3, 4);
+        assert_ne!(word_hash(&symbols), hash);
+        let mut record = Record::default();
+        record.set_word(&Word::cyclic(&symbols));
+        let text = record.spelling().unwrap().text();
+        assert!(text.starts_with('#') && text.ends_with("/100") && text.len() <= 64, "{text}");
+    }
+}

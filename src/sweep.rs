@@ -1,0 +1,102 @@
+//! The run of a map: batch after batch through an engine, each kept before the next begins.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use thiserror::Error;
+
+use crate::engine::{Engine, EngineError};
+use crate::plan::{Batch, Plan};
+use crate::record::Record;
+
+/// What a batch should take: short enough to lose one, long enough not to be noticed.
+const BATCH_SECONDS: f64 = 1.0;
+
+/// Most cells of a batch, lest a fast engine's batch fills the memory.
+const LARGEST_BATCH: usize = 1 << 20;
+
+/// Why a sweep ended before its last cell.
+#[derive(Debug, Error)]
+pub enum SweepError {
+    /// The engine failed. Batches that were kept before are kept.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// A batch could not be kept.
+    #[error("{0:#}")]
+    Keep(anyhow::Error),
+}
+
+/// Runs the plan's cells from place `from` of its order on and hands every batch to `keep`,
+/// which says whether to go on. Returns the place reached: the plan's cell count if all is
+/// done.
+///
+/// Batches grow and shrink so that each takes about a second; records do not depend on it.
+/// A batch too large for the engine's memory is tried again with half as many cells.
+///
+/// # Errors
+/// [`SweepError`], after which everything handed to `keep` before is still good.
+pub async fn run(
+    plan: &Plan,
+    engine: &mut Engine<'_>,
+    from: usize,
+    mut keep: impl FnMut(&Batch, &[Record]) -> anyhow::Result<ControlFlow<()>>,
+) -> Result<usize, SweepError> {
+    let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH };
+    let mut place = from;
+    while place < plan.cell_count() {
+        let batch = plan.batch(place, pace.cells);
+        let clock = Instant::now();
+        let records = match engine.run(&batch).await {
+            Err(EngineError::OutOfMemory { .. }) if pace.halve(batch.cells.len()) => continue,
+            other => other?,
+        };
+        place = batch.places.end;
+        pace.adapt(batch.cells.len(), clock.elapsed());
+        if keep(&batch, &records).map_err(SweepError::Keep)?.is_break() {
+            break;
+        }
+    }
+    Ok(place)
+}
+
+/// How many cells the next batch has.
+struct Pace {
+    cells: usize,
+    most: usize,
+}
+
+impl Pace {
+    /// Makes batches smaller for good; false if they have one cell already.
+    fn halve(&mut self, tried: usize) -> bool {
+        self.most = tried / 2;
+        self.cells = self.most;
+        self.most > 0
+    }
+
+    /// Aims at a second, by no more than a factor of 4 at a time: costs differ from one part
+    /// of a map to the next.
+    fn adapt(&mut self, cells: usize, elapsed: Duration) {
+        let factor = (BATCH_SECONDS / elapsed.as_secs_f64().max(1e-3)).clamp(0.25, 4.0);
+        self.cells = ((cells as f64 * factor) as usize).clamp(1, self.most);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn batches_aim_at_a_second() {
+        let mut pace = Pace { cells: 100, most: 1000 };
+        pace.adapt(100, Duration::from_millis(500));
+        assert_eq!(pace.cells, 200);
+        pace.adapt(200, Duration::from_nanos(1));
+        assert_eq!(pace.cells, 800);
+        pace.adapt(800, Duration::from_secs(100));
+        assert_eq!(pace.cells, 200);
+        assert!(pace.halve(200));
+        pace.adapt(100, Duration::from_nanos(1));
+        assert_eq!(pace.cells, 100);
+        assert!(!pace.halve(1));
+    }
+}

@@ -1,0 +1,189 @@
+//! Maps through the library: classes against single orbits, and independence of how the
+//! work was cut up.
+
+use std::ops::ControlFlow;
+
+use rattlemap::classify::classify;
+use rattlemap::engine::{Cpu, Engine, EngineError, Fake};
+use rattlemap::flow::Flow;
+use rattlemap::model::GearPair;
+use rattlemap::orbit::{Class, Orbit, Settings, analyse};
+use rattlemap::plan::{Cell, Plan};
+use rattlemap::record::{Record, valid};
+use rattlemap::reference::Trajectory;
+use rattlemap::scene::{Purpose, REST, Scene};
+use rattlemap::sweep::{self, SweepError};
+use rayon::prelude::*;
+
+const QUANTITIES: &str =
+    "outputs.quantities=[\"class\",\"lyapunov\",\"impacts\",\"mesh\",\"symmetric\",\"word\"]";
+
+/// A map over restitution and frequency with as many cells along each axis.
+fn scene(count: usize, sets: &[&str]) -> Scene {
+    let axis = |name, min, max| {
+        format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = {count}\n")
+    };
+    let text = axis("e", 0.0, 1.0) + &axis("omega", 1.0, 12.0);
+    let sets: Vec<String> = [QUANTITIES].iter().chain(sets).map(ToString::to_string).collect();
+    Scene::parse(&text, "test", &sets, Purpose::Map).unwrap()
+}
+
+/// All records by id, computed in batches of `size`.
+fn records(plan: &Plan, engine: &mut Engine<'_>, size: usize) -> Vec<Record> {
+    let mut records = vec![Record::default(); plan.cell_count()];
+    let mut place = 0;
+    while place < plan.cell_count() {
+        let batch = plan.batch(place, size);
+        let computed = pollster::block_on(engine.run(&batch)).unwrap();
+        assert_eq!(computed.len(), batch.cells.len());
+        batch.cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
+        place = batch.places.end;
+    }
+    records
+}
+
+fn on_cpu(scene: &Scene) -> Vec<Record> {
+    let plan = Plan::new(scene);
+    records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), 64)
+}
+
+/// Whether the motion from rest is still far from an orbit when a map's budget ends.
+fn is_elsewhere(pair: &GearPair, orbit: &Orbit, settings: &Settings) -> bool {
+    let flow = Flow::new(&pair.oscillator().unwrap());
+    let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
+    for _ in 0..settings.transient_periods + settings.observed_periods {
+        trajectory.advance_period(&mut ()).unwrap();
+    }
+    let end = trajectory.state();
+    let mut cycle = Trajectory::new(&flow, pair.law(), orbit.strobe);
+    (0..orbit.cycle_periods).all(|_| {
+        let y = cycle.state();
+        cycle.advance_period(&mut ()).unwrap();
+        (0..4).any(|i| (y[i] - end[i]).abs() > 1e-3)
+    })
+}
+
+#[test]
+fn cells_are_what_single_orbits_are() {
+    let scene = scene(24, &[]);
+    let plan = Plan::new(&scene);
+    let records = on_cpu(&scene);
+    let settings = Settings::default();
+    let differing: Vec<String> = (0..plan.cell_count() as u32)
+        .into_par_iter()
+        .filter_map(|id| {
+            let (record, pair) = (&records[id as usize], plan.gear_pair(id));
+            let class = classify(record);
+            // The budget may not suffice, and says so; a single orbit goes on.
+            if class == Class::Undecided {
+                return None;
+            }
+            let orbit = analyse(&pair, REST, &settings);
+            let at = format!("e = {}, omega = {}: {class:?}, {:?}", pair.e, pair.omega, orbit.class);
+            if orbit.class != class {
+                // Transient chaos that outlives the budget; a single orbit waits for its end.
+                let transient = class == Class::Chaotic && is_elsewhere(&pair, &orbit, &settings);
+                return (!transient).then_some(at);
+            }
+            if let Class::Periodic { .. } = class {
+                let near = |a: f64, b: f64| (a - b).abs() < 1e-6 * (1.0 + b.abs()) || a == b;
+                assert!(
+                    near(record.lyapunov, orbit.lyapunov),
+                    "{at}: {} {}",
+                    record.lyapunov,
+                    orbit.lyapunov
+                );
+                assert!(near(record.mesh_fraction, orbit.mesh_fraction), "{at}");
+                assert_eq!(record.impacts_per_period, orbit.impacts_per_period, "{at}");
+                assert_eq!(record.symmetric == 1, orbit.symmetric.unwrap(), "{at}");
+            }
+            None
+        })
+        .collect();
+    assert!(differing.is_empty(), "{differing:#?}");
+    let undecided = records.iter().filter(|record| classify(record) == Class::Undecided).count();
+    assert!(undecided <= 6, "{undecided} of 576 cells undecided");
+}
+
+#[test]
+fn without_early_stops_every_cell_runs_its_whole_budget() {
+    let whole = scene(12, &["integration.early_stop=false"]);
+    let full = on_cpu(&whole);
+    assert!(full.iter().all(|record| record.periods_run == 528));
+    let early = on_cpu(&scene(12, &[]));
+    for (id, (full, early)) in full.iter().zip(&early).enumerate() {
+        if classify(early) != Class::Undecided {
+            assert_eq!(classify(full), classify(early), "cell {id}");
+            assert_eq!(full.word, early.word, "cell {id}");
+        }
+    }
+    assert!(early.iter().filter(|record| record.periods_run < 300).count() > 100);
+}
+
+#[test]
+fn records_do_not_depend_on_batches_or_threads() {
+    let scene = scene(10, &[]);
+    let plan = Plan::new(&scene);
+    let with = |threads: usize, size: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), size))
+    };
+    let one = with(1, 1);
+    for (threads, size) in [(1, 100), (2, 7), (5, 33)] {
+        assert_eq!(with(threads, size), one, "{threads} threads, batches of {size}");
+    }
+    let rule = |size| records(&plan, &mut Engine::Fake(Fake::new(by_id)), size);
+    assert_eq!(rule(1), rule(64));
+}
+
+#[test]
+fn nothing_is_recorded_that_nobody_asks_for() {
+    let only = |quantities: &str| on_cpu(&scene(4, &[&format!("outputs.quantities=[{quantities}]")]));
+    let bits = valid::STROBE | valid::PERIOD;
+    for record in only("\"mesh\"") {
+        assert_eq!(record.valid, bits | valid::MESH);
+        assert_eq!((record.lyapunov, record.impacts_per_period, record.word), (0.0, 0.0, [0; 4]));
+    }
+    // A class needs the exponent, but not the other way round.
+    assert!(only("\"class\"").iter().all(|record| record.valid == bits | valid::LYAPUNOV));
+}
+
+/// A cell's own number, so that a misplaced record shows.
+fn by_id(cell: &Cell) -> Record {
+    Record { period: cell.id + 1, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
+}
+
+/// Sweeps with a fake; returns what it says and the ids kept, in order.
+fn sweep(plan: &Plan, fake: Fake, from: usize) -> (Result<usize, SweepError>, Vec<u32>) {
+    let mut kept = Vec::new();
+    let end = pollster::block_on(sweep::run(plan, &mut Engine::Fake(fake), from, |batch, records| {
+        assert!(batch.cells.iter().zip(records).all(|(cell, record)| record.period == cell.id + 1));
+        kept.extend(batch.cells.iter().map(|cell| cell.id));
+        Ok(ControlFlow::Continue(()))
+    }));
+    (end, kept)
+}
+
+#[test]
+fn a_lost_engine_leaves_what_was_done_and_the_next_goes_on() {
+    let scene = scene(20, &[]);
+    let plan = Plan::new(&scene);
+    let (end, kept) = sweep(&plan, Fake { batches_left: Some(2), ..Fake::new(by_id) }, 0);
+    assert!(matches!(end, Err(SweepError::Engine(EngineError::Lost { .. }))), "{end:?}");
+    assert!(!kept.is_empty() && kept.len() < plan.cell_count());
+    let (end, rest) = sweep(&plan, Fake::new(by_id), kept.len());
+    assert_eq!(end.unwrap(), plan.cell_count());
+    assert_eq!([kept, rest].concat(), plan.order());
+}
+
+#[test]
+fn batches_shrink_to_the_memory_there_is() {
+    let scene = scene(20, &[]);
+    let plan = Plan::new(&scene);
+    let (end, kept) = sweep(&plan, Fake { memory_cells: 3, ..Fake::new(by_id) }, 0);
+    assert_eq!(end.unwrap(), plan.cell_count());
+    assert_eq!(kept, plan.order());
+    let (end, kept) = sweep(&plan, Fake { memory_cells: 0, ..Fake::new(by_id) }, 0);
+    assert!(matches!(end, Err(SweepError::Engine(EngineError::OutOfMemory { cells: 1, .. }))), "{end:?}");
+    assert!(kept.is_empty());
+}
