@@ -9,6 +9,7 @@
 pub mod bifurcation;
 mod certificate;
 pub mod flow;
+pub mod gpu;
 pub mod model;
 pub mod orbit;
 pub mod output;

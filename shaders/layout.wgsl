@@ -1,0 +1,134 @@
+// Everything that lies in buffers. The host's twins are in src/gpu/layout.rs; a test
+// compares the offsets. A struct holds either Reals or u32s alone, so that both precisions
+// have the same shape.
+
+// One linear domain in units of its own step: time tau = t / h, velocities per step.
+struct Domain {
+    // The propagator of one step less the identity: rows gap, its rate, x, its rate;
+    // columns the same four, cos, sin, 1.
+    step: array<Real, 28>,
+    // Accelerations of the gap and of x: on gap, rate, x, rate, cos, 1.
+    gap_row: array<Real, 6>,
+    x_row: array<Real, 6>,
+    // |(n+1)-th derivative of the gap|^2 <= this form of the n-th derivatives: on rate^2,
+    // rate * x_rate, x_rate^2, gap^2, gap * x, x^2.
+    energy: array<Real, 6>,
+    // Growth per step of that bound for n = 5.
+    growth: Real,
+    // Forcing angle of one step, cos - 1 of it and sin of it.
+    angle: Real,
+    turn_less: Real,
+    turn_sin: Real,
+    // Free steps per step of this domain: a power of two, at most 1.
+    share: Real,
+    // Steps of this domain per free step.
+    substeps: Real,
+}
+
+// All that is common to the lanes that differ in the contact law alone.
+struct Flow {
+    // Free motion, meshing on the right, on the left. Meshing measures the gap from its wall.
+    domains: array<Domain, 3>,
+    // Right and left wall.
+    walls: array<Real, 2>,
+    // Change of v per unit of gap rate that the contact impulse removes.
+    kick: Real,
+    // Length of a free step.
+    h: Real,
+}
+
+struct FlowShape {
+    // Free steps per forcing period.
+    steps: u32,
+    // Where its phasors start.
+    phasors: u32,
+}
+
+struct Law {
+    restitution: Real,
+    mesh_speed: Real,
+}
+
+struct Cell {
+    flow_index: u32,
+    law_index: u32,
+}
+
+struct Settings {
+    // Lanes in the buffers.
+    lanes: u32,
+    // Forcing periods to integrate.
+    periods: u32,
+    // Loop trips that one dispatch may spend on a lane.
+    trips: u32,
+    // Passes (scan steps and careful steps) allowed in one period.
+    passes_per_period: u32,
+    // Events allowed in one period.
+    events_per_period: u32,
+    // Workgroups along the first dimension of a dispatch.
+    row: u32,
+    reserved_0: u32,
+    reserved_1: u32,
+}
+
+// What a lane carries between dispatches: the motion.
+struct Motion {
+    // Gap (from the wall while meshing), its rate, x, its rate; rates per free step.
+    q: array<Real, 4>,
+    // cos and sin of the forcing phase.
+    phasor: array<Real, 2>,
+    // Fraction of the free step that has passed.
+    theta: Real,
+    // Bound on the sixth derivative of the gap, in steps of the present domain.
+    bound: Real,
+    // Part of a free step spent meshing that is not counted yet.
+    mesh_part: Real,
+}
+
+// What a lane carries between dispatches: the counting.
+struct Tally {
+    // Free steps since phase 0.
+    step: u32,
+    // MODE_*.
+    mode: u32,
+    // Wall of the last event: SIDE_*.
+    origin: u32,
+    // Order of the root of the distance from that wall at the start; 0 away from it.
+    order: u32,
+    // Forcing periods completed.
+    period: u32,
+    // STATUS_*.
+    status: u32,
+    passes_in_period: u32,
+    events_in_period: u32,
+    impacts: u32,
+    events: u32,
+    // Whole free steps spent meshing.
+    mesh_steps: u32,
+    // Events too near to grazing for the linearisation to mean much.
+    grazes: u32,
+}
+
+@group(0) @binding(0) var<uniform> settings: Settings;
+@group(0) @binding(1) var<storage, read> flows: array<Flow>;
+@group(0) @binding(2) var<storage, read> shapes: array<FlowShape>;
+@group(0) @binding(3) var<storage, read> phasors: array<array<Real, 2>>;
+@group(0) @binding(4) var<storage, read> laws: array<Law>;
+@group(0) @binding(5) var<storage, read> cells: array<Cell>;
+@group(0) @binding(6) var<storage, read_write> motions: array<Motion>;
+@group(0) @binding(7) var<storage, read_write> tallies: array<Tally>;
+@group(0) @binding(8) var<storage, read_write> live: atomic<u32>;
+
+const MODE_FREE: u32 = 0u;
+const MODE_PRESSED: u32 = 1u; // + side
+const MODE_DIP: u32 = 3u; // + side
+
+const SIDE_RIGHT: u32 = 0u;
+const SIDE_LEFT: u32 = 1u;
+const SIDE_NONE: u32 = 2u;
+
+const STATUS_OK: u32 = 0u;
+const STATUS_CAP_EVENTS: u32 = 4u;
+const STATUS_CAP_ROOT: u32 = 5u;
+const STATUS_TOO_STIFF: u32 = 6u;
+const STATUS_NON_FINITE: u32 = 7u;

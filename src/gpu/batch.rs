@@ -1,0 +1,319 @@
+//! Batches: buffers, dispatches and reading back.
+
+use super::constants::Constants;
+use super::layout::{Cell, FlowShape, MODE_FREE, MODE_PRESSED, Motion, SIDE_NONE, Settings, Tally};
+use super::shader::{Precision, Variant};
+use super::signal::Signal;
+use super::{Gpu, GpuError, Lane, LaneSettings, device, layout};
+use crate::model::{Law, Oscillator};
+use crate::orbit::Status;
+use crate::record::{Record, valid};
+
+/// Dispatches between two looks at how many lanes are still running.
+const DISPATCHES_PER_LOOK: u32 = 4;
+
+/// Batches hold no more lanes than this, so that results come back in portions.
+const LARGEST_BATCH: usize = 1 << 20;
+
+/// What all batches of a run share.
+struct Shared {
+    constants: Vec<Option<Constants>>,
+    flows: wgpu::Buffer,
+    shapes: wgpu::Buffer,
+    phasors: wgpu::Buffer,
+    laws: wgpu::Buffer,
+}
+
+pub(super) async fn run(
+    gpu: &mut Gpu,
+    flows: &[Oscillator],
+    laws: &[Law],
+    lanes: &[Lane],
+    settings: &LaneSettings,
+) -> Result<Vec<Record>, GpuError> {
+    for (i, lane) in lanes.iter().enumerate() {
+        if lane.flow as usize >= flows.len() || lane.law as usize >= laws.len() {
+            let (flow, law) = (lane.flow, lane.law);
+            return Err(GpuError::NoSuchCell { lane: i, flow, law, flows: flows.len(), laws: laws.len() });
+        }
+    }
+    let variant = Variant { precision: gpu.precision, workgroup: settings.workgroup };
+    if !gpu.pipelines.contains_key(&variant) {
+        let pipeline = device::pipeline(gpu, variant).await?;
+        gpu.pipelines.insert(variant, pipeline);
+    }
+    let pipeline = &gpu.pipelines[&variant];
+    let shared = shared(gpu, flows, laws, settings)?;
+    let mut records = Vec::with_capacity(lanes.len());
+    for batch in lanes.chunks(batch_lanes(gpu, settings)) {
+        records.extend(
+            Batch::new(gpu, &shared, batch, settings).run(gpu, pipeline, &shared, batch, settings).await?,
+        );
+    }
+    Ok(records)
+}
+
+/// Lanes per batch that the adapter's limits allow.
+fn batch_lanes(gpu: &Gpu, settings: &LaneSettings) -> usize {
+    let limits = gpu.device.limits();
+    let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
+    let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
+    let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
+    let most = by_binding.min(by_grid).min(LARGEST_BATCH as u64) as usize;
+    settings.batch.unwrap_or(most).clamp(1, most.max(1))
+}
+
+fn shared(
+    gpu: &Gpu,
+    flows: &[Oscillator],
+    laws: &[Law],
+    settings: &LaneSettings,
+) -> Result<Shared, GpuError> {
+    let constants: Vec<_> =
+        flows.iter().map(|flow| Constants::new(flow, settings.steps_per_period)).collect();
+    let (mut tables, mut shapes, mut phasors) = (Vec::new(), Vec::new(), Vec::new());
+    for constants in &constants {
+        match constants {
+            Some(constants) => {
+                shapes.push(FlowShape { steps: constants.steps, phasors: phasors.len() as u32 });
+                tables.push(constants.flow);
+                phasors.extend_from_slice(&constants.phasors);
+            }
+            // Its lanes are refused before they start.
+            None => {
+                shapes.push(FlowShape { steps: 1, phasors: 0 });
+                tables.push(bytemuck::Zeroable::zeroed());
+            }
+        }
+    }
+    phasors.push([1.0, 0.0]);
+    let laws: Vec<layout::Law> = laws
+        .iter()
+        .map(|law| layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed })
+        .collect();
+    let tables = reals(&tables, gpu.precision);
+    let phasors = reals(&phasors, gpu.precision);
+    let allowed = gpu.device.limits().max_storage_buffer_binding_size;
+    let needed = tables.len().max(phasors.len()) as u64;
+    if needed > allowed {
+        return Err(GpuError::TooManyFlows { flows: flows.len(), needed, allowed });
+    }
+    Ok(Shared {
+        flows: upload(gpu, "flows", &tables),
+        shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
+        phasors: upload(gpu, "phasors", &phasors),
+        laws: upload(gpu, "laws", &reals(&laws, gpu.precision)),
+        constants,
+    })
+}
+
+/// Numbers of structs of reals in the variant's precision.
+fn reals<T: bytemuck::Pod>(items: &[T], precision: Precision) -> Vec<u8> {
+    let numbers: &[f64] = bytemuck::cast_slice(items);
+    match precision {
+        Precision::F64 => bytemuck::cast_slice(numbers).to_vec(),
+        Precision::F32 => numbers.iter().flat_map(|&x| (x as f32).to_ne_bytes()).collect(),
+    }
+}
+
+/// The reverse of [`reals`].
+fn from_reals<T: bytemuck::Pod>(bytes: &[u8], precision: Precision) -> Vec<T> {
+    let numbers: Vec<f64> = match precision {
+        Precision::F64 => bytemuck::pod_collect_to_vec(bytes),
+        Precision::F32 => {
+            bytemuck::pod_collect_to_vec::<u8, f32>(bytes).iter().map(|&x| f64::from(x)).collect()
+        }
+    };
+    bytemuck::cast_slice(&numbers).to_vec()
+}
+
+fn upload(gpu: &Gpu, label: &'static str, bytes: &[u8]) -> wgpu::Buffer {
+    let usage = wgpu::BufferUsages::STORAGE
+        | wgpu::BufferUsages::UNIFORM
+        | wgpu::BufferUsages::COPY_DST
+        | wgpu::BufferUsages::COPY_SRC;
+    let size = bytes.len().max(16) as u64;
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size,
+        usage,
+        mapped_at_creation: false,
+    });
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    buffer
+}
+
+/// The state of one batch on the device.
+struct Batch {
+    motions: wgpu::Buffer,
+    tallies: wgpu::Buffer,
+    live: wgpu::Buffer,
+    look: wgpu::Buffer,
+    bindings: wgpu::BindGroup,
+    groups: [u32; 2],
+}
+
+impl Batch {
+    fn new(gpu: &Gpu, shared: &Shared, lanes: &[Lane], settings: &LaneSettings) -> Batch {
+        let cells: Vec<Cell> =
+            lanes.iter().map(|lane| Cell { flow_index: lane.flow, law_index: lane.law }).collect();
+        let (motions, tallies): (Vec<Motion>, Vec<Tally>) =
+            lanes.iter().map(|lane| start(shared.constants[lane.flow as usize].as_ref(), lane)).unzip();
+        let groups = grid(gpu, lanes.len(), settings.workgroup);
+        let uniform = Settings {
+            lanes: lanes.len() as u32,
+            periods: settings.periods,
+            trips: settings.trips,
+            passes_per_period: settings.passes_per_period,
+            events_per_period: settings.events_per_period,
+            row: groups[0] * settings.workgroup,
+            ..Settings::default()
+        };
+        let uniform = upload(gpu, "settings", bytemuck::bytes_of(&uniform));
+        let cells = upload(gpu, "cells", bytemuck::cast_slice(&cells));
+        let motions = upload(gpu, "motions", &reals(&motions, gpu.precision));
+        let tallies = upload(gpu, "tallies", bytemuck::cast_slice(&tallies));
+        let live = upload(gpu, "live", &[0; 4]);
+        let look = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("look"),
+            size: 4,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let buffers = [
+            &uniform,
+            &shared.flows,
+            &shared.shapes,
+            &shared.phasors,
+            &shared.laws,
+            &cells,
+            &motions,
+            &tallies,
+            &live,
+        ];
+        let entries: Vec<_> = buffers
+            .iter()
+            .enumerate()
+            .map(|(i, buffer)| wgpu::BindGroupEntry {
+                binding: i as u32,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        let bindings = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("lane"),
+            layout: &gpu.layout,
+            entries: &entries,
+        });
+        Batch { motions, tallies, live, look, bindings, groups }
+    }
+
+    /// Dispatches until no lane is running, then reads the records.
+    async fn run(
+        self,
+        gpu: &Gpu,
+        pipeline: &wgpu::ComputePipeline,
+        shared: &Shared,
+        lanes: &[Lane],
+        settings: &LaneSettings,
+    ) -> Result<Vec<Record>, GpuError> {
+        loop {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            for _ in 0..DISPATCHES_PER_LOOK {
+                encoder.clear_buffer(&self.live, 0, None);
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &self.bindings, &[]);
+                pass.dispatch_workgroups(self.groups[0], self.groups[1], 1);
+            }
+            encoder.copy_buffer_to_buffer(&self.live, 0, &self.look, 0, 4);
+            gpu.queue.submit([encoder.finish()]);
+            if read(gpu, &self.look).await?[..4] == [0; 4] {
+                break;
+            }
+        }
+        let motions: Vec<Motion> = from_reals(&download(gpu, &self.motions).await?, gpu.precision);
+        let tallies: Vec<Tally> = bytemuck::pod_collect_to_vec(&download(gpu, &self.tallies).await?);
+        let _ = settings;
+        Ok(lanes
+            .iter()
+            .zip(motions.iter().zip(&tallies))
+            .map(|(lane, (motion, tally))| {
+                record(shared.constants[lane.flow as usize].as_ref(), motion, tally)
+            })
+            .collect())
+    }
+}
+
+/// Workgroups in two dimensions for so many lanes.
+fn grid(gpu: &Gpu, lanes: usize, workgroup: u32) -> [u32; 2] {
+    let groups = (lanes as u32).div_ceil(workgroup).max(1);
+    let widest = gpu.device.limits().max_compute_workgroups_per_dimension;
+    let rows = groups.div_ceil(widest);
+    [groups.div_ceil(rows), rows]
+}
+
+/// Where a lane starts.
+fn start(constants: Option<&Constants>, lane: &Lane) -> (Motion, Tally) {
+    let tally = Tally { mode: MODE_FREE, origin: SIDE_NONE, ..Tally::default() };
+    let refused = |status: Status| (Motion::default(), Tally { status: status.code(), ..tally });
+    let Some(constants) = constants else { return refused(Status::TooStiff) };
+    if !lane.start.iter().all(|x| x.is_finite()) {
+        return refused(Status::NonFinite);
+    }
+    let mut motion = Motion { q: constants.to_lane(lane.start), phasor: [1.0, 0.0], ..Motion::default() };
+    let [right, left] = constants.flow.walls;
+    let mut tally = tally;
+    for (side, beyond) in [(0, motion.q[0] - right), (1, left - motion.q[0])] {
+        if beyond > 0.0 {
+            motion.q[0] -= constants.flow.walls[side as usize];
+            tally.mode = MODE_PRESSED + side;
+            tally.origin = side;
+        }
+    }
+    (motion, tally)
+}
+
+fn record(constants: Option<&Constants>, motion: &Motion, tally: &Tally) -> Record {
+    let Some(constants) = constants else {
+        return Record { status: tally.status, ..Record::default() };
+    };
+    let mut q = motion.q;
+    if tally.mode >= MODE_PRESSED {
+        q[0] += constants.flow.walls[((tally.mode - 1) & 1) as usize];
+    }
+    let periods = f64::from(tally.period.max(1));
+    let meshing = f64::from(tally.mesh_steps) + motion.mesh_part;
+    Record {
+        strobe: constants.to_state(q),
+        impacts_per_period: f64::from(tally.impacts) / periods,
+        mesh_fraction: meshing / (periods * f64::from(constants.steps)),
+        periods_run: tally.period,
+        status: tally.status,
+        valid: valid::STROBE | valid::IMPACTS | valid::MESH,
+        ..Record::default()
+    }
+}
+
+async fn download(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+    let copy = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("download"),
+        size: buffer.size(),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
+    gpu.queue.submit([encoder.finish()]);
+    read(gpu, &copy).await
+}
+
+async fn read(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+    let lost = |message: String| GpuError::Lost { message };
+    let (mapped, send) = Signal::new();
+    buffer.map_async(wgpu::MapMode::Read, .., send);
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
+    mapped.await.map_err(|error| lost(error.to_string()))?;
+    let bytes = buffer.get_mapped_range(..).map_err(|error| lost(error.to_string()))?.to_vec();
+    buffer.unmap();
+    Ok(bytes)
+}

@@ -1,0 +1,62 @@
+//! Shader variants: one source, put together from small files.
+
+/// Precision of a variant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Precision {
+    /// Single precision, on every adapter.
+    F32,
+    /// Double precision, where the adapter has `SHADER_F64`.
+    F64,
+}
+
+impl Precision {
+    /// Both precisions.
+    pub const ALL: [Precision; 2] = [Precision::F32, Precision::F64];
+
+    /// Bytes of a real number.
+    pub fn bytes(self) -> usize {
+        match self {
+            Precision::F32 => 4,
+            Precision::F64 => 8,
+        }
+    }
+}
+
+/// What is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Variant {
+    /// Precision of the motion.
+    pub precision: Precision,
+    /// Invocations per workgroup.
+    pub workgroup: u32,
+}
+
+/// Invocations per workgroup where nothing else is asked for.
+pub const WORKGROUP: u32 = 64;
+
+/// All but the precision.
+const BODY: &str = concat!(
+    include_str!("../../shaders/layout.wgsl"),
+    include_str!("../../shaders/phase.wgsl"),
+    include_str!("../../shaders/gear_pair.wgsl"),
+    include_str!("../../shaders/taylor.wgsl"),
+    include_str!("../../shaders/flight.wgsl"),
+    include_str!("../../shaders/events.wgsl"),
+    include_str!("../../shaders/sweep.wgsl"),
+);
+
+impl Variant {
+    /// The variant of a precision with the usual workgroup.
+    pub fn of(precision: Precision) -> Variant {
+        Variant { precision, workgroup: WORKGROUP }
+    }
+
+    /// Its WGSL source.
+    pub fn source(&self) -> String {
+        let real = match self.precision {
+            Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
+            Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
+        };
+        format!("{real}\nconst WORKGROUP: u32 = {}u;\n{BODY}", self.workgroup)
+    }
+}

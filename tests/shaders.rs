@@ -1,0 +1,96 @@
+//! Every shader variant, without an adapter: it parses, it is valid, and its structs lie in
+//! memory as the host's do.
+
+use std::mem::{offset_of, size_of};
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use rattlemap::gpu::{Precision, Variant, layout};
+
+fn module(variant: Variant) -> naga::Module {
+    let source = variant.source();
+    let module = naga::front::wgsl::parse_str(&source)
+        .unwrap_or_else(|error| panic!("{variant:?}: {}", error.emit_to_string(&source)));
+    let capabilities = match variant.precision {
+        Precision::F32 => Capabilities::empty(),
+        Precision::F64 => Capabilities::FLOAT64,
+    };
+    Validator::new(ValidationFlags::all(), capabilities)
+        .validate(&module)
+        .unwrap_or_else(|error| panic!("{variant:?}: {}", error.emit_to_string(&source)));
+    module
+}
+
+/// Members of a struct as `(name, offset)`, and its size.
+fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
+    let (_, ty) = module
+        .types
+        .iter()
+        .find(|(_, ty)| ty.name.as_deref() == Some(name))
+        .unwrap_or_else(|| panic!("the shader has no struct {name}"));
+    let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
+    let members = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
+    (members, *span)
+}
+
+/// Compares a struct field by field; `bytes` is the size of the shader's numbers, `host` that
+/// of the host's.
+macro_rules! same_layout {
+    ($module:expr, $host:ty, $bytes:expr, $host_bytes:expr, [$($field:ident),* $(,)?]) => {{
+        let name = stringify!($host).rsplit("::").next().unwrap().trim();
+        let (members, span) = shape($module, name);
+        let scaled = |bytes: usize| (bytes / $host_bytes * $bytes) as u32;
+        let expected: Vec<(String, u32)> =
+            vec![$((stringify!($field).to_owned(), scaled(offset_of!($host, $field)))),*];
+        assert_eq!(members, expected, "{name}");
+        assert_eq!(span, scaled(size_of::<$host>()), "{name}");
+    }};
+}
+
+#[test]
+fn every_variant_is_valid_and_lies_as_the_host_says() {
+    for precision in Precision::ALL {
+        for workgroup in [32, 64, 256] {
+            let module = &module(Variant { workgroup, ..Variant::of(precision) });
+            let real = precision.bytes();
+            same_layout!(
+                module,
+                layout::Domain,
+                real,
+                8,
+                [step, gap_row, x_row, energy, growth, angle, turn_less, turn_sin, share, substeps]
+            );
+            same_layout!(module, layout::Flow, real, 8, [domains, walls, kick, h]);
+            same_layout!(module, layout::Law, real, 8, [restitution, mesh_speed]);
+            same_layout!(module, layout::Motion, real, 8, [q, phasor, theta, bound, mesh_part]);
+            same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors]);
+            same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index]);
+            same_layout!(
+                module,
+                layout::Settings,
+                4,
+                4,
+                [lanes, periods, trips, passes_per_period, events_per_period, row, reserved_0, reserved_1]
+            );
+            same_layout!(
+                module,
+                layout::Tally,
+                4,
+                4,
+                [
+                    step,
+                    mode,
+                    origin,
+                    order,
+                    period,
+                    status,
+                    passes_in_period,
+                    events_in_period,
+                    impacts,
+                    events,
+                    mesh_steps,
+                    grazes
+                ]
+            );
+        }
+    }
+}
