@@ -73,7 +73,7 @@ fn set_offsets() {
 
 // Newton's cap; bisection finishes what it leaves.
 const NEWTON_CAP: u32 = 10u;
-const ROOT_CAP: u32 = 80u;
+const ROOT_CAP: u32 = 120u;
 // Stretches that one careful step may be cut into.
 const LOOK_CAP: u32 = 200u;
 
@@ -92,15 +92,20 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> Real {
         } else {
             hi = t;
         }
-        var next = t - f.x / (f.y - Real(order) * f.x / t);
+        // What a Newton step leaves over is of second order in it.
+        let step = f.x / (f.y - Real(order) * f.x / t);
+        var next = t - step;
+        let converged = abs(f.z) * (step * step) <= ULP * t * abs(f.y) || abs(step) <= 4.0 * ULP * t;
+        if converged && next >= start && next <= end {
+            return next;
+        }
         if i >= NEWTON_CAP || !(next > lo && next < hi) {
             next = 0.5 * (lo + hi);
+            if hi - lo <= 4.0 * ULP * hi {
+                return next;
+            }
         }
-        let moved = abs(next - t);
         t = next;
-        if moved <= 2.0 * ULP * t {
-            return t;
-        }
     }
     tally.status = STATUS_CAP_ROOT;
     return t;
