@@ -169,9 +169,14 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             let at_start = select(left.first.x, left.second.x, which);
             let at_end = select(right.first.x, right.second.x, which);
             let order = select(orders.x, orders.y, which);
-            let fraction = select(at_start / (at_start - at_end), Real(0.5), order > 0u);
-            let tau = root(which, a, b, order, a + clamp(fraction, Real(0.01), Real(0.99)) * dt);
-            return Find(true, which, tau);
+            var guess = a + clamp(at_start / (at_start - at_end), Real(0.01), Real(0.99)) * dt;
+            if order > 0u {
+                // Leaving and pressed back: the parabola of a short flight.
+                let leaving = select(left.first, left.second, which);
+                let short = -2.0 * leaving.y / leaving.z;
+                guess = select(Real(0.5) * b, short, short > 0.0 && short < 0.5 * b);
+            }
+            return Find(true, which, root(which, a, b, order, guess));
         }
         if dt > SHORTEST {
             width = 0.5 * dt;

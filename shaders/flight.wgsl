@@ -102,16 +102,16 @@ fn scan() -> u32 {
     motion.bound = bound;
     tally.step = n;
     tally.passes_in_period += taken;
-    if d > 0u {
-        count_meshing(Real(taken) * share);
-    }
+    // Whole numbers, so that it does not matter where a dispatch ends.
+    tally.mesh_right += select(0u, taken, d == 1u);
+    tally.mesh_left += select(0u, taken, d == 2u);
     return verdict;
 }
 
-// Adds a time, in free steps, to the time spent meshing.
+// Adds a part of a step, in free steps, to the time spent meshing.
 fn count_meshing(part: Real) {
     motion.mesh_part += part;
     let whole = floor(motion.mesh_part);
-    tally.mesh_steps += u32(whole);
+    tally.mesh_whole += u32(whole);
     motion.mesh_part -= whole;
 }

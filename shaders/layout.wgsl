@@ -81,7 +81,7 @@ struct Motion {
     theta: Real,
     // Bound on the sixth derivative of the gap, in steps of the present domain.
     bound: Real,
-    // Part of a free step spent meshing that is not counted yet.
+    // Time spent meshing in parts of steps, in free steps, less the whole ones.
     mesh_part: Real,
 }
 
@@ -103,8 +103,10 @@ struct Tally {
     events_in_period: u32,
     impacts: u32,
     events: u32,
-    // Whole free steps spent meshing.
-    mesh_steps: u32,
+    // Time spent meshing: whole steps of the two domains, and whole free steps made of parts.
+    mesh_right: u32,
+    mesh_left: u32,
+    mesh_whole: u32,
     // Events too near to grazing for the linearisation to mean much.
     grazes: u32,
 }

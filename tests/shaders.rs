@@ -87,7 +87,9 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     events_in_period,
                     impacts,
                     events,
-                    mesh_steps,
+                    mesh_right,
+                    mesh_left,
+                    mesh_whole,
                     grazes
                 ]
             );

@@ -282,7 +282,11 @@ fn record(constants: Option<&Constants>, motion: &Motion, tally: &Tally) -> Reco
         q[0] += constants.flow.walls[((tally.mode - 1) & 1) as usize];
     }
     let periods = f64::from(tally.period.max(1));
-    let meshing = f64::from(tally.mesh_steps) + motion.mesh_part;
+    let [_, right, left] = constants.flow.domains;
+    let meshing = f64::from(tally.mesh_whole)
+        + motion.mesh_part
+        + f64::from(tally.mesh_right) * right.share
+        + f64::from(tally.mesh_left) * left.share;
     Record {
         strobe: constants.to_state(q),
         impacts_per_period: f64::from(tally.impacts) / periods,

@@ -110,7 +110,7 @@ pub struct Motion {
     pub theta: f64,
     /// Bound on the sixth derivative of the gap.
     pub bound: f64,
-    /// Part of a free step spent meshing that is not counted yet.
+    /// Time spent meshing in parts of steps, in free steps, less the whole ones.
     pub mesh_part: f64,
 }
 
@@ -138,8 +138,12 @@ pub struct Tally {
     pub impacts: u32,
     /// Events so far.
     pub events: u32,
-    /// Whole free steps spent meshing.
-    pub mesh_steps: u32,
+    /// Whole steps of the right meshing domain.
+    pub mesh_right: u32,
+    /// Whole steps of the left meshing domain.
+    pub mesh_left: u32,
+    /// Whole free steps of meshing, made of parts of steps.
+    pub mesh_whole: u32,
     /// Events too near to grazing.
     pub grazes: u32,
 }
