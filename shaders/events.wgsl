@@ -218,14 +218,16 @@ fn careful() {
     if tally.mode >= MODE_DIP {
         pressing_bound = derivative_bound(d, 7u, 5040.0);
     }
-    let part = to_strobe() * substeps;
-    let strobe = part <= 1.0 && tally.step + 1u == shapes[f].steps;
+    let mark = next_mark();
+    let part = to_mark(mark) * substeps;
+    let lands = part <= 1.0 && tally.step + 1u == mark;
     let len = min(part, Real(1.0));
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
     let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
     let found = first_event(len, growth, order);
     tally.passes_in_period += 1u;
     let share = flows[f].domains[d].share;
+    carry_tangents(d, found.tau);
     motion.q = state_at(found.tau, substeps);
     motion.bound += growth;
     tally.order = 0u;
@@ -233,8 +235,9 @@ fn careful() {
         count_meshing(found.tau * share);
     }
     advance_phase(found.tau * share);
-    if strobe && !found.event {
-        tally.step = shapes[f].steps;
+    if lands && !found.event {
+        tally.step = mark;
+        motion.theta = 0.0;
     }
     check_finite();
     sync_phasor();
@@ -243,6 +246,24 @@ fn careful() {
     }
     if tally.step >= shapes[f].steps {
         begin_period();
+    } else if tally.step >= mark {
+        compare_mirror();
+    }
+}
+
+// Pressing ceases inside the dip: the event function is the acceleration itself.
+fn end_dip(side: u32) {
+    let f = cell.flow_index;
+    let before = motion.q;
+    tally.mode = MODE_FREE;
+    motion.q[0] += flows[f].walls[side];
+    if EXPONENT {
+        let row = flows[f].domains[1u + side].gap_row;
+        let share = flows[f].domains[1u + side].share;
+        let normal = array<Real, 4>(row[0], share * row[1], row[2], share * row[3]);
+        expand(1u + side, before);
+        let rate = 6.0 * gap_terms[3] * flows[f].domains[1u + side].substeps;
+        saltate(field(1u + side, before), field(0u, motion.q), normal, rate, 1.0, 0.0);
     }
 }
 
@@ -271,12 +292,15 @@ fn act(second: bool, settling: bool) {
         }
         motion.q[1] = -sign * max(-sign * motion.q[1], Real(0.0));
         count_event(side);
+        let before = motion.q;
         leave(side);
+        if EXPONENT {
+            saltate(field(1u + side, before), field(0u, motion.q), ALONG_GAP, before[1], 1.0, 0.0);
+        }
     } else if second {
         // Pressing ceases inside the dip.
         count_event(side);
-        tally.mode = MODE_FREE;
-        motion.q[0] += flows[f].walls[side];
+        end_dip(side);
     } else {
         // The dip is over; no event.
         motion.q[0] = 0.0;

@@ -33,7 +33,7 @@ fn scan() -> u32 {
     let sine = flows[f].domains[d].turn_sin;
     let share = flows[f].domains[d].share;
     let substeps = flows[f].domains[d].substeps;
-    let steps = shapes[f].steps;
+    let mark = next_mark();
     // Meshing measures from its wall and has but one.
     var low = flows[f].walls[1];
     var high = flows[f].walls[0];
@@ -61,11 +61,11 @@ fn scan() -> u32 {
             verdict = SCAN_BUDGET;
             break;
         }
-        // The strobe must not be stepped over.
+        // The mark must not be stepped over.
         let next_theta = theta + share;
         let wraps = next_theta >= 1.0;
         let next_n = n + select(0u, 1u, wraps);
-        if next_n >= steps {
+        if next_n >= mark {
             break;
         }
         trips += 1u;
@@ -102,6 +102,7 @@ fn scan() -> u32 {
     motion.bound = bound;
     tally.step = n;
     tally.passes_in_period += taken;
+    tally.pending += taken;
     // Whole numbers, so that it does not matter where a dispatch ends.
     tally.mesh_right += select(0u, taken, d == 1u);
     tally.mesh_left += select(0u, taken, d == 2u);

@@ -49,6 +49,7 @@ fn contact(side: u32) {
     let e = laws[cell.law_index].restitution;
     let approach = max(sign * motion.q[1], Real(0.0));
     let leaving = e * approach;
+    let before = motion.q;
     motion.q[1] = -sign * leaving;
     motion.q[3] += flows[cell.flow_index].kick * (sign * (1.0 + e) * approach);
 
@@ -64,6 +65,13 @@ fn contact(side: u32) {
         tally.grazes += 1u;
     }
     count_event(side);
+    if EXPONENT {
+        var next = motion.q;
+        next[0] = select(next[0], 0.0, meshes);
+        let after = field(select(0u, 1u + side, meshes), next);
+        let kick = flows[cell.flow_index].kick * (1.0 + e);
+        saltate(field(0u, before), after, ALONG_GAP, before[1], -e, kick);
+    }
     if meshes {
         start_meshing(side, leaving);
     } else {
@@ -74,6 +82,9 @@ fn contact(side: u32) {
 
 // Approach speeds below this, with the load pulling away, count as near grazing.
 const GRAZING_SPEED: Real = 1e-4;
+
+// The gradient of the gap.
+const ALONG_GAP = array<Real, 4>(1.0, 0.0, 0.0, 0.0);
 
 fn start_meshing(side: u32, leaving: Real) {
     motion.q[0] = 0.0;
@@ -98,6 +109,8 @@ fn leave(side: u32) {
 }
 
 fn count_event(side: u32) {
+    note_symbol(side);
+    note_strobe();
     tally.origin = side;
     tally.events += 1u;
     tally.events_in_period += 1u;

@@ -23,6 +23,8 @@ struct Domain {
     share: Real,
     // Steps of this domain per free step.
     substeps: Real,
+    // The homogeneous propagator (4 x 4) of 1, 2, 4, ... 128 steps, less the identity.
+    powers: array<Real, 128>,
 }
 
 // All that is common to the lanes that differ in the contact law alone.
@@ -65,10 +67,17 @@ struct Settings {
     passes_per_period: u32,
     // Events allowed in one period.
     events_per_period: u32,
-    // Workgroups along the first dimension of a dispatch.
+    // Invocations along the first dimension of a dispatch.
     row: u32,
-    reserved_0: u32,
-    reserved_1: u32,
+    // Periods before averages are taken.
+    transient_periods: u32,
+    // Periods before the exponent is accumulated, and periods per block of it.
+    exponent_from: u32,
+    exponent_block: u32,
+    // Longest period looked for; 0 looks for none.
+    max_period: u32,
+    // 1: lanes end once their period is decided.
+    early_stop: u32,
 }
 
 // What a lane carries between dispatches: the motion.
@@ -83,6 +92,18 @@ struct Motion {
     bound: Real,
     // Time spent meshing in parts of steps, in free steps, less the whole ones.
     mesh_part: Real,
+    // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
+    tangents: array<Real, 16>,
+    // Growth of the tangent vector, binary logarithms: of this block, the sum of the whole
+    // blocks, and of their squares.
+    block_growth: Real,
+    growth_sum: Real,
+    growth_squares: Real,
+    // Strobe state that later ones are compared with; where the cycle is read, its start.
+    anchor: array<Real, 4>,
+    // Largest position and rate at strobes: the unit of distances.
+    position_scale: Real,
+    rate_scale: Real,
 }
 
 // What a lane carries between dispatches: the counting.
@@ -109,7 +130,45 @@ struct Tally {
     mesh_whole: u32,
     // Events too near to grazing for the linearisation to mean much.
     grazes: u32,
+    // STAGE_*.
+    stage: u32,
+    // Periods of the cycle that are still to be read.
+    to_read: u32,
+    // 1 once a cycle is being read or has been.
+    has_read: u32,
+    // Period at which counting began.
+    counted_from: u32,
+    // Full steps that the tangent vectors have not taken yet, and how many vectors there are.
+    pending: u32,
+    tangent_count: u32,
+    // Blocks of the exponent, and periods in the present one.
+    blocks: u32,
+    block_periods: u32,
+    // Recurrence: when the anchor was taken, lags of this window, the smallest lag that
+    // recurs and contracts and for how many windows, lags that the last window held.
+    anchor_period: u32,
+    window: u32,
+    candidate: u32,
+    streak: u32,
+    known_lags: u32,
+    // Distances per lag of this window and the last: quarter octaves below 1, in bytes.
+    distances: array<u32, 16>,
+    last_distances: array<u32, 16>,
+    // The word: symbols, ten to a number, how many, and a rotation-invariant hash.
+    word: array<u32, 7>,
+    word_length: u32,
+    hash_low: u32,
+    hash_high: u32,
+    recent: u32,
+    // Events on the strobe phase.
+    on_strobe: u32,
+    // Whether the cycle is its own mirror image.
+    symmetric: u32,
 }
+
+const STAGE_RUNNING: u32 = 0u;
+const STAGE_READING: u32 = 1u; // the period is decided, its cycle is being read
+const STAGE_DONE: u32 = 2u;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read> flows: array<Flow>;

@@ -28,10 +28,18 @@ fn advance_phase(part: Real) {
     }
 }
 
-// Free steps to the next phase 0, as far as one step can see: 1 stands for "one or more".
-fn to_strobe() -> Real {
-    if tally.step + 1u < shapes[cell.flow_index].steps {
+// Free steps to the next mark, as far as one step can see: 1 stands for "one or more".
+fn to_mark(mark: u32) -> Real {
+    if tally.step + 1u < mark {
         return 1.0;
     }
     return 1.0 - motion.theta;
+}
+
+// The step at which the lane must land: phase 0, or half a period where a cycle is read that
+// may be its own mirror image and stands halfway.
+fn next_mark() -> u32 {
+    let steps = shapes[cell.flow_index].steps;
+    let halfway = tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
+    return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
 }

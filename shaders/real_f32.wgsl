@@ -8,3 +8,7 @@ const ULP: Real = 6e-8;
 const SHORTEST: Real = 0.001;
 // States beyond this are taken for a loss of finiteness.
 const HUGE: Real = 1e15;
+// Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
+const RESOLVED: u32 = 60u;
+// Events this close to phase 0, in turns, lie on it.
+const ON_STROBE: Real = 1e-6;

@@ -8,3 +8,7 @@ const ULP: Real = 1.2e-16;
 const SHORTEST: Real = 1e-8;
 // States beyond this are taken for a loss of finiteness.
 const HUGE: Real = 1e150;
+// Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
+const RESOLVED: u32 = 160u;
+// Events this close to phase 0, in turns, lie on it.
+const ON_STROBE: Real = 1e-9;

@@ -6,16 +6,6 @@ var<private> tally: Tally;
 // Loop trips of this dispatch.
 var<private> trips: u32;
 
-// Phase 0: a forcing period is complete.
-fn begin_period() {
-    tally.step = 0u;
-    motion.theta = 0.0;
-    motion.phasor = array<Real, 2>(1.0, 0.0);
-    tally.period += 1u;
-    tally.passes_in_period = 0u;
-    tally.events_in_period = 0u;
-}
-
 // NaN compares false with everything, itself included.
 fn check_finite() {
     let size = max(max(abs(motion.q[0]), abs(motion.q[1])), max(abs(motion.q[2]), abs(motion.q[3])));
@@ -27,7 +17,7 @@ fn check_finite() {
 }
 
 fn running() -> bool {
-    return tally.status == STATUS_OK && tally.period < settings.periods;
+    return tally.status == STATUS_OK && tally.stage != STAGE_DONE;
 }
 
 @compute @workgroup_size(WORKGROUP)

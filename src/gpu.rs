@@ -13,6 +13,7 @@ mod batch;
 mod constants;
 mod device;
 pub mod layout;
+mod reading;
 mod shader;
 mod signal;
 
@@ -109,8 +110,19 @@ pub struct Lane {
 /// How lanes are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneSettings {
-    /// Forcing periods to integrate.
+    /// Forcing periods to integrate at most; reading the cycle of a periodic cell adds its
+    /// period to them.
     pub periods: u32,
+    /// Periods before averages are taken. Those of periodic cells are taken over one cycle.
+    pub transient_periods: u32,
+    /// Longest period looked for, at most 64; 0 looks for none.
+    pub max_period: u32,
+    /// Whether lanes end once their period is decided.
+    pub early_stop: bool,
+    /// Whether exponents are asked for.
+    pub exponent: bool,
+    /// Periods before the exponent of aperiodic cells is accumulated.
+    pub exponent_from: u32,
     /// Free steps per period at least; none for as many as the motion needs.
     pub steps_per_period: Option<u32>,
     /// Lanes per batch at most; none for what the adapter's limits allow.
@@ -130,6 +142,11 @@ impl Default for LaneSettings {
     fn default() -> Self {
         LaneSettings {
             periods: 528,
+            transient_periods: 400,
+            max_period: 64,
+            early_stop: true,
+            exponent: true,
+            exponent_from: 100,
             steps_per_period: None,
             batch: None,
             trips: 4000,

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::word::Word;
+
 /// Layout version of [`Record`]; files that hold records carry it.
 pub const RECORD_VERSION: u32 = 1;
 
@@ -61,4 +63,45 @@ pub struct Record {
     pub valid: u32,
     /// Reserved; zero.
     pub reserved: [u32; 8],
+}
+
+/// Symbols in one number of [`Record::word`].
+const SYMBOLS_PER_NUMBER: usize = 21;
+
+impl Record {
+    /// Writes the symbols 1 to 6 of a word of at most [`WORD_SYMBOLS`], in canonical rotation.
+    pub fn spell(&mut self, symbols: &[u8]) {
+        let digits: Vec<u8> = symbols.iter().map(|symbol| b'0' + symbol).collect();
+        self.word = [0; 4];
+        for (i, digit) in Word::cyclic(&digits).symbols().iter().enumerate() {
+            self.word[i / SYMBOLS_PER_NUMBER] |= u64::from(digit - b'0') << (3 * (i % SYMBOLS_PER_NUMBER));
+        }
+    }
+
+    /// The word, if it is valid and spelled out.
+    pub fn word(&self) -> Option<Word> {
+        let length = self.word_length as usize;
+        if self.valid & valid::WORD == 0 || length > WORD_SYMBOLS {
+            return None;
+        }
+        let number = |i: usize| self.word[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER));
+        let digits: Vec<u8> = (0..length).map(|i| b'0' + (number(i) & 7) as u8).collect();
+        Some(Word::cyclic(&digits))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_is_read_as_it_was_spelled() {
+        for length in [0, 1, 21, 22, 63, 64] {
+            let symbols: Vec<u8> = (0..length).map(|i| 1 + ((i * 5 + i / 7) % 6) as u8).collect();
+            let mut record = Record { word_length: length, valid: valid::WORD, ..Record::default() };
+            record.spell(&symbols);
+            let digits: Vec<u8> = symbols.iter().map(|s| b'0' + s).collect();
+            assert_eq!(record.word(), Some(Word::cyclic(&digits)));
+        }
+    }
 }

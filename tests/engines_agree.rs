@@ -29,7 +29,15 @@ fn run(gpu: &mut Gpu, cells: &[(GearPair, State)], settings: &LaneSettings) -> V
 }
 
 fn periods(periods: u32) -> LaneSettings {
-    LaneSettings { periods, ..LaneSettings::default() }
+    // So many periods and nothing else.
+    let only = LaneSettings {
+        transient_periods: 0,
+        max_period: 0,
+        early_stop: false,
+        exponent: false,
+        ..LaneSettings::default()
+    };
+    LaneSettings { periods, ..only }
 }
 
 /// Strobe states of the reference after `periods` and one more.
@@ -147,7 +155,6 @@ fn scenarios_agree() {
         (pair(0.72, 1.5), REST),                 // long chatter
         (pair(0.7, 5.4), REST),                  // chaos
         (pair(0.606, 5.6), REST),                // grazing chaos
-        (pair(1.0, 3.0), REST),                  // no loss at the walls
         (pair(0.5, 5.6), on_wall(1.0)),          // starts on the wall, closing
         (pair(0.5, 5.6), on_wall(-1.0)),         // starts on the wall, leaving
         (pair(0.5, 5.6), on_wall(0.0)),          // starts at rest on the wall
@@ -155,6 +162,8 @@ fn scenarios_agree() {
         (pair(0.3, 4.0), [-0.4, 0.0, 0.2, 0.0]), // starts meshing on the left
     ];
     check(&cells, 6, bar);
+    // No loss at the walls: errors grow twentyfold in a period.
+    check(&[(pair(1.0, 3.0), REST)], 2, bar);
 }
 
 /// `z = A cos(omega t)` with the amplitude a hair below or above the wall: free flight that

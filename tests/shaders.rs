@@ -49,19 +49,38 @@ macro_rules! same_layout {
 #[test]
 fn every_variant_is_valid_and_lies_as_the_host_says() {
     for precision in Precision::ALL {
-        for workgroup in [32, 64, 256] {
-            let module = &module(Variant { workgroup, ..Variant::of(precision) });
+        for (workgroup, exponent) in [(32, false), (64, true), (64, false), (256, true)] {
+            let module = &module(Variant { precision, workgroup, exponent });
             let real = precision.bytes();
             same_layout!(
                 module,
                 layout::Domain,
                 real,
                 8,
-                [step, gap_row, x_row, energy, growth, angle, turn_less, turn_sin, share, substeps]
+                [step, gap_row, x_row, energy, growth, angle, turn_less, turn_sin, share, substeps, powers]
             );
             same_layout!(module, layout::Flow, real, 8, [domains, walls, kick, h]);
             same_layout!(module, layout::Law, real, 8, [restitution, mesh_speed]);
-            same_layout!(module, layout::Motion, real, 8, [q, phasor, theta, bound, mesh_part]);
+            same_layout!(
+                module,
+                layout::Motion,
+                real,
+                8,
+                [
+                    q,
+                    phasor,
+                    theta,
+                    bound,
+                    mesh_part,
+                    tangents,
+                    block_growth,
+                    growth_sum,
+                    growth_squares,
+                    anchor,
+                    position_scale,
+                    rate_scale
+                ]
+            );
             same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors]);
             same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index]);
             same_layout!(
@@ -69,7 +88,19 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 layout::Settings,
                 4,
                 4,
-                [lanes, periods, trips, passes_per_period, events_per_period, row, reserved_0, reserved_1]
+                [
+                    lanes,
+                    periods,
+                    trips,
+                    passes_per_period,
+                    events_per_period,
+                    row,
+                    transient_periods,
+                    exponent_from,
+                    exponent_block,
+                    max_period,
+                    early_stop
+                ]
             );
             same_layout!(
                 module,
@@ -90,7 +121,29 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     mesh_right,
                     mesh_left,
                     mesh_whole,
-                    grazes
+                    grazes,
+                    stage,
+                    to_read,
+                    has_read,
+                    counted_from,
+                    pending,
+                    tangent_count,
+                    blocks,
+                    block_periods,
+                    anchor_period,
+                    window,
+                    candidate,
+                    streak,
+                    known_lags,
+                    distances,
+                    last_distances,
+                    word,
+                    word_length,
+                    hash_low,
+                    hash_high,
+                    recent,
+                    on_strobe,
+                    symmetric
                 ]
             );
         }

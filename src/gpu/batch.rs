@@ -2,18 +2,25 @@
 
 use super::constants::Constants;
 use super::layout::{Cell, FlowShape, MODE_FREE, MODE_PRESSED, Motion, SIDE_NONE, Settings, Tally};
+use super::reading::{record, refused};
 use super::shader::{Precision, Variant};
 use super::signal::Signal;
 use super::{Gpu, GpuError, Lane, LaneSettings, device, layout};
 use crate::model::{Law, Oscillator};
 use crate::orbit::Status;
-use crate::record::{Record, valid};
+use crate::record::Record;
 
 /// Dispatches between two looks at how many lanes are still running.
 const DISPATCHES_PER_LOOK: u32 = 4;
 
 /// Batches hold no more lanes than this, so that results come back in portions.
 const LARGEST_BATCH: usize = 1 << 20;
+
+/// Longest period that a lane can look for: a byte per lag.
+const LONGEST_PERIOD: u32 = 64;
+
+/// Blocks whose means give the exponent's standard error.
+const EXPONENT_BLOCKS: u32 = 16;
 
 /// What all batches of a run share.
 struct Shared {
@@ -37,7 +44,8 @@ pub(super) async fn run(
             return Err(GpuError::NoSuchCell { lane: i, flow, law, flows: flows.len(), laws: laws.len() });
         }
     }
-    let variant = Variant { precision: gpu.precision, workgroup: settings.workgroup };
+    let variant =
+        Variant { precision: gpu.precision, workgroup: settings.workgroup, exponent: settings.exponent };
     if !gpu.pipelines.contains_key(&variant) {
         let pipeline = device::pipeline(gpu, variant).await?;
         gpu.pipelines.insert(variant, pipeline);
@@ -143,6 +151,11 @@ fn upload(gpu: &Gpu, label: &'static str, bytes: &[u8]) -> wgpu::Buffer {
     buffer
 }
 
+/// Periods per block of the exponent.
+pub(super) fn exponent_block(settings: &LaneSettings) -> u32 {
+    (settings.periods.saturating_sub(settings.exponent_from) / EXPONENT_BLOCKS).max(1)
+}
+
 /// The state of one batch on the device.
 struct Batch {
     motions: wgpu::Buffer,
@@ -167,7 +180,11 @@ impl Batch {
             passes_per_period: settings.passes_per_period,
             events_per_period: settings.events_per_period,
             row: groups[0] * settings.workgroup,
-            ..Settings::default()
+            transient_periods: settings.transient_periods,
+            exponent_from: settings.exponent_from,
+            exponent_block: exponent_block(settings),
+            max_period: settings.max_period.min(LONGEST_PERIOD),
+            early_stop: u32::from(settings.early_stop),
         };
         let uniform = upload(gpu, "settings", bytemuck::bytes_of(&uniform));
         let cells = upload(gpu, "cells", bytemuck::cast_slice(&cells));
@@ -233,14 +250,11 @@ impl Batch {
         }
         let motions: Vec<Motion> = from_reals(&download(gpu, &self.motions).await?, gpu.precision);
         let tallies: Vec<Tally> = bytemuck::pod_collect_to_vec(&download(gpu, &self.tallies).await?);
-        let _ = settings;
-        Ok(lanes
-            .iter()
-            .zip(motions.iter().zip(&tallies))
-            .map(|(lane, (motion, tally))| {
-                record(shared.constants[lane.flow as usize].as_ref(), motion, tally)
-            })
-            .collect())
+        let read = |(lane, (motion, tally)): (&Lane, (&Motion, &Tally))| {
+            let constants = shared.constants[lane.flow as usize].as_ref();
+            constants.map_or_else(|| refused(tally), |constants| record(constants, motion, tally, settings))
+        };
+        Ok(lanes.iter().zip(motions.iter().zip(&tallies)).map(read).collect())
     }
 }
 
@@ -254,13 +268,14 @@ fn grid(gpu: &Gpu, lanes: usize, workgroup: u32) -> [u32; 2] {
 
 /// Where a lane starts.
 fn start(constants: Option<&Constants>, lane: &Lane) -> (Motion, Tally) {
-    let tally = Tally { mode: MODE_FREE, origin: SIDE_NONE, ..Tally::default() };
-    let refused = |status: Status| (Motion::default(), Tally { status: status.code(), ..tally });
-    let Some(constants) = constants else { return refused(Status::TooStiff) };
+    let tally = Tally { mode: MODE_FREE, origin: SIDE_NONE, tangent_count: 1, ..Tally::default() };
+    let refuse = |status: Status| (Motion::default(), Tally { status: status.code(), ..tally });
+    let Some(constants) = constants else { return refuse(Status::TooStiff) };
     if !lane.start.iter().all(|x| x.is_finite()) {
-        return refused(Status::NonFinite);
+        return refuse(Status::NonFinite);
     }
     let mut motion = Motion { q: constants.to_lane(lane.start), phasor: [1.0, 0.0], ..Motion::default() };
+    motion.tangents[..4].fill(0.5);
     let [right, left] = constants.flow.walls;
     let mut tally = tally;
     for (side, beyond) in [(0, motion.q[0] - right), (1, left - motion.q[0])] {
@@ -271,31 +286,6 @@ fn start(constants: Option<&Constants>, lane: &Lane) -> (Motion, Tally) {
         }
     }
     (motion, tally)
-}
-
-fn record(constants: Option<&Constants>, motion: &Motion, tally: &Tally) -> Record {
-    let Some(constants) = constants else {
-        return Record { status: tally.status, ..Record::default() };
-    };
-    let mut q = motion.q;
-    if tally.mode >= MODE_PRESSED {
-        q[0] += constants.flow.walls[((tally.mode - 1) & 1) as usize];
-    }
-    let periods = f64::from(tally.period.max(1));
-    let [_, right, left] = constants.flow.domains;
-    let meshing = f64::from(tally.mesh_whole)
-        + motion.mesh_part
-        + f64::from(tally.mesh_right) * right.share
-        + f64::from(tally.mesh_left) * left.share;
-    Record {
-        strobe: constants.to_state(q),
-        impacts_per_period: f64::from(tally.impacts) / periods,
-        mesh_fraction: meshing / (periods * f64::from(constants.steps)),
-        periods_run: tally.period,
-        status: tally.status,
-        valid: valid::STROBE | valid::IMPACTS | valid::MESH,
-        ..Record::default()
-    }
 }
 
 async fn download(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {

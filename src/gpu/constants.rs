@@ -23,6 +23,8 @@ pub struct Constants {
     pub steps: u32,
     /// `(cos, sin)` at every step, the end included.
     pub phasors: Vec<[f64; 2]>,
+    /// Whether the mirror image of a motion is a motion.
+    pub mirror_symmetric: bool,
     gap: [f64; 2],
 }
 
@@ -42,7 +44,8 @@ impl Constants {
     pub fn new(oscillator: &model::Oscillator, steps: Option<u32>) -> Option<Constants> {
         let period = oscillator.period();
         let needed = (period * rate(oscillator, &oscillator.free) / STEP_ANGLE).ceil().max(8.0);
-        let steps = f64::from(steps.unwrap_or(0)).max(needed);
+        // Even, so that half a period is a step, too.
+        let steps = 2.0 * (0.5 * f64::from(steps.unwrap_or(0)).max(needed)).ceil();
         if !(steps.is_finite() && steps < f64::from(1u32 << 24)) {
             return None;
         }
@@ -63,7 +66,13 @@ impl Constants {
             h,
         };
         let steps = steps as u32;
-        Some(Constants { flow, steps, phasors: phasors(steps), gap: oscillator.gap })
+        Some(Constants {
+            flow,
+            steps,
+            phasors: phasors(steps),
+            mirror_symmetric: oscillator.mirror_symmetric(),
+            gap: oscillator.gap,
+        })
     }
 
     /// Lane units `(z, z', x2, x2')` of a state `(x1, v1, x2, v2)`.
@@ -165,11 +174,32 @@ fn domain(
         turn_sin: angle.sin(),
         share: substeps.recip(),
         substeps,
+        powers: powers(&gap_row, &x_row),
     }
 }
 
 /// `exp(G) - 1` of the generator on `(z, z', x, x', cos, sin, 1)`, its first four rows.
 fn step(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> [f64; 28] {
+    let propagator = propagator(gap_row, x_row, angle);
+    std::array::from_fn(|i| propagator[(i / 7, i % 7)])
+}
+
+/// The unforced propagators of 1, 2, 4, ... 128 steps, less the identity.
+fn powers(gap_row: &[f64; 6], x_row: &[f64; 6]) -> [f64; 128] {
+    let whole = propagator(gap_row, x_row, 0.0);
+    let mut less = whole.fixed_view::<4, 4>(0, 0).into_owned();
+    let mut powers = [0.0; 128];
+    for power in powers.chunks_mut(16) {
+        for (i, entry) in power.iter_mut().enumerate() {
+            *entry = less[(i / 4, i % 4)];
+        }
+        // (1 + L)^2 - 1
+        less = 2.0 * less + less * less;
+    }
+    powers
+}
+
+fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
     let mut g = Generator::zeros();
     g[(0, 1)] = 1.0;
     g[(2, 3)] = 1.0;
@@ -186,7 +216,7 @@ fn step(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> [f64; 28] {
     for n in (1..=EXPONENTIAL_TERMS).rev() {
         sum = g * (Generator::identity() + sum) / f64::from(n);
     }
-    std::array::from_fn(|i| sum[(i / 7, i % 7)])
+    sum
 }
 
 /// The energy bound on derivatives of the gap, in units of the step.

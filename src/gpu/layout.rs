@@ -29,6 +29,8 @@ pub struct Domain {
     pub share: f64,
     /// Steps of this domain per free step.
     pub substeps: f64,
+    /// Homogeneous propagators of 1, 2, 4, ... 128 steps, less the identity.
+    pub powers: [f64; 128],
 }
 
 /// All that is common to lanes that differ in the contact law alone.
@@ -91,10 +93,16 @@ pub struct Settings {
     pub events_per_period: u32,
     /// Invocations along the first dimension of a dispatch.
     pub row: u32,
-    /// Zero.
-    pub reserved_0: u32,
-    /// Zero.
-    pub reserved_1: u32,
+    /// Periods before averages are taken.
+    pub transient_periods: u32,
+    /// Periods before the exponent is accumulated.
+    pub exponent_from: u32,
+    /// Periods per block of the exponent.
+    pub exponent_block: u32,
+    /// Longest period looked for; 0 looks for none.
+    pub max_period: u32,
+    /// 1: lanes end once their period is decided.
+    pub early_stop: u32,
 }
 
 /// The motion of a lane between dispatches.
@@ -112,6 +120,20 @@ pub struct Motion {
     pub bound: f64,
     /// Time spent meshing in parts of steps, in free steps, less the whole ones.
     pub mesh_part: f64,
+    /// Tangent vectors in lane units.
+    pub tangents: [f64; 16],
+    /// Growth of the present block, in octaves.
+    pub block_growth: f64,
+    /// Sum of the whole blocks' growth.
+    pub growth_sum: f64,
+    /// Sum of its squares.
+    pub growth_squares: f64,
+    /// Strobe state that later ones are compared with.
+    pub anchor: [f64; 4],
+    /// Largest position at strobes.
+    pub position_scale: f64,
+    /// Largest rate at strobes.
+    pub rate_scale: f64,
 }
 
 /// The counting of a lane between dispatches.
@@ -146,11 +168,57 @@ pub struct Tally {
     pub mesh_whole: u32,
     /// Events too near to grazing.
     pub grazes: u32,
+    /// Running, reading the cycle, done.
+    pub stage: u32,
+    /// Periods of the cycle still to be read.
+    pub to_read: u32,
+    /// 1 once a cycle is being read or has been.
+    pub has_read: u32,
+    /// Period at which counting began.
+    pub counted_from: u32,
+    /// Full steps that the tangent vectors have not taken yet.
+    pub pending: u32,
+    /// Tangent vectors carried.
+    pub tangent_count: u32,
+    /// Whole blocks of the exponent.
+    pub blocks: u32,
+    /// Periods in the present block.
+    pub block_periods: u32,
+    /// When the anchor was taken.
+    pub anchor_period: u32,
+    /// Lags of the present window.
+    pub window: u32,
+    /// Smallest lag that recurs and contracts.
+    pub candidate: u32,
+    /// Windows for which it has.
+    pub streak: u32,
+    /// Lags that the last window held.
+    pub known_lags: u32,
+    /// Distances per lag, in bytes.
+    pub distances: [u32; 16],
+    /// The same of the last window.
+    pub last_distances: [u32; 16],
+    /// Symbols of the cycle, ten to a number.
+    pub word: [u32; 7],
+    /// How many.
+    pub word_length: u32,
+    /// Hash of the stretches of symbols so far, low half.
+    pub hash_low: u32,
+    /// High half.
+    pub hash_high: u32,
+    /// The latest symbols, three bits each.
+    pub recent: u32,
+    /// Events on the strobe phase.
+    pub on_strobe: u32,
+    /// Whether the cycle is its own mirror image.
+    pub symmetric: u32,
 }
 
 /// [`Tally::mode`]: between the walls.
 pub const MODE_FREE: u32 = 0;
 /// [`Tally::mode`]: beyond a wall; plus the side.
 pub const MODE_PRESSED: u32 = 1;
+/// [`Tally::stage`]: ended.
+pub const STAGE_DONE: u32 = 2;
 /// [`Tally::origin`]: no event yet.
 pub const SIDE_NONE: u32 = 2;

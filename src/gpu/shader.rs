@@ -29,6 +29,8 @@ pub struct Variant {
     pub precision: Precision,
     /// Invocations per workgroup.
     pub workgroup: u32,
+    /// Whether tangent vectors are carried.
+    pub exponent: bool,
 }
 
 /// Invocations per workgroup where nothing else is asked for.
@@ -42,13 +44,15 @@ const BODY: &str = concat!(
     include_str!("../../shaders/taylor.wgsl"),
     include_str!("../../shaders/flight.wgsl"),
     include_str!("../../shaders/events.wgsl"),
+    include_str!("../../shaders/tangent.wgsl"),
+    include_str!("../../shaders/observe.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
 );
 
 impl Variant {
     /// The variant of a precision with the usual workgroup.
     pub fn of(precision: Precision) -> Variant {
-        Variant { precision, workgroup: WORKGROUP }
+        Variant { precision, workgroup: WORKGROUP, exponent: true }
     }
 
     /// Its WGSL source.
@@ -57,6 +61,7 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        format!("{real}\nconst WORKGROUP: u32 = {}u;\n{BODY}", self.workgroup)
+        let Variant { workgroup, exponent, .. } = self;
+        format!("{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n{BODY}")
     }
 }
