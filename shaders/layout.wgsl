@@ -151,7 +151,9 @@ struct Tally {
     candidate: u32,
     streak: u32,
     known_lags: u32,
-    // Distances per lag of this window and the last: quarter octaves below 1, in bytes.
+    // 1 if the candidate's limit is near.
+    settled: u32,
+    // Distances per lag, of this window and the last: quarter octaves below 1, in bytes.
     distances: array<u32, 16>,
     last_distances: array<u32, 16>,
     // The word: symbols, ten to a number, how many, and a rotation-invariant hash.

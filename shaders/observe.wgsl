@@ -4,8 +4,8 @@
 const OCTAVE: f32 = 4.0;
 // Recurrences farther apart than 2^-6 of the motion are none.
 const NEAR: u32 = 24u;
-// Recurrences within 2^-13 need no better proof than that they contract.
-const SETTLED: u32 = 52u;
+// A lane has settled once its limit is estimated to lie within 2^-12 of the motion.
+const SETTLED: f32 = 48.0;
 // A distance must have shrunk by this much (a factor of 0.7) since the last window.
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
@@ -101,8 +101,25 @@ fn recurs() -> bool {
     let settled = judge_lag(found);
     tally.known_lags = tally.window;
     tally.last_distances = tally.distances;
-    begin_window(q, min(2u * tally.window, settings.max_period));
+    // The next anchor lies at the same place of the cycle: only there do distances compare.
+    let lags = min(2u * tally.window, settings.max_period);
+    let cycle = max(select(closest_lag(), found, found > 0u), 1u);
+    begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
+}
+
+// The lag that recurs best; a longer one must be better by a factor of four.
+fn closest_lag() -> u32 {
+    var best = 0u;
+    var distance = NEAR;
+    for (var lag = 1u; lag <= tally.known_lags; lag++) {
+        trips += 1u;
+        if distance_at(lag) >= distance {
+            best = lag;
+            distance = distance_at(lag) + 8u;
+        }
+    }
+    return best;
 }
 
 fn begin_window(q: array<Real, 4>, lags: u32) {
@@ -151,15 +168,34 @@ fn contracting_lag() -> u32 {
     return 0u;
 }
 
+// Whether the limit is near enough: strobes `d` apart that shrink by `mu` per period are
+// `d / (1 - mu)` away from it. A slow approach must come closer.
+fn has_settled(lag: u32) -> bool {
+    let now = distance_at(lag);
+    let shrunk = f32(now) - f32(last_distance_at(lag));
+    if now >= RESOLVED {
+        return true;
+    }
+    // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), 1e-6, 1.0);
+    return f32(now) >= SETTLED - OCTAVE * log2(away);
+}
+
+// Natural logarithm of a quarter octave.
+const QUARTER_OCTAVE: f32 = 0.1733;
+
 // Keeps the books on the candidate; true once it is settled.
 fn judge_lag(found: u32) -> bool {
     if found == 0u || found != tally.candidate {
         tally.candidate = found;
         tally.streak = select(1u, 0u, found == 0u);
+        tally.settled = 0u;
         return false;
     }
     tally.streak += 1u;
-    return tally.streak >= STREAK && distance_at(found) >= SETTLED;
+    let settled = tally.streak >= STREAK && has_settled(found);
+    tally.settled = select(0u, 1u, settled);
+    return settled;
 }
 
 // Half a period after the middle of a cycle of odd period: is the state the mirror image of

@@ -135,6 +135,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     candidate,
                     streak,
                     known_lags,
+                    settled,
                     distances,
                     last_distances,
                     word,

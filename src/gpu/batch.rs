@@ -2,7 +2,7 @@
 
 use super::constants::Constants;
 use super::layout::{Cell, FlowShape, MODE_FREE, MODE_PRESSED, Motion, SIDE_NONE, Settings, Tally};
-use super::reading::{record, refused};
+use super::reading::{record, refused, send_on};
 use super::shader::{Precision, Variant};
 use super::signal::Signal;
 use super::{Gpu, GpuError, Lane, LaneSettings, device, layout};
@@ -233,6 +233,29 @@ impl Batch {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
+        let (motions, tallies) = loop {
+            self.dispatch_all(gpu, pipeline).await?;
+            let mut motions: Vec<Motion> = from_reals(&download(gpu, &self.motions).await?, gpu.precision);
+            let mut tallies: Vec<Tally> = bytemuck::pod_collect_to_vec(&download(gpu, &self.tallies).await?);
+            let mut sent_on = 0;
+            for (motion, tally) in motions.iter_mut().zip(&mut tallies) {
+                sent_on += usize::from(send_on(motion, tally, settings));
+            }
+            if sent_on == 0 {
+                break (motions, tallies);
+            }
+            gpu.queue.write_buffer(&self.motions, 0, &reals(&motions, gpu.precision));
+            gpu.queue.write_buffer(&self.tallies, 0, bytemuck::cast_slice(&tallies));
+        };
+        let read = |(lane, (motion, tally)): (&Lane, (&Motion, &Tally))| {
+            let constants = shared.constants[lane.flow as usize].as_ref();
+            constants.map_or_else(|| refused(tally), |constants| record(constants, motion, tally, settings))
+        };
+        Ok(lanes.iter().zip(motions.iter().zip(&tallies)).map(read).collect())
+    }
+
+    /// Dispatches until no lane is running.
+    async fn dispatch_all(&self, gpu: &Gpu, pipeline: &wgpu::ComputePipeline) -> Result<(), GpuError> {
         loop {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             for _ in 0..DISPATCHES_PER_LOOK {
@@ -245,16 +268,9 @@ impl Batch {
             encoder.copy_buffer_to_buffer(&self.live, 0, &self.look, 0, 4);
             gpu.queue.submit([encoder.finish()]);
             if read(gpu, &self.look).await?[..4] == [0; 4] {
-                break;
+                return Ok(());
             }
         }
-        let motions: Vec<Motion> = from_reals(&download(gpu, &self.motions).await?, gpu.precision);
-        let tallies: Vec<Tally> = bytemuck::pod_collect_to_vec(&download(gpu, &self.tallies).await?);
-        let read = |(lane, (motion, tally)): (&Lane, (&Motion, &Tally))| {
-            let constants = shared.constants[lane.flow as usize].as_ref();
-            constants.map_or_else(|| refused(tally), |constants| record(constants, motion, tally, settings))
-        };
-        Ok(lanes.iter().zip(motions.iter().zip(&tallies)).map(read).collect())
     }
 }
 

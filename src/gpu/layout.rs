@@ -194,6 +194,8 @@ pub struct Tally {
     pub streak: u32,
     /// Lags that the last window held.
     pub known_lags: u32,
+    /// 1 if the candidate's limit is near.
+    pub settled: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.
@@ -218,6 +220,8 @@ pub struct Tally {
 pub const MODE_FREE: u32 = 0;
 /// [`Tally::mode`]: beyond a wall; plus the side.
 pub const MODE_PRESSED: u32 = 1;
+/// [`Tally::stage`]: going on.
+pub const STAGE_RUNNING: u32 = 0;
 /// [`Tally::stage`]: ended.
 pub const STAGE_DONE: u32 = 2;
 /// [`Tally::origin`]: no event yet.

@@ -5,12 +5,12 @@ use nalgebra::Matrix4;
 use super::LaneSettings;
 use super::batch::exponent_block;
 use super::constants::Constants;
-use super::layout::{MODE_PRESSED, Motion, STAGE_DONE, Tally};
+use super::layout::{MODE_PRESSED, Motion, STAGE_DONE, STAGE_RUNNING, Tally};
 use crate::orbit::Status;
 use crate::record::{Record, WORD_SYMBOLS, valid};
 
-/// Recurrence distance, in quarter octaves below 1, from which a period counts as reached.
-const SETTLED: u32 = 52;
+/// A lane has settled on its cycle once it is this close to it, relative to the motion.
+const SETTLED: f64 = 5e-4;
 
 /// Symbols that the shader keeps in one number.
 const SYMBOLS_PER_NUMBER: usize = 10;
@@ -37,7 +37,7 @@ pub(super) fn record(
     let mut record = Record {
         strobe: constants.to_state(q),
         periods_run: tally.period,
-        status: status(tally).code(),
+        status: status(motion, tally, settings).code(),
         valid: valid::STROBE,
         ..Record::default()
     };
@@ -47,7 +47,7 @@ pub(super) fn record(
     averages(&mut record, constants, motion, tally);
     if settings.max_period > 0 {
         record.valid |= valid::PERIOD;
-        record.period = cycle(tally).unwrap_or(0);
+        record.period = cycle(motion, tally, settings).unwrap_or(0);
     }
     if record.period > 0 {
         read_cycle(&mut record, constants, motion, tally, settings);
@@ -60,20 +60,60 @@ pub(super) fn record(
     record
 }
 
-/// The period of the cycle that the lane has read, if it came to that.
-fn cycle(tally: &Tally) -> Option<u32> {
-    (tally.stage == STAGE_DONE && tally.has_read != 0).then_some(tally.candidate)
+/// Whether the lane has read a cycle.
+fn has_read(tally: &Tally) -> bool {
+    tally.stage == STAGE_DONE && tally.has_read != 0
 }
 
-fn status(tally: &Tally) -> Status {
+/// Largest modulus of the multipliers of the cycle that was read.
+fn spectral_radius(motion: &Motion) -> f64 {
+    // The tangent vectors started as the unit vectors: they are the monodromy's columns.
+    let monodromy = Matrix4::from_column_slice(&motion.tangents);
+    monodromy.complex_eigenvalues().iter().map(|mu| mu.norm()).fold(1e-300, f64::max)
+}
+
+/// The period of the cycle that the lane has read, if it came to that and attracts. Without
+/// exponents recurrence alone must do.
+fn cycle(motion: &Motion, tally: &Tally, settings: &LaneSettings) -> Option<u32> {
+    let attracts = !settings.exponent || spectral_radius(motion) < 1.0;
+    (has_read(tally) && attracts).then_some(tally.candidate)
+}
+
+/// Sends a lane on that has read a cycle which does not attract, if it has periods left:
+/// chaos lingers at such cycles. True if it has been.
+pub(super) fn send_on(motion: &mut Motion, tally: &mut Tally, settings: &LaneSettings) -> bool {
+    let over = tally.status != Status::Ok.code() || tally.period >= settings.periods;
+    if over || !has_read(tally) || cycle(motion, tally, settings).is_some() {
+        return false;
+    }
+    // The exponent starts anew, but for what it has collected; recurrence from scratch.
+    motion.tangents = [0.0; 16];
+    motion.tangents[..4].fill(0.5);
+    tally.stage = STAGE_RUNNING;
+    (tally.has_read, tally.tangent_count) = (0, 1);
+    (tally.window, tally.candidate, tally.streak, tally.known_lags, tally.settled) = (0, 0, 0, 0, 0);
+    tally.last_distances = [0; 16];
+    true
+}
+
+/// Whether the lane has come so near to its cycle that its symmetry shows.
+fn has_settled(motion: &Motion, tally: &Tally, settings: &LaneSettings) -> bool {
+    let lag = tally.candidate.saturating_sub(1) as usize;
+    let octaves = f64::from((tally.last_distances[lag / 4] >> (8 * (lag % 4))) & 255) / 4.0;
+    // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
+    let mu = if settings.exponent { spectral_radius(motion) } else { 0.0 };
+    tally.settled != 0 && (-octaves).exp2() < SETTLED * (1.0 - mu)
+}
+
+fn status(motion: &Motion, tally: &Tally, settings: &LaneSettings) -> Status {
     let ended = Status::from_code(tally.status).unwrap_or(Status::NonFinite);
-    let Some(period) = cycle(tally) else { return ended };
-    let lag = (period - 1) as usize;
-    let distance = (tally.last_distances[lag / 4] >> (8 * (lag % 4))) & 255;
+    if !has_read(tally) {
+        return ended;
+    }
     match ended {
         Status::Ok if tally.grazes > 0 => Status::NearGrazing,
         Status::Ok if tally.on_strobe > 0 => Status::StrobeOnEvent,
-        Status::Ok if distance < SETTLED => Status::Slow,
+        Status::Ok if !has_settled(motion, tally, settings) => Status::Slow,
         other => other,
     }
 }
@@ -97,16 +137,14 @@ fn read_cycle(
     tally: &Tally,
     settings: &LaneSettings,
 ) {
-    if constants.mirror_symmetric {
+    // On a slow approach a lost symmetry cannot be told from one not reached yet.
+    if constants.mirror_symmetric && has_settled(motion, tally, settings) {
         record.symmetric = tally.symmetric;
         record.valid |= valid::SYMMETRIC;
     }
     if settings.exponent {
-        // The tangent vectors started as the unit vectors: they are the monodromy's columns.
-        let monodromy = Matrix4::from_column_slice(&motion.tangents);
-        let largest = monodromy.complex_eigenvalues().iter().map(|mu| mu.norm()).fold(1e-300, f64::max);
         let period = constants.flow.h * f64::from(constants.steps);
-        record.lyapunov = largest.ln() / (f64::from(record.period) * period);
+        record.lyapunov = spectral_radius(motion).ln() / (f64::from(record.period) * period);
         record.valid |= valid::LYAPUNOV;
     }
     record.word_length = tally.word_length;
