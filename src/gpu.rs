@@ -14,6 +14,7 @@ mod constants;
 mod device;
 pub mod layout;
 mod reading;
+mod self_test;
 mod shader;
 mod signal;
 
@@ -67,6 +68,21 @@ pub enum GpuError {
     Lost {
         /// The driver's words.
         message: String,
+    },
+    /// The device computes something else than what is known.
+    #[error(
+        "{adapter} fails the known answer of e = {e}, omega = {omega} by {error:.1e}: its driver cannot be trusted; \
+         choose another adapter or the CPU engine"
+    )]
+    WrongAnswer {
+        /// Name of the adapter.
+        adapter: String,
+        /// Restitution of the cell.
+        e: f64,
+        /// Frequency of the cell.
+        omega: f64,
+        /// State error.
+        error: f64,
     },
     /// Constants of the flows exceed what one buffer may hold.
     #[error(
@@ -168,12 +184,15 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens an adapter for a precision.
+    /// Opens an adapter for a precision and asks it for known answers.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] if there is none with that precision, and what the device refuses.
+    /// [`GpuError::NoAdapter`] if there is none with that precision, [`GpuError::WrongAnswer`]
+    /// if it computes wrongly, and what the device refuses.
     pub async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
-        device::open(precision, choice).await
+        let mut gpu = device::open(precision, choice).await?;
+        self_test::check(&mut gpu).await?;
+        Ok(gpu)
     }
 
     /// The adapter in use.
