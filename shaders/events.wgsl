@@ -84,7 +84,7 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> Real {
     var hi = end;
     var t = guess;
     for (var i = 0u; i < ROOT_CAP; i++) {
-        trips += TERMS;
+        trips += 1u;
         let at = watch(t);
         let f = select(at.first, at.second, second);
         if f.x > 0.0 {
@@ -140,7 +140,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             tally.status = STATUS_CAP_ROOT;
             break;
         }
-        trips += TERMS;
+        trips += 1u;
         var b = a + width;
         if b >= len - 0.5 * SHORTEST {
             b = len;
@@ -210,13 +210,15 @@ fn careful() {
     let substeps = flows[f].domains[d].substeps;
     let growth = flows[f].domains[d].growth;
     sync_phasor();
-    trips += TERMS;
+    trips += 1u;
     expand(d, motion.q);
     set_offsets();
-    motion.bound = derivative_bound(d, 5u, 120.0);
+    motion.bound =
+        derivative_bound(d, 120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
     if tally.mode >= MODE_DIP {
-        pressing_bound = derivative_bound(d, 7u, 5040.0);
+        pressing_bound =
+            derivative_bound(d, 5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
     }
     let mark = next_mark();
     let part = to_mark(mark) * substeps;

@@ -30,12 +30,8 @@ fn presses(d: u32, side: u32, q: array<Real, 4>) -> bool {
         return sign_of(side) * a > 0.0;
     }
     expand(d, q);
-    for (var k = 3u; k < 6u; k++) {
-        if gap_terms[k] != 0.0 {
-            return sign_of(side) * gap_terms[k] > 0.0;
-        }
-    }
-    return false;
+    let first = select(select(gap_terms[5], gap_terms[4], gap_terms[4] != 0.0), gap_terms[3], gap_terms[3] != 0.0);
+    return sign_of(side) * first > 0.0;
 }
 
 // Order of the root of the distance for a gap that rests on the wall.

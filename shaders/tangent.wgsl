@@ -62,9 +62,9 @@ fn glide(d: u32, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
     var v = u[3];
     var sum = u;
     // (z, w, x, v) are the derivatives of order k, k + 1 times tau^k / k!.
-    var k: Real = 1.0;
-    for (var n = 1u; n < TERMS; n++) {
-        let step = tau / k;
+    //% for k in 1..TERMS
+    {
+        let step = tau * (1.0 / $k.0);
         let a = (g[0] * z + g[2] * x) + (g[1] * w + g[3] * v);
         let b = (r[0] * z + r[2] * x) + (r[1] * w + r[3] * v);
         z = step * w;
@@ -75,8 +75,8 @@ fn glide(d: u32, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
         sum[1] += w;
         sum[2] += x;
         sum[3] += v;
-        k += 1.0;
     }
+    //% end
     return sum;
 }
 

@@ -17,6 +17,7 @@ mod reading;
 mod self_test;
 mod shader;
 mod signal;
+mod unroll;
 
 use std::collections::HashMap;
 

@@ -1,5 +1,7 @@
 //! Shader variants: one source, put together from small files.
 
+use super::unroll::unroll;
+
 /// Precision of a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Precision {
@@ -62,6 +64,15 @@ impl Variant {
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
         let Variant { workgroup, exponent, .. } = self;
-        format!("{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n{BODY}")
+        let terms = terms(real);
+        let body = unroll(BODY, terms);
+        format!("{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n{body}")
     }
+}
+
+/// The number of Taylor terms that a precision's file declares.
+fn terms(real: &str) -> u32 {
+    let (_, after) = real.split_once("const TERMS: u32 = ").expect("the precision declares TERMS");
+    let (number, _) = after.split_once("u;").expect("TERMS is a number");
+    number.parse().expect("TERMS is a number")
 }
