@@ -80,8 +80,9 @@ struct Settings {
     early_stop: u32,
 }
 
-// What a lane carries between dispatches: the motion.
-struct Motion {
+// What a lane carries between dispatches: the motion. While it runs, numbers lie in
+// registers; arrays that are indexed stay in the buffer, or they would drag the rest along.
+struct MotionNow {
     // Gap (from the wall while meshing), its rate, x, its rate; rates per free step.
     q: array<Real, 4>,
     // cos and sin of the forcing phase.
@@ -92,8 +93,6 @@ struct Motion {
     bound: Real,
     // Time spent meshing in parts of steps, in free steps, less the whole ones.
     mesh_part: Real,
-    // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
-    tangents: array<Real, 16>,
     // Growth of the tangent vector, binary logarithms: of this block, the sum of the whole
     // blocks, and of their squares.
     block_growth: Real,
@@ -106,8 +105,14 @@ struct Motion {
     rate_scale: Real,
 }
 
+struct Motion {
+    now: MotionNow,
+    // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
+    tangents: array<Real, 16>,
+}
+
 // What a lane carries between dispatches: the counting.
-struct Tally {
+struct TallyNow {
     // Free steps since phase 0.
     step: u32,
     // MODE_*.
@@ -153,11 +158,7 @@ struct Tally {
     known_lags: u32,
     // 1 if the candidate's limit is near.
     settled: u32,
-    // Distances per lag, of this window and the last: quarter octaves below 1, in bytes.
-    distances: array<u32, 16>,
-    last_distances: array<u32, 16>,
-    // The word: symbols, ten to a number, how many, and a rotation-invariant hash.
-    word: array<u32, 7>,
+    // The word: how many symbols, and a rotation-invariant hash.
     word_length: u32,
     hash_low: u32,
     hash_high: u32,
@@ -166,6 +167,15 @@ struct Tally {
     on_strobe: u32,
     // Whether the cycle is its own mirror image.
     symmetric: u32,
+}
+
+struct Tally {
+    now: TallyNow,
+    // Distances per lag, of this window and the last: quarter octaves below 1, in bytes.
+    distances: array<u32, 16>,
+    last_distances: array<u32, 16>,
+    // The word's symbols, ten to a number.
+    word: array<u32, 7>,
 }
 
 const STAGE_RUNNING: u32 = 0u;

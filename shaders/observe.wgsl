@@ -55,7 +55,7 @@ fn begin_counting() {
     tally.hash_low = 0u;
     tally.hash_high = 0u;
     tally.recent = 0u;
-    tally.word = array<u32, 7>();
+    tallies[lane].word = array<u32, 7>();
     tally.counted_from = tally.period;
 }
 
@@ -68,7 +68,7 @@ fn begin_reading() {
     motion.anchor = strobe_state();
     if EXPONENT {
         tally.tangent_count = 4u;
-        motion.tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     }
 }
 
@@ -93,14 +93,14 @@ fn recurs() -> bool {
     let lag = tally.period - tally.anchor_period;
     let p = max(abs(q[0] - motion.anchor[0]), abs(q[2] - motion.anchor[2])) / max(motion.position_scale, Real(1e-30));
     let r = max(abs(q[1] - motion.anchor[1]), abs(q[3] - motion.anchor[3])) / max(motion.rate_scale, Real(1e-30));
-    tally.distances[(lag - 1u) / 4u] |= octaves(max(p, r)) << (8u * ((lag - 1u) % 4u));
+    tallies[lane].distances[(lag - 1u) / 4u] |= octaves(max(p, r)) << (8u * ((lag - 1u) % 4u));
     if lag < tally.window {
         return false;
     }
     let found = contracting_lag();
     let settled = judge_lag(found);
     tally.known_lags = tally.window;
-    tally.last_distances = tally.distances;
+    tallies[lane].last_distances = tallies[lane].distances;
     // The next anchor lies at the same place of the cycle: only there do distances compare.
     let lags = min(2u * tally.window, settings.max_period);
     let cycle = max(select(closest_lag(), found, found > 0u), 1u);
@@ -126,7 +126,7 @@ fn begin_window(q: array<Real, 4>, lags: u32) {
     motion.anchor = q;
     tally.anchor_period = tally.period;
     tally.window = min(lags, settings.max_period);
-    tally.distances = array<u32, 16>();
+    tallies[lane].distances = array<u32, 16>();
 }
 
 // A distance in quarter octaves below 1, at most 255.
@@ -139,11 +139,11 @@ fn octaves(distance: Real) -> u32 {
 }
 
 fn distance_at(lag: u32) -> u32 {
-    return (tally.distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+    return (tallies[lane].distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
 }
 
 fn last_distance_at(lag: u32) -> u32 {
-    return (tally.last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+    return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
 }
 
 // The smallest lag that recurs at all its multiples and contracts, or has reached rounding.
@@ -225,7 +225,7 @@ fn note_symbol(side: u32) {
     }
     let n = tally.word_length;
     if n < 70u {
-        tally.word[n / 10u] |= symbol << (3u * (n % 10u));
+        tallies[lane].word[n / 10u] |= symbol << (3u * (n % 10u));
     }
     tally.word_length = n + 1u;
     // Stretches of eight symbols, hashed and summed: no matter where the cycle starts.

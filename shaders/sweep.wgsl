@@ -1,8 +1,10 @@
 // One invocation is one lane.
 
 var<private> cell: Cell;
-var<private> motion: Motion;
-var<private> tally: Tally;
+var<private> motion: MotionNow;
+var<private> tally: TallyNow;
+// Index of this lane.
+var<private> lane: u32;
 // Loop trips of this dispatch.
 var<private> trips: u32;
 
@@ -27,8 +29,9 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     cell = cells[i];
-    motion = motions[i];
-    tally = tallies[i];
+    lane = i;
+    motion = motions[i].now;
+    tally = tallies[i].now;
     trips = 0u;
     // Scanning and acting are separate, so that lanes scan together and act together.
     while running() && trips < settings.trips {
@@ -40,8 +43,8 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
             tally.status = STATUS_TOO_STIFF;
         }
     }
-    motions[i] = motion;
-    tallies[i] = tally;
+    motions[i].now = motion;
+    tallies[i].now = tally;
     if running() {
         atomicAdd(&live, 1u);
     }

@@ -3,12 +3,12 @@
 
 fn tangent(i: u32) -> array<Real, 4> {
     let k = 4u * i;
-    return array<Real, 4>(motion.tangents[k], motion.tangents[k + 1u], motion.tangents[k + 2u], motion.tangents[k + 3u]);
+    return array<Real, 4>(motions[lane].tangents[k], motions[lane].tangents[k + 1u], motions[lane].tangents[k + 2u], motions[lane].tangents[k + 3u]);
 }
 
 fn set_tangent(i: u32, u: array<Real, 4>) {
     for (var j = 0u; j < 4u; j++) {
-        motion.tangents[4u * i + j] = u[j];
+        motions[lane].tangents[4u * i + j] = u[j];
     }
 }
 

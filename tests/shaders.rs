@@ -28,8 +28,14 @@ fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
         .find(|(_, ty)| ty.name.as_deref() == Some(name))
         .unwrap_or_else(|| panic!("the shader has no struct {name}"));
     let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
-    let members = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
-    (members, *span)
+    // A struct within a struct is read as its members.
+    let flat = members.iter().flat_map(|m| match &module.types[m.ty].inner {
+        naga::TypeInner::Struct { members, .. } => {
+            members.iter().map(|inner| (inner.name.clone(), m.offset + inner.offset)).collect()
+        }
+        _ => vec![(m.name.clone(), m.offset)],
+    });
+    (flat.map(|(name, offset)| (name.unwrap_or_default(), offset)).collect(), *span)
 }
 
 /// Compares a struct field by field; `bytes` is the size of the shader's numbers, `host` that
@@ -72,13 +78,13 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     theta,
                     bound,
                     mesh_part,
-                    tangents,
                     block_growth,
                     growth_sum,
                     growth_squares,
                     anchor,
                     position_scale,
-                    rate_scale
+                    rate_scale,
+                    tangents
                 ]
             );
             same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors]);
@@ -136,15 +142,15 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     streak,
                     known_lags,
                     settled,
-                    distances,
-                    last_distances,
-                    word,
                     word_length,
                     hash_low,
                     hash_high,
                     recent,
                     on_strobe,
-                    symmetric
+                    symmetric,
+                    distances,
+                    last_distances,
+                    word
                 ]
             );
         }

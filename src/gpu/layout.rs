@@ -120,8 +120,6 @@ pub struct Motion {
     pub bound: f64,
     /// Time spent meshing in parts of steps, in free steps, less the whole ones.
     pub mesh_part: f64,
-    /// Tangent vectors in lane units.
-    pub tangents: [f64; 16],
     /// Growth of the present block, in octaves.
     pub block_growth: f64,
     /// Sum of the whole blocks' growth.
@@ -134,6 +132,8 @@ pub struct Motion {
     pub position_scale: f64,
     /// Largest rate at strobes.
     pub rate_scale: f64,
+    /// Tangent vectors in lane units.
+    pub tangents: [f64; 16],
 }
 
 /// The counting of a lane between dispatches.
@@ -196,13 +196,7 @@ pub struct Tally {
     pub known_lags: u32,
     /// 1 if the candidate's limit is near.
     pub settled: u32,
-    /// Distances per lag, in bytes.
-    pub distances: [u32; 16],
-    /// The same of the last window.
-    pub last_distances: [u32; 16],
-    /// Symbols of the cycle, ten to a number.
-    pub word: [u32; 7],
-    /// How many.
+    /// Symbols of the cycle.
     pub word_length: u32,
     /// Hash of the stretches of symbols so far, low half.
     pub hash_low: u32,
@@ -214,6 +208,12 @@ pub struct Tally {
     pub on_strobe: u32,
     /// Whether the cycle is its own mirror image.
     pub symmetric: u32,
+    /// Distances per lag, in bytes.
+    pub distances: [u32; 16],
+    /// The same of the last window.
+    pub last_distances: [u32; 16],
+    /// Symbols of the cycle, ten to a number.
+    pub word: [u32; 7],
 }
 
 /// [`Tally::mode`]: between the walls.
