@@ -71,6 +71,10 @@ fn set_offsets() {
     }
 }
 
+// A crossing must be this much steeper than its remainder; the derivative of a step's
+// remainder is at most 1.08 times the remainder itself.
+const STEEP: Real = 4.0;
+
 // Newton's cap; bisection finishes what it leaves.
 const NEWTON_CAP: u32 = 10u;
 const ROOT_CAP: u32 = 120u;
@@ -176,7 +180,15 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
                 let short = -2.0 * leaving.y / leaving.z;
                 guess = select(Real(0.5) * b, short, short > 0.0 && short < 0.5 * b);
             }
-            return Find(true, which, root(which, a, b, order, guess));
+            let tau = root(which, a, b, order, guess);
+            // Where the slope drowns in the remainder there may be three roots for one.
+            let there = watch(tau);
+            let slope = dt * abs(select(there.first.y, there.second.y, which));
+            if slope > STEEP * select(eps.x, eps.y, which) || dt <= SHORTEST {
+                return Find(true, which, tau);
+            }
+            width = 0.5 * dt;
+            continue;
         }
         if dt > SHORTEST {
             width = 0.5 * dt;

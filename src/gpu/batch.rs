@@ -16,6 +16,9 @@ const DISPATCHES_PER_LOOK: u32 = 4;
 /// Batches hold no more lanes than this, so that results come back in portions.
 const LARGEST_BATCH: usize = 1 << 20;
 
+/// Batches are not made smaller than this for want of memory.
+const SMALLEST_BATCH: usize = 1024;
+
 /// Longest period that a lane can look for: a byte per lag.
 const LONGEST_PERIOD: u32 = 64;
 
@@ -53,10 +56,21 @@ pub(super) async fn run(
     let pipeline = &gpu.pipelines[&variant];
     let shared = shared(gpu, flows, laws, settings)?;
     let mut records = Vec::with_capacity(lanes.len());
-    for batch in lanes.chunks(batch_lanes(gpu, settings)) {
-        records.extend(
-            Batch::new(gpu, &shared, batch, settings).run(gpu, pipeline, &shared, batch, settings).await?,
-        );
+    let mut size = batch_lanes(gpu, settings);
+    while records.len() < lanes.len() {
+        let rest = &lanes[records.len()..];
+        let batch = &rest[..size.min(rest.len())];
+        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let buffers = Batch::new(gpu, &shared, batch, settings);
+        if scope.pop().await.is_some() {
+            // A smaller batch may fit: results do not depend on it.
+            if batch.len() <= SMALLEST_BATCH {
+                return Err(GpuError::OutOfMemory { lanes: batch.len() });
+            }
+            size = batch.len() / 2;
+            continue;
+        }
+        records.extend(buffers.run(gpu, pipeline, &shared, batch, settings).await?);
     }
     Ok(records)
 }
