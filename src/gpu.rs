@@ -182,6 +182,7 @@ pub struct Gpu {
     precision: Precision,
     layout: wgpu::BindGroupLayout,
     pipelines: HashMap<Variant, wgpu::ComputePipeline>,
+    trouble: device::Trouble,
 }
 
 impl Gpu {

@@ -1,7 +1,7 @@
 //! The reference: an event-driven f64 integrator on the exact flow.
 //!
 //! A [`Trajectory`] jumps along one oscillator. Between events it takes the longest steps
-//! that [`crate::certificate`] can show to be free of events, whatever the forcing does;
+//! that the certificate can show to be free of events, whatever the forcing does;
 //! a step that crosses is cut at the event, converged to rounding on the Taylor polynomial
 //! of the solution itself. There is no time-stepping error and no event is missed.
 //!

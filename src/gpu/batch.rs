@@ -332,12 +332,36 @@ async fn download(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError>
 }
 
 async fn read(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
-    let lost = |message: String| GpuError::Lost { message };
+    // A device that is lost tells so once; what follows from it says less.
+    let lost = |message: String| GpuError::Lost { message: gpu.trouble.message().unwrap_or(message) };
     let (mapped, send) = Signal::new();
     buffer.map_async(wgpu::MapMode::Read, .., send);
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
+    if let Some(message) = gpu.trouble.message() {
+        return Err(GpuError::Lost { message });
+    }
     mapped.await.map_err(|error| lost(error.to_string()))?;
     let bytes = buffer.get_mapped_range(..).map_err(|error| lost(error.to_string()))?.to_vec();
     buffer.unmap();
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::AdapterChoice;
+    use crate::model::GearPair;
+
+    #[test]
+    fn a_lost_device_is_an_error_that_says_so() {
+        let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
+        gpu.device.destroy();
+        let pair = GearPair::paper(0.5);
+        let lanes = [Lane { flow: 0, law: 0, start: [0.0; 4] }];
+        let flows = [pair.oscillator().unwrap()];
+        let settings = LaneSettings::default();
+        let error = pollster::block_on(gpu.run(&flows, &[pair.law()], &lanes, &settings)).unwrap_err();
+        assert!(matches!(error, GpuError::Lost { .. }), "{error}");
+        assert!(error.to_string().contains("lost"), "{error}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Adapters: which there are, which one is taken, and opening it.
 
 use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{Gpu, GpuError, Precision};
 
@@ -14,6 +15,31 @@ pub struct AdapterChoice {
 /// Storage bindings of the shader, in order: flows, shapes, phasors, laws, cells, motions,
 /// tallies, live; `true` where it writes.
 const STORAGE: [bool; 8] = [false, false, false, false, false, true, true, true];
+
+/// What went wrong on a device outside any error scope: its loss, or a command it refused.
+/// Left alone, wgpu would panic.
+pub(super) struct Trouble(Arc<Mutex<Option<String>>>);
+
+impl Trouble {
+    fn watch(device: &wgpu::Device) -> Trouble {
+        let first = Arc::new(Mutex::new(None));
+        let sink = || {
+            let first = Arc::clone(&first);
+            move |message: String| {
+                first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
+            }
+        };
+        let (refused, lost) = (sink(), sink());
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| refused(error.to_string())));
+        device.set_device_lost_callback(move |reason, message| lost(format!("{reason:?}: {message}")));
+        Trouble(first)
+    }
+
+    /// The first thing that went wrong, if anything has.
+    pub(super) fn message(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
 
 fn instance() -> wgpu::Instance {
     wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
@@ -74,7 +100,8 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .await
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
     let layout = bind_group_layout(&device);
-    Ok(Gpu { device, queue, info, precision, layout, pipelines: HashMap::new() })
+    let trouble = Trouble::watch(&device);
+    Ok(Gpu { device, queue, info, precision, layout, pipelines: HashMap::new(), trouble })
 }
 
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
