@@ -2,8 +2,10 @@
 //!
 //! Modules in the order in which data flows through them: a scene says what is asked
 //! ([`scene`]) and becomes numbered cells ([`plan`]), a model is described ([`model`]), its
-//! flow is solved in closed form ([`flow`]), the reference jumps from event to event on it ([`mod@reference`]), and what it
-//! meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a bifurcation diagram
+//! flow is solved in closed form ([`flow`]), the reference jumps from event to event on it
+//! ([`mod@reference`]), lanes on a graphics device do so on a grid of their own ([`gpu`]), and
+//! what the reference meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a
+//! bifurcation diagram
 //! ([`bifurcation`]). A map's cells go through an engine ([`engine`], [`sweep`]) and come back
 //! as records ([`record`], [`classify`]). All of it is then written down ([`output`]).
 
@@ -12,6 +14,7 @@ pub mod certificate;
 pub mod classify;
 pub mod engine;
 pub mod flow;
+pub mod gpu;
 pub mod model;
 pub mod orbit;
 pub mod output;

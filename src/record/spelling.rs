@@ -7,7 +7,7 @@ use crate::word::Word;
 const PER_WORD: usize = 21;
 
 /// Consecutive symbols that the hash looks at together.
-const HASH_WINDOW: usize = 8;
+pub(crate) const HASH_WINDOW: usize = 8;
 
 /// A word as a record keeps it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -44,16 +44,25 @@ pub fn word_hash(symbols: &[u8]) -> u64 {
     let mut halves = [0u32; 2];
     for start in 0..n {
         let code = (0..HASH_WINDOW).fold(0, |code, k| code << 3 | u32::from(symbols[(start + k) % n] - b'0'));
-        halves[0] = halves[0].wrapping_add(mix(code));
-        halves[1] = halves[1].wrapping_add(mix(code ^ 0x9e37_79b9));
+        halves = add_window(halves, code);
     }
-    u64::from(halves[1]) << 32 | u64::from(halves[0])
+    joined(halves)
 }
 
-/// MurmurHash3's finaliser: every input bit moves every output bit.
+/// The hash from its two halves, low and high.
+pub(crate) fn joined([low, high]: [u32; 2]) -> u64 {
+    u64::from(high) << 32 | u64::from(low)
+}
+
+/// Adds one window of symbols, 3 bits each, to the halves of a hash; the shader does the same.
+pub(crate) fn add_window([low, high]: [u32; 2], code: u32) -> [u32; 2] {
+    [low.wrapping_add(mix(code)), high.wrapping_add(mix(code ^ 0x5bd1_e995))]
+}
+
+/// The shader's `mix_bits`: every input bit moves every output bit.
 fn mix(mut x: u32) -> u32 {
-    x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
-    x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
+    x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
+    x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)
 }
 
@@ -72,7 +81,15 @@ impl Record {
         }
     }
 
-    /// The word, if the record has one.
+    /// The word, if the record has one and spells it out.
+    pub fn word(&self) -> Option<Word> {
+        match self.spelling()? {
+            Spelling::Whole(word) => Some(word),
+            Spelling::Hashed { .. } => None,
+        }
+    }
+
+    /// The word, spelled out or hashed, if the record has one.
     pub fn spelling(&self) -> Option<Spelling> {
         if self.valid & valid::WORD == 0 {
             return None;

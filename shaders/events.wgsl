@@ -1,0 +1,325 @@
+// The careful step: what happens first on the next step, and acting on it.
+
+const CLEAR: u32 = 0u;
+const CROSSING: u32 = 1u;
+const UNCLEAR: u32 = 2u;
+
+// Judges a distance (positive inside) on a stretch of length `dt`, from its jets at both
+// ends. `order` is the order of its root at the start: dividing it out drops as many
+// Bernstein coefficients. `eps` is the remainder.
+fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -> u32 {
+    let f0 = select(left.x, Real(0.0), order > 0u);
+    let s0 = dt * left.y;
+    let a0 = dt * dt * left.z;
+    let f1 = right.x;
+    let s1 = dt * right.y;
+    let a1 = dt * dt * right.z;
+    let c3 = 0.5 * ((f0 + 0.4 * s0 + 0.05 * a0) + (f1 - 0.4 * s1 + 0.05 * a1));
+    var plus = 0u;
+    plus |= select(0u, 1u, f0 > 0.0);
+    plus |= select(0u, 2u, f0 + s0 * (1.0 / 6.0) > 0.0);
+    plus |= select(0u, 4u, f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0)) > 0.0);
+    plus |= select(0u, 16u, f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0)) > 0.0);
+    plus |= select(0u, 32u, f1 - s1 * (1.0 / 6.0) > 0.0);
+    plus |= select(0u, 64u, f1 > 0.0);
+    // The two polynomials that enclose the function.
+    let lower = (plus | select(0u, 8u, c3 > eps)) >> order;
+    let upper = (plus | select(0u, 8u, c3 > -eps)) >> order;
+    if lower == (127u >> order) {
+        return CLEAR;
+    }
+    // A run of + from the start, then - to the end: one change of sign each.
+    let single = (lower & (lower + 1u)) == 0u && (upper & (upper + 1u)) == 0u && lower > 0u;
+    if single && upper != (127u >> order) {
+        return CROSSING;
+    }
+    return UNCLEAR;
+}
+
+// The two distances that may end a flight, as jets.
+struct Watch {
+    first: vec3<Real>,
+    second: vec3<Real>,
+}
+
+// Distances at the start of the careful step.
+var<private> offsets: vec2<Real>;
+
+fn watch(tau: Real) -> Watch {
+    let z = gap_jet(tau);
+    if tally.mode == MODE_FREE {
+        return Watch(
+            vec3<Real>(offsets.x - z.x, -z.y, -z.z),
+            vec3<Real>(offsets.y + z.x, z.y, z.z),
+        );
+    }
+    let sign = sign_of(side_of(tally.mode));
+    if tally.mode < MODE_DIP {
+        return Watch(vec3<Real>(offsets.x + sign * z.x, sign * z.y, sign * z.z), vec3<Real>(1.0, 0.0, 0.0));
+    }
+    return Watch(vec3<Real>(offsets.x - sign * z.x, -sign * z.y, -sign * z.z), sign * pressing_jet(tau));
+}
+
+fn set_offsets() {
+    let z = motion.q[0];
+    if tally.mode == MODE_FREE {
+        let walls = flows[cell.flow_index].walls;
+        offsets = vec2<Real>(walls[0] - z, z - walls[1]);
+    } else {
+        let sign = sign_of(side_of(tally.mode));
+        offsets = vec2<Real>(select(sign, -sign, tally.mode >= MODE_DIP) * z, 0.0);
+    }
+}
+
+// A crossing must be this much steeper than its remainder; the derivative of a step's
+// remainder is at most 1.08 times the remainder itself.
+const STEEP: Real = 4.0;
+
+// Newton's cap; bisection finishes what it leaves.
+const NEWTON_CAP: u32 = 10u;
+const ROOT_CAP: u32 = 120u;
+// Stretches that one careful step may be cut into.
+const LOOK_CAP: u32 = 200u;
+
+// The root of one distance in (lo, hi], where it falls from + to -; on the exact flow, with
+// the root at the start divided out.
+fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> Real {
+    var lo = start;
+    var hi = end;
+    var t = guess;
+    for (var i = 0u; i < ROOT_CAP; i++) {
+        trips += 1u;
+        let at = watch(t);
+        let f = select(at.first, at.second, second);
+        if f.x > 0.0 {
+            lo = t;
+        } else {
+            hi = t;
+        }
+        // What a Newton step leaves over is of second order in it.
+        let step = f.x / (f.y - Real(order) * f.x / t);
+        var next = t - step;
+        let converged = abs(f.z) * (step * step) <= ULP * t * abs(f.y) || abs(step) <= 4.0 * ULP * t;
+        if converged && next >= start && next <= end {
+            return next;
+        }
+        if i >= NEWTON_CAP || !(next > lo && next < hi) {
+            next = 0.5 * (lo + hi);
+            if hi - lo <= 4.0 * ULP * hi {
+                return next;
+            }
+        }
+        t = next;
+    }
+    tally.status = STATUS_CAP_ROOT;
+    return t;
+}
+
+// What a careful step finds.
+struct Find {
+    // Whether there is an event, and of which distance.
+    event: bool,
+    second: bool,
+    // Where; the end of the step if there is none.
+    tau: Real,
+}
+
+// The first event within `len` of the present step.
+fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
+    var orders = order;
+    var a: Real = 0.0;
+    var width = len;
+    var left = watch(0.0);
+    var looks = 0u;
+    // A start that rounding has put on or beyond its boundary.
+    if orders.x == 0u && left.first.x <= 0.0 {
+        return Find(true, false, 0.0);
+    }
+    if orders.y == 0u && left.second.x <= 0.0 {
+        return Find(true, true, 0.0);
+    }
+    loop {
+        looks += 1u;
+        if looks > LOOK_CAP {
+            tally.status = STATUS_CAP_ROOT;
+            break;
+        }
+        trips += 1u;
+        var b = a + width;
+        if b >= len - 0.5 * SHORTEST {
+            b = len;
+        }
+        let dt = b - a;
+        let right = watch(b);
+        let cube = dt * dt * dt;
+        let rest = cube * cube * (1.0 / 14400.0);
+        // In the dip the second distance is an acceleration: two derivatives further on.
+        let eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest)
+            + 8.0 * ULP * abs(offsets);
+        let first = judge(left.first, right.first, dt, orders.x, eps.x);
+        let second = judge(left.second, right.second, dt, orders.y, eps.y);
+        if first == CLEAR && second == CLEAR {
+            if b == len {
+                break;
+            }
+            a = b;
+            left = right;
+            orders = vec2<u32>(0u, 0u);
+            width = 2.0 * dt;
+            continue;
+        }
+        if first + second == CROSSING {
+            let which = second == CROSSING;
+            let at_start = select(left.first.x, left.second.x, which);
+            let at_end = select(right.first.x, right.second.x, which);
+            let order = select(orders.x, orders.y, which);
+            var guess = a + clamp(at_start / (at_start - at_end), Real(0.01), Real(0.99)) * dt;
+            if order > 0u {
+                // Leaving and pressed back: the parabola of a short flight.
+                let leaving = select(left.first, left.second, which);
+                let short = -2.0 * leaving.y / leaving.z;
+                guess = select(Real(0.5) * b, short, short > 0.0 && short < 0.5 * b);
+            }
+            let tau = root(which, a, b, order, guess);
+            // Where the slope drowns in the remainder there may be three roots for one.
+            let there = watch(tau);
+            let slope = dt * abs(select(there.first.y, there.second.y, which));
+            if slope > STEEP * select(eps.x, eps.y, which) || dt <= SHORTEST {
+                return Find(true, which, tau);
+            }
+            width = 0.5 * dt;
+            continue;
+        }
+        if dt > SHORTEST {
+            width = 0.5 * dt;
+            continue;
+        }
+        // The shortest stretch is still undecided: what touches here does so within rounding.
+        tally.grazes += 1u;
+        if right.first.x <= 0.0 {
+            return Find(true, false, b);
+        }
+        if right.second.x <= 0.0 {
+            return Find(true, true, b);
+        }
+        if b == len {
+            break;
+        }
+        a = b;
+        left = right;
+        orders = vec2<u32>(0u, 0u);
+        width = dt;
+    }
+    return Find(false, false, len);
+}
+
+// Bound on the eighth derivative of the gap where the dip asks for it.
+var<private> pressing_bound: Real;
+
+fn careful() {
+    let f = cell.flow_index;
+    let d = domain_of(tally.mode);
+    let substeps = flows[f].domains[d].substeps;
+    let growth = flows[f].domains[d].growth;
+    sync_phasor();
+    trips += 1u;
+    expand(d, motion.q);
+    set_offsets();
+    motion.bound =
+        derivative_bound(d, 120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
+    pressing_bound = motion.bound;
+    if tally.mode >= MODE_DIP {
+        pressing_bound =
+            derivative_bound(d, 5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
+    }
+    let mark = next_mark();
+    let part = to_mark(mark) * substeps;
+    let lands = part <= 1.0 && tally.step + 1u == mark;
+    let len = min(part, Real(1.0));
+    let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
+    let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
+    let found = first_event(len, growth, order);
+    tally.passes_in_period += 1u;
+    let share = flows[f].domains[d].share;
+    carry_tangents(d, found.tau);
+    motion.q = state_at(found.tau, substeps);
+    motion.bound += growth;
+    tally.order = 0u;
+    if d > 0u {
+        count_meshing(found.tau * share);
+    }
+    advance_phase(found.tau * share);
+    if lands && !found.event {
+        tally.step = mark;
+        motion.theta = 0.0;
+    }
+    check_finite();
+    sync_phasor();
+    if found.event {
+        act(found.second, found.tau == 0.0);
+    }
+    if tally.step >= shapes[f].steps {
+        begin_period();
+    } else if tally.step >= mark {
+        compare_mirror();
+    }
+}
+
+// Pressing ceases inside the dip: the event function is the acceleration itself.
+fn end_dip(side: u32) {
+    let f = cell.flow_index;
+    let before = motion.q;
+    tally.mode = MODE_FREE;
+    motion.q[0] += flows[f].walls[side];
+    if EXPONENT {
+        let row = flows[f].domains[1u + side].gap_row;
+        let share = flows[f].domains[1u + side].share;
+        let normal = array<Real, 4>(row[0], share * row[1], row[2], share * row[3]);
+        expand(1u + side, before);
+        let rate = 6.0 * gap_terms[3] * flows[f].domains[1u + side].substeps;
+        saltate(field(1u + side, before), field(0u, motion.q), normal, rate, 1.0, 0.0);
+    }
+}
+
+// Acts on an event at the present state.
+fn act(second: bool, settling: bool) {
+    let f = cell.flow_index;
+    if tally.mode == MODE_FREE {
+        let side = select(SIDE_RIGHT, SIDE_LEFT, second);
+        motion.q[0] = flows[f].walls[side];
+        let closing = sign_of(side) * motion.q[1];
+        // On or beyond the wall by rounding, or by its start: a contact only if it closes.
+        if settling && (closing < 0.0 || (closing == 0.0 && !presses(0u, side, motion.q))) {
+            leave(side);
+        } else {
+            contact(side);
+        }
+        return;
+    }
+    let side = side_of(tally.mode);
+    let sign = sign_of(side);
+    if tally.mode < MODE_DIP {
+        motion.q[0] = 0.0;
+        if settling && sign * motion.q[1] > 0.0 {
+            tally.order = 1u;
+            return;
+        }
+        motion.q[1] = -sign * max(-sign * motion.q[1], Real(0.0));
+        count_event(side);
+        let before = motion.q;
+        leave(side);
+        if EXPONENT {
+            saltate(field(1u + side, before), field(0u, motion.q), ALONG_GAP, before[1], 1.0, 0.0);
+        }
+    } else if second {
+        // Pressing ceases inside the dip.
+        count_event(side);
+        end_dip(side);
+    } else {
+        // The dip is over; no event.
+        motion.q[0] = 0.0;
+        motion.q[1] = sign * max(sign * motion.q[1], Real(0.0));
+        tally.mode = MODE_PRESSED + side;
+        tally.order = select(1u, 2u, motion.q[1] == 0.0);
+    }
+}

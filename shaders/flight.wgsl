@@ -1,0 +1,118 @@
+// Scanning: full steps of the exact propagator, as long as they are certainly free of events.
+
+// Certificate of a step for one pair of ends: how far the function certainly stays within
+// [low, high], from value, slope and curvature at both ends, in units of the step.
+// Quintic Hermite interpolation in Bernstein form of degree 6; its remainder is at most
+// `eps` times the middle basis polynomial.
+fn room(f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
+    let c1 = f0 + s0 * (1.0 / 6.0);
+    let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
+    let c3 = 0.5 * ((f0 + 0.4 * s0 + 0.05 * a0) + (f1 - 0.4 * s1 + 0.05 * a1));
+    let c4 = f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0));
+    let c5 = f1 - s1 * (1.0 / 6.0);
+    let top = max(max(max(f0, f1), max(c1, c5)), max(max(c2, c4), c3 + eps));
+    let bottom = min(min(min(f0, f1), min(c1, c5)), min(min(c2, c4), c3 - eps));
+    return min(high - top, bottom - low) - 8.0 * ULP * (abs(f0) + abs(f1));
+}
+
+// Why a scan ended.
+const SCAN_CAREFUL: u32 = 0u; // the next step needs a careful look
+const SCAN_BUDGET: u32 = 1u; // this dispatch has done its share
+
+fn scan() -> u32 {
+    // From a wall, and through the dip, every step is a careful one.
+    if tally.order > 0u || tally.mode >= MODE_DIP {
+        return SCAN_CAREFUL;
+    }
+    let f = cell.flow_index;
+    let d = domain_of(tally.mode);
+    let m = flows[f].domains[d].step;
+    let row = flows[f].domains[d].gap_row;
+    let growth = flows[f].domains[d].growth;
+    let less = flows[f].domains[d].turn_less;
+    let sine = flows[f].domains[d].turn_sin;
+    let share = flows[f].domains[d].share;
+    let substeps = flows[f].domains[d].substeps;
+    let mark = next_mark();
+    // Meshing measures from its wall and has but one.
+    var low = flows[f].walls[1];
+    var high = flows[f].walls[0];
+    if d == 1u {
+        low = 0.0;
+        high = HUGE;
+    } else if d == 2u {
+        low = -HUGE;
+        high = 0.0;
+    }
+    var z = motion.q[0];
+    var w = motion.q[1] * share;
+    var x = motion.q[2];
+    var v = motion.q[3] * share;
+    var c = motion.phasor[0];
+    var s = motion.phasor[1];
+    var theta = motion.theta;
+    var n = tally.step;
+    var bound = motion.bound;
+    var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + row[5]);
+    var taken = 0u;
+    var verdict = SCAN_CAREFUL;
+    loop {
+        if trips >= settings.trips {
+            verdict = SCAN_BUDGET;
+            break;
+        }
+        // The mark must not be stepped over.
+        let next_theta = theta + share;
+        let wraps = next_theta >= 1.0;
+        let next_n = n + select(0u, 1u, wraps);
+        if next_n >= mark {
+            break;
+        }
+        trips += 1u;
+        let z1 = z + (((m[0] * z + m[1] * w) + (m[2] * x + m[3] * v)) + ((m[4] * c + m[5] * s) + m[6]));
+        let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + m[13]));
+        let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + m[20]));
+        let v1 = v + (((m[21] * z + m[22] * w) + (m[23] * x + m[24] * v)) + ((m[25] * c + m[26] * s) + m[27]));
+        let c1 = c + (less * c - sine * s);
+        let s1 = s + (sine * c + less * s);
+        let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + row[5]);
+        let bound1 = bound + growth;
+        if !(room(z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
+            break;
+        }
+        z = z1;
+        w = w1;
+        x = x1;
+        v = v1;
+        c = c1;
+        s = s1;
+        a = a1;
+        bound = bound1;
+        theta = select(next_theta, next_theta - 1.0, wraps);
+        n = next_n;
+        taken += 1u;
+    }
+    motion.q[0] = z;
+    motion.q[1] = w * substeps;
+    motion.q[2] = x;
+    motion.q[3] = v * substeps;
+    motion.phasor[0] = c;
+    motion.phasor[1] = s;
+    motion.theta = theta;
+    motion.bound = bound;
+    tally.step = n;
+    tally.passes_in_period += taken;
+    tally.pending += taken;
+    // Whole numbers, so that it does not matter where a dispatch ends.
+    tally.mesh_right += select(0u, taken, d == 1u);
+    tally.mesh_left += select(0u, taken, d == 2u);
+    return verdict;
+}
+
+// Adds a part of a step, in free steps, to the time spent meshing.
+fn count_meshing(part: Real) {
+    motion.mesh_part += part;
+    let whole = floor(motion.mesh_part);
+    tally.mesh_whole += u32(whole);
+    motion.mesh_part -= whole;
+}

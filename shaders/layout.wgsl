@@ -1,0 +1,207 @@
+// Everything that lies in buffers. The host's twins are in src/gpu/layout.rs; a test
+// compares the offsets. A struct holds either Reals or u32s alone, so that both precisions
+// have the same shape.
+
+// One linear domain in units of its own step: time tau = t / h, velocities per step.
+struct Domain {
+    // The propagator of one step less the identity: rows gap, its rate, x, its rate;
+    // columns the same four, cos, sin, 1.
+    step: array<Real, 28>,
+    // Accelerations of the gap and of x: on gap, rate, x, rate, cos, 1.
+    gap_row: array<Real, 6>,
+    x_row: array<Real, 6>,
+    // |(n+1)-th derivative of the gap|^2 <= this form of the n-th derivatives: on rate^2,
+    // rate * x_rate, x_rate^2, gap^2, gap * x, x^2.
+    energy: array<Real, 6>,
+    // Growth per step of that bound for n = 5.
+    growth: Real,
+    // Forcing angle of one step, cos - 1 of it and sin of it.
+    angle: Real,
+    turn_less: Real,
+    turn_sin: Real,
+    // Free steps per step of this domain: a power of two, at most 1.
+    share: Real,
+    // Steps of this domain per free step.
+    substeps: Real,
+    // The homogeneous propagator (4 x 4) of 1, 2, 4, ... 128 steps, less the identity.
+    powers: array<Real, 128>,
+}
+
+// All that is common to the lanes that differ in the contact law alone.
+struct Flow {
+    // Free motion, meshing on the right, on the left. Meshing measures the gap from its wall.
+    domains: array<Domain, 3>,
+    // Right and left wall.
+    walls: array<Real, 2>,
+    // Change of v per unit of gap rate that the contact impulse removes.
+    kick: Real,
+    // Length of a free step.
+    h: Real,
+}
+
+struct FlowShape {
+    // Free steps per forcing period.
+    steps: u32,
+    // Where its phasors start.
+    phasors: u32,
+}
+
+struct Law {
+    restitution: Real,
+    mesh_speed: Real,
+}
+
+struct Cell {
+    flow_index: u32,
+    law_index: u32,
+}
+
+struct Settings {
+    // Lanes in the buffers.
+    lanes: u32,
+    // Forcing periods to integrate.
+    periods: u32,
+    // Loop trips that one dispatch may spend on a lane.
+    trips: u32,
+    // Passes (scan steps and careful steps) allowed in one period.
+    passes_per_period: u32,
+    // Events allowed in one period.
+    events_per_period: u32,
+    // Invocations along the first dimension of a dispatch.
+    row: u32,
+    // Periods before averages are taken.
+    transient_periods: u32,
+    // Periods before the exponent is accumulated, and periods per block of it.
+    exponent_from: u32,
+    exponent_block: u32,
+    // Longest period looked for; 0 looks for none.
+    max_period: u32,
+    // 1: lanes end once their period is decided.
+    early_stop: u32,
+}
+
+// What a lane carries between dispatches: the motion. While it runs, numbers lie in
+// registers; arrays that are indexed stay in the buffer, or they would drag the rest along.
+struct MotionNow {
+    // Gap (from the wall while meshing), its rate, x, its rate; rates per free step.
+    q: array<Real, 4>,
+    // cos and sin of the forcing phase.
+    phasor: array<Real, 2>,
+    // Fraction of the free step that has passed.
+    theta: Real,
+    // Bound on the sixth derivative of the gap, in steps of the present domain.
+    bound: Real,
+    // Time spent meshing in parts of steps, in free steps, less the whole ones.
+    mesh_part: Real,
+    // Growth of the tangent vector, binary logarithms: of this block, the sum of the whole
+    // blocks, and of their squares.
+    block_growth: Real,
+    growth_sum: Real,
+    growth_squares: Real,
+    // Strobe state that later ones are compared with; where the cycle is read, its start.
+    anchor: array<Real, 4>,
+    // Largest position and rate at strobes: the unit of distances.
+    position_scale: Real,
+    rate_scale: Real,
+}
+
+struct Motion {
+    now: MotionNow,
+    // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
+    tangents: array<Real, 16>,
+}
+
+// What a lane carries between dispatches: the counting.
+struct TallyNow {
+    // Free steps since phase 0.
+    step: u32,
+    // MODE_*.
+    mode: u32,
+    // Wall of the last event: SIDE_*.
+    origin: u32,
+    // Order of the root of the distance from that wall at the start; 0 away from it.
+    order: u32,
+    // Forcing periods completed.
+    period: u32,
+    // STATUS_*.
+    status: u32,
+    passes_in_period: u32,
+    events_in_period: u32,
+    impacts: u32,
+    events: u32,
+    // Time spent meshing: whole steps of the two domains, and whole free steps made of parts.
+    mesh_right: u32,
+    mesh_left: u32,
+    mesh_whole: u32,
+    // Events too near to grazing for the linearisation to mean much.
+    grazes: u32,
+    // STAGE_*.
+    stage: u32,
+    // Periods of the cycle that are still to be read.
+    to_read: u32,
+    // 1 once a cycle is being read or has been.
+    has_read: u32,
+    // Period at which counting began.
+    counted_from: u32,
+    // Full steps that the tangent vectors have not taken yet, and how many vectors there are.
+    pending: u32,
+    tangent_count: u32,
+    // Blocks of the exponent, and periods in the present one.
+    blocks: u32,
+    block_periods: u32,
+    // Recurrence: when the anchor was taken, lags of this window, the smallest lag that
+    // recurs and contracts and for how many windows, lags that the last window held.
+    anchor_period: u32,
+    window: u32,
+    candidate: u32,
+    streak: u32,
+    known_lags: u32,
+    // 1 if the candidate's limit is near.
+    settled: u32,
+    // The word: how many symbols, and a rotation-invariant hash.
+    word_length: u32,
+    hash_low: u32,
+    hash_high: u32,
+    recent: u32,
+    // Events on the strobe phase.
+    on_strobe: u32,
+    // Whether the cycle is its own mirror image.
+    symmetric: u32,
+}
+
+struct Tally {
+    now: TallyNow,
+    // Distances per lag, of this window and the last: quarter octaves below 1, in bytes.
+    distances: array<u32, 16>,
+    last_distances: array<u32, 16>,
+    // The word's symbols, ten to a number.
+    word: array<u32, 7>,
+}
+
+const STAGE_RUNNING: u32 = 0u;
+const STAGE_READING: u32 = 1u; // the period is decided, its cycle is being read
+const STAGE_DONE: u32 = 2u;
+
+@group(0) @binding(0) var<uniform> settings: Settings;
+@group(0) @binding(1) var<storage, read> flows: array<Flow>;
+@group(0) @binding(2) var<storage, read> shapes: array<FlowShape>;
+@group(0) @binding(3) var<storage, read> phasors: array<array<Real, 2>>;
+@group(0) @binding(4) var<storage, read> laws: array<Law>;
+@group(0) @binding(5) var<storage, read> cells: array<Cell>;
+@group(0) @binding(6) var<storage, read_write> motions: array<Motion>;
+@group(0) @binding(7) var<storage, read_write> tallies: array<Tally>;
+@group(0) @binding(8) var<storage, read_write> live: atomic<u32>;
+
+const MODE_FREE: u32 = 0u;
+const MODE_PRESSED: u32 = 1u; // + side
+const MODE_DIP: u32 = 3u; // + side
+
+const SIDE_RIGHT: u32 = 0u;
+const SIDE_LEFT: u32 = 1u;
+const SIDE_NONE: u32 = 2u;
+
+const STATUS_OK: u32 = 0u;
+const STATUS_CAP_EVENTS: u32 = 4u;
+const STATUS_CAP_ROOT: u32 = 5u;
+const STATUS_TOO_STIFF: u32 = 6u;
+const STATUS_NON_FINITE: u32 = 7u;

@@ -1,0 +1,253 @@
+// What a lane is: strobes, recurrence, averages, the word.
+
+// Distances are kept as quarter octaves below 1: 4 means half.
+const OCTAVE: f32 = 4.0;
+// Recurrences farther apart than 2^-6 of the motion are none.
+const NEAR: u32 = 24u;
+// A lane has settled once its limit is estimated to lie within 2^-12 of the motion.
+const SETTLED: f32 = 48.0;
+// A distance must have shrunk by this much (a factor of 0.7) since the last window.
+const SHRUNK: u32 = 2u;
+// Windows over which a candidate must have contracted.
+const STREAK: u32 = 2u;
+// Lags of the first window; the following ones are twice as long each.
+const FIRST_WINDOW: u32 = 8u;
+
+// Phase 0: a forcing period is complete.
+fn begin_period() {
+    tally.step = 0u;
+    motion.theta = 0.0;
+    motion.phasor = array<Real, 2>(1.0, 0.0);
+    tally.period += 1u;
+    tally.passes_in_period = 0u;
+    tally.events_in_period = 0u;
+    if tally.stage == STAGE_READING {
+        tally.to_read -= 1u;
+        if tally.to_read == 0u {
+            tally.stage = STAGE_DONE;
+        }
+        return;
+    }
+    accumulate_growth();
+    if tally.period == settings.transient_periods {
+        begin_counting();
+    }
+    let decided = settings.max_period > 0u && recurs();
+    let last = tally.period >= settings.periods;
+    if (decided && settings.early_stop == 1u) || (last && tally.streak >= STREAK) {
+        begin_reading();
+    } else if last {
+        tally.stage = STAGE_DONE;
+    }
+}
+
+// Averages start here.
+fn begin_counting() {
+    tally.impacts = 0u;
+    tally.events = 0u;
+    tally.grazes = 0u;
+    tally.on_strobe = 0u;
+    tally.mesh_right = 0u;
+    tally.mesh_left = 0u;
+    tally.mesh_whole = 0u;
+    motion.mesh_part = 0.0;
+    tally.word_length = 0u;
+    tally.hash_low = 0u;
+    tally.hash_high = 0u;
+    tally.recent = 0u;
+    tallies[lane].word = array<u32, 7>();
+    tally.counted_from = tally.period;
+}
+
+// The period is decided: one cycle is read from here on.
+fn begin_reading() {
+    begin_counting();
+    tally.stage = STAGE_READING;
+    tally.to_read = tally.candidate;
+    tally.has_read = 1u;
+    motion.anchor = strobe_state();
+    if EXPONENT {
+        tally.tangent_count = 4u;
+        motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    }
+}
+
+// The present state with the gap measured from its middle, whatever the domain.
+fn strobe_state() -> array<Real, 4> {
+    var q = motion.q;
+    if tally.mode != MODE_FREE {
+        q[0] += flows[cell.flow_index].walls[side_of(tally.mode)];
+    }
+    return q;
+}
+
+// Looks at a strobe; true once a period is confirmed.
+fn recurs() -> bool {
+    let q = strobe_state();
+    motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
+    motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
+    if tally.window == 0u {
+        begin_window(q, FIRST_WINDOW);
+        return false;
+    }
+    let lag = tally.period - tally.anchor_period;
+    let p = max(abs(q[0] - motion.anchor[0]), abs(q[2] - motion.anchor[2])) / max(motion.position_scale, Real(1e-30));
+    let r = max(abs(q[1] - motion.anchor[1]), abs(q[3] - motion.anchor[3])) / max(motion.rate_scale, Real(1e-30));
+    tallies[lane].distances[(lag - 1u) / 4u] |= octaves(max(p, r)) << (8u * ((lag - 1u) % 4u));
+    if lag < tally.window {
+        return false;
+    }
+    let found = contracting_lag();
+    let settled = judge_lag(found);
+    tally.known_lags = tally.window;
+    tallies[lane].last_distances = tallies[lane].distances;
+    // The next anchor lies at the same place of the cycle: only there do distances compare.
+    let lags = min(2u * tally.window, settings.max_period);
+    let cycle = max(select(closest_lag(), found, found > 0u), 1u);
+    begin_window(q, max(lags - lags % cycle, 1u));
+    return settled;
+}
+
+// The lag that recurs best; a longer one must be better by a factor of four.
+fn closest_lag() -> u32 {
+    var best = 0u;
+    var distance = NEAR;
+    for (var lag = 1u; lag <= tally.known_lags; lag++) {
+        trips += 1u;
+        if distance_at(lag) >= distance {
+            best = lag;
+            distance = distance_at(lag) + 8u;
+        }
+    }
+    return best;
+}
+
+fn begin_window(q: array<Real, 4>, lags: u32) {
+    motion.anchor = q;
+    tally.anchor_period = tally.period;
+    tally.window = min(lags, settings.max_period);
+    tallies[lane].distances = array<u32, 16>();
+}
+
+// A distance in quarter octaves below 1, at most 255.
+fn octaves(distance: Real) -> u32 {
+    let d = f32(distance);
+    if d <= 1e-19 {
+        return 255u;
+    }
+    return u32(clamp(-OCTAVE * log2(d), 0.0, 255.0));
+}
+
+fn distance_at(lag: u32) -> u32 {
+    return (tallies[lane].distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+}
+
+fn last_distance_at(lag: u32) -> u32 {
+    return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+}
+
+// The smallest lag that recurs at all its multiples and contracts, or has reached rounding.
+// Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
+fn contracting_lag() -> u32 {
+    for (var lag = 1u; lag <= min(tally.window, tally.known_lags); lag++) {
+        trips += 1u;
+        let now = distance_at(lag);
+        let contracts = now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
+        if now < NEAR || !contracts {
+            continue;
+        }
+        var kept = true;
+        for (var multiple = 2u * lag; multiple <= tally.window; multiple += lag) {
+            trips += 1u;
+            kept = kept && distance_at(multiple) >= NEAR;
+        }
+        if kept {
+            return lag;
+        }
+    }
+    return 0u;
+}
+
+// Whether the limit is near enough: strobes `d` apart that shrink by `mu` per period are
+// `d / (1 - mu)` away from it. A slow approach must come closer.
+fn has_settled(lag: u32) -> bool {
+    let now = distance_at(lag);
+    let shrunk = f32(now) - f32(last_distance_at(lag));
+    if now >= RESOLVED {
+        return true;
+    }
+    // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), 1e-6, 1.0);
+    return f32(now) >= SETTLED - OCTAVE * log2(away);
+}
+
+// Natural logarithm of a quarter octave.
+const QUARTER_OCTAVE: f32 = 0.1733;
+
+// Keeps the books on the candidate; true once it is settled.
+fn judge_lag(found: u32) -> bool {
+    if found == 0u || found != tally.candidate {
+        tally.candidate = found;
+        tally.streak = select(1u, 0u, found == 0u);
+        tally.settled = 0u;
+        return false;
+    }
+    tally.streak += 1u;
+    let settled = tally.streak >= STREAK && has_settled(found);
+    tally.settled = select(0u, 1u, settled);
+    return settled;
+}
+
+// Half a period after the middle of a cycle of odd period: is the state the mirror image of
+// the cycle's start?
+fn compare_mirror() {
+    let q = strobe_state();
+    let p = max(abs(q[0] + motion.anchor[0]), abs(q[2] + motion.anchor[2]));
+    let r = max(abs(q[1] + motion.anchor[1]), abs(q[3] + motion.anchor[3]));
+    let near = p <= MIRROR * motion.position_scale && r <= MIRROR * motion.rate_scale;
+    tally.symmetric = select(0u, 1u, near);
+}
+
+// A cycle this close to its mirror image, relative to the motion, is symmetric.
+const MIRROR: Real = 0.001;
+
+// One flight ends on `side`: its symbol. The first flight of all comes from no wall.
+fn note_symbol(side: u32) {
+    var symbol: u32;
+    if tally.mode != MODE_FREE {
+        symbol = select(4u, 1u, side == SIDE_RIGHT);
+    } else if tally.origin == SIDE_RIGHT {
+        symbol = select(3u, 2u, side == SIDE_RIGHT);
+    } else if tally.origin == SIDE_LEFT {
+        symbol = select(6u, 5u, side == SIDE_LEFT);
+    } else {
+        return;
+    }
+    let n = tally.word_length;
+    if n < 70u {
+        tallies[lane].word[n / 10u] |= symbol << (3u * (n % 10u));
+    }
+    tally.word_length = n + 1u;
+    // Stretches of eight symbols, hashed and summed: no matter where the cycle starts.
+    tally.recent = ((tally.recent << 3u) | symbol) & 0xffffffu;
+    if n >= 7u {
+        tally.hash_low += mix_bits(tally.recent);
+        tally.hash_high += mix_bits(tally.recent ^ 0x5bd1e995u);
+    }
+}
+
+// A bijection of 32-bit numbers that scatters them.
+fn mix_bits(x: u32) -> u32 {
+    var h = x;
+    h = (h ^ (h >> 16u)) * 0x7feb352du;
+    h = (h ^ (h >> 15u)) * 0x846ca68bu;
+    return h ^ (h >> 16u);
+}
+
+// Events this close to phase 0, in turns, lie on the strobe.
+fn note_strobe() {
+    let turns = (Real(tally.step) + motion.theta) / Real(shapes[cell.flow_index].steps);
+    if turns < ON_STROBE || 1.0 - turns < ON_STROBE {
+        tally.on_strobe += 1u;
+    }
+}

@@ -1,0 +1,45 @@
+// The forcing phase: an integer step and a fraction, never a time.
+
+// Phasor at `theta` of a free step after step `n`: table and angle addition.
+fn sync_phasor() {
+    let at = phasors[shapes[cell.flow_index].phasors + tally.step];
+    let angle = motion.theta * flows[cell.flow_index].domains[0].angle;
+    let turn = small_turn(angle);
+    motion.phasor[0] = at[0] + (turn.x * at[0] - turn.y * at[1]);
+    motion.phasor[1] = at[1] + (turn.y * at[0] + turn.x * at[1]);
+}
+
+// cos - 1 and sin of an angle of at most half a radian.
+fn small_turn(angle: Real) -> vec2<Real> {
+    let s = angle * angle;
+    let c = s * (-1.0 / 2.0 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40320.0
+        + s * (-1.0 / 3628800.0 + s * (1.0 / 479001600.0 - s * (1.0 / 87178291200.0)))))));
+    let sine = 1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s * (1.0 / 362880.0
+        + s * (-1.0 / 39916800.0 + s * (1.0 / 6227020800.0))))));
+    return vec2<Real>(c, angle * sine);
+}
+
+// Moves the phase on by a part of a free step.
+fn advance_phase(part: Real) {
+    motion.theta += part;
+    if motion.theta >= 1.0 {
+        motion.theta -= 1.0;
+        tally.step += 1u;
+    }
+}
+
+// Free steps to the next mark, as far as one step can see: 1 stands for "one or more".
+fn to_mark(mark: u32) -> Real {
+    if tally.step + 1u < mark {
+        return 1.0;
+    }
+    return 1.0 - motion.theta;
+}
+
+// The step at which the lane must land: phase 0, or half a period where a cycle is read that
+// may be its own mirror image and stands halfway.
+fn next_mark() -> u32 {
+    let steps = shapes[cell.flow_index].steps;
+    let halfway = tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
+    return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
+}

@@ -1,0 +1,14 @@
+// Single precision.
+alias Real = f32;
+// Terms of a Taylor expansion over one step of at most 0.35 rad: the rest is below rounding.
+const TERMS: u32 = 9u;
+// Half a unit in the last place of 1.
+const ULP: Real = 6e-8;
+// Steps are not halved below this: what touches a wall there does so within rounding.
+const SHORTEST: Real = 0.001;
+// States beyond this are taken for a loss of finiteness.
+const HUGE: Real = 1e15;
+// Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
+const RESOLVED: u32 = 60u;
+// Events this close to phase 0, in turns, lie on it.
+const ON_STROBE: Real = 1e-6;

@@ -1,0 +1,14 @@
+// Double precision; needs SHADER_F64.
+alias Real = f64;
+// Terms of a Taylor expansion over one step of at most 0.35 rad: the rest is below rounding.
+const TERMS: u32 = 14u;
+// Half a unit in the last place of 1.
+const ULP: Real = 1.2e-16;
+// Steps are not halved below this: what touches a wall there does so within rounding.
+const SHORTEST: Real = 1e-8;
+// States beyond this are taken for a loss of finiteness.
+const HUGE: Real = 1e150;
+// Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
+const RESOLVED: u32 = 160u;
+// Events this close to phase 0, in turns, lie on it.
+const ON_STROBE: Real = 1e-9;

@@ -1,0 +1,51 @@
+// One invocation is one lane.
+
+var<private> cell: Cell;
+var<private> motion: MotionNow;
+var<private> tally: TallyNow;
+// Index of this lane.
+var<private> lane: u32;
+// Loop trips of this dispatch.
+var<private> trips: u32;
+
+// NaN compares false with everything, itself included.
+fn check_finite() {
+    let size = max(max(abs(motion.q[0]), abs(motion.q[1])), max(abs(motion.q[2]), abs(motion.q[3])));
+    let sum = abs(motion.q[0]) + abs(motion.q[1]) + abs(motion.q[2]) + abs(motion.q[3]);
+    if !(size < HUGE && sum < HUGE) {
+        tally.status = STATUS_NON_FINITE;
+        motion.q = array<Real, 4>(0.0, 0.0, 0.0, 0.0);
+    }
+}
+
+fn running() -> bool {
+    return tally.status == STATUS_OK && tally.stage != STAGE_DONE;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = id.y * settings.row + id.x;
+    if i >= settings.lanes {
+        return;
+    }
+    cell = cells[i];
+    lane = i;
+    motion = motions[i].now;
+    tally = tallies[i].now;
+    trips = 0u;
+    // Scanning and acting are separate, so that lanes scan together and act together.
+    while running() && trips < settings.trips {
+        if scan() == SCAN_BUDGET {
+            break;
+        }
+        careful();
+        if tally.passes_in_period > settings.passes_per_period {
+            tally.status = STATUS_TOO_STIFF;
+        }
+    }
+    motions[i].now = motion;
+    tallies[i].now = tally;
+    if running() {
+        atomicAdd(&live, 1u);
+    }
+}

@@ -1,0 +1,92 @@
+// The exact flow over part of a step: its Taylor series, in units of the domain's step.
+//
+// Loops over terms are marked with //% and copied out before compilation (src/gpu/unroll.rs):
+// only then do drivers keep the terms in registers.
+
+var<private> gap_terms: array<Real, TERMS>;
+var<private> x_terms: array<Real, TERMS>;
+
+// Expands the motion in domain `d` about `q` (lane units) and the present phase.
+fn expand(d: u32, q: array<Real, 4>) {
+    let g = flows[cell.flow_index].domains[d].gap_row;
+    let r = flows[cell.flow_index].domains[d].x_row;
+    let share = flows[cell.flow_index].domains[d].share;
+    let angle = flows[cell.flow_index].domains[d].angle;
+    var c = motion.phasor[0];
+    var s = motion.phasor[1];
+    gap_terms[0] = q[0];
+    gap_terms[1] = share * q[1];
+    x_terms[0] = q[2];
+    x_terms[1] = share * q[3];
+    var load_gap = g[5];
+    var load_x = r[5];
+    //% for k in 0..TERMS-2
+    {
+        let z = gap_terms[$k];
+        let w = $(k+1).0 * gap_terms[$(k+1)];
+        let x = x_terms[$k];
+        let v = $(k+1).0 * x_terms[$(k+1)];
+        let next: Real = 1.0 / ($(k+1).0 * $(k+2).0);
+        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + load_gap));
+        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + load_x));
+        load_gap = 0.0;
+        load_x = 0.0;
+        let turn = angle * (1.0 / $(k+1).0);
+        let turned = -turn * s;
+        s = turn * c;
+        c = turned;
+    }
+    //% end
+}
+
+// Bound on the derivative of order n + 1 of the gap, from the derivatives of order n and
+// n + 1 of gap and x: the energy of the differentiated motion.
+fn derivative_bound(d: u32, z: Real, w: Real, x: Real, v: Real) -> Real {
+    let e = flows[cell.flow_index].domains[d].energy;
+    let square = (e[0] * w * w + e[1] * w * v + e[2] * v * v) + (e[3] * z * z + e[4] * z * x + e[5] * x * x);
+    return 1.0001 * sqrt(max(square, Real(0.0)));
+}
+
+// Displacement of the gap from the expansion point, slope and curvature at `tau`.
+fn gap_jet(tau: Real) -> vec3<Real> {
+    var p = gap_terms[TERMS - 1u];
+    var p1: Real = 0.0;
+    var p2: Real = 0.0;
+    //% for k in 1..TERMS-1 down
+    p2 = p2 * tau + p1;
+    p1 = p1 * tau + p;
+    p = p * tau + gap_terms[$k];
+    //% end
+    // The constant term is left out: a flight from the wall keeps its relative accuracy.
+    p2 = p2 * tau + p1;
+    p1 = p1 * tau + p;
+    return vec3<Real>(p * tau, p1, 2.0 * p2);
+}
+
+// Acceleration of the gap, its slope and curvature at `tau`.
+fn pressing_jet(tau: Real) -> vec3<Real> {
+    var p: Real = 0.0;
+    var p1: Real = 0.0;
+    var p2: Real = 0.0;
+    //% for k in 2..TERMS down
+    p2 = p2 * tau + p1;
+    p1 = p1 * tau + p;
+    p = p * tau + ($k.0 * $(k-1).0) * gap_terms[$k];
+    //% end
+    return vec3<Real>(p, p1, 2.0 * p2);
+}
+
+// State at `tau` of the expansion, in lane units, as gap, rate, x, rate.
+fn state_at(tau: Real, substeps: Real) -> array<Real, 4> {
+    var z = gap_terms[TERMS - 1u];
+    var w: Real = 0.0;
+    var x = x_terms[TERMS - 1u];
+    var v: Real = 0.0;
+    //% for k in 0..TERMS-1 down
+    w = w * tau + z;
+    z = z * tau + gap_terms[$k];
+    v = v * tau + x;
+    x = x * tau + x_terms[$k];
+    //% end
+    return array<Real, 4>(z, substeps * w, x, substeps * v);
+}

@@ -1,0 +1,226 @@
+//! The GPU engine: WGSL lanes on whatever adapter there is.
+//!
+//! [`Gpu::open`] takes an adapter and compiles the lane for one precision; [`Gpu::run`]
+//! integrates lanes in batches that the adapter's limits allow, by short dispatches over
+//! state that stays on the device, and hands back one [`Record`] per lane. The engine knows
+//! no files, threads or blocking waits of its own.
+//!
+//! The lane is independent of [`crate::reference`]: it takes the model's description
+//! ([`crate::model`]) and nothing else. A fixed grid of steps with the exact propagator
+//! carries it from event to event; see `shaders/`.
+
+mod batch;
+mod constants;
+mod device;
+pub mod layout;
+mod reading;
+mod self_test;
+mod shader;
+mod signal;
+mod unroll;
+
+use std::collections::HashMap;
+
+pub use constants::{Constants, STEP_ANGLE};
+pub use device::{AdapterChoice, adapters};
+pub use shader::{Precision, Variant, WORKGROUP};
+
+use crate::model::{Law, Oscillator, State};
+use crate::record::Record;
+
+/// Why the engine could not do what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// No adapter fits.
+    #[error(
+        "no graphics adapter {wanted}; install a Vulkan driver (Debian: mesa-vulkan-drivers) or use the CPU engine. \
+         Found: {found}"
+    )]
+    NoAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        found: String,
+    },
+    /// The adapter gives no device.
+    #[error("the adapter {adapter} gives no device")]
+    NoDevice {
+        /// Its name.
+        adapter: String,
+        /// Why.
+        source: wgpu::RequestDeviceError,
+    },
+    /// The device refused a shader, a buffer or a command.
+    #[error("the device refused {what}: {message}")]
+    Refused {
+        /// What was asked of it.
+        what: &'static str,
+        /// Its words.
+        message: String,
+    },
+    /// The device ran out of memory.
+    #[error("the device has no memory for a batch of {lanes} lanes; ask for smaller batches")]
+    OutOfMemory {
+        /// Lanes of the batch.
+        lanes: usize,
+    },
+    /// The device was lost on the way.
+    #[error("the device was lost during a batch: {message}; finished batches are kept")]
+    Lost {
+        /// The driver's words.
+        message: String,
+    },
+    /// The device computes something else than what is known.
+    #[error(
+        "{adapter} fails the known answer of e = {e}, omega = {omega} by {error:.1e}: its driver cannot be trusted; \
+         choose another adapter or the CPU engine"
+    )]
+    WrongAnswer {
+        /// Name of the adapter.
+        adapter: String,
+        /// Restitution of the cell.
+        e: f64,
+        /// Frequency of the cell.
+        omega: f64,
+        /// State error.
+        error: f64,
+    },
+    /// Constants of the flows exceed what one buffer may hold.
+    #[error(
+        "{flows} flows need {needed} bytes in one buffer, the adapter allows {allowed}; run fewer flows at a time"
+    )]
+    TooManyFlows {
+        /// Number of flows.
+        flows: usize,
+        /// Bytes they need.
+        needed: u64,
+        /// Bytes the adapter allows.
+        allowed: u64,
+    },
+    /// A lane names a flow or law that was not handed in.
+    #[error("lane {lane} names flow {flow} and law {law}, but there are {flows} flows and {laws} laws")]
+    NoSuchCell {
+        /// The lane.
+        lane: usize,
+        /// Its flow.
+        flow: u32,
+        /// Its law.
+        law: u32,
+        /// Flows there are.
+        flows: usize,
+        /// Laws there are.
+        laws: usize,
+    },
+}
+
+/// One lane: which flow, which law, and where it starts at phase 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lane {
+    /// Index into the flows.
+    pub flow: u32,
+    /// Index into the laws.
+    pub law: u32,
+    /// State `(x1, v1, x2, v2)` at phase 0.
+    pub start: State,
+}
+
+/// How lanes are integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LaneSettings {
+    /// Forcing periods to integrate at most; reading the cycle of a periodic cell adds its
+    /// period to them.
+    pub periods: u32,
+    /// Periods before averages are taken. Those of periodic cells are taken over one cycle.
+    pub transient_periods: u32,
+    /// Longest period looked for, at most 64; 0 looks for none.
+    pub max_period: u32,
+    /// Whether lanes end once their period is decided.
+    pub early_stop: bool,
+    /// Whether exponents are asked for.
+    pub exponent: bool,
+    /// Periods before the exponent of aperiodic cells is accumulated.
+    pub exponent_from: u32,
+    /// Free steps per period at least; none for as many as the motion needs.
+    pub steps_per_period: Option<u32>,
+    /// Lanes per batch at most; none for what the adapter's limits allow.
+    pub batch: Option<usize>,
+    /// Loop trips that one dispatch may spend on a lane. Some drivers stop loops after
+    /// 65,535 trips in all.
+    pub trips: u32,
+    /// Invocations per workgroup.
+    pub workgroup: u32,
+    /// Passes per period beyond which a cell is refused as too stiff.
+    pub passes_per_period: u32,
+    /// Events per period beyond which a cell ends.
+    pub events_per_period: u32,
+}
+
+impl Default for LaneSettings {
+    fn default() -> Self {
+        LaneSettings {
+            periods: 528,
+            transient_periods: 400,
+            max_period: 64,
+            early_stop: true,
+            exponent: true,
+            exponent_from: 100,
+            steps_per_period: None,
+            batch: None,
+            trips: 4000,
+            workgroup: WORKGROUP,
+            passes_per_period: 20_000,
+            events_per_period: 10_000,
+        }
+    }
+}
+
+/// A device that integrates lanes in one precision.
+pub struct Gpu {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
+    precision: Precision,
+    layout: wgpu::BindGroupLayout,
+    pipelines: HashMap<Variant, wgpu::ComputePipeline>,
+    trouble: device::Trouble,
+}
+
+impl Gpu {
+    /// Opens an adapter for a precision and asks it for known answers.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] if there is none with that precision, [`GpuError::WrongAnswer`]
+    /// if it computes wrongly, and what the device refuses.
+    pub async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
+        let mut gpu = device::open(precision, choice).await?;
+        self_test::check(&mut gpu).await?;
+        Ok(gpu)
+    }
+
+    /// The adapter in use.
+    pub fn adapter(&self) -> &wgpu::AdapterInfo {
+        &self.info
+    }
+
+    /// The precision in use.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// Integrates every lane and returns its record, in the same order.
+    ///
+    /// What a lane gives depends on its own flow, law and start alone: not on batch size,
+    /// dispatch length, workgroup size or neighbours.
+    ///
+    /// # Errors
+    /// A [`GpuError`]; a lane that ends early is no error but a status in its record.
+    pub async fn run(
+        &mut self,
+        flows: &[Oscillator],
+        laws: &[Law],
+        lanes: &[Lane],
+        settings: &LaneSettings,
+    ) -> Result<Vec<Record>, GpuError> {
+        batch::run(self, flows, laws, lanes, settings).await
+    }
+}

@@ -1,0 +1,248 @@
+//! Constants of a lane, derived in f64 from the model's description.
+
+use nalgebra::{SMatrix, Vector2};
+
+use super::layout::{Domain, Flow};
+use crate::model;
+
+/// Largest angle, in radians, that the fastest mode may turn in one step: Taylor series and
+/// certificate of the shaders are laid out for it.
+pub const STEP_ANGLE: f64 = 0.35;
+
+/// Terms of the matrix exponential over one step; rates times steps are below 1.
+const EXPONENTIAL_TERMS: u32 = 30;
+
+type Generator = SMatrix<f64, 7, 7>;
+
+/// The constants of one oscillator and the phasors of its steps.
+#[derive(Clone, Debug)]
+pub struct Constants {
+    /// What the shader reads.
+    pub flow: Flow,
+    /// Free steps per forcing period.
+    pub steps: u32,
+    /// `(cos, sin)` at every step, the end included.
+    pub phasors: Vec<[f64; 2]>,
+    /// Whether the mirror image of a motion is a motion.
+    pub mirror_symmetric: bool,
+    gap: [f64; 2],
+}
+
+/// Second-order form `y'' = -stiffness y - damping y' + force cos + load` of a domain, in
+/// the displacements `(z, x2)`.
+struct Equations {
+    stiffness: [[f64; 2]; 2],
+    damping: [[f64; 2]; 2],
+    force: [f64; 2],
+    load: [f64; 2],
+}
+
+impl Constants {
+    /// Derives the constants, with `steps` free steps per period or as many as the motion
+    /// needs. None if a step would be longer than the series carry, or shorter than a lane
+    /// can count.
+    pub fn new(oscillator: &model::Oscillator, steps: Option<u32>) -> Option<Constants> {
+        let period = oscillator.period();
+        let needed = (period * rate(oscillator, &oscillator.free) / STEP_ANGLE).ceil().max(8.0);
+        // Even, so that half a period is a step, too.
+        let steps = 2.0 * (0.5 * f64::from(steps.unwrap_or(0)).max(needed)).ceil();
+        if !(steps.is_finite() && steps < f64::from(1u32 << 24)) {
+            return None;
+        }
+        let h = period / steps;
+        let substeps = |domain: &model::Domain| {
+            (h * rate(oscillator, domain) / STEP_ANGLE).max(1.0).log2().ceil().exp2()
+        };
+        let [right, left] = oscillator.meshing;
+        let domain = |d: &model::Domain, wall: f64, substeps: f64| domain(oscillator, d, wall, h, substeps);
+        let flow = Flow {
+            domains: [
+                domain(&oscillator.free, 0.0, 1.0),
+                domain(&right, oscillator.walls[0], substeps(&right)),
+                domain(&left, oscillator.walls[1], substeps(&left)),
+            ],
+            walls: oscillator.walls,
+            kick: kick(oscillator),
+            h,
+        };
+        let steps = steps as u32;
+        Some(Constants {
+            flow,
+            steps,
+            phasors: phasors(steps),
+            mirror_symmetric: oscillator.mirror_symmetric(),
+            gap: oscillator.gap,
+        })
+    }
+
+    /// Lane units `(z, z', x2, x2')` of a state `(x1, v1, x2, v2)`.
+    pub fn to_lane(&self, y: model::State) -> [f64; 4] {
+        let [g0, g1] = self.gap;
+        let h = self.flow.h;
+        [g0 * y[0] + g1 * y[2], h * (g0 * y[1] + g1 * y[3]), y[2], h * y[3]]
+    }
+
+    /// The state of lane units.
+    pub fn to_state(&self, q: [f64; 4]) -> model::State {
+        let [g0, g1] = self.gap;
+        let (w, v) = (q[1] / self.flow.h, q[3] / self.flow.h);
+        [(q[0] - g1 * q[2]) / g0, (w - g1 * v) / g0, q[2], v]
+    }
+}
+
+/// Share of the contact impulse, per unit of gap rate, that the second displacement takes.
+fn kick(oscillator: &model::Oscillator) -> f64 {
+    let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses);
+    -(g1 / m2) / (g0 * g0 / m1 + g1 * g1 / m2)
+}
+
+fn phasors(steps: u32) -> Vec<[f64; 2]> {
+    (0..=steps)
+        .map(|n| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(n % steps) / f64::from(steps)).sin_cos();
+            [cos, sin]
+        })
+        .collect()
+}
+
+/// A bound on all rates of a domain: the forcing, and the spectral norms of the mass-scaled
+/// system.
+fn rate(oscillator: &model::Oscillator, domain: &model::Domain) -> f64 {
+    let root = Vector2::from(oscillator.masses).map(|m| m.sqrt().recip());
+    let norm = |m: [[f64; 2]; 2]| {
+        let scaled = [m[0][0] * root[0] * root[0], m[0][1] * root[0] * root[1], m[1][1] * root[1] * root[1]];
+        let (mean, half) = (0.5 * (scaled[0] + scaled[2]), 0.5 * (scaled[0] - scaled[2]));
+        mean.abs() + half.hypot(scaled[1])
+    };
+    (0.5 * norm(domain.damping) + norm(domain.stiffness).sqrt()).max(oscillator.omega)
+}
+
+/// The equations in `(z, x2)`, the gap measured from `wall`.
+fn equations(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64) -> Equations {
+    let ([g0, g1], m) = (oscillator.gap, oscillator.masses);
+    // x1 = (z - g1 x2) / g0 turns columns, z = g . x turns rows.
+    let turned = |a: [[f64; 2]; 2]| {
+        let row = |i: usize| {
+            let [p, q] = [a[i][0] / m[i], a[i][1] / m[i]];
+            [p / g0, q - p * g1 / g0]
+        };
+        let (first, second) = (row(0), row(1));
+        [[g0 * first[0] + g1 * second[0], g0 * first[1] + g1 * second[1]], second]
+    };
+    let projected = |f: [f64; 2]| [g0 * f[0] / m[0] + g1 * f[1] / m[1], f[1] / m[1]];
+    let stiffness = turned(domain.stiffness);
+    let load = projected(domain.load);
+    Equations {
+        damping: turned(domain.damping),
+        force: projected(oscillator.force),
+        load: [load[0] - stiffness[0][0] * wall, load[1] - stiffness[1][0] * wall],
+        stiffness,
+    }
+}
+
+fn domain(
+    oscillator: &model::Oscillator,
+    domain: &model::Domain,
+    wall: f64,
+    free_step: f64,
+    substeps: f64,
+) -> Domain {
+    let h = free_step / substeps;
+    let angle = oscillator.omega * h;
+    let equations = equations(oscillator, domain, wall);
+    let row = |i: usize| {
+        let (k, c) = (equations.stiffness[i], equations.damping[i]);
+        [
+            -k[0] * h * h,
+            -c[0] * h,
+            -k[1] * h * h,
+            -c[1] * h,
+            equations.force[i] * h * h,
+            equations.load[i] * h * h,
+        ]
+    };
+    let (gap_row, x_row) = (row(0), row(1));
+    let (energy, growth) = gap_bound(oscillator, domain, h);
+    Domain {
+        step: step(&gap_row, &x_row, angle),
+        gap_row,
+        x_row,
+        energy,
+        growth: growth * angle.powi(5),
+        angle,
+        turn_less: -2.0 * (0.5 * angle).sin().powi(2),
+        turn_sin: angle.sin(),
+        share: substeps.recip(),
+        substeps,
+        powers: powers(&gap_row, &x_row),
+    }
+}
+
+/// `exp(G) - 1` of the generator on `(z, z', x, x', cos, sin, 1)`, its first four rows.
+fn step(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> [f64; 28] {
+    let propagator = propagator(gap_row, x_row, angle);
+    std::array::from_fn(|i| propagator[(i / 7, i % 7)])
+}
+
+/// The unforced propagators of 1, 2, 4, ... 128 steps, less the identity.
+fn powers(gap_row: &[f64; 6], x_row: &[f64; 6]) -> [f64; 128] {
+    let whole = propagator(gap_row, x_row, 0.0);
+    let mut less = whole.fixed_view::<4, 4>(0, 0).into_owned();
+    let mut powers = [0.0; 128];
+    for power in powers.chunks_mut(16) {
+        for (i, entry) in power.iter_mut().enumerate() {
+            *entry = less[(i / 4, i % 4)];
+        }
+        // (1 + L)^2 - 1
+        less = 2.0 * less + less * less;
+    }
+    powers
+}
+
+fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
+    let mut g = Generator::zeros();
+    g[(0, 1)] = 1.0;
+    g[(2, 3)] = 1.0;
+    for (i, row) in [(1, gap_row), (3, x_row)] {
+        for j in 0..5 {
+            g[(i, j)] = row[j];
+        }
+        g[(i, 6)] = row[5];
+    }
+    g[(4, 5)] = -angle;
+    g[(5, 4)] = angle;
+    // Horner, so that small terms are added first.
+    let mut sum = Generator::zeros();
+    for n in (1..=EXPONENTIAL_TERMS).rev() {
+        sum = g * (Generator::identity() + sum) / f64::from(n);
+    }
+    sum
+}
+
+/// The energy bound on derivatives of the gap, in units of the step.
+///
+/// `y^(n)` obeys the same equations with the force times `omega^n` and no load, and its
+/// energy `2 E = sum m_i v_i^2 + x K x` grows by the force alone. So with
+/// `c^2 = sum g_i^2 / m_i`
+///
+/// ```text
+/// |z^(n+1)| <= c sqrt(2 E_n),   d sqrt(2 E_n) / dt <= omega^n sqrt(sum force_i^2 / m_i).
+/// ```
+///
+/// Returns the form `c^2 2 E` on `(w^2, w v, v^2, z^2, z x, x^2)` and the growth of its
+/// root per step, less the factor `angle^n`.
+fn gap_bound(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> ([f64; 6], f64) {
+    let ([g0, g1], [m1, m2], k) = (oscillator.gap, oscillator.masses, domain.stiffness);
+    let compliance = g0 * g0 / m1 + g1 * g1 / m2;
+    // A symmetric form on (x1, x2), written in (z, x2).
+    let in_gap = |a: f64, b: f64, c: f64| {
+        let slope = -g1 / g0;
+        [a / (g0 * g0), 2.0 * (a * slope + b) / g0, a * slope * slope + 2.0 * b * slope + c]
+    };
+    let kinetic = in_gap(m1, 0.0, m2).map(|x| x * compliance);
+    let potential = in_gap(k[0][0], k[0][1], k[1][1]).map(|x| x * compliance * h * h);
+    let [f1, f2] = oscillator.force;
+    let force = (f1 * f1 / m1 + f2 * f2 / m2).sqrt();
+    let form = [kinetic[0], kinetic[1], kinetic[2], potential[0], potential[1], potential[2]];
+    (form, compliance.sqrt() * force * h * h)
+}

@@ -1,0 +1,228 @@
+//! The host's twins of the structs in `shaders/layout.wgsl`.
+//!
+//! Structs of reals are written once, in f64, and rounded number by number for the f32
+//! variant: they hold nothing else, so both precisions have the same shape.
+
+use bytemuck::{Pod, Zeroable};
+
+/// One linear domain in units of its own step; see the shader for the meaning of each field.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Domain {
+    /// Propagator of one step less the identity, row by row.
+    pub step: [f64; 28],
+    /// Acceleration of the gap.
+    pub gap_row: [f64; 6],
+    /// Acceleration of the second displacement.
+    pub x_row: [f64; 6],
+    /// Quadratic form that bounds the gap's derivatives.
+    pub energy: [f64; 6],
+    /// Growth of that bound per step.
+    pub growth: f64,
+    /// Forcing angle per step.
+    pub angle: f64,
+    /// `cos - 1` of it.
+    pub turn_less: f64,
+    /// `sin` of it.
+    pub turn_sin: f64,
+    /// Free steps per step of this domain.
+    pub share: f64,
+    /// Steps of this domain per free step.
+    pub substeps: f64,
+    /// Homogeneous propagators of 1, 2, 4, ... 128 steps, less the identity.
+    pub powers: [f64; 128],
+}
+
+/// All that is common to lanes that differ in the contact law alone.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Flow {
+    /// Free motion, meshing on the right, meshing on the left.
+    pub domains: [Domain; 3],
+    /// Right and left wall.
+    pub walls: [f64; 2],
+    /// Share of the contact impulse that the second displacement takes.
+    pub kick: f64,
+    /// Length of a free step.
+    pub h: f64,
+}
+
+/// Whole numbers that belong to a [`Flow`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct FlowShape {
+    /// Free steps per forcing period.
+    pub steps: u32,
+    /// Index of its first phasor.
+    pub phasors: u32,
+}
+
+/// The contact law of a cell.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Law {
+    /// Coefficient of restitution.
+    pub restitution: f64,
+    /// Leaving speed up to which a pressed contact becomes meshing.
+    pub mesh_speed: f64,
+}
+
+/// What a lane integrates.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Cell {
+    /// Index of its flow.
+    pub flow_index: u32,
+    /// Index of its law.
+    pub law_index: u32,
+}
+
+/// Settings of one dispatch.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Settings {
+    /// Lanes in the buffers.
+    pub lanes: u32,
+    /// Forcing periods to integrate.
+    pub periods: u32,
+    /// Loop trips that one dispatch may spend on a lane.
+    pub trips: u32,
+    /// Passes allowed in one period.
+    pub passes_per_period: u32,
+    /// Events allowed in one period.
+    pub events_per_period: u32,
+    /// Invocations along the first dimension of a dispatch.
+    pub row: u32,
+    /// Periods before averages are taken.
+    pub transient_periods: u32,
+    /// Periods before the exponent is accumulated.
+    pub exponent_from: u32,
+    /// Periods per block of the exponent.
+    pub exponent_block: u32,
+    /// Longest period looked for; 0 looks for none.
+    pub max_period: u32,
+    /// 1: lanes end once their period is decided.
+    pub early_stop: u32,
+}
+
+/// The motion of a lane between dispatches.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Motion {
+    /// Gap (from the wall while meshing), its rate, second displacement, its rate; rates
+    /// per free step.
+    pub q: [f64; 4],
+    /// Forcing phasor.
+    pub phasor: [f64; 2],
+    /// Fraction of the free step that has passed.
+    pub theta: f64,
+    /// Bound on the sixth derivative of the gap.
+    pub bound: f64,
+    /// Time spent meshing in parts of steps, in free steps, less the whole ones.
+    pub mesh_part: f64,
+    /// Growth of the present block, in octaves.
+    pub block_growth: f64,
+    /// Sum of the whole blocks' growth.
+    pub growth_sum: f64,
+    /// Sum of its squares.
+    pub growth_squares: f64,
+    /// Strobe state that later ones are compared with.
+    pub anchor: [f64; 4],
+    /// Largest position at strobes.
+    pub position_scale: f64,
+    /// Largest rate at strobes.
+    pub rate_scale: f64,
+    /// Tangent vectors in lane units.
+    pub tangents: [f64; 16],
+}
+
+/// The counting of a lane between dispatches.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Tally {
+    /// Free steps since phase 0.
+    pub step: u32,
+    /// What governs the motion.
+    pub mode: u32,
+    /// Wall of the last event.
+    pub origin: u32,
+    /// Order of the root of the distance from that wall at the start.
+    pub order: u32,
+    /// Forcing periods completed.
+    pub period: u32,
+    /// Status code.
+    pub status: u32,
+    /// Steps taken in this period.
+    pub passes_in_period: u32,
+    /// Events in this period.
+    pub events_in_period: u32,
+    /// Impacts so far.
+    pub impacts: u32,
+    /// Events so far.
+    pub events: u32,
+    /// Whole steps of the right meshing domain.
+    pub mesh_right: u32,
+    /// Whole steps of the left meshing domain.
+    pub mesh_left: u32,
+    /// Whole free steps of meshing, made of parts of steps.
+    pub mesh_whole: u32,
+    /// Events too near to grazing.
+    pub grazes: u32,
+    /// Running, reading the cycle, done.
+    pub stage: u32,
+    /// Periods of the cycle still to be read.
+    pub to_read: u32,
+    /// 1 once a cycle is being read or has been.
+    pub has_read: u32,
+    /// Period at which counting began.
+    pub counted_from: u32,
+    /// Full steps that the tangent vectors have not taken yet.
+    pub pending: u32,
+    /// Tangent vectors carried.
+    pub tangent_count: u32,
+    /// Whole blocks of the exponent.
+    pub blocks: u32,
+    /// Periods in the present block.
+    pub block_periods: u32,
+    /// When the anchor was taken.
+    pub anchor_period: u32,
+    /// Lags of the present window.
+    pub window: u32,
+    /// Smallest lag that recurs and contracts.
+    pub candidate: u32,
+    /// Windows for which it has.
+    pub streak: u32,
+    /// Lags that the last window held.
+    pub known_lags: u32,
+    /// 1 if the candidate's limit is near.
+    pub settled: u32,
+    /// Symbols of the cycle.
+    pub word_length: u32,
+    /// Hash of the stretches of symbols so far, low half.
+    pub hash_low: u32,
+    /// High half.
+    pub hash_high: u32,
+    /// The latest symbols, three bits each.
+    pub recent: u32,
+    /// Events on the strobe phase.
+    pub on_strobe: u32,
+    /// Whether the cycle is its own mirror image.
+    pub symmetric: u32,
+    /// Distances per lag, in bytes.
+    pub distances: [u32; 16],
+    /// The same of the last window.
+    pub last_distances: [u32; 16],
+    /// Symbols of the cycle, ten to a number.
+    pub word: [u32; 7],
+}
+
+/// [`Tally::mode`]: between the walls.
+pub const MODE_FREE: u32 = 0;
+/// [`Tally::mode`]: beyond a wall; plus the side.
+pub const MODE_PRESSED: u32 = 1;
+/// [`Tally::stage`]: going on.
+pub const STAGE_RUNNING: u32 = 0;
+/// [`Tally::stage`]: ended.
+pub const STAGE_DONE: u32 = 2;
+/// [`Tally::origin`]: no event yet.
+pub const SIDE_NONE: u32 = 2;

@@ -1,0 +1,78 @@
+//! Shader variants: one source, put together from small files.
+
+use super::unroll::unroll;
+
+/// Precision of a variant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Precision {
+    /// Single precision, on every adapter.
+    F32,
+    /// Double precision, where the adapter has `SHADER_F64`.
+    F64,
+}
+
+impl Precision {
+    /// Both precisions.
+    pub const ALL: [Precision; 2] = [Precision::F32, Precision::F64];
+
+    /// Bytes of a real number.
+    pub fn bytes(self) -> usize {
+        match self {
+            Precision::F32 => 4,
+            Precision::F64 => 8,
+        }
+    }
+}
+
+/// What is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Variant {
+    /// Precision of the motion.
+    pub precision: Precision,
+    /// Invocations per workgroup.
+    pub workgroup: u32,
+    /// Whether tangent vectors are carried.
+    pub exponent: bool,
+}
+
+/// Invocations per workgroup where nothing else is asked for.
+pub const WORKGROUP: u32 = 64;
+
+/// All but the precision.
+const BODY: &str = concat!(
+    include_str!("../../shaders/layout.wgsl"),
+    include_str!("../../shaders/phase.wgsl"),
+    include_str!("../../shaders/gear_pair.wgsl"),
+    include_str!("../../shaders/taylor.wgsl"),
+    include_str!("../../shaders/flight.wgsl"),
+    include_str!("../../shaders/events.wgsl"),
+    include_str!("../../shaders/tangent.wgsl"),
+    include_str!("../../shaders/observe.wgsl"),
+    include_str!("../../shaders/sweep.wgsl"),
+);
+
+impl Variant {
+    /// The variant of a precision with the usual workgroup.
+    pub fn of(precision: Precision) -> Variant {
+        Variant { precision, workgroup: WORKGROUP, exponent: true }
+    }
+
+    /// Its WGSL source.
+    pub fn source(&self) -> String {
+        let real = match self.precision {
+            Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
+            Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
+        };
+        let Variant { workgroup, exponent, .. } = self;
+        let terms = terms(real);
+        let body = unroll(BODY, terms);
+        format!("{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n{body}")
+    }
+}
+
+/// The number of Taylor terms that a precision's file declares.
+fn terms(real: &str) -> u32 {
+    let (_, after) = real.split_once("const TERMS: u32 = ").expect("the precision declares TERMS");
+    let (number, _) = after.split_once("u;").expect("TERMS is a number");
+    number.parse().expect("TERMS is a number")
+}

@@ -1,0 +1,65 @@
+//! Unrolling of the shaders' series.
+//!
+//! Drivers keep an array in registers only where every index is a constant, and unroll no
+//! loop that carries a bound. So loops over Taylor terms are written with a marker,
+//!
+//! ```text
+//! //% for k in FIRST..LAST      (or LAST-1 down to FIRST: "for k in FIRST..LAST down")
+//! ... $k ... $(k+1) ... $(k-1) ...
+//! //% end
+//! ```
+//!
+//! and copied out once per term before they are compiled.
+
+/// The source with every marked loop copied out; `terms` stands for `TERMS` in its bounds.
+pub(super) fn unroll(source: &str, terms: u32) -> String {
+    let mut out = String::with_capacity(4 * source.len());
+    let mut lines = source.lines();
+    while let Some(line) = lines.next() {
+        let Some(header) = line.trim().strip_prefix("//% for k in ") else {
+            out.push_str(line);
+            out.push('\n');
+            continue;
+        };
+        let body: Vec<&str> = lines.by_ref().take_while(|line| line.trim() != "//% end").collect();
+        for k in indices(header, terms) {
+            for line in &body {
+                out.push_str(&with_index(line, k));
+                out.push('\n');
+            }
+        }
+    }
+    out
+}
+
+/// The values that a header runs through.
+fn indices(header: &str, terms: u32) -> Vec<u32> {
+    let (range, down) = header.strip_suffix(" down").map_or((header, false), |range| (range, true));
+    let bound = |text: &str| match text.strip_prefix("TERMS-") {
+        Some(less) => terms - less.parse::<u32>().expect("a marker ends in a number"),
+        None if text == "TERMS" => terms,
+        None => text.parse().expect("a marker's bound is a number"),
+    };
+    let (first, last) = range.split_once("..").expect("a marker names a range");
+    let all = bound(first)..bound(last);
+    if down { all.rev().collect() } else { all.collect() }
+}
+
+fn with_index(line: &str, k: u32) -> String {
+    line.replace("$(k+2)", &(k + 2).to_string())
+        .replace("$(k+1)", &(k + 1).to_string())
+        .replace("$(k-1)", &k.wrapping_sub(1).to_string())
+        .replace("$k", &k.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_marked_loop_is_copied_out() {
+        let source = "a\n  //% for k in 1..TERMS-1 down\n  t[$(k+1)] = t[$k] + t[$(k-1)];\n  //% end\nb\n";
+        assert_eq!(unroll(source, 4), "a\n  t[3] = t[2] + t[1];\n  t[2] = t[1] + t[0];\nb\n");
+        assert_eq!(unroll("//% for k in 0..TERMS\n$k.0\n//% end", 2), "0.0\n1.0\n");
+    }
+}

@@ -1,0 +1,270 @@
+//! The same cells on the reference and on the lanes, in both precisions.
+//!
+//! No adapter is a failure: install a software driver (see `scripts/test.sh`).
+
+use rattlemap::flow::Flow;
+use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::model::{GearPair, State};
+use rattlemap::orbit::Status;
+use rattlemap::record::Record;
+use rattlemap::reference::Trajectory;
+use rayon::prelude::*;
+
+const REST: State = [0.0; 4];
+
+fn pair(e: f64, omega: f64) -> GearPair {
+    GearPair { omega, ..GearPair::paper(e) }
+}
+
+fn open(precision: Precision) -> Gpu {
+    pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap()
+}
+
+/// One record per cell and start.
+fn run(gpu: &mut Gpu, cells: &[(GearPair, State)], settings: &LaneSettings) -> Vec<Record> {
+    let flows: Vec<_> = cells.iter().map(|(pair, _)| pair.oscillator().unwrap()).collect();
+    let laws: Vec<_> = cells.iter().map(|(pair, _)| pair.law()).collect();
+    let lanes: Vec<_> = (0u32..).zip(cells).map(|(i, &(_, start))| Lane { flow: i, law: i, start }).collect();
+    pollster::block_on(gpu.run(&flows, &laws, &lanes, settings)).unwrap()
+}
+
+fn periods(periods: u32) -> LaneSettings {
+    // So many periods and nothing else.
+    let only = LaneSettings {
+        transient_periods: 0,
+        max_period: 0,
+        early_stop: false,
+        exponent: false,
+        ..LaneSettings::default()
+    };
+    LaneSettings { periods, ..only }
+}
+
+/// Strobe states of the reference after `periods` and one more.
+fn reference(pair: &GearPair, start: State, periods: u32) -> [State; 2] {
+    let flow = Flow::new(&pair.oscillator().unwrap());
+    let mut trajectory = Trajectory::new(&flow, pair.law(), start);
+    for _ in 0..periods {
+        trajectory.advance_period(&mut ()).unwrap();
+    }
+    let at = trajectory.state();
+    trajectory.advance_period(&mut ()).unwrap();
+    [at, trajectory.state()]
+}
+
+fn apart(a: &State, b: &State) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Largest state error allowed in each precision.
+fn bar(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-3,
+        Precision::F64 => 1e-9,
+    }
+}
+
+/// How far the reference itself ends from where it does, if its start is moved by about the
+/// rounding of a precision: large where a chaotic transient chooses between attractors.
+fn sensitivity(pair: &GearPair, horizon: u32, precision: Precision) -> f64 {
+    let nudge = match precision {
+        Precision::F32 => 1e-6,
+        Precision::F64 => 1e-14,
+    };
+    let centre = reference(pair, REST, horizon)[0];
+    let ends = (0..8).map(|i| {
+        let mut start = REST;
+        start[i % 4] = if i < 4 { nudge } else { -nudge };
+        apart(&reference(pair, start, horizon)[0], &centre)
+    });
+    ends.fold(0.0, f64::max)
+}
+
+/// Compares cells after `horizon` periods, all of them within `bar` of the reference.
+fn check(cells: &[(GearPair, State)], horizon: u32, bar: impl Fn(Precision) -> f64) {
+    let truth: Vec<_> = cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
+    for precision in Precision::ALL {
+        let records = run(&mut open(precision), cells, &periods(horizon));
+        for ((record, truth), (pair, start)) in records.iter().zip(&truth).zip(cells) {
+            let at = format!("{precision:?}, e = {}, omega = {} from {start:?}", pair.e, pair.omega);
+            assert_eq!(record.status, Status::Ok.code(), "{at}");
+            assert_eq!(record.periods_run, horizon, "{at}");
+            let error = apart(&record.strobe, truth);
+            assert!(error < bar(precision), "{at}: off by {error:.2e}: {:?} {truth:?}", record.strobe);
+        }
+    }
+}
+
+/// The strobe state of stable period-1 cells over the plane.
+#[test]
+fn stable_cells_of_the_plane_agree() {
+    const HORIZON: u32 = 200;
+    const SIDE: u32 = 27;
+    let step = |i: u32, lo: f64, hi: f64| lo + (hi - lo) * f64::from(i) / f64::from(SIDE - 1);
+    let all: Vec<_> =
+        (0..SIDE * SIDE).map(|i| (pair(step(i % SIDE, 0.0, 1.0), step(i / SIDE, 1.0, 12.0)), REST)).collect();
+    let (cells, truth): (Vec<_>, Vec<State>) = all
+        .into_par_iter()
+        .filter_map(|cell| {
+            let [at, next] = reference(&cell.0, cell.1, HORIZON);
+            (apart(&at, &next) < 1e-10).then_some((cell, at))
+        })
+        .unzip();
+    assert!(cells.len() >= 400, "{} stable cells are too few", cells.len());
+    for (precision, median_bar, bar_99, worst_bar) in
+        [(Precision::F64, 1e-12, 1e-10, 1e-9), (Precision::F32, 2e-6, 2e-4, 1e-3)]
+    {
+        let records = run(&mut open(precision), &cells, &periods(HORIZON));
+        let mut errors: Vec<_> = records
+            .iter()
+            .zip(&truth)
+            .zip(&cells)
+            .map(|((record, truth), (pair, _))| (apart(&record.strobe, truth), pair.e, pair.omega))
+            .collect();
+        errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let at = |share: usize| errors[(errors.len() - 1) * share / 100];
+        println!(
+            "{precision:?}: {} cells, median {:?}, 99 % {:?}, worst {:?}",
+            errors.len(),
+            at(50),
+            at(99),
+            at(100)
+        );
+        assert!(at(50).0 < median_bar, "{precision:?}: median {:?}", at(50));
+        assert!(at(99).0 < bar_99, "{precision:?}: 99 % {:?}", at(99));
+        for &(error, e, omega) in errors.iter().filter(|(error, ..)| *error > worst_bar) {
+            let own = sensitivity(&pair(e, omega), HORIZON, precision);
+            assert!(
+                own > 0.1 * error,
+                "{precision:?}, e = {e}, omega = {omega}: off by {error:.2e}, sensitive to {own:.2e}"
+            );
+        }
+    }
+}
+
+/// Every kind of motion over a horizon short enough for chaos.
+#[test]
+fn scenarios_agree() {
+    let on_wall = |w: f64| [0.25, 0.5 + w, -0.25, 0.5];
+    let cells = [
+        (pair(0.5, 11.5), REST),                 // no contact
+        (pair(0.605, 5.6), REST),                // impacts on both walls
+        (pair(0.06, 5.6), REST),                 // meshing on both sides
+        (pair(0.0, 2.0), REST),                  // meshing without restitution
+        (pair(0.56, 1.5), REST),                 // chatter into meshing
+        (pair(0.72, 1.5), REST),                 // long chatter
+        (pair(0.7, 5.4), REST),                  // chaos
+        (pair(0.606, 5.6), REST),                // grazing chaos
+        (pair(0.5, 5.6), on_wall(1.0)),          // starts on the wall, closing
+        (pair(0.5, 5.6), on_wall(-1.0)),         // starts on the wall, leaving
+        (pair(0.5, 5.6), on_wall(0.0)),          // starts at rest on the wall
+        (pair(0.3, 4.0), [0.4, 0.0, -0.2, 0.0]), // starts meshing on the right
+        (pair(0.3, 4.0), [-0.4, 0.0, 0.2, 0.0]), // starts meshing on the left
+    ];
+    check(&cells, 6, bar);
+    // No loss at the walls: errors grow twentyfold in a period.
+    check(&[(pair(1.0, 3.0), REST)], 2, bar);
+}
+
+/// `z = A cos(omega t)` with the amplitude a hair below or above the wall: free flight that
+/// misses it by less than any grid shows, and one that touches it.
+#[test]
+fn a_graze_is_neither_missed_nor_made_up() {
+    let e = 0.8;
+    for hair in [1e-3, 1e-5] {
+        for sign in [-1.0, 1.0] {
+            let omega = 10.5;
+            let stiff = GearPair { k1: 30.0, r1: 0.0, r2: 0.0, ..pair(e, omega) };
+            // The steady response of gear 1 alone; gear 2 is at rest.
+            let unit = 1.0 / (stiff.k1 - stiff.m1 * omega * omega);
+            let amplitude = -(stiff.b + sign * hair);
+            let grazing = GearPair { force: amplitude / unit, ..stiff };
+            let start = [amplitude, 0.0, 0.0, 0.0];
+            // Starts a turn away from the wall in phase where it is beyond it.
+            let start = if sign > 0.0 { [0.0; 4] } else { start };
+            let truth = reference(&grazing, start, 2)[0];
+            for precision in Precision::ALL {
+                let record = run(&mut open(precision), &[(grazing, start)], &periods(2))[0];
+                let error = apart(&record.strobe, &truth);
+                assert!(error < bar(precision), "{precision:?}, {hair} {sign}: {error:.2e}");
+                if sign < 0.0 {
+                    assert_eq!(record.impacts_per_period, 0.0, "{precision:?}: an impact made up");
+                }
+            }
+        }
+    }
+}
+
+fn table() -> Vec<(GearPair, bool)> {
+    let mut reader = csv::Reader::from_path("tests/data/cells.csv").unwrap();
+    reader
+        .records()
+        .map(|row| {
+            let row = row.unwrap();
+            (pair(row[0].parse().unwrap(), row[1].parse().unwrap()), &row[2] == "periodic")
+        })
+        .collect()
+}
+
+/// Every row of the independent program's table: from rest over a short horizon, and the
+/// periodic ones after a long transient.
+#[test]
+fn every_row_of_the_table_agrees() {
+    let rows = table();
+    assert_eq!(rows.len(), 40);
+    let all: Vec<_> = rows.iter().map(|&(pair, _)| (pair, REST)).collect();
+    check(&all, 4, bar);
+    let periodic: Vec<_> =
+        rows.iter().filter(|(_, periodic)| *periodic).map(|&(pair, _)| (pair, REST)).collect();
+    check(&periodic, 300, bar);
+}
+
+/// Batch size, dispatch length and workgroup size change nothing, to the bit.
+#[test]
+fn results_do_not_depend_on_how_the_work_is_cut() {
+    let cells: Vec<_> = table().into_iter().map(|(pair, _)| (pair, REST)).collect();
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        let everything = LaneSettings { periods: 80, transient_periods: 20, ..LaneSettings::default() };
+        let settings = LaneSettings { exponent_from: 10, ..everything };
+        let whole = run(&mut gpu, &cells, &settings);
+        for (batch, trips, workgroup) in [(Some(7), 4000, 64), (None, 333, 64), (Some(33), 1000, 32)] {
+            let cut = run(&mut gpu, &cells, &LaneSettings { batch, trips, workgroup, ..settings });
+            assert!(whole == cut, "{precision:?}: batch {batch:?}, trips {trips}, workgroup {workgroup}");
+        }
+    }
+}
+
+/// Hostile parameters end in a status of their own and leave their neighbours alone.
+#[test]
+fn hostile_lanes_end_in_a_status() {
+    let ordinary: Vec<_> = (0..9).map(|i| (pair(0.1 * f64::from(i), 5.6), REST)).collect();
+    let hostile = [
+        (GearPair { k: 1e13, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
+        (GearPair { omega: 1e-6, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
+        (GearPair { mesh_speed: 0.0, ..pair(0.98, 0.1) }, REST, Status::CapEvents),
+        (GearPair { force: 1e300, ..pair(0.5, 5.6) }, REST, Status::NonFinite),
+        (pair(0.5, 5.6), [f64::NAN, 0.0, 0.0, 0.0], Status::NonFinite),
+    ];
+    let mut mixed = Vec::new();
+    for (i, cell) in ordinary.iter().enumerate() {
+        mixed.push(*cell);
+        if let Some(&(pair, start, _)) = hostile.get(i) {
+            mixed.push((pair, start));
+        }
+    }
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        let alone = run(&mut gpu, &ordinary, &periods(5));
+        let together = run(&mut gpu, &mixed, &periods(5));
+        for (i, record) in alone.iter().enumerate() {
+            let at = if i <= hostile.len() { 2 * i } else { i + hostile.len() };
+            assert!(*record == together[at], "{precision:?}: ordinary lane {i} was disturbed");
+        }
+        for (i, (pair, _, status)) in hostile.iter().enumerate() {
+            let record = &together[2 * i + 1];
+            assert_eq!(record.status, status.code(), "{precision:?}: {pair:?}");
+            assert!(record.strobe.iter().all(|x| x.is_finite()), "{precision:?}: {pair:?}");
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Every shader variant, without an adapter: it parses, it is valid, and its structs lie in
+//! memory as the host's do.
+
+use std::mem::{offset_of, size_of};
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use rattlemap::gpu::{Precision, Variant, layout};
+
+fn module(variant: Variant) -> naga::Module {
+    let source = variant.source();
+    let module = naga::front::wgsl::parse_str(&source)
+        .unwrap_or_else(|error| panic!("{variant:?}: {}", error.emit_to_string(&source)));
+    let capabilities = match variant.precision {
+        Precision::F32 => Capabilities::empty(),
+        Precision::F64 => Capabilities::FLOAT64,
+    };
+    Validator::new(ValidationFlags::all(), capabilities)
+        .validate(&module)
+        .unwrap_or_else(|error| panic!("{variant:?}: {}", error.emit_to_string(&source)));
+    module
+}
+
+/// Members of a struct as `(name, offset)`, and its size.
+fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
+    let (_, ty) = module
+        .types
+        .iter()
+        .find(|(_, ty)| ty.name.as_deref() == Some(name))
+        .unwrap_or_else(|| panic!("the shader has no struct {name}"));
+    let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
+    // A struct within a struct is read as its members.
+    let flat = members.iter().flat_map(|m| match &module.types[m.ty].inner {
+        naga::TypeInner::Struct { members, .. } => {
+            members.iter().map(|inner| (inner.name.clone(), m.offset + inner.offset)).collect()
+        }
+        _ => vec![(m.name.clone(), m.offset)],
+    });
+    (flat.map(|(name, offset)| (name.unwrap_or_default(), offset)).collect(), *span)
+}
+
+/// Compares a struct field by field; `bytes` is the size of the shader's numbers, `host` that
+/// of the host's.
+macro_rules! same_layout {
+    ($module:expr, $host:ty, $bytes:expr, $host_bytes:expr, [$($field:ident),* $(,)?]) => {{
+        let name = stringify!($host).rsplit("::").next().unwrap().trim();
+        let (members, span) = shape($module, name);
+        let scaled = |bytes: usize| (bytes / $host_bytes * $bytes) as u32;
+        let expected: Vec<(String, u32)> =
+            vec![$((stringify!($field).to_owned(), scaled(offset_of!($host, $field)))),*];
+        assert_eq!(members, expected, "{name}");
+        assert_eq!(span, scaled(size_of::<$host>()), "{name}");
+    }};
+}
+
+#[test]
+fn every_variant_is_valid_and_lies_as_the_host_says() {
+    for precision in Precision::ALL {
+        for (workgroup, exponent) in [(32, false), (64, true), (64, false), (256, true)] {
+            let module = &module(Variant { precision, workgroup, exponent });
+            let real = precision.bytes();
+            same_layout!(
+                module,
+                layout::Domain,
+                real,
+                8,
+                [step, gap_row, x_row, energy, growth, angle, turn_less, turn_sin, share, substeps, powers]
+            );
+            same_layout!(module, layout::Flow, real, 8, [domains, walls, kick, h]);
+            same_layout!(module, layout::Law, real, 8, [restitution, mesh_speed]);
+            same_layout!(
+                module,
+                layout::Motion,
+                real,
+                8,
+                [
+                    q,
+                    phasor,
+                    theta,
+                    bound,
+                    mesh_part,
+                    block_growth,
+                    growth_sum,
+                    growth_squares,
+                    anchor,
+                    position_scale,
+                    rate_scale,
+                    tangents
+                ]
+            );
+            same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors]);
+            same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index]);
+            same_layout!(
+                module,
+                layout::Settings,
+                4,
+                4,
+                [
+                    lanes,
+                    periods,
+                    trips,
+                    passes_per_period,
+                    events_per_period,
+                    row,
+                    transient_periods,
+                    exponent_from,
+                    exponent_block,
+                    max_period,
+                    early_stop
+                ]
+            );
+            same_layout!(
+                module,
+                layout::Tally,
+                4,
+                4,
+                [
+                    step,
+                    mode,
+                    origin,
+                    order,
+                    period,
+                    status,
+                    passes_in_period,
+                    events_in_period,
+                    impacts,
+                    events,
+                    mesh_right,
+                    mesh_left,
+                    mesh_whole,
+                    grazes,
+                    stage,
+                    to_read,
+                    has_read,
+                    counted_from,
+                    pending,
+                    tangent_count,
+                    blocks,
+                    block_periods,
+                    anchor_period,
+                    window,
+                    candidate,
+                    streak,
+                    known_lags,
+                    settled,
+                    word_length,
+                    hash_low,
+                    hash_high,
+                    recent,
+                    on_strobe,
+                    symmetric,
+                    distances,
+                    last_distances,
+                    word
+                ]
+            );
+        }
+    }
+}
