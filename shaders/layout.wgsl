@@ -44,6 +44,8 @@ struct FlowShape {
     steps: u32,
     // Where its phasors start.
     phasors: u32,
+    // 1 if the mirror image of a motion is a motion.
+    mirror: u32,
 }
 
 struct Law {
@@ -54,6 +56,8 @@ struct Law {
 struct Cell {
     flow_index: u32,
     law_index: u32,
+    // Status of a lane that is refused before it starts, else 0.
+    refused: u32,
 }
 
 struct Settings {
@@ -103,6 +107,8 @@ struct MotionNow {
     // Largest position and rate at strobes: the unit of distances.
     position_scale: Real,
     rate_scale: Real,
+    // Largest multiplier of the cycle that was read, binary logarithm of its modulus.
+    cycle_growth: Real,
 }
 
 struct Motion {
@@ -139,8 +145,9 @@ struct TallyNow {
     stage: u32,
     // Periods of the cycle that are still to be read.
     to_read: u32,
-    // 1 once a cycle is being read or has been.
+    // 1 once a cycle is being read or has been, and its period if it attracts.
     has_read: u32,
+    cycle: u32,
     // Period at which counting began.
     counted_from: u32,
     // Full steps that the tangent vectors have not taken yet, and how many vectors there are.
@@ -178,9 +185,39 @@ struct Tally {
     word: array<u32, 7>,
 }
 
+// What travels back of a lane: the numbers.
+struct Reading {
+    // Gap, its rate per free step, x, its rate.
+    strobe: array<Real, 4>,
+    // Exponent per period, natural logarithms, and its standard error.
+    growth: Real,
+    growth_error: Real,
+    mesh_fraction: Real,
+}
+
+// What travels back of a lane: the counting.
+struct Finding {
+    // VALID_* bits; what is not valid is zero.
+    valid: u32,
+    status: u32,
+    // 0 for none.
+    period: u32,
+    periods_run: u32,
+    impacts: u32,
+    // Periods over which impacts were counted.
+    counted: u32,
+    symmetric: u32,
+    word_length: u32,
+    // Hash of a word that is too long to be spelled out.
+    hash_low: u32,
+    hash_high: u32,
+    word: array<u32, 7>,
+}
+
 const STAGE_RUNNING: u32 = 0u;
 const STAGE_READING: u32 = 1u; // the period is decided, its cycle is being read
-const STAGE_DONE: u32 = 2u;
+const STAGE_READ: u32 = 2u; // its cycle has been read and is to be judged
+const STAGE_DONE: u32 = 3u;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var<storage, read> flows: array<Flow>;
@@ -191,6 +228,9 @@ const STAGE_DONE: u32 = 2u;
 @group(0) @binding(6) var<storage, read_write> motions: array<Motion>;
 @group(0) @binding(7) var<storage, read_write> tallies: array<Tally>;
 @group(0) @binding(8) var<storage, read_write> live: atomic<u32>;
+@group(0) @binding(9) var<storage, read> starts: array<array<Real, 4>>;
+@group(0) @binding(10) var<storage, read_write> readings: array<Reading>;
+@group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
 
 const MODE_FREE: u32 = 0u;
 const MODE_PRESSED: u32 = 1u; // + side
@@ -201,6 +241,9 @@ const SIDE_LEFT: u32 = 1u;
 const SIDE_NONE: u32 = 2u;
 
 const STATUS_OK: u32 = 0u;
+const STATUS_SLOW: u32 = 1u;
+const STATUS_NEAR_GRAZING: u32 = 2u;
+const STATUS_STROBE_ON_EVENT: u32 = 3u;
 const STATUS_CAP_EVENTS: u32 = 4u;
 const STATUS_CAP_ROOT: u32 = 5u;
 const STATUS_TOO_STIFF: u32 = 6u;

@@ -24,7 +24,7 @@ fn begin_period() {
     if tally.stage == STAGE_READING {
         tally.to_read -= 1u;
         if tally.to_read == 0u {
-            tally.stage = STAGE_DONE;
+            tally.stage = STAGE_READ;
         }
         return;
     }
@@ -228,12 +228,20 @@ fn note_symbol(side: u32) {
         tallies[lane].word[n / 10u] |= symbol << (3u * (n % 10u));
     }
     tally.word_length = n + 1u;
-    // Stretches of eight symbols, hashed and summed: no matter where the cycle starts.
-    tally.recent = ((tally.recent << 3u) | symbol) & 0xffffffu;
+    take_symbol(symbol);
     if n >= 7u {
-        tally.hash_low += mix_bits(tally.recent);
-        tally.hash_high += mix_bits(tally.recent ^ 0x5bd1e995u);
+        add_stretch();
     }
+}
+
+fn take_symbol(symbol: u32) {
+    tally.recent = ((tally.recent << 3u) | symbol) & 0xffffffu;
+}
+
+// Stretches of eight symbols, hashed and summed: no matter where the cycle starts.
+fn add_stretch() {
+    tally.hash_low += mix_bits(tally.recent);
+    tally.hash_high += mix_bits(tally.recent ^ 0x5bd1e995u);
 }
 
 // A bijection of 32-bit numbers that scatters them.

@@ -19,7 +19,21 @@ fn check_finite() {
 }
 
 fn running() -> bool {
-    return tally.status == STATUS_OK && tally.stage != STAGE_DONE;
+    return tally.status == STATUS_OK && tally.stage < STAGE_READ;
+}
+
+// Takes lane `i` into registers.
+fn take_up(i: u32) {
+    lane = i;
+    cell = cells[i];
+    motion = motions[i].now;
+    tally = tallies[i].now;
+    trips = 0u;
+}
+
+fn put_down() {
+    motions[lane].now = motion;
+    tallies[lane].now = tally;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -28,11 +42,7 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     if i >= settings.lanes {
         return;
     }
-    cell = cells[i];
-    lane = i;
-    motion = motions[i].now;
-    tally = tallies[i].now;
-    trips = 0u;
+    take_up(i);
     // Scanning and acting are separate, so that lanes scan together and act together.
     while running() && trips < settings.trips {
         if scan() == SCAN_BUDGET {
@@ -43,8 +53,10 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
             tally.status = STATUS_TOO_STIFF;
         }
     }
-    motions[i].now = motion;
-    tallies[i].now = tally;
+    if tally.stage == STAGE_READ {
+        judge_cycle();
+    }
+    put_down();
     if running() {
         atomicAdd(&live, 1u);
     }

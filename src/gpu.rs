@@ -17,6 +17,8 @@ mod reading;
 mod self_test;
 mod shader;
 mod signal;
+mod tables;
+mod transfer;
 mod unroll;
 
 use std::collections::HashMap;
@@ -24,6 +26,7 @@ use std::collections::HashMap;
 pub use constants::{Constants, STEP_ANGLE};
 pub use device::{AdapterChoice, adapters};
 pub use shader::{Precision, Variant, WORKGROUP};
+pub use tables::Tables;
 
 use crate::model::{Law, Oscillator, State};
 use crate::record::Record;
@@ -180,8 +183,7 @@ pub struct Gpu {
     queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
     precision: Precision,
-    layout: wgpu::BindGroupLayout,
-    pipelines: HashMap<Variant, wgpu::ComputePipeline>,
+    pipelines: HashMap<Variant, device::Pipelines>,
     trouble: device::Trouble,
 }
 
@@ -221,6 +223,45 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
-        batch::run(self, flows, laws, lanes, settings).await
+        let tables = self.load(flows, laws, settings.steps_per_period)?;
+        self.run_on(&tables, lanes, settings).await
+    }
+
+    /// Derives the constants of flows and laws and uploads them, for any number of runs.
+    /// `steps_per_period` is the least number of free steps per forcing period; none for as
+    /// many as the motion needs.
+    ///
+    /// # Errors
+    /// [`GpuError::TooManyFlows`] if they do not fit one buffer.
+    pub fn load(
+        &self,
+        flows: &[Oscillator],
+        laws: &[Law],
+        steps_per_period: Option<u32>,
+    ) -> Result<Tables, GpuError> {
+        Tables::new(self, flows, laws, steps_per_period)
+    }
+
+    /// [`Gpu::run`] on flows and laws that are loaded; the settings' `steps_per_period` is
+    /// that of the tables.
+    ///
+    /// # Errors
+    /// As [`Gpu::run`].
+    pub async fn run_on(
+        &mut self,
+        tables: &Tables,
+        lanes: &[Lane],
+        settings: &LaneSettings,
+    ) -> Result<Vec<Record>, GpuError> {
+        let variant = Variant {
+            precision: self.precision,
+            workgroup: settings.workgroup,
+            exponent: settings.exponent,
+        };
+        if !self.pipelines.contains_key(&variant) {
+            let pipelines = device::pipelines(self, variant).await?;
+            self.pipelines.insert(variant, pipelines);
+        }
+        batch::run(self, &self.pipelines[&variant], tables, lanes, settings).await
     }
 }

@@ -2,7 +2,7 @@
 
 mod spelling;
 
-pub(crate) use spelling::{HASH_WINDOW, add_window, joined};
+pub(crate) use spelling::joined;
 pub use spelling::{Spelling, word_hash};
 
 use bytemuck::{Pod, Zeroable};

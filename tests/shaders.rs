@@ -84,11 +84,38 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     anchor,
                     position_scale,
                     rate_scale,
+                    cycle_growth,
                     tangents
                 ]
             );
-            same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors]);
-            same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index]);
+            same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);
+            same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index, refused]);
+            same_layout!(
+                module,
+                layout::Reading,
+                real,
+                8,
+                [strobe, growth, growth_error, mesh_fraction]
+            );
+            same_layout!(
+                module,
+                layout::Finding,
+                4,
+                4,
+                [
+                    valid,
+                    status,
+                    period,
+                    periods_run,
+                    impacts,
+                    counted,
+                    symmetric,
+                    word_length,
+                    hash_low,
+                    hash_high,
+                    word
+                ]
+            );
             same_layout!(
                 module,
                 layout::Settings,
@@ -131,6 +158,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     stage,
                     to_read,
                     has_read,
+                    cycle,
                     counted_from,
                     pending,
                     tangent_count,

@@ -12,9 +12,32 @@ pub struct AdapterChoice {
     pub name: Option<String>,
 }
 
-/// Storage bindings of the shader, in order: flows, shapes, phasors, laws, cells, motions,
-/// tallies, live; `true` where it writes.
-const STORAGE: [bool; 8] = [false, false, false, false, false, true, true, true];
+/// Storage bindings of the shader by number: flows, shapes, phasors, laws, cells, motions,
+/// tallies, live, starts, readings, findings; `true` where it writes.
+const WRITES: [bool; 11] = [false, false, false, false, false, true, true, true, false, true, true];
+
+/// An entry point of the shader and the storage that it touches: no more than eight buffers,
+/// which every adapter has.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EntryPoint {
+    name: &'static str,
+    pub(super) storage: &'static [u32],
+}
+
+/// Puts every lane at its start.
+pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 5, 6, 7, 9] };
+/// Integrates.
+pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
+/// Makes records.
+pub(super) const CONCLUDE: EntryPoint =
+    EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 10, 11] };
+
+/// The pipelines of one variant.
+pub(super) struct Pipelines {
+    pub(super) begin: wgpu::ComputePipeline,
+    pub(super) sweep: wgpu::ComputePipeline,
+    pub(super) conclude: wgpu::ComputePipeline,
+}
 
 /// What went wrong on a device outside any error scope: its loss, or a command it refused.
 /// Left alone, wgpu would panic.
@@ -99,9 +122,8 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .request_device(&descriptor)
         .await
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
-    let layout = bind_group_layout(&device);
     let trouble = Trouble::watch(&device);
-    Ok(Gpu { device, queue, info, precision, layout, pipelines: HashMap::new(), trouble })
+    Ok(Gpu { device, queue, info, precision, pipelines: HashMap::new(), trouble })
 }
 
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
@@ -123,46 +145,55 @@ fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter
     GpuError::NoAdapter { wanted, found }
 }
 
-fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding: usize, ty: wgpu::BufferBindingType| wgpu::BindGroupLayoutEntry {
-        binding: binding as u32,
+fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::BindGroupLayout {
+    let entry = |binding: u32, ty: wgpu::BufferBindingType| wgpu::BindGroupLayoutEntry {
+        binding,
         visibility: wgpu::ShaderStages::COMPUTE,
         ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
         count: None,
     };
-    let storage = STORAGE
-        .iter()
-        .enumerate()
-        .map(|(i, &writes)| entry(i + 1, wgpu::BufferBindingType::Storage { read_only: !writes }));
+    let storage = |&binding: &u32| {
+        let read_only = !WRITES[binding as usize - 1];
+        entry(binding, wgpu::BufferBindingType::Storage { read_only })
+    };
+    let uniform = entry(0, wgpu::BufferBindingType::Uniform);
     let entries: Vec<_> =
-        std::iter::once(entry(0, wgpu::BufferBindingType::Uniform)).chain(storage).collect();
-    device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lane"), entries: &entries })
+        std::iter::once(uniform).chain(entry_point.storage.iter().map(storage)).collect();
+    let label = Some(entry_point.name);
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries })
 }
 
 /// Compiles a variant.
-pub(super) async fn pipeline(gpu: &Gpu, variant: super::Variant) -> Result<wgpu::ComputePipeline, GpuError> {
-    let device = &gpu.device;
-    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipelines, GpuError> {
+    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("lane"),
         source: wgpu::ShaderSource::Wgsl(variant.source().into()),
     });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("lane"),
-        bind_group_layouts: &[Some(&gpu.layout)],
-        immediate_size: 0,
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("lane"),
-        layout: Some(&layout),
-        module: &module,
-        entry_point: Some("sweep"),
-        compilation_options: Default::default(),
-        cache: None,
-    });
+    let pipelines = Pipelines {
+        begin: pipeline(gpu, &module, BEGIN),
+        sweep: pipeline(gpu, &module, SWEEP),
+        conclude: pipeline(gpu, &module, CONCLUDE),
+    };
     match scope.pop().await {
-        None => Ok(pipeline),
+        None => Ok(pipelines),
         Some(error) => Err(GpuError::Refused { what: "a shader", message: error.to_string() }),
     }
+}
+
+fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry_point: EntryPoint) -> wgpu::ComputePipeline {
+    let layout = bind_group_layout(&gpu.device, entry_point);
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(entry_point.name),
+        bind_group_layouts: &[Some(&layout)],
+        immediate_size: 0,
+    });
+    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry_point.name),
+        layout: Some(&layout),
+        module,
+        entry_point: Some(entry_point.name),
+        compilation_options: Default::default(),
+        cache: None,
+    })
 }

@@ -55,6 +55,8 @@ pub struct FlowShape {
     pub steps: u32,
     /// Index of its first phasor.
     pub phasors: u32,
+    /// 1 if the mirror image of a motion is a motion.
+    pub mirror: u32,
 }
 
 /// The contact law of a cell.
@@ -75,6 +77,8 @@ pub struct Cell {
     pub flow_index: u32,
     /// Index of its law.
     pub law_index: u32,
+    /// Status code of a lane that is refused before it starts, else 0.
+    pub refused: u32,
 }
 
 /// Settings of one dispatch.
@@ -132,6 +136,8 @@ pub struct Motion {
     pub position_scale: f64,
     /// Largest rate at strobes.
     pub rate_scale: f64,
+    /// Largest multiplier of the cycle that was read, binary logarithm of its modulus.
+    pub cycle_growth: f64,
     /// Tangent vectors in lane units.
     pub tangents: [f64; 16],
 }
@@ -168,12 +174,14 @@ pub struct Tally {
     pub mesh_whole: u32,
     /// Events too near to grazing.
     pub grazes: u32,
-    /// Running, reading the cycle, done.
+    /// Running, reading the cycle, having read it, done.
     pub stage: u32,
     /// Periods of the cycle still to be read.
     pub to_read: u32,
     /// 1 once a cycle is being read or has been.
     pub has_read: u32,
+    /// Period of the cycle that was read, if it attracts.
+    pub cycle: u32,
     /// Period at which counting began.
     pub counted_from: u32,
     /// Full steps that the tangent vectors have not taken yet.
@@ -216,13 +224,44 @@ pub struct Tally {
     pub word: [u32; 7],
 }
 
-/// [`Tally::mode`]: between the walls.
-pub const MODE_FREE: u32 = 0;
-/// [`Tally::mode`]: beyond a wall; plus the side.
-pub const MODE_PRESSED: u32 = 1;
-/// [`Tally::stage`]: going on.
-pub const STAGE_RUNNING: u32 = 0;
-/// [`Tally::stage`]: ended.
-pub const STAGE_DONE: u32 = 2;
-/// [`Tally::origin`]: no event yet.
-pub const SIDE_NONE: u32 = 2;
+/// What travels back of a lane: the numbers.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Reading {
+    /// Gap, its rate per free step, second displacement, its rate.
+    pub strobe: [f64; 4],
+    /// Exponent per period, natural logarithms.
+    pub growth: f64,
+    /// Its standard error.
+    pub growth_error: f64,
+    /// Fraction of the time spent meshing.
+    pub mesh_fraction: f64,
+}
+
+/// What travels back of a lane: the counting.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Finding {
+    /// Bits of [`valid`](crate::record::valid); what is not valid is zero.
+    pub valid: u32,
+    /// Status code.
+    pub status: u32,
+    /// Period; 0 for none.
+    pub period: u32,
+    /// Forcing periods integrated.
+    pub periods_run: u32,
+    /// Impacts while they were counted.
+    pub impacts: u32,
+    /// Periods over which they were.
+    pub counted: u32,
+    /// 1 if the cycle is its own mirror image.
+    pub symmetric: u32,
+    /// Symbols of the cycle.
+    pub word_length: u32,
+    /// Hash of a word that is too long to be spelled out, low half.
+    pub hash_low: u32,
+    /// High half.
+    pub hash_high: u32,
+    /// Symbols of the cycle, ten to a number.
+    pub word: [u32; 7],
+}

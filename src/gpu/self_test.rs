@@ -1,6 +1,5 @@
 //! Known answers: a device is asked before it is trusted.
 
-use super::batch;
 use super::{Gpu, GpuError, Lane, LaneSettings, Precision};
 use crate::model::{GearPair, State};
 
@@ -27,7 +26,7 @@ pub(super) async fn check(gpu: &mut Gpu) -> Result<(), GpuError> {
     let laws = pairs.map(|pair| pair.law());
     let lanes = [0, 1, 2, 3].map(|i| Lane { flow: i, law: i, start: [0.0; 4] });
     let settings = LaneSettings { periods: PERIODS, max_period: 0, ..LaneSettings::default() };
-    let records = batch::run(gpu, &flows, &laws, &lanes, &settings).await?;
+    let records = gpu.run(&flows, &laws, &lanes, &settings).await?;
     let bar = match gpu.precision {
         Precision::F32 => 1e-3,
         Precision::F64 => 1e-9,

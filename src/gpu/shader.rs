@@ -1,6 +1,7 @@
 //! Shader variants: one source, put together from small files.
 
 use super::unroll::unroll;
+use crate::record::{WORD_SYMBOLS, valid};
 
 /// Precision of a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,7 +49,10 @@ const BODY: &str = concat!(
     include_str!("../../shaders/events.wgsl"),
     include_str!("../../shaders/tangent.wgsl"),
     include_str!("../../shaders/observe.wgsl"),
+    include_str!("../../shaders/cycle.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
+    include_str!("../../shaders/begin.wgsl"),
+    include_str!("../../shaders/record.wgsl"),
 );
 
 impl Variant {
@@ -66,9 +70,25 @@ impl Variant {
         let Variant { workgroup, exponent, .. } = self;
         let terms = terms(real);
         let body = unroll(BODY, terms);
-        format!("{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n{body}")
+        let bits: String =
+            VALID.iter().map(|(name, bits)| format!("const VALID_{name}: u32 = {bits}u;\n")).collect();
+        format!(
+            "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
+             const WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
+        )
     }
 }
+
+/// The records' validity bits under their names in the shader.
+const VALID: [(&str, u32); 7] = [
+    ("PERIOD", valid::PERIOD),
+    ("LYAPUNOV", valid::LYAPUNOV),
+    ("IMPACTS", valid::IMPACTS),
+    ("MESH", valid::MESH),
+    ("SYMMETRIC", valid::SYMMETRIC),
+    ("WORD", valid::WORD),
+    ("STROBE", valid::STROBE),
+];
 
 /// The number of Taylor terms that a precision's file declares.
 fn terms(real: &str) -> u32 {

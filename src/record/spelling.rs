@@ -7,7 +7,7 @@ use crate::word::Word;
 const PER_WORD: usize = 21;
 
 /// Consecutive symbols that the hash looks at together.
-pub(crate) const HASH_WINDOW: usize = 8;
+const HASH_WINDOW: usize = 8;
 
 /// A word as a record keeps it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -55,7 +55,7 @@ pub(crate) fn joined([low, high]: [u32; 2]) -> u64 {
 }
 
 /// Adds one window of symbols, 3 bits each, to the halves of a hash; the shader does the same.
-pub(crate) fn add_window([low, high]: [u32; 2], code: u32) -> [u32; 2] {
+fn add_window([low, high]: [u32; 2], code: u32) -> [u32; 2] {
     [low.wrapping_add(mix(code)), high.wrapping_add(mix(code ^ 0x5bd1_e995))]
 }
 

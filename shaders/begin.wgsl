@@ -1,0 +1,32 @@
+// Before the first dispatch: every lane at its start.
+
+@compute @workgroup_size(WORKGROUP)
+fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
+    lane = id.y * settings.row + id.x;
+    if lane >= settings.lanes {
+        return;
+    }
+    cell = cells[lane];
+    tally.status = cell.refused;
+    tally.mode = MODE_FREE;
+    tally.origin = SIDE_NONE;
+    tally.tangent_count = 1u;
+    motion.q = starts[lane];
+    motion.phasor = array<Real, 2>(1.0, 0.0);
+    let walls = flows[cell.flow_index].walls;
+    if motion.q[0] > walls[0] {
+        begin_beyond(SIDE_RIGHT);
+    } else if motion.q[0] < walls[1] {
+        begin_beyond(SIDE_LEFT);
+    }
+    motions[lane] = Motion(motion, array<Real, 16>());
+    tallies[lane] = Tally(tally, array<u32, 16>(), array<u32, 16>(), array<u32, 7>());
+    set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
+}
+
+// A start beyond a wall is meshing.
+fn begin_beyond(side: u32) {
+    motion.q[0] -= flows[cell.flow_index].walls[side];
+    tally.mode = MODE_PRESSED + side;
+    tally.origin = side;
+}

@@ -1,0 +1,77 @@
+// The cycle that was read: does it attract, and has the lane come near it?
+
+// Squarings of the monodromy matrix. With `n = 2^SQUARINGS` the modulus of its largest
+// multiplier is `|M^n|^(1/n)` up to a factor of `kappa^(1/n)`, kappa the condition of its
+// eigenvectors.
+const SQUARINGS: u32 = 20u;
+
+// A lane has settled once it is this close to its cycle, relative to the motion.
+const ON_CYCLE: f32 = 5e-4;
+
+// The binary logarithm of the spectral radius of the monodromy matrix, whose columns the
+// tangent vectors are: they started as the unit vectors.
+fn spectral_growth() -> Real {
+    var m = motions[lane].tangents;
+    var growth: Real = 0.0;
+    var weight: Real = 1.0;
+    for (var n = 0u; n <= SQUARINGS; n++) {
+        var size: Real = 0.0;
+        for (var k = 0u; k < 16u; k++) {
+            size = max(size, abs(m[k]));
+        }
+        if !(size > 1e-30) {
+            // Superstable, as far as can be told.
+            return -100.0;
+        }
+        growth += weight * Real(log2(f32(size)));
+        weight *= 0.5;
+        let inverse = 1.0 / size;
+        var square: array<Real, 16>;
+        for (var k = 0u; k < 16u; k++) {
+            let i = k % 4u;
+            let j = k - i;
+            square[k] = (inverse * inverse) * ((m[i] * m[j] + m[i + 4u] * m[j + 1u])
+                + (m[i + 8u] * m[j + 2u] + m[i + 12u] * m[j + 3u]));
+        }
+        m = square;
+    }
+    return growth;
+}
+
+// Without exponents recurrence alone must do. A lane that has read a cycle which does not
+// attract goes on while it has periods left: chaos lingers at such cycles.
+fn judge_cycle() {
+    tally.stage = STAGE_DONE;
+    if !EXPONENT {
+        tally.cycle = tally.candidate;
+        return;
+    }
+    motion.cycle_growth = spectral_growth();
+    if motion.cycle_growth < 0.0 {
+        tally.cycle = tally.candidate;
+    } else if tally.period < settings.periods {
+        search_on();
+    }
+}
+
+// The exponent starts anew, but for what it has collected; recurrence from scratch.
+fn search_on() {
+    tally.stage = STAGE_RUNNING;
+    tally.has_read = 0u;
+    tally.tangent_count = 1u;
+    set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
+    tally.window = 0u;
+    tally.candidate = 0u;
+    tally.streak = 0u;
+    tally.known_lags = 0u;
+    tally.settled = 0u;
+    tallies[lane].last_distances = array<u32, 16>();
+}
+
+// Whether the lane has come so near to its cycle that its symmetry shows.
+fn is_on_cycle() -> bool {
+    // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
+    let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
+    let distance = exp2(-f32(last_distance_at(max(tally.candidate, 1u))) / OCTAVE);
+    return tally.settled != 0u && distance < ON_CYCLE * (1.0 - mu);
+}

@@ -1,0 +1,98 @@
+// What travels back: a lane's last state, read as a record.
+
+@compute @workgroup_size(WORKGROUP)
+fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = id.y * settings.row + id.x;
+    if i >= settings.lanes {
+        return;
+    }
+    take_up(i);
+    var reading: Reading;
+    var finding: Finding;
+    finding.status = last_status();
+    finding.periods_run = tally.period;
+    if cell.refused == 0u {
+        reading.strobe = strobe_state();
+        finding.valid = VALID_STROBE;
+    }
+    if tally.status == STATUS_OK {
+        finding.valid |= VALID_IMPACTS | VALID_MESH;
+        finding.impacts = tally.impacts;
+        finding.counted = max(tally.period - tally.counted_from, 1u);
+        reading.mesh_fraction = mesh_fraction(finding.counted);
+        if settings.max_period > 0u {
+            finding.valid |= VALID_PERIOD;
+            finding.period = tally.cycle;
+        }
+        if tally.cycle > 0u {
+            read_cycle(&reading, &finding);
+        } else if EXPONENT && tally.blocks > 1u {
+            finding.valid |= VALID_LYAPUNOV;
+            let growth = mean_growth();
+            reading.growth = growth.x;
+            reading.growth_error = growth.y;
+        }
+    }
+    readings[i] = reading;
+    findings[i] = finding;
+}
+
+fn last_status() -> u32 {
+    if tally.status != STATUS_OK || tally.has_read == 0u || tally.stage != STAGE_DONE {
+        return tally.status;
+    }
+    if tally.grazes > 0u {
+        return STATUS_NEAR_GRAZING;
+    }
+    if tally.on_strobe > 0u {
+        return STATUS_STROBE_ON_EVENT;
+    }
+    return select(STATUS_SLOW, STATUS_OK, is_on_cycle());
+}
+
+fn mesh_fraction(periods: u32) -> Real {
+    let f = cell.flow_index;
+    let right = Real(tally.mesh_right) * flows[f].domains[1].share;
+    let left = Real(tally.mesh_left) * flows[f].domains[2].share;
+    let steps = Real(tally.mesh_whole) + ((right + left) + motion.mesh_part);
+    return steps / (Real(periods) * Real(shapes[f].steps));
+}
+
+fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
+    // On a slow approach a lost symmetry cannot be told from one not reached yet.
+    if shapes[cell.flow_index].mirror == 1u && is_on_cycle() {
+        (*finding).valid |= VALID_SYMMETRIC;
+        (*finding).symmetric = tally.symmetric;
+    }
+    if EXPONENT {
+        (*finding).valid |= VALID_LYAPUNOV;
+        (*reading).growth = LN_2 * motion.cycle_growth / Real(tally.cycle);
+    }
+    (*finding).valid |= VALID_WORD;
+    (*finding).word_length = tally.word_length;
+    (*finding).word = tallies[lane].word;
+    if tally.word_length > WORD_SYMBOLS {
+        close_hash();
+        (*finding).hash_low = tally.hash_low;
+        (*finding).hash_high = tally.hash_high;
+    }
+}
+
+// The hash so far holds all stretches of symbols but those across the word's end.
+fn close_hash() {
+    for (var n = 0u; n < 7u; n++) {
+        take_symbol((tallies[lane].word[0] >> (3u * n)) & 7u);
+        add_stretch();
+    }
+}
+
+const LN_2: Real = 0.6931471805599453;
+
+// Mean growth per period of the tangent vector, natural logarithms, and its standard error
+// from the means of blocks.
+fn mean_growth() -> vec2<Real> {
+    let blocks = Real(tally.blocks);
+    let mean = motion.growth_sum / blocks;
+    let variance = max(motion.growth_squares / blocks - mean * mean, Real(0.0)) / (blocks - 1.0);
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(mean, sqrt(variance));
+}

@@ -1,0 +1,68 @@
+//! What lanes share, on the device: flows and contact laws.
+
+use super::constants::Constants;
+use super::layout::{self, Flow, FlowShape};
+use super::transfer::{reals, upload};
+use super::{Gpu, GpuError};
+use crate::model::{Law, Oscillator};
+
+/// Flows and laws of a run, uploaded once for all its batches.
+pub struct Tables {
+    /// None for a flow that lanes cannot carry.
+    pub(super) constants: Vec<Option<Constants>>,
+    pub(super) law_count: usize,
+    pub(super) flows: wgpu::Buffer,
+    pub(super) shapes: wgpu::Buffer,
+    pub(super) phasors: wgpu::Buffer,
+    pub(super) laws: wgpu::Buffer,
+}
+
+impl Tables {
+    pub(super) fn new(
+        gpu: &Gpu,
+        flows: &[Oscillator],
+        laws: &[Law],
+        steps_per_period: Option<u32>,
+    ) -> Result<Tables, GpuError> {
+        let constants: Vec<_> = flows.iter().map(|flow| Constants::new(flow, steps_per_period)).collect();
+        let mut tables: Vec<Flow> = Vec::with_capacity(flows.len());
+        let mut shapes = Vec::with_capacity(flows.len());
+        let mut phasors = Vec::new();
+        for constants in &constants {
+            match constants {
+                Some(constants) => {
+                    shapes.push(FlowShape {
+                        steps: constants.steps,
+                        phasors: phasors.len() as u32,
+                        mirror: u32::from(constants.mirror_symmetric),
+                    });
+                    tables.push(constants.flow);
+                    phasors.extend_from_slice(&constants.phasors);
+                }
+                // Its lanes are refused before they start.
+                None => {
+                    shapes.push(FlowShape { steps: 1, phasors: 0, mirror: 0 });
+                    tables.push(bytemuck::Zeroable::zeroed());
+                }
+            }
+        }
+        phasors.push([1.0, 0.0]);
+        let law = |law: &Law| layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed };
+        let rows: Vec<layout::Law> = laws.iter().map(law).collect();
+        let tables = reals(&tables, gpu.precision);
+        let phasors = reals(&phasors, gpu.precision);
+        let allowed = gpu.device.limits().max_storage_buffer_binding_size;
+        let needed = tables.len().max(phasors.len()) as u64;
+        if needed > allowed {
+            return Err(GpuError::TooManyFlows { flows: flows.len(), needed, allowed });
+        }
+        Ok(Tables {
+            flows: upload(gpu, "flows", &tables),
+            shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
+            phasors: upload(gpu, "phasors", &phasors),
+            laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
+            constants,
+            law_count: laws.len(),
+        })
+    }
+}
