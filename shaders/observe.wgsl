@@ -33,10 +33,12 @@ fn begin_period() {
         begin_counting();
     }
     let decided = settings.max_period > 0u && recurs();
-    let last = tally.period >= settings.periods;
-    if (decided && settings.early_stop == 1u) || (last && tally.streak >= STREAK) {
+    // Reading the cycle belongs to the budget.
+    let read_by = tally.period + tally.candidate;
+    let is_due = tally.streak >= STREAK && read_by == settings.periods;
+    if read_by <= settings.periods && (is_due || (decided && settings.early_stop == 1u)) {
         begin_reading();
-    } else if last {
+    } else if tally.period >= settings.periods {
         tally.stage = STAGE_DONE;
     }
 }

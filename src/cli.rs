@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use rattlemap::gpu::Precision;
 use rattlemap::model::State;
 use rattlemap::orbit::Settings;
 use rattlemap::scene::REST;
@@ -31,6 +32,11 @@ pub(crate) enum Command {
     Map(Map),
     Orbit(Orbit),
     Bifurcation(Bifurcation),
+    /// What there is to compute on: adapters, precisions, limits, and what `--engine auto` takes
+    ///
+    /// A map is tried for a moment on each engine where nothing else decides. WGPU_ADAPTER_NAME (part of
+    /// a name) and WGPU_BACKEND (vulkan, metal, dx12) in the environment narrow the adapters down.
+    Devices,
 }
 
 /// A map over two parameters: what every cell's motion is
@@ -47,9 +53,8 @@ pub(crate) struct Map {
     #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
 
-    /// Who computes
-    #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
-    pub(crate) engine: EngineChoice,
+    #[command(flatten)]
+    pub(crate) engine: EngineOptions,
 
     /// Where to write [default: out/<scene's name>]
     #[arg(long, value_name = "DIR")]
@@ -73,11 +78,31 @@ pub(crate) struct Map {
     pub(crate) quiet: bool,
 }
 
+/// Who computes, and how precisely.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct EngineOptions {
+    /// Who computes
+    #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
+    pub(crate) engine: EngineChoice,
+
+    /// Precision of the motion: f32 or f64. A GPU takes f32 unless told otherwise, and f64 only
+    /// where it has double precision; the CPU is f64
+    #[arg(long, value_name = "PRECISION", value_parser = precision)]
+    pub(crate) precision: Option<Precision>,
+}
+
+fn precision(text: &str) -> Result<Precision, String> {
+    let named = Precision::ALL.into_iter().find(|precision| precision.name() == text);
+    named.ok_or_else(|| "it must be f32 or f64".to_owned())
+}
+
 /// Engines by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum EngineChoice {
-    /// The best there is: today the CPU
+    /// A hardware GPU if there is one, else the faster of CPU and software GPU
     Auto,
+    /// Lanes on a graphics device
+    Gpu,
     /// The event-driven reference on all processor cores, f64
     Cpu,
 }
@@ -96,6 +121,12 @@ impl Map {
         if let Some(out) = &self.out {
             words.push(format!("--out {}", quoted(out.display().to_string())));
         }
+        if let Some(engine) =
+            self.engine.engine.to_possible_value().filter(|_| self.engine.engine != EngineChoice::Auto)
+        {
+            words.push(format!("--engine {}", engine.get_name()));
+        }
+        words.extend(self.engine.precision.map(|precision| format!("--precision {}", precision.name())));
         words.extend(self.set.iter().map(|set| format!("--set {}", quoted(set.clone()))));
         words.push("--resume".to_owned());
         words.join(" ")

@@ -6,11 +6,13 @@
 
 mod cpu;
 mod fake;
+mod gpu;
 
 use thiserror::Error;
 
 pub use cpu::Cpu;
 pub use fake::Fake;
+pub use gpu::Gpu;
 
 use crate::plan::Batch;
 use crate::record::Record;
@@ -26,6 +28,14 @@ pub enum EngineError {
         /// Cells in the batch.
         cells: usize,
     },
+    /// The engine's device did not do what it was asked.
+    #[error("{device}: {reason}")]
+    Refused {
+        /// The engine's device.
+        device: String,
+        /// What happened.
+        reason: String,
+    },
     /// The engine is gone and computes nothing any more.
     #[error("{device} was lost ({reason})")]
     Lost {
@@ -40,6 +50,8 @@ pub enum EngineError {
 pub enum Engine<'p> {
     /// The event-driven reference on all processor cores, in f64.
     Cpu(Cpu<'p>),
+    /// Lanes in WGSL on a graphics device, in f32 or f64.
+    Gpu(Box<Gpu<'p>>),
     /// Records by rule, and failures on demand: for tests of everything around an engine.
     Fake(Fake),
 }
@@ -49,6 +61,7 @@ impl Engine<'_> {
     pub fn name(&self) -> &'static str {
         match self {
             Engine::Cpu(_) => "cpu",
+            Engine::Gpu(_) => "gpu",
             Engine::Fake(_) => "fake",
         }
     }
@@ -57,6 +70,7 @@ impl Engine<'_> {
     pub fn precision(&self) -> &'static str {
         match self {
             Engine::Cpu(_) | Engine::Fake(_) => "f64",
+            Engine::Gpu(gpu) => gpu.precision(),
         }
     }
 
@@ -65,6 +79,7 @@ impl Engine<'_> {
     pub fn device(&self) -> String {
         match self {
             Engine::Cpu(_) => "event-driven reference".to_owned(),
+            Engine::Gpu(gpu) => gpu.device(),
             Engine::Fake(_) => "fake".to_owned(),
         }
     }
@@ -73,7 +88,16 @@ impl Engine<'_> {
     pub fn least_batch(&self) -> usize {
         match self {
             Engine::Cpu(cpu) => cpu.least_batch(),
+            Engine::Gpu(gpu) => gpu.least_batch(),
             Engine::Fake(_) => 16,
+        }
+    }
+
+    /// Free steps that lanes have taken so far; none where there is no grid.
+    pub fn lane_steps(&self) -> Option<u64> {
+        match self {
+            Engine::Gpu(gpu) => Some(gpu.steps()),
+            Engine::Cpu(_) | Engine::Fake(_) => None,
         }
     }
 
@@ -84,6 +108,7 @@ impl Engine<'_> {
     pub async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
         match self {
             Engine::Cpu(cpu) => Ok(cpu.run(batch)),
+            Engine::Gpu(gpu) => gpu.run(batch).await,
             Engine::Fake(fake) => fake.run(batch),
         }
     }

@@ -18,19 +18,25 @@ pub(crate) enum Failure {
 impl Failure {
     /// Says on stderr what went wrong, causes included, and returns the exit code.
     pub(crate) fn report(&self) -> ExitCode {
-        let (code, error) = match self {
-            Failure::Usage(error) => (2, error),
-            Failure::Run(error) => (1, error),
-        };
-        // The alternate form is the whole chain of causes on one line.
-        eprintln!("error: {error:#}");
-        ExitCode::from(code)
+        eprintln!("error: {self}");
+        ExitCode::from(match self {
+            Failure::Usage(_) => 2,
+            Failure::Run(_) => 1,
+        })
     }
 }
 
 /// A run that went through but came to nothing.
 pub(crate) fn fail_if(failed: bool, message: &'static str) -> Result<(), Failure> {
     if failed { Err(Failure::Run(anyhow!(message))) } else { Ok(()) }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (Failure::Usage(error) | Failure::Run(error)) = self;
+        // The alternate form is the whole chain of causes on one line.
+        write!(f, "{error:#}")
+    }
 }
 
 impl From<SceneError> for Failure {

@@ -24,7 +24,7 @@ mod unroll;
 use std::collections::HashMap;
 
 pub use constants::{Constants, STEP_ANGLE};
-pub use device::{AdapterChoice, adapters};
+pub use device::{AdapterChoice, AdapterReport, adapters, describe, is_hardware};
 pub use shader::{Precision, Variant, WORKGROUP};
 pub use tables::Tables;
 
@@ -130,8 +130,8 @@ pub struct Lane {
 /// How lanes are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneSettings {
-    /// Forcing periods to integrate at most; reading the cycle of a periodic cell adds its
-    /// period to them.
+    /// Forcing periods to integrate at most; the last of them read the cycle of a periodic
+    /// cell.
     pub periods: u32,
     /// Periods before averages are taken. Those of periodic cells are taken over one cycle.
     pub transient_periods: u32,
@@ -227,6 +227,11 @@ impl Gpu {
         self.run_on(&tables, lanes, settings).await
     }
 
+    /// A device that is lost tells so once; what follows from it says less.
+    fn failure(&self, error: GpuError) -> GpuError {
+        self.trouble.message().map_or(error, |message| GpuError::Lost { message })
+    }
+
     /// Derives the constants of flows and laws and uploads them, for any number of runs.
     /// `steps_per_period` is the least number of free steps per forcing period; none for as
     /// many as the motion needs.
@@ -253,11 +258,8 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
-        let variant = Variant {
-            precision: self.precision,
-            workgroup: settings.workgroup,
-            exponent: settings.exponent,
-        };
+        let variant =
+            Variant { precision: self.precision, workgroup: settings.workgroup, exponent: settings.exponent };
         if !self.pipelines.contains_key(&variant) {
             let pipelines = device::pipelines(self, variant).await?;
             self.pipelines.insert(variant, pipelines);

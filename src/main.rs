@@ -2,6 +2,8 @@
 
 mod capacity;
 mod cli;
+mod devices_command;
+mod engine_choice;
 mod error;
 mod map_command;
 mod progress;
@@ -23,6 +25,7 @@ fn main() -> ExitCode {
         Command::Map(ask) => map_command::run(&ask),
         Command::Orbit(ask) => run_orbit(&ask),
         Command::Bifurcation(ask) => run_bifurcation(&ask),
+        Command::Devices => devices_command::run(),
     };
     done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
 }

@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, anyhow};
-use rattlemap::engine::{Cpu, Engine};
+use rattlemap::engine::Engine;
+use rattlemap::gpu::Precision;
 use rattlemap::orbit::Class;
 use rattlemap::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
 use rattlemap::plan::{Plan, count_classes};
@@ -16,7 +17,8 @@ use rattlemap::scene::{self, Purpose, Scene};
 use rattlemap::sweep::{self, SweepError};
 
 use crate::capacity;
-use crate::cli::{EngineChoice, Map};
+use crate::cli::{EngineChoice, EngineOptions, Map};
+use crate::engine_choice::{self, Chosen};
 use crate::error::{Failure, fail_if};
 use crate::progress::Progress;
 
@@ -26,12 +28,14 @@ const KILLED: i32 = 130;
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let scene = scene::load(&ask.scene, &ask.set, Purpose::Map)?;
+    engine_choice::check(&ask.engine)?;
     capacity::check(&scene, &ask.out())?;
     let folder = open_folder(ask)?;
     let plan = Plan::new(&scene);
-    let mut engine = match ask.engine {
-        EngineChoice::Auto | EngineChoice::Cpu => Engine::Cpu(Cpu::new(&plan)),
-    };
+    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;
+    if !ask.quiet && !why.is_empty() {
+        eprintln!("{} ({}): {why}", engine.name(), engine.precision());
+    }
     let (mut file, mut records) = open_records(ask, &folder, &scene, &plan, &engine)?;
     let resumed_cells = file.places();
     let clock = Instant::now();
@@ -39,13 +43,13 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     integrate(ask, &plan, &mut engine, &mut file, &mut records, &progress)?;
     let elapsed = clock.elapsed();
     let cells = Cells::new(&scene, &plan, &records);
-    let device = engine.device();
+    let (device, lane_steps) = (engine.device(), engine.lane_steps());
     let (engine, precision) = (engine.name(), engine.precision());
     let run = output::map::Run { sets: &ask.set, engine, precision, device: &device, elapsed, resumed_cells };
     let files = output::map::write(&folder, &cells, &run)?;
     progress.finish(&format!(
         "{}\n{}: {}",
-        summary(&cells, &run, clock.elapsed().as_secs_f64()),
+        summary(&cells, &run, lane_steps, clock.elapsed().as_secs_f64()),
         folder.path().display(),
         files.join(", ")
     ));
@@ -61,6 +65,24 @@ fn open_folder(ask: &Map) -> Result<Folder, Failure> {
         return Err(RecordFileError::NothingToResume { folder: out }.into());
     }
     Ok(Folder::open(&out, ask.force || ask.resume)?)
+}
+
+/// The engine that was asked for; where that is left open, an interrupted run goes on with
+/// its own.
+fn engine_of(ask: &Map, folder: &Folder) -> EngineOptions {
+    let asked = ask.engine;
+    if !ask.resume || asked.engine != EngineChoice::Auto || asked.precision.is_some() {
+        return asked;
+    }
+    match Identity::read(&folder.path().join(RECORDS)) {
+        Ok(identity) if identity.engine() == "cpu" => EngineOptions { engine: EngineChoice::Cpu, ..asked },
+        Ok(identity) => {
+            let precision = Precision::ALL.into_iter().find(|p| p.name() == identity.precision());
+            EngineOptions { engine: EngineChoice::Gpu, precision }
+        }
+        // What is wrong with the file is said when it is resumed.
+        Err(_) => asked,
+    }
 }
 
 /// The record file, and what it holds already, by cell id.
@@ -140,7 +162,7 @@ fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
 }
 
 /// What was done, how fast, and what came out.
-fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, seconds: f64) -> String {
+fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64>, seconds: f64) -> String {
     let [columns, rows] = cells.counts();
     let count = columns * rows;
     let integrating = run.elapsed.as_secs_f64().max(1e-9);
@@ -151,8 +173,11 @@ fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, seconds: f64) -> Strin
         0 => String::new(),
         cells => format!(", {cells} of them before"),
     };
+    let per_step = lane_steps
+        .filter(|&steps| steps > 0)
+        .map_or(String::new(), |steps| format!(", {:.0} ns per lane-step", 1e9 * integrating / steps as f64));
     format!(
-        "{count} cells{resumed} on {} ({}) in {integrating:.1} s: {:.0} cells/s, {:.0} periods/s; outputs {:.1} s\n\
+        "{count} cells{resumed} on {} ({}) in {integrating:.1} s: {:.0} cells/s, {:.0} lane-periods/s{per_step}; outputs {:.1} s\n\
          {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
         run.engine,
         run.precision,

@@ -14,7 +14,7 @@ pub use size::Size;
 
 use crate::model::{GearPair, Law, Oscillator, State};
 use crate::orbit::{Budget, Class};
-use crate::scene::{Axis, Quantity, REST, Scene, Start};
+use crate::scene::{Axis, Quantity, REST, Scene, Start, Steps};
 
 /// The parameters that a contact law is made of; all others belong to the flow.
 const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
@@ -62,6 +62,7 @@ pub struct Plan {
     is_law: [bool; 2],
     start: State,
     budget: Budget,
+    steps: Steps,
     needs: Needs,
     order: Vec<u32>,
 }
@@ -92,6 +93,7 @@ impl Plan {
                 early_stop: integration.early_stop,
                 exponent: needs.exponent,
             },
+            steps: integration.steps_per_period,
             needs,
             order: morton::order(first.count(), second.count()),
         }
@@ -120,6 +122,11 @@ impl Plan {
     /// How long each cell is integrated.
     pub fn budget(&self) -> &Budget {
         &self.budget
+    }
+
+    /// How fine the grid of the lanes is at least.
+    pub fn steps_per_period(&self) -> Steps {
+        self.steps
     }
 
     /// What is asked for.

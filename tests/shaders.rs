@@ -90,13 +90,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
             );
             same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);
             same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index, refused]);
-            same_layout!(
-                module,
-                layout::Reading,
-                real,
-                8,
-                [strobe, growth, growth_error, mesh_fraction]
-            );
+            same_layout!(module, layout::Reading, real, 8, [strobe, growth, growth_error, mesh_fraction]);
             same_layout!(
                 module,
                 layout::Finding,

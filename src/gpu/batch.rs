@@ -15,9 +15,6 @@ const DISPATCHES_PER_LOOK: u32 = 4;
 /// Batches hold no more lanes than this: below 1 GB on the device.
 const LARGEST_BATCH: usize = 1 << 20;
 
-/// Batches are not made smaller than this for want of memory.
-const SMALLEST_BATCH: usize = 1024;
-
 /// Longest period that a lane can look for: a byte per lag.
 const LONGEST_PERIOD: u32 = 64;
 
@@ -38,33 +35,35 @@ pub(super) async fn run(
         }
     }
     let mut records = Vec::with_capacity(lanes.len());
-    let mut size = batch_lanes(gpu, settings);
-    while records.len() < lanes.len() {
-        let rest = &lanes[records.len()..];
-        let batch = &rest[..size.min(rest.len())];
-        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    for batch in lanes.chunks(batch_lanes(gpu, settings)) {
+        let out_of_memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        // What is made of a buffer that is not there is refused, which says no more.
+        let refused = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let buffers = Batch::new(gpu, pipelines, tables, batch, settings);
-        if scope.pop().await.is_some() {
-            // A smaller batch may fit: results do not depend on it.
-            if batch.len() <= SMALLEST_BATCH {
-                return Err(GpuError::OutOfMemory { lanes: batch.len() });
-            }
-            size = batch.len() / 2;
-            continue;
+        let (refused, out_of_memory) = (refused.pop(), out_of_memory.pop());
+        let (refused, out_of_memory) = (refused.await, out_of_memory.await);
+        if out_of_memory.is_some() {
+            return Err(GpuError::OutOfMemory { lanes: batch.len() });
+        }
+        if let Some(error) = refused {
+            return Err(gpu.failure(GpuError::Refused { what: "a batch", message: error.to_string() }));
         }
         records.extend(buffers.run(gpu, pipelines, tables, batch).await?);
     }
     Ok(records)
 }
 
-/// Lanes per batch that the adapter's limits allow.
 fn batch_lanes(gpu: &Gpu, settings: &LaneSettings) -> usize {
-    let limits = gpu.device.limits();
+    let most = largest_batch(&gpu.device.limits());
+    settings.batch.unwrap_or(most).clamp(1, most)
+}
+
+/// Lanes per batch that an adapter's limits allow.
+pub(super) fn largest_batch(limits: &wgpu::Limits) -> usize {
     let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
     let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
     let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
-    let most = by_binding.min(by_grid).min(LARGEST_BATCH as u64) as usize;
-    settings.batch.unwrap_or(most).clamp(1, most.max(1))
+    by_binding.min(by_grid).clamp(1, LARGEST_BATCH as u64) as usize
 }
 
 /// Periods per block of the exponent.
@@ -128,7 +127,11 @@ impl Batch {
             };
             let entries: Vec<_> = [0].iter().chain(entry_point.storage).map(entry).collect();
             let layout = &pipeline.get_bind_group_layout(0);
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout,
+                entries: &entries,
+            })
         };
         Batch {
             looks: [landing(gpu, "look", 4), landing(gpu, "look", 4)],

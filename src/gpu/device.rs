@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::batch::largest_batch;
 use super::{Gpu, GpuError, Precision};
 
 /// Which adapter to take.
@@ -29,8 +30,7 @@ pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 5
 /// Integrates.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
 /// Makes records.
-pub(super) const CONCLUDE: EntryPoint =
-    EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 10, 11] };
+pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 10, 11] };
 
 /// The pipelines of one variant.
 pub(super) struct Pipelines {
@@ -42,6 +42,13 @@ pub(super) struct Pipelines {
 /// What went wrong on a device outside any error scope: its loss, or a command it refused.
 /// Left alone, wgpu would panic.
 pub(super) struct Trouble(Arc<Mutex<Option<String>>>);
+
+impl AdapterChoice {
+    /// The adapter that the environment names by `WGPU_ADAPTER_NAME`, else the best.
+    pub fn from_environment() -> AdapterChoice {
+        AdapterChoice { name: std::env::var("WGPU_ADAPTER_NAME").ok().filter(|name| !name.is_empty()) }
+    }
+}
 
 impl Trouble {
     fn watch(device: &wgpu::Device) -> Trouble {
@@ -68,20 +75,56 @@ fn instance() -> wgpu::Instance {
     wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
 }
 
-/// All adapters of this machine and whether they have double precision, the best first.
-pub async fn adapters() -> Vec<(wgpu::AdapterInfo, bool)> {
-    let mut all: Vec<_> = instance()
-        .enumerate_adapters(wgpu::Backends::all())
-        .await
-        .iter()
-        .map(|adapter| (adapter.get_info(), has_doubles(adapter)))
-        .collect();
-    all.sort_by_key(|(info, _)| rank(info));
+/// What an adapter offers.
+#[derive(Clone, Debug)]
+pub struct AdapterReport {
+    /// Name, kind, driver.
+    pub info: wgpu::AdapterInfo,
+    /// Precisions that lanes can have on it.
+    pub precisions: Vec<Precision>,
+    /// Largest storage buffer that a shader sees, in bytes.
+    pub largest_binding: u64,
+    /// Lanes of one batch at most.
+    pub batch_lanes: usize,
+}
+
+/// All adapters of this machine, the best first.
+pub async fn adapters() -> Vec<AdapterReport> {
+    let report = |adapter: &wgpu::Adapter| AdapterReport {
+        info: adapter.get_info(),
+        precisions: Precision::ALL.into_iter().filter(|&p| has(adapter, p)).collect(),
+        largest_binding: adapter.limits().max_storage_buffer_binding_size,
+        batch_lanes: largest_batch(&adapter.limits()),
+    };
+    all_adapters().await.iter().map(report).collect()
+}
+
+async fn all_adapters() -> Vec<wgpu::Adapter> {
+    let mut all = instance().enumerate_adapters(wgpu::Backends::all()).await;
+    all.sort_by_key(|adapter| rank(&adapter.get_info()));
     all
 }
 
-fn has_doubles(adapter: &wgpu::Adapter) -> bool {
-    adapter.features().contains(wgpu::Features::SHADER_F64)
+/// An adapter in words: name, interface and driver, as manifests have it.
+pub fn describe(info: &wgpu::AdapterInfo) -> String {
+    let driver = [info.driver.as_str(), info.driver_info.as_str()].join(" ");
+    format!("{} ({:?}; {})", info.name, info.backend, driver.trim())
+}
+
+/// Whether an adapter is more than a program on the processor.
+pub fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
+    info.device_type != wgpu::DeviceType::Cpu
+}
+
+fn has(adapter: &wgpu::Adapter, precision: Precision) -> bool {
+    adapter.features().contains(features(precision))
+}
+
+fn features(precision: Precision) -> wgpu::Features {
+    match precision {
+        Precision::F32 => wgpu::Features::empty(),
+        Precision::F64 => wgpu::Features::SHADER_F64,
+    }
 }
 
 /// Hardware before software, dedicated before integrated.
@@ -96,24 +139,18 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
 }
 
 pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
-    let mut all = instance().enumerate_adapters(wgpu::Backends::all()).await;
-    all.sort_by_key(|adapter| rank(&adapter.get_info()));
+    let all = all_adapters().await;
     let named = |adapter: &wgpu::Adapter| {
         let name = adapter.get_info().name.to_lowercase();
         choice.name.as_ref().is_none_or(|wanted| name.contains(&wanted.to_lowercase()))
     };
-    let fits =
-        |adapter: &wgpu::Adapter| named(adapter) && (precision == Precision::F32 || has_doubles(adapter));
+    let fits = |adapter: &wgpu::Adapter| named(adapter) && has(adapter, precision);
     let Some(adapter) = all.iter().find(|adapter| fits(adapter)) else {
         return Err(no_adapter(precision, choice, &all));
     };
-    let features = match precision {
-        Precision::F32 => wgpu::Features::empty(),
-        Precision::F64 => wgpu::Features::SHADER_F64,
-    };
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("rattlemap"),
-        required_features: features,
+        required_features: features(precision),
         required_limits: adapter.limits(),
         ..Default::default()
     };
@@ -137,7 +174,7 @@ fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter
     let list: Vec<String> = all
         .iter()
         .map(|adapter| {
-            let doubles = if has_doubles(adapter) { "f32, f64" } else { "f32" };
+            let doubles = if has(adapter, Precision::F64) { "f32, f64" } else { "f32" };
             format!("{} ({doubles})", adapter.get_info().name)
         })
         .collect();
@@ -157,8 +194,7 @@ fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::Bi
         entry(binding, wgpu::BufferBindingType::Storage { read_only })
     };
     let uniform = entry(0, wgpu::BufferBindingType::Uniform);
-    let entries: Vec<_> =
-        std::iter::once(uniform).chain(entry_point.storage.iter().map(storage)).collect();
+    let entries: Vec<_> = std::iter::once(uniform).chain(entry_point.storage.iter().map(storage)).collect();
     let label = Some(entry_point.name);
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries })
 }

@@ -45,7 +45,8 @@ fn set_word(record: &mut Record, finding: &Finding) {
         record.word_hash = joined([finding.hash_low, finding.hash_high]);
         return;
     }
-    let symbol =
-        |i: usize| b'0' + ((finding.word[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8;
+    let symbol = |i: usize| {
+        b'0' + ((finding.word[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8
+    };
     record.set_word(&Word::cyclic(&(0..length).map(symbol).collect::<Vec<_>>()));
 }

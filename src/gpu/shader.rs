@@ -16,6 +16,14 @@ impl Precision {
     /// Both precisions.
     pub const ALL: [Precision; 2] = [Precision::F32, Precision::F64];
 
+    /// The name in manifests and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Precision::F32 => "f32",
+            Precision::F64 => "f64",
+        }
+    }
+
     /// Bytes of a real number.
     pub fn bytes(self) -> usize {
         match self {

@@ -18,6 +18,11 @@ pub struct Tables {
 }
 
 impl Tables {
+    /// Free steps per forcing period of a flow; 0 if lanes cannot carry it.
+    pub fn steps_per_period(&self, flow: u32) -> u32 {
+        self.constants[flow as usize].as_ref().map_or(0, |constants| constants.steps)
+    }
+
     pub(super) fn new(
         gpu: &Gpu,
         flows: &[Oscillator],

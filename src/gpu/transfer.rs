@@ -64,8 +64,7 @@ pub(super) async fn read<T>(
     submission: wgpu::SubmissionIndex,
     take: impl FnOnce(&[u8]) -> T,
 ) -> Result<T, GpuError> {
-    // A device that is lost tells so once; what follows from it says less.
-    let lost = |message: String| GpuError::Lost { message: gpu.trouble.message().unwrap_or(message) };
+    let lost = |message: String| gpu.failure(GpuError::Lost { message });
     let (mapped, send) = Signal::new();
     buffer.map_async(wgpu::MapMode::Read, .., send);
     // Native devices call back only while they are polled; a browser's do so by themselves.

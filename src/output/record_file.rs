@@ -99,6 +99,27 @@ impl Identity {
         }
     }
 
+    /// The identity of the run whose records a file holds.
+    ///
+    /// # Errors
+    /// [`RecordFileError`] if it cannot be read.
+    pub fn read(path: &Path) -> Result<Identity, RecordFileError> {
+        let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
+        let file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        Reader { input: BufReader::new(&file), path, at: 0, length }.identity()
+    }
+
+    /// The engine's name.
+    pub fn engine(&self) -> &str {
+        &self.engine
+    }
+
+    /// Its precision.
+    pub fn precision(&self) -> &str {
+        &self.precision
+    }
+
     fn named(&self) -> Vec<(&str, String)> {
         let own = [
             ("record version", self.record_version.to_string()),

@@ -1,0 +1,44 @@
+//! `rattlemap devices`: what there is to compute on, and what a map would take.
+
+use rattlemap::gpu::{self, AdapterReport};
+use rattlemap::plan::Plan;
+use rattlemap::scene::{Purpose, Scene};
+
+use crate::cli::{EngineChoice, EngineOptions};
+use crate::engine_choice;
+use crate::error::Failure;
+
+/// What engines are tried on.
+const MAIN_MAP: &str = include_str!("../scenes/e_omega.toml");
+
+/// Prints the processor, the adapters, and the choice of `--engine auto` on the main map.
+pub(crate) fn run() -> Result<(), Failure> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    println!("cpu: event-driven reference, {threads} threads");
+    println!("  precision   f64");
+    let adapters = pollster::block_on(gpu::adapters());
+    for adapter in &adapters {
+        print(adapter);
+    }
+    if adapters.is_empty() {
+        println!("no graphics adapter; a software one comes with Mesa (Debian: mesa-vulkan-drivers)");
+    }
+    let scene = Scene::parse(MAIN_MAP, "e_omega", &[], Purpose::Map)?;
+    let plan = Plan::new(&scene);
+    let auto = EngineOptions { engine: EngineChoice::Auto, precision: None };
+    let chosen = engine_choice::open(&plan, &auto)?;
+    let (engine, precision) = (chosen.engine.name(), chosen.engine.precision());
+    println!("auto takes {engine} ({precision}) for the main map: {}", chosen.why);
+    Ok(())
+}
+
+fn print(adapter: &AdapterReport) {
+    let AdapterReport { info, precisions, largest_binding, batch_lanes } = adapter;
+    let names: Vec<&str> = precisions.iter().map(|precision| precision.name()).collect();
+    let kind = if gpu::is_hardware(info) { "hardware" } else { "software" };
+    println!("gpu: {}", gpu::describe(info));
+    println!("  kind        {kind} ({:?})", info.device_type);
+    println!("  precision   {}", names.join(", "));
+    println!("  binding     {:.1} GiB", *largest_binding as f64 / f64::from(1 << 30));
+    println!("  batch       up to {batch_lanes} lanes");
+}

@@ -1,0 +1,196 @@
+//! Lanes on a graphics device as an engine.
+
+use std::collections::HashMap;
+
+use super::EngineError;
+use crate::gpu::{self, GpuError, Lane, LaneSettings, Tables};
+use crate::plan::{Batch, Cell, Needs, Plan};
+use crate::record::{Record, valid};
+use crate::scene::Steps;
+
+/// Most flows that stay on the device for all batches; each takes 2 kB in f32, 4 kB in f64,
+/// and a phasor per step.
+const KEPT_FLOWS: usize = 16_384;
+
+/// First batches: enough to keep a hardware device busy, or a software one for a second.
+const LEAST_ON_HARDWARE: usize = 1 << 16;
+const LEAST_IN_SOFTWARE: usize = 256;
+
+/// Lanes on one device, in one precision.
+pub struct Gpu<'p> {
+    plan: &'p Plan,
+    device: gpu::Gpu,
+    settings: LaneSettings,
+    /// All flows and laws; none where there are too many of them to be kept.
+    tables: Option<Tables>,
+    /// Free steps taken so far.
+    steps: u64,
+}
+
+impl<'p> Gpu<'p> {
+    /// An engine for the cells of a plan on an open device.
+    ///
+    /// # Errors
+    /// [`EngineError`] if the device takes no constants.
+    pub fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+        let settings = lane_settings(plan);
+        let is_shared = plan.flow_count() < plan.cell_count() && plan.flow_count() <= KEPT_FLOWS;
+        let mut engine = Gpu { plan, device, settings, tables: None, steps: 0 };
+        if is_shared {
+            let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
+            let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
+            engine.tables = match engine.load(&flows, &laws) {
+                // Batches that need fewer of them may fit.
+                Err(GpuError::TooManyFlows { .. }) => None,
+                other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
+            };
+        }
+        Ok(engine)
+    }
+
+    pub(super) fn precision(&self) -> &'static str {
+        self.device.precision().name()
+    }
+
+    pub(super) fn device(&self) -> String {
+        gpu::describe(self.device.adapter())
+    }
+
+    pub(super) fn least_batch(&self) -> usize {
+        if gpu::is_hardware(self.device.adapter()) { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+    }
+
+    /// Free steps of all lanes so far.
+    pub(super) fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    pub(super) async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
+        let cells = batch.cells.len();
+        let (own, lanes) = match &self.tables {
+            Some(_) => (None, batch.cells.iter().map(|cell| self.lane(cell.flow, cell.law)).collect()),
+            None => {
+                let (flows, laws, lanes) = self.renumbered(&batch.cells);
+                (Some(self.load(&flows, &laws).map_err(|error| self.error(error, cells))?), lanes)
+            }
+        };
+        let Some(tables) = own.as_ref().or(self.tables.as_ref()) else {
+            unreachable!("one of them is there")
+        };
+        let ran = self.device.run_on(tables, &lanes, &self.settings).await;
+        let mut records = ran.map_err(|error| self.error(error, cells))?;
+        for (record, lane) in records.iter_mut().zip(&lanes) {
+            self.steps += u64::from(record.periods_run) * u64::from(tables.steps_per_period(lane.flow));
+            keep(record, self.plan.needs());
+        }
+        Ok(records)
+    }
+
+    fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
+        let flows: Vec<_> = flows.iter().map(|&flow| self.plan.oscillator(flow)).collect();
+        let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
+        self.device.load(&flows, &laws, self.settings.steps_per_period)
+    }
+
+    fn lane(&self, flow: u32, law: u32) -> Lane {
+        Lane { flow, law, start: self.plan.start() }
+    }
+
+    /// The flows and laws of a batch alone, and its lanes with indices among them.
+    fn renumbered(&self, cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
+        let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
+        let lanes =
+            cells.iter().map(|cell| self.lane(flows.place(cell.flow), laws.place(cell.law))).collect();
+        (flows.list, laws.list, lanes)
+    }
+
+    fn error(&self, error: GpuError, cells: usize) -> EngineError {
+        let device = self.device();
+        match error {
+            GpuError::OutOfMemory { .. } | GpuError::TooManyFlows { .. } => {
+                EngineError::OutOfMemory { device, cells }
+            }
+            GpuError::Lost { message } => EngineError::Lost { device, reason: message },
+            other => EngineError::Refused { device, reason: other.to_string() },
+        }
+    }
+}
+
+/// Things in the order in which they were first met.
+#[derive(Default)]
+struct Numbering {
+    list: Vec<u32>,
+    places: HashMap<u32, u32>,
+}
+
+impl Numbering {
+    fn place(&mut self, thing: u32) -> u32 {
+        *self.places.entry(thing).or_insert_with(|| {
+            self.list.push(thing);
+            self.list.len() as u32 - 1
+        })
+    }
+}
+
+fn lane_settings(plan: &Plan) -> LaneSettings {
+    let budget = plan.budget();
+    let default = LaneSettings::default();
+    LaneSettings {
+        periods: budget.settings.transient_periods.saturating_add(budget.settings.observed_periods),
+        transient_periods: budget.settings.transient_periods,
+        max_period: budget.settings.max_period,
+        early_stop: budget.early_stop,
+        exponent: budget.exponent,
+        exponent_from: default.exponent_from.min(budget.settings.transient_periods),
+        steps_per_period: match plan.steps_per_period() {
+            Steps::Auto => None,
+            Steps::PerPeriod(steps) => Some(steps),
+        },
+        ..default
+    }
+}
+
+/// Leaves what somebody asked for.
+fn keep(record: &mut Record, needs: &Needs) {
+    let mut drop = |asked: bool, bits: u32, clear: fn(&mut Record)| {
+        if !asked {
+            record.valid &= !bits;
+            clear(record);
+        }
+    };
+    drop(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
+    drop(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
+    drop(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
+    drop(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
+    drop(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_nobody_asked_for_is_not_in_the_record() {
+        let mut record = Record {
+            lyapunov: 1.0,
+            lyapunov_error: 1.0,
+            impacts_per_period: 1.0,
+            mesh_fraction: 1.0,
+            word: [1; 4],
+            word_hash: 1,
+            word_length: 1,
+            symmetric: 1,
+            valid: u32::MAX >> 25,
+            ..Record::default()
+        };
+        let whole = record;
+        let all = Needs { exponent: true, impacts: true, mesh: true, symmetric: true, word: true };
+        keep(&mut record, &all);
+        assert_eq!(record, whole);
+        keep(
+            &mut record,
+            &Needs { exponent: false, impacts: false, mesh: false, symmetric: false, word: false },
+        );
+        assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });
+    }
+}
