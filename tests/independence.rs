@@ -1,0 +1,69 @@
+//! What a lane gives depends on its own cell alone: properties over random cells, batches,
+//! dispatch lengths and workgroups.
+
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::model::{GearPair, Law, Oscillator, State};
+
+/// A cell anywhere in the plane, stiff or soft, with a start that may lie beyond a wall.
+fn cell() -> impl Strategy<Value = (GearPair, State)> {
+    let pair = (0.0..=1.0, 1.0..12.0, 100.0..3000.0, prop_oneof![Just(0.0), 1e-4..0.1])
+        .prop_map(|(e, omega, k, mesh_speed)| GearPair { omega, k, mesh_speed, ..GearPair::paper(e) });
+    let start = prop_oneof![Just([0.0; 4]), prop::array::uniform4(-0.6..0.6)];
+    (pair, start)
+}
+
+/// How the work is cut up.
+#[derive(Debug)]
+struct Cut {
+    batch: usize,
+    trips: u32,
+    workgroup: u32,
+    /// Where the order of the lanes begins.
+    turn: usize,
+}
+
+fn cut() -> impl Strategy<Value = Cut> {
+    (1..40usize, 60..4000u32, prop::sample::select(vec![32, 64]), 0..24usize)
+        .prop_map(|(batch, trips, workgroup, turn)| Cut { batch, trips, workgroup, turn })
+}
+
+fn records(
+    gpu: &mut Gpu,
+    (flows, laws): (&[Oscillator], &[Law]),
+    lanes: &[Lane],
+    settings: &LaneSettings,
+) -> Vec<rattlemap::record::Record> {
+    pollster::block_on(gpu.run(flows, laws, lanes, settings)).unwrap()
+}
+
+/// Every field of every record, to the bit, whatever the batch size, the dispatch length, the
+/// workgroup size and the neighbours.
+#[test]
+fn records_do_not_depend_on_how_the_work_is_cut() {
+    for precision in Precision::ALL {
+        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+        let mut runner = TestRunner::new(ProptestConfig { cases: 10, ..ProptestConfig::default() });
+        let gpu = std::cell::RefCell::new(&mut gpu);
+        let cases = (prop::collection::vec(cell(), 24), cut(), any::<bool>(), any::<bool>());
+        runner
+            .run(&cases, |(cells, cut, early_stop, exponent)| {
+                let flows: Vec<_> = cells.iter().map(|(pair, _)| pair.oscillator().unwrap()).collect();
+                let laws: Vec<_> = cells.iter().map(|(pair, _)| pair.law()).collect();
+                let lane = |(i, &(_, start)): (u32, &(GearPair, State))| Lane { flow: i, law: i, start };
+                let mut lanes: Vec<_> = (0..).zip(&cells).map(lane).collect();
+                let budget = LaneSettings { periods: 60, transient_periods: 20, ..LaneSettings::default() };
+                let settings = LaneSettings { exponent_from: 10, early_stop, exponent, ..budget };
+                let gpu = &mut *gpu.borrow_mut();
+                let mut whole = records(gpu, (&flows, &laws), &lanes, &settings);
+                lanes.rotate_left(cut.turn);
+                whole.rotate_left(cut.turn);
+                let Cut { batch, trips, workgroup, .. } = cut;
+                let settings = LaneSettings { batch: Some(batch), trips, workgroup, ..settings };
+                prop_assert_eq!(records(gpu, (&flows, &laws), &lanes, &settings), whole);
+                Ok(())
+            })
+            .unwrap();
+    }
+}
