@@ -3,10 +3,11 @@
 
 use std::mem::{offset_of, size_of};
 
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::back::{hlsl, msl, spv};
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use rattlemap::gpu::{Precision, Variant, layout};
 
-fn module(variant: Variant) -> naga::Module {
+fn module(variant: Variant) -> (naga::Module, ModuleInfo) {
     let source = variant.source();
     let module = naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|error| panic!("{variant:?}: {}", error.emit_to_string(&source)));
@@ -14,10 +15,10 @@ fn module(variant: Variant) -> naga::Module {
         Precision::F32 => Capabilities::empty(),
         Precision::F64 => Capabilities::FLOAT64,
     };
-    Validator::new(ValidationFlags::all(), capabilities)
+    let info = Validator::new(ValidationFlags::all(), capabilities)
         .validate(&module)
         .unwrap_or_else(|error| panic!("{variant:?}: {}", error.emit_to_string(&source)));
-    module
+    (module, info)
 }
 
 /// Members of a struct as `(name, offset)`, and its size.
@@ -56,7 +57,7 @@ macro_rules! same_layout {
 fn every_variant_is_valid_and_lies_as_the_host_says() {
     for precision in Precision::ALL {
         for (workgroup, exponent) in [(32, false), (64, true), (64, false), (256, true)] {
-            let module = &module(Variant { precision, workgroup, exponent });
+            let (module, _) = &module(Variant { precision, workgroup, exponent });
             let real = precision.bytes();
             same_layout!(
                 module,
@@ -175,6 +176,34 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     word
                 ]
             );
+        }
+    }
+}
+
+/// What Vulkan, Metal and DirectX 12 get: wgpu translates the shaders when a device compiles
+/// them. Metal has no double precision at all, and wgpu asks DirectX for none.
+#[test]
+fn every_variant_translates_for_every_kind_of_device() {
+    for exponent in [false, true] {
+        for precision in Precision::ALL {
+            let variant = Variant { exponent, ..Variant::of(precision) };
+            let (module, info) = module(variant);
+            let words = spv::write_vec(&module, &info, &spv::Options::default(), None)
+                .unwrap_or_else(|error| panic!("SPIR-V, {variant:?}: {error}"));
+            assert!(words.len() > 10_000, "{variant:?}: {} words", words.len());
+            if precision == Precision::F64 {
+                continue;
+            }
+            let options = msl::Options { fake_missing_bindings: true, ..msl::Options::default() };
+            let (text, _) = msl::write_string(&module, &info, &options, &msl::PipelineOptions::default())
+                .unwrap_or_else(|error| panic!("Metal, {variant:?}: {error}"));
+            assert!(text.contains("kernel void sweep"), "{variant:?}");
+            let (options, mut text) = (hlsl::Options::default(), String::new());
+            let pipeline = hlsl::PipelineOptions::default();
+            hlsl::Writer::new(&mut text, &options, &pipeline)
+                .write(&module, &info, None)
+                .unwrap_or_else(|error| panic!("HLSL, {variant:?}: {error}"));
+            assert!(text.contains("void sweep("), "{variant:?}");
         }
     }
 }
