@@ -49,20 +49,27 @@ pub(crate) enum Command {
 #[command(after_help = "Example, the main map with fewer cells:\n  \
     rattlemap map scenes/e_omega.toml --set axis.0.count=128 --set axis.1.count=128")]
 pub(crate) struct Map {
-    /// A scene with two [[axis]] tables
-    #[arg(value_name = "SCENE")]
-    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) run: SceneOptions,
 
     #[command(flatten)]
     pub(crate) engine: EngineOptions,
 
-    /// Where to write [default: out/<scene's name>]
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
-
     /// Go on with an interrupted run of the same scene
     #[arg(long, conflicts_with = "force")]
     pub(crate) resume: bool,
+}
+
+/// A scene, where its results go, and what to change about it.
+#[derive(Debug, Args)]
+pub(crate) struct SceneOptions {
+    /// The scene: a TOML file
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+
+    /// Where to write [default: out/<scene's name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
 
     /// Replace the files of an earlier run; without it a folder that is not empty is refused
     #[arg(long)]
@@ -76,6 +83,14 @@ pub(crate) struct Map {
     /// Say nothing unless something is wrong
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+impl SceneOptions {
+    /// The folder to write to.
+    pub(crate) fn out(&self) -> PathBuf {
+        let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
+        self.out.clone().unwrap_or_else(default)
+    }
 }
 
 /// Who computes, and how precisely.
@@ -108,17 +123,12 @@ pub(crate) enum EngineChoice {
 }
 
 impl Map {
-    /// The folder to write to.
-    pub(crate) fn out(&self) -> PathBuf {
-        out_folder(self.out.as_deref(), &self.scene)
-    }
-
     /// The command that goes on with this run.
     pub(crate) fn resume_command(&self) -> String {
         let quoted =
             |text: String| if text.contains([' ', '"', '*', '$', '[']) { format!("'{text}'") } else { text };
-        let mut words = vec!["rattlemap map".to_owned(), quoted(self.scene.display().to_string())];
-        if let Some(out) = &self.out {
+        let mut words = vec!["rattlemap map".to_owned(), quoted(self.run.scene.display().to_string())];
+        if let Some(out) = &self.run.out {
             words.push(format!("--out {}", quoted(out.display().to_string())));
         }
         if let Some(engine) =
@@ -127,15 +137,10 @@ impl Map {
             words.push(format!("--engine {}", engine.get_name()));
         }
         words.extend(self.engine.precision.map(|precision| format!("--precision {}", precision.name())));
-        words.extend(self.set.iter().map(|set| format!("--set {}", quoted(set.clone()))));
+        words.extend(self.run.set.iter().map(|set| format!("--set {}", quoted(set.clone()))));
         words.push("--resume".to_owned());
         words.join(" ")
     }
-}
-
-fn out_folder(out: Option<&Path>, scene: &Path) -> PathBuf {
-    let default = || Path::new("out").join(scene.file_stem().unwrap_or_default());
-    out.map_or_else(default, Path::to_owned)
 }
 
 /// One motion: its class, word, exponent, multipliers and every event on the cycle
@@ -212,33 +217,8 @@ impl Orbit {
 #[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
     rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200")]
 pub(crate) struct Bifurcation {
-    /// A scene with one [[axis]]
-    #[arg(value_name = "SCENE")]
-    pub(crate) scene: PathBuf,
-
-    /// Where to write [default: out/<scene's name>]
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
-
-    /// Replace the files of an earlier run; without it a folder that is not empty is refused
-    #[arg(long)]
-    pub(crate) force: bool,
-
-    /// Override the scene: a parameter by name (omega=6), anything else by its path
-    /// (integration.max_period=32, axis.0.count=200). May be repeated
-    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
-    pub(crate) set: Vec<String>,
-
-    /// Say nothing unless something is wrong
-    #[arg(long)]
-    pub(crate) quiet: bool,
-}
-
-impl Bifurcation {
-    /// The folder to write to.
-    pub(crate) fn out(&self) -> PathBuf {
-        out_folder(self.out.as_deref(), &self.scene)
-    }
+    #[command(flatten)]
+    pub(crate) run: SceneOptions,
 }
 
 #[cfg(test)]

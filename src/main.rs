@@ -43,6 +43,7 @@ fn run_orbit(ask: &cli::Orbit) -> Result<(), Failure> {
 }
 
 fn run_bifurcation(ask: &cli::Bifurcation) -> Result<(), Failure> {
+    let ask = &ask.run;
     let scene = scene::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
     let folder = Folder::open(&ask.out(), ask.force)?;
     let cells = scene.line();

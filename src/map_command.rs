@@ -27,25 +27,26 @@ const KILLED: i32 = 130;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
-    let scene = scene::load(&ask.scene, &ask.set, Purpose::Map)?;
+    let scene = scene::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
-    capacity::check(&scene, &ask.out())?;
+    capacity::check(&scene, &ask.run.out())?;
     let folder = open_folder(ask)?;
     let plan = Plan::new(&scene);
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;
-    if !ask.quiet && !why.is_empty() {
+    if !ask.run.quiet && !why.is_empty() {
         eprintln!("{} ({}): {why}", engine.name(), engine.precision());
     }
     let (mut file, mut records) = open_records(ask, &folder, &scene, &plan, &engine)?;
     let resumed_cells = file.places();
     let clock = Instant::now();
-    let progress = Progress::new(plan.cell_count(), resumed_cells, "cells", ask.quiet);
+    let progress = Progress::new(plan.cell_count(), resumed_cells, "cells", ask.run.quiet);
     integrate(ask, &plan, &mut engine, &mut file, &mut records, &progress)?;
     let elapsed = clock.elapsed();
     let cells = Cells::new(&scene, &plan, &records);
     let (device, lane_steps) = (engine.device(), engine.lane_steps());
     let (engine, precision) = (engine.name(), engine.precision());
-    let run = output::map::Run { sets: &ask.set, engine, precision, device: &device, elapsed, resumed_cells };
+    let run =
+        output::map::Run { sets: &ask.run.set, engine, precision, device: &device, elapsed, resumed_cells };
     let files = output::map::write(&folder, &cells, &run)?;
     progress.finish(&format!(
         "{}\n{}: {}",
@@ -59,12 +60,12 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
 
 /// A new folder, an earlier run's with `--force`, an interrupted one's with `--resume`.
 fn open_folder(ask: &Map) -> Result<Folder, Failure> {
-    let out = ask.out();
+    let out = ask.run.out();
     let is_new = out.read_dir().map_or(true, |mut entries| entries.next().is_none());
     if ask.resume && !is_new && !out.join(RECORDS).is_file() {
         return Err(RecordFileError::NothingToResume { folder: out }.into());
     }
-    Ok(Folder::open(&out, ask.force || ask.resume)?)
+    Ok(Folder::open(&out, ask.run.force || ask.resume)?)
 }
 
 /// The engine that was asked for; where that is left open, an interrupted run goes on with
@@ -123,7 +124,7 @@ fn integrate(
     records: &mut [Record],
     progress: &Progress,
 ) -> Result<(), Failure> {
-    let stop = stop_on_interrupt(ask.quiet)?;
+    let stop = stop_on_interrupt(ask.run.quiet)?;
     let from = file.places();
     let swept = pollster::block_on(sweep::run(plan, engine, from, |batch, computed| {
         file.append(computed)?;
