@@ -6,8 +6,8 @@
 //! ([`mod@reference`]), lanes on a graphics device do so on a grid of their own ([`gpu`]), and
 //! what the reference meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a
 //! bifurcation diagram
-//! ([`bifurcation`]). A map's cells go through an engine ([`engine`], [`sweep`]) and come back
-//! as records ([`record`], [`classify`]). All of it is then written down ([`output`]).
+//! ([`bifurcation`]). A map's cells are numbered ([`plan`]) and put in order ([`schedule`]), go through an
+//! engine ([`engine`], [`sweep`]) and come back as records ([`record`], [`classify`]). All of it is then written down ([`output`]).
 
 pub mod bifurcation;
 pub mod certificate;
@@ -22,6 +22,7 @@ pub mod plan;
 pub mod record;
 pub mod reference;
 pub mod scene;
+pub mod schedule;
 pub mod stability;
 pub mod sweep;
 pub mod word;

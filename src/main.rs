@@ -49,7 +49,7 @@ fn run_bifurcation(ask: &cli::Bifurcation) -> Result<(), Failure> {
     let cells = scene.line();
     let progress = Progress::new(cells.len(), 0, "columns", ask.quiet);
     let clock = Instant::now();
-    let report = |done| progress.report(done);
+    let report = |done| progress.report(done, cells.len());
     let columns = bifurcation::run(&cells, &scene.start().into(), &scene.orbit_settings(), &report);
     let files = output::bifurcation::write(&folder, &scene, &ask.set, &columns, clock.elapsed())?;
     progress.finish(&format!("{}: {}", folder.path().display(), files.join(", ")));

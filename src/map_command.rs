@@ -14,6 +14,7 @@ use rattlemap::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, Reco
 use rattlemap::plan::{Plan, count_classes};
 use rattlemap::record::Record;
 use rattlemap::scene::{self, Purpose, Scene};
+use rattlemap::schedule::{Refined, Schedule};
 use rattlemap::sweep::{self, SweepError};
 
 use crate::capacity;
@@ -36,17 +37,27 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     if !ask.run.quiet && !why.is_empty() {
         eprintln!("{} ({}): {why}", engine.name(), engine.precision());
     }
-    let (mut file, mut records) = open_records(ask, &folder, &scene, &plan, &engine)?;
+    let mut work = Work::new(&plan);
+    let mut file = open_records(ask, &folder, &scene, &mut work, &engine)?;
     let resumed_cells = file.places();
     let clock = Instant::now();
-    let progress = Progress::new(plan.cell_count(), resumed_cells, "cells", ask.run.quiet);
-    integrate(ask, &plan, &mut engine, &mut file, &mut records, &progress)?;
+    let progress = Progress::new(work.schedule.sequence().len(), resumed_cells, "cells", ask.run.quiet);
+    integrate(ask, &mut work, &mut engine, &mut file, &progress)?;
+    let Work { schedule, mut records, .. } = work;
+    let refined = schedule.finish(&mut records);
     let elapsed = clock.elapsed();
     let cells = Cells::new(&scene, &plan, &records);
     let (device, lane_steps) = (engine.device(), engine.lane_steps());
     let (engine, precision) = (engine.name(), engine.precision());
-    let run =
-        output::map::Run { sets: &ask.run.set, engine, precision, device: &device, elapsed, resumed_cells };
+    let run = output::map::Run {
+        sets: &ask.run.set,
+        engine,
+        precision,
+        device: &device,
+        elapsed,
+        resumed_cells,
+        refined,
+    };
     let files = output::map::write(&folder, &cells, &run)?;
     progress.finish(&format!(
         "{}\n{}: {}",
@@ -91,55 +102,63 @@ fn open_records(
     ask: &Map,
     folder: &Folder,
     scene: &Scene,
-    plan: &Plan,
+    work: &mut Work<'_>,
     engine: &Engine<'_>,
-) -> Result<(RecordFile, Vec<Record>), Failure> {
+) -> Result<RecordFile, Failure> {
     let path = folder.path().join(RECORDS);
     let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
-    let mut records = vec![Record::default(); plan.cell_count()];
     let file = if ask.resume && path.is_file() {
-        RecordFile::resume(&path, &identity, plan.cell_count(), |place, batch| {
-            store(plan, &mut records, place, batch);
+        let Work { plan, schedule, records } = work;
+        RecordFile::resume(&path, &identity, |place, batch| {
+            sweep::replay(plan, schedule, records, place, batch)
         })?
     } else {
         RecordFile::create(&path, &identity)?
     };
     output::map::clear(folder)?;
-    Ok((file, records))
+    Ok(file)
 }
 
-/// Puts a batch that begins at `place` of the plan's order where its cells belong.
-fn store(plan: &Plan, records: &mut [Record], place: usize, batch: &[Record]) {
-    for (&id, record) in plan.order()[place..].iter().zip(batch) {
-        records[id as usize] = *record;
+/// What is to be done, and what has been.
+struct Work<'p> {
+    plan: &'p Plan,
+    schedule: Schedule,
+    /// By cell id.
+    records: Vec<Record>,
+}
+
+impl<'p> Work<'p> {
+    fn new(plan: &'p Plan) -> Work<'p> {
+        Work { plan, schedule: Schedule::new(plan), records: vec![Record::default(); plan.cell_count()] }
     }
 }
 
 /// Integrates what is left. Ctrl-C ends it after the batch at hand.
 fn integrate(
     ask: &Map,
-    plan: &Plan,
+    work: &mut Work<'_>,
     engine: &mut Engine<'_>,
     file: &mut RecordFile,
-    records: &mut [Record],
     progress: &Progress,
 ) -> Result<(), Failure> {
     let stop = stop_on_interrupt(ask.run.quiet)?;
     let from = file.places();
-    let swept = pollster::block_on(sweep::run(plan, engine, from, |batch, computed| {
-        file.append(computed)?;
-        store(plan, records, batch.places.start, computed);
-        progress.report(batch.places.end);
-        let stopped = stop.load(Ordering::Relaxed);
-        Ok(if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
-    }));
+    let Work { plan, schedule, records } = work;
+    let swept =
+        pollster::block_on(sweep::run(plan, schedule, engine, records, from, |batch, computed, known| {
+            file.append(computed)?;
+            progress.report(batch.places.end, known);
+            let stopped = stop.load(Ordering::Relaxed);
+            Ok(if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        }));
     let go_on = || {
-        let (done, total, command) = (file.places(), plan.cell_count(), ask.resume_command());
-        format!("{done} of {total} cells are kept; go on with: {command}")
+        let (done, total) = (file.places(), plan.cell_count());
+        let most = if plan.refine().is_some() { "at most " } else { "" };
+        format!("{done} of {most}{total} cells are kept; go on with: {}", ask.resume_command())
     };
     match swept {
-        Ok(place) if place == plan.cell_count() => Ok(()),
-        Ok(_) => Err(Failure::Run(anyhow!("interrupted; {}", go_on()))),
+        Ok(true) => Ok(()),
+        Ok(false) => Err(Failure::Run(anyhow!("interrupted; {}", go_on()))),
         Err(error @ SweepError::Engine(_)) => Err(Failure::Run(anyhow!("{error}; {}", go_on()))),
         Err(error) => Err(Failure::Run(anyhow!("{error}; make room there; {}", go_on()))),
     }
@@ -166,9 +185,10 @@ fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
 fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64>, seconds: f64) -> String {
     let [columns, rows] = cells.counts();
     let count = columns * rows;
+    let integrated = run.refined.as_ref().map_or(count, |refined| refined.integrated);
     let integrating = run.elapsed.as_secs_f64().max(1e-9);
-    let here = (count - run.resumed_cells) as f64;
-    let periods = cells.periods() as f64 * here / count as f64;
+    let here = (integrated - run.resumed_cells) as f64;
+    let periods = cells.periods() as f64 * here / integrated as f64;
     let [periodic, chaotic, undecided, failed] = count_classes(cells.classes());
     let resumed = match run.resumed_cells {
         0 => String::new(),
@@ -177,13 +197,30 @@ fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64
     let per_step = lane_steps
         .filter(|&steps| steps > 0)
         .map_or(String::new(), |steps| format!(", {:.0} ns per lane-step", 1e9 * integrating / steps as f64));
+    let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
     format!(
-        "{count} cells{resumed} on {} ({}) in {integrating:.1} s: {:.0} cells/s, {:.0} lane-periods/s{per_step}; outputs {:.1} s\n\
+        "{integrated} cells{resumed} on {} ({}) in {integrating:.1} s: {:.0} cells/s, {:.0} lane-periods/s{per_step}; outputs {:.1} s\n{refined}\
          {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
         run.engine,
         run.precision,
         here / integrating,
         periods / integrating,
         seconds - integrating,
+    )
+}
+
+/// How much an adaptive map left out, and what the audit says of it.
+fn refinement(refined: &Refined, count: usize) -> String {
+    let share = 100.0 * refined.integrated as f64 / count as f64;
+    let audit = refined.audits.last().map_or(String::new(), |audit| {
+        let [low, high] = audit.interval().map(|rate| 100.0 * rate);
+        let (wrong, sampled, rate) = (audit.wrong, audit.sampled, 100.0 * audit.rate());
+        format!(
+            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %)"
+        )
+    });
+    format!(
+        "{share:.1} % of {count} cells integrated in {} rounds, the others filled{audit}\n",
+        refined.rounds
     )
 }

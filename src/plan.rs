@@ -8,13 +8,15 @@
 mod morton;
 mod size;
 
+pub(crate) use morton::key as morton_key;
+
 use std::ops::Range;
 
 pub use size::Size;
 
 use crate::model::{GearPair, Law, Oscillator, State};
 use crate::orbit::{Budget, Class};
-use crate::scene::{Axis, Quantity, REST, Scene, Start, Steps};
+use crate::scene::{Axis, Quantity, REST, Refine, Scene, Start, Steps};
 
 /// The parameters that a contact law is made of; all others belong to the flow.
 const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
@@ -63,6 +65,7 @@ pub struct Plan {
     start: State,
     budget: Budget,
     steps: Steps,
+    refine: Option<Refine>,
     needs: Needs,
     order: Vec<u32>,
 }
@@ -94,6 +97,7 @@ impl Plan {
                 exponent: needs.exponent,
             },
             steps: integration.steps_per_period,
+            refine: scene.refine(),
             needs,
             order: morton::order(first.count(), second.count()),
         }
@@ -127,6 +131,11 @@ impl Plan {
     /// How fine the grid of the lanes is at least.
     pub fn steps_per_period(&self) -> Steps {
         self.steps
+    }
+
+    /// How the map is refined; none if every cell is integrated.
+    pub fn refine(&self) -> Option<Refine> {
+        self.refine
     }
 
     /// What is asked for.
@@ -198,13 +207,6 @@ impl Plan {
     pub fn gear_pair(&self, id: u32) -> GearPair {
         self.pair([true; 2], id)
     }
-
-    /// The batch of up to `count` cells from place `from` of the order on.
-    pub fn batch(&self, from: usize, count: usize) -> Batch {
-        let places = from..from.saturating_add(count).min(self.order.len());
-        let cells = self.order[places.clone()].iter().map(|&id| self.cell(id)).collect();
-        Batch { places, cells }
-    }
 }
 
 fn needs(quantities: &[Quantity]) -> Needs {
@@ -266,16 +268,12 @@ mod tests {
     }
 
     #[test]
-    fn batches_of_any_size_cover_every_cell_once() {
+    fn the_order_is_that_of_the_keys_and_has_every_cell_once() {
         let plan = plan("e", "omega", [7, 5]);
-        for size in [1, 4, 34, 35, 1000] {
-            let mut ids = Vec::new();
-            while ids.len() < plan.cell_count() {
-                ids.extend(plan.batch(ids.len(), size).cells.iter().map(|cell| cell.id));
-            }
-            assert_eq!(ids, plan.order());
-            ids.sort_unstable();
-            assert!(ids.iter().copied().eq(0..35));
-        }
+        let keys: Vec<u64> = plan.order().iter().map(|&id| morton_key(plan.indices(id))).collect();
+        assert!(keys.is_sorted());
+        let mut ids = plan.order().to_vec();
+        ids.sort_unstable();
+        assert!(ids.into_iter().eq(0..35));
     }
 }

@@ -18,7 +18,6 @@ pub(crate) enum Progress {
 
 /// Plain lines, for pipes and logs.
 pub(crate) struct Lines {
-    total: usize,
     unit: &'static str,
     /// What was done before this run, and when this run began.
     from: usize,
@@ -34,7 +33,7 @@ impl Progress {
         }
         if !stderr().is_terminal() {
             let (clock, said) = (Instant::now(), AtomicUsize::new(from * LINES / total));
-            return Progress::Lines(Lines { total, unit, from, clock, said });
+            return Progress::Lines(Lines { unit, from, clock, said });
         }
         let template = format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{per_sec}}, {{eta}} left");
         let style = ProgressStyle::with_template(&template);
@@ -43,19 +42,22 @@ impl Progress {
         Progress::Bar(bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())))
     }
 
-    /// Says that `done` units are done so far; calls may come from any thread, in any order.
-    pub(crate) fn report(&self, done: usize) {
+    /// Says that `done` of `total` units are done so far; calls may come from any thread, in
+    /// any order. The total may grow.
+    pub(crate) fn report(&self, done: usize, total: usize) {
         match self {
             Progress::Quiet => {}
             Progress::Bar(bar) => {
+                bar.set_length(total as u64);
                 if done as u64 > bar.position() {
                     bar.set_position(done as u64);
                 }
             }
             Progress::Lines(lines) => {
-                let part = done * LINES / lines.total;
-                if lines.said.fetch_max(part, Ordering::Relaxed) < part {
-                    eprintln!("{}", lines.text(done));
+                // Of a total that has grown, what has been said may be said again.
+                let part = done * LINES / total;
+                if lines.said.swap(part, Ordering::Relaxed) < part {
+                    eprintln!("{}", lines.text(done, total));
                 }
             }
         }
@@ -75,12 +77,12 @@ impl Progress {
 }
 
 impl Lines {
-    fn text(&self, done: usize) -> String {
-        let Lines { total, unit, .. } = self;
+    fn text(&self, done: usize, total: usize) -> String {
+        let unit = self.unit;
         let seconds = self.clock.elapsed().as_secs_f64();
         let rate = (done - self.from.min(done)) as f64 / seconds.max(1e-9);
         let left = (total - done) as f64 / rate.max(1e-9);
-        if done == *total || seconds < 1.0 {
+        if done == total || seconds < 1.0 {
             return format!("{done} of {total} {unit}");
         }
         format!("{done} of {total} {unit}, {rate:.0} per second, {left:.0} s left")

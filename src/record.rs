@@ -29,6 +29,8 @@ pub mod valid {
     pub const WORD: u32 = 1 << 5;
     /// `strobe`.
     pub const STROBE: u32 = 1 << 6;
+    /// Nothing was measured: the record was filled from its neighbours.
+    pub const FILLED: u32 = 1 << 7;
 }
 
 /// What one cell measured, in one fixed layout for all engines, precisions and variants.

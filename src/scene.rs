@@ -19,7 +19,7 @@ use std::path::Path;
 
 pub use axis::{Axis, MAX_COUNT};
 pub use error::{Place, Problem, SceneError};
-pub use settings::{Format, Integration, Outputs, Quantity, REST, Refine, Start, Steps};
+pub use settings::{Continuous, Format, Integration, Outputs, Quantity, REST, Refine, Start, Steps};
 
 use crate::model::GearPair;
 use crate::orbit;

@@ -8,6 +8,7 @@ use thiserror::Error;
 use crate::engine::{Engine, EngineError};
 use crate::plan::{Batch, Plan};
 use crate::record::Record;
+use crate::schedule::Schedule;
 
 /// What a batch should take: short enough to lose one, long enough not to be noticed.
 const BATCH_SECONDS: f64 = 1.0;
@@ -26,9 +27,9 @@ pub enum SweepError {
     Keep(anyhow::Error),
 }
 
-/// Runs the plan's cells from place `from` of its order on and hands every batch to `keep`,
-/// which says whether to go on. Returns the place reached: the plan's cell count if all is
-/// done.
+/// Runs the cells of a schedule from place `from` on, puts their records into `records` (by
+/// id) and hands every batch to `keep`, with the number of places that are scheduled by now;
+/// `keep` says whether to go on. True if the map is finished.
 ///
 /// Batches grow and shrink so that each takes about a second; records do not depend on it.
 /// A batch too large for the engine's memory is tried again with half as many cells.
@@ -37,26 +38,54 @@ pub enum SweepError {
 /// [`SweepError`], after which everything handed to `keep` before is still good.
 pub async fn run(
     plan: &Plan,
+    schedule: &mut Schedule,
     engine: &mut Engine<'_>,
+    records: &mut [Record],
     from: usize,
-    mut keep: impl FnMut(&Batch, &[Record]) -> anyhow::Result<ControlFlow<()>>,
-) -> Result<usize, SweepError> {
+    mut keep: impl FnMut(&Batch, &[Record], usize) -> anyhow::Result<ControlFlow<()>>,
+) -> Result<bool, SweepError> {
     let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH };
     let mut place = from;
-    while place < plan.cell_count() {
-        let batch = plan.batch(place, pace.cells);
+    while place < schedule.sequence().len() || schedule.extend(records) {
+        let batch = schedule.batch(plan, place, pace.cells);
         let clock = Instant::now();
-        let records = match engine.run(&batch).await {
+        let computed = match engine.run(&batch).await {
             Err(EngineError::OutOfMemory { .. }) if pace.halve(batch.cells.len()) => continue,
             other => other?,
         };
         place = batch.places.end;
         pace.adapt(batch.cells.len(), clock.elapsed());
-        if keep(&batch, &records).map_err(SweepError::Keep)?.is_break() {
-            break;
+        store(&batch, &computed, records);
+        let stops = keep(&batch, &computed, schedule.sequence().len()).map_err(SweepError::Keep)?.is_break();
+        if stops && (place < schedule.sequence().len() || schedule.extend(records)) {
+            return Ok(false);
         }
     }
-    Ok(place)
+    Ok(true)
+}
+
+/// Puts the records of a batch where its cells belong.
+fn store(batch: &Batch, computed: &[Record], records: &mut [Record]) {
+    for (cell, record) in batch.cells.iter().zip(computed) {
+        records[cell.id as usize] = *record;
+    }
+}
+
+/// Takes up the records of an interrupted run, a batch that begins at `place`. False if the
+/// schedule has no such places.
+pub fn replay(
+    plan: &Plan,
+    schedule: &mut Schedule,
+    records: &mut [Record],
+    place: usize,
+    computed: &[Record],
+) -> bool {
+    if place == schedule.sequence().len() && !schedule.extend(records) {
+        return false;
+    }
+    let batch = schedule.batch(plan, place, computed.len());
+    store(&batch, computed, records);
+    batch.cells.len() == computed.len()
 }
 
 /// How many cells the next batch has.

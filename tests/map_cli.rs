@@ -377,7 +377,7 @@ fn scenes_that_maps_cannot_do_are_refused() {
             "start.policy=up",
             "`start.policy = up` does not fit: `map` starts every cell from one state so far",
         ),
-        ("refine.max_error=0.01", "`refine = { ... }` does not fit: `map` integrates every cell so far"),
+        ("refine.max_error=0", "`refine.max_error = 0` is out of range"),
         ("e=0.5", "`parameters.e = 0.5` does not fit: axis 0 sweeps `e`"),
     ] {
         let run = map(&folder, &["--set", set]);

@@ -4,7 +4,7 @@ use crate::classify::{classify, status};
 use crate::orbit::{Class, Status};
 use crate::plan::Plan;
 use crate::record::{Record, Spelling, valid};
-use crate::scene::{Quantity, Scene};
+use crate::scene::{Continuous, Quantity, Scene};
 
 /// Where a cell's values come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,8 +97,11 @@ impl<'a> Cells<'a> {
         let [first, second] = self.plan.axes();
         let class = classify(record);
         let periodic = matches!(class, Class::Periodic { .. });
+        let is_filled = record.valid & valid::FILLED != 0;
+        let shows = !is_filled
+            || self.scene.refine().is_none_or(|refine| refine.continuous == Continuous::Interpolated);
         let asked = |quantity, bit, value: f64| {
-            (self.asks(quantity) && record.valid & bit != 0 && value.is_finite()).then_some(value)
+            (shows && self.asks(quantity) && record.valid & bit != 0 && value.is_finite()).then_some(value)
         };
         let asks_class = self.asks(Quantity::Class);
         let lyapunov = asked(Quantity::Lyapunov, valid::LYAPUNOV, record.lyapunov);
@@ -118,7 +121,7 @@ impl<'a> Cells<'a> {
                 .then_some(record.symmetric != 0),
             status: status(record),
             periods_run: record.periods_run,
-            source: if record.periods_run == 0 { Source::Filled } else { Source::Integrated },
+            source: if is_filled { Source::Filled } else { Source::Integrated },
         }
     }
 }

@@ -13,6 +13,7 @@ use super::orbit_json::Parameters;
 use crate::orbit::Status;
 use crate::plan::count_classes;
 use crate::scene::{Scene, Steps};
+use crate::schedule::{Audit, Refined};
 
 /// Who computed a map and in what time.
 #[derive(Clone, Debug)]
@@ -29,6 +30,8 @@ pub struct Run<'a> {
     pub elapsed: Duration,
     /// Cells of an earlier run that this one went on from.
     pub resumed_cells: usize,
+    /// How an adaptive map went.
+    pub refined: Option<Refined>,
 }
 
 #[derive(Serialize)]
@@ -54,6 +57,7 @@ struct Manifest<'a> {
     codes: Codes,
     elapsed_seconds: f64,
     resumed_cells: usize,
+    refinement: Option<RefinementObject>,
     files: &'a [String],
 }
 
@@ -64,6 +68,40 @@ struct IntegrationObject {
     observed_periods: u32,
     early_stop: bool,
     max_period: u32,
+}
+
+/// An adaptive map: how much was integrated, and how good the rest is.
+#[derive(Serialize)]
+struct RefinementObject {
+    integrated: usize,
+    filled: usize,
+    rounds: usize,
+    audits: Vec<AuditObject>,
+}
+
+/// `rate` is the fraction of filled cells that integration shows to be wrong, `interval` its
+/// 95 % interval (Wilson).
+#[derive(Serialize)]
+struct AuditObject {
+    filled: usize,
+    sampled: usize,
+    wrong: usize,
+    rate: f64,
+    interval: [f64; 2],
+}
+
+impl From<&Refined> for RefinementObject {
+    fn from(refined: &Refined) -> Self {
+        let audit = |audit: &Audit| AuditObject {
+            filled: audit.filled,
+            sampled: audit.sampled,
+            wrong: audit.wrong,
+            rate: audit.rate(),
+            interval: audit.interval(),
+        };
+        let Refined { integrated, filled, rounds, ref audits } = *refined;
+        RefinementObject { integrated, filled, rounds, audits: audits.iter().map(audit).collect() }
+    }
 }
 
 /// What small integers in `cells.npy` stand for.
@@ -104,6 +142,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, files: &[String]) -> serde_j
         codes: codes(),
         elapsed_seconds: run.elapsed.as_secs_f64(),
         resumed_cells: run.resumed_cells,
+        refinement: run.refined.as_ref().map(RefinementObject::from),
         files,
     })
 }

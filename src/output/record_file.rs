@@ -172,17 +172,16 @@ impl RecordFile {
         Ok(RecordFile { file, path: path.to_owned(), places: 0 })
     }
 
-    /// Opens the file of an interrupted run; `take` gets every batch that is whole: its
-    /// first place and its records. A torn last batch is cut off.
+    /// Opens the file of an interrupted run; `take` gets every batch that is whole, its first
+    /// place and its records, and says whether the run has such places. A torn last batch is
+    /// cut off.
     ///
     /// # Errors
-    /// [`RecordFileError`] if the file is another run's, damaged, in use or unreadable, or
-    /// holds more than `places` cells.
+    /// [`RecordFileError`] if the file is another run's, damaged, in use or unreadable.
     pub fn resume(
         path: &Path,
         identity: &Identity,
-        places: usize,
-        take: impl FnMut(usize, &[Record]),
+        take: impl FnMut(usize, &[Record]) -> bool,
     ) -> Result<RecordFile, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         let mut file = lock(OpenOptions::new().read(true).write(true).open(path).map_err(io)?, path)?;
@@ -193,7 +192,7 @@ impl RecordFile {
         if !differences.is_empty() {
             return Err(RecordFileError::OtherRun { path: path.to_owned(), differences });
         }
-        let (done, end) = reader.batches(places, take)?;
+        let (done, end) = reader.batches(take)?;
         drop(reader);
         file.set_len(end).and_then(|()| file.seek(SeekFrom::End(0))).map_err(io)?;
         Ok(RecordFile { file, path: path.to_owned(), places: done })
@@ -287,8 +286,7 @@ impl Reader<'_> {
     /// length of what is whole.
     fn batches(
         &mut self,
-        places: usize,
-        mut take: impl FnMut(usize, &[Record]),
+        mut take: impl FnMut(usize, &[Record]) -> bool,
     ) -> Result<(usize, u64), RecordFileError> {
         let mut done = 0;
         let mut records: Vec<Record> = Vec::new();
@@ -318,10 +316,9 @@ impl Reader<'_> {
                     Err(self.damaged(start, "a batch does not match its checksum"))
                 };
             }
-            if head[..8] != (done as u64).to_le_bytes() || done + cells as usize > places {
+            if head[..8] != (done as u64).to_le_bytes() || !take(done, &records) {
                 return Err(self.damaged(start, "a batch is out of place"));
             }
-            take(done, &records);
             done += cells as usize;
         }
         Ok((done, self.at))

@@ -1,5 +1,11 @@
 //! Morton order: a walk through a grid that stays among neighbours.
 
+/// The place of a cell in Morton order: its indices with their bits interlaced.
+pub(crate) fn key([i, j]: [usize; 2]) -> u64 {
+    let spread = |n: usize| (0..32).fold(0, |bits, k| bits | (n as u64 >> k & 1) << (2 * k));
+    spread(i) | spread(j) << 1
+}
+
 /// The ids `j * columns + i` of a grid, in Morton order.
 pub(super) fn order(columns: usize, rows: usize) -> Vec<u32> {
     let mut ids = Vec::with_capacity(columns * rows);

@@ -38,6 +38,12 @@ impl Scene {
             Start::Down => "down".to_owned(),
         };
         tell("start".into(), start);
+        if let Some(refine) = self.refine() {
+            tell("refine.minimum_grid".into(), refine.minimum_grid.to_string());
+            tell("refine.rounds".into(), refine.rounds.map_or("all".to_owned(), |n| n.to_string()));
+            tell("refine.max_error".into(), format!("{:?}", refine.max_error));
+            tell("refine.audit".into(), refine.audit.to_string());
+        }
         let mut quantities = self.outputs().quantities.clone();
         quantities.sort_unstable();
         tell("outputs.quantities".into(), format!("{quantities:?}").to_lowercase());

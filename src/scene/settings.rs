@@ -93,8 +93,24 @@ impl From<Start> for bifurcation::Policy {
 pub struct Refine {
     /// Every this many cells along an axis one is integrated in any case.
     pub minimum_grid: u32,
-    /// Fraction of cells that may be filled wrongly.
+    /// Times that blocks are halved at most before the audit; none for as many as it takes to
+    /// come down to single cells.
+    pub rounds: Option<u32>,
+    /// Fraction of the filled cells that may be wrong, as the audit measures it.
     pub max_error: f64,
+    /// Filled cells that one audit integrates.
+    pub audit: u32,
+    /// What filled cells show of quantities that vary continuously.
+    pub continuous: Continuous,
+}
+
+/// What filled cells show of exponent, impacts and mesh fraction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Continuous {
+    /// The bilinear average of the corners around them.
+    Interpolated,
+    /// Nothing.
+    Empty,
 }
 
 /// What can be asked of a cell.
@@ -236,7 +252,8 @@ fn read_state(field: &Field<'_>) -> Result<State, SceneError> {
 }
 
 pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option<Refine>, SceneError> {
-    let section = root.section("refine", &["minimum_grid", "max_error"])?;
+    let known = ["minimum_grid", "rounds", "max_error", "audit", "continuous"];
+    let section = root.section("refine", &known)?;
     if !section.is_present() {
         return Ok(None);
     }
@@ -254,14 +271,19 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
         None => 0.003,
     };
     let minimum_grid = section.get("minimum_grid").map_or(Ok(8), |field| field.whole(1..=1024))?;
-    Ok(Some(Refine { minimum_grid, max_error }))
+    let rounds = section.get("rounds").map(|field| field.whole(0..=32)).transpose()?;
+    let audit = section.get("audit").map_or(Ok(2000), |field| field.whole(1..=10_000_000))?;
+    let continuous = match section.get("continuous") {
+        Some(field) => {
+            field.choice(&[("interpolated", Continuous::Interpolated), ("empty", Continuous::Empty)])?
+        }
+        None => Continuous::Interpolated,
+    };
+    Ok(Some(Refine { minimum_grid, rounds, max_error, audit, continuous }))
 }
 
 /// Refuses what maps cannot do yet, though scenes can say it: better than ignoring it.
 pub(super) fn refuse_unbuilt(root: &Section<'_>, start: Start) -> Result<(), SceneError> {
-    if let Some(field) = root.get("refine") {
-        return Err(field.conflict("`map` integrates every cell so far; drop [refine]".to_owned()));
-    }
     let section = root.section("start", &["policy", "state"])?;
     match (start, section.get("policy")) {
         (Start::Up | Start::Down, Some(field)) => Err(field.conflict(

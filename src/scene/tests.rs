@@ -105,8 +105,6 @@ fn a_map_takes_two_axes_in_their_order() {
 fn a_map_refuses_what_it_would_ignore() {
     let text = format!("{GOOD}{SECOND_AXIS}");
     let refused = |text: &str| Scene::parse(text, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
-    let refine = refused(&format!("{text}\n[refine]\nmax_error = 0.01\n"));
-    assert_says(&refine, &["s.toml:33:", "`refine = { ... }` does not fit", "drop [refine]"]);
     for policy in ["up", "down"] {
         let message = refused(&text.replace("\"rest\"", &format!("\"{policy}\"")));
         assert_says(&message, &["s.toml:21:10", &format!("`start.policy = \"{policy}\"`"), "\"rest\""]);

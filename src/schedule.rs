@@ -1,0 +1,201 @@
+//! Which cells are integrated, in which order, and which need not be. Pure.
+//!
+//! Without `[refine]` every cell is, in Morton order. With it the map is adaptive: cells of a
+//! coarse grid first, then round after round what lies in blocks whose corners differ (in
+//! class, period, and symmetry or word where they are asked for), or that touch such a block,
+//! down to single cells. The rest is filled from the corners around it. An audit then
+//! integrates a random sample of the filled cells. If it finds too many of them wrong, all
+//! blocks are halved and the audit is repeated; if not, only the blocks with wrong cells are
+//! refined on.
+//!
+//! The order of the cells follows from the records of the cells before. So a run that was
+//! interrupted goes on by replaying its records.
+
+mod adaptive;
+mod audit;
+mod blocks;
+mod fill;
+mod label;
+
+pub use audit::Audit;
+
+use adaptive::Adaptive;
+
+use crate::plan::{Batch, Plan};
+use crate::record::Record;
+
+/// The order of work on a map.
+pub struct Schedule {
+    sequence: Vec<u32>,
+    /// Where the last round begins.
+    round: usize,
+    rounds: usize,
+    adaptive: Option<Box<Adaptive>>,
+}
+
+/// What became of an adaptive map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refined {
+    /// Cells that were integrated.
+    pub integrated: usize,
+    /// Cells that were filled.
+    pub filled: usize,
+    /// Rounds of integration, audits included.
+    pub rounds: usize,
+    /// Audits in order; the last one found no more wrong cells than the scene allows, unless
+    /// nothing was left to refine.
+    pub audits: Vec<Audit>,
+}
+
+impl Schedule {
+    /// The schedule of a plan.
+    pub fn new(plan: &Plan) -> Schedule {
+        match plan.refine() {
+            None => Schedule { sequence: plan.order().to_vec(), round: 0, rounds: 1, adaptive: None },
+            Some(refine) => {
+                let adaptive = Adaptive::new(plan, refine);
+                let sequence = adaptive.first();
+                Schedule { sequence, round: 0, rounds: 1, adaptive: Some(Box::new(adaptive)) }
+            }
+        }
+    }
+
+    /// Ids of the cells to integrate, as far as they are known by now.
+    pub fn sequence(&self) -> &[u32] {
+        &self.sequence
+    }
+
+    /// Adds the next round, once every cell of the sequence has its record (by id). False if
+    /// the map is finished.
+    pub fn extend(&mut self, records: &[Record]) -> bool {
+        let Some(adaptive) = &mut self.adaptive else { return false };
+        let next = adaptive.next(&self.sequence[self.round..], records);
+        self.round = self.sequence.len();
+        self.sequence.extend(&next);
+        self.rounds += usize::from(!next.is_empty());
+        !next.is_empty()
+    }
+
+    /// The batch of up to `count` cells of the sequence from place `from` on.
+    pub fn batch(&self, plan: &Plan, from: usize, count: usize) -> Batch {
+        let places = from..from.saturating_add(count).min(self.sequence.len());
+        let cells = self.sequence[places.clone()].iter().map(|&id| plan.cell(id)).collect();
+        Batch { places, cells }
+    }
+
+    /// Fills what was not integrated and says how it went; none where every cell was.
+    pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
+        let adaptive = self.adaptive.as_ref()?;
+        let filled = adaptive.fill(records);
+        Some(Refined {
+            integrated: self.sequence.len(),
+            filled,
+            rounds: self.rounds,
+            audits: adaptive.audits().to_vec(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::classify::classify;
+    use crate::orbit::Class;
+    use crate::record::valid;
+    use crate::scene::{Purpose, Scene};
+
+    fn plan(counts: [usize; 2], refine: &str) -> Plan {
+        let axis =
+            |name, count| format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1.0\ncount = {count}\n");
+        let text = format!("{}{}[refine]\n{refine}", axis("e", counts[0]), axis("omega", counts[1]));
+        Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+    }
+
+    /// Runs a schedule on a picture: a period for every cell.
+    fn run(plan: &Plan, period: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
+        let mut schedule = Schedule::new(plan);
+        let mut records = vec![Record::default(); plan.cell_count()];
+        let mut place = 0;
+        loop {
+            for &id in &schedule.sequence()[place..] {
+                let [i, j] = plan.indices(id);
+                assert_eq!(records[id as usize].periods_run, 0, "cell {id} was asked for twice");
+                let valid = valid::PERIOD;
+                records[id as usize] =
+                    Record { period: period(i, j), valid, periods_run: 7, ..Record::default() };
+            }
+            place = schedule.sequence().len();
+            if !schedule.extend(&records) {
+                break;
+            }
+        }
+        let refined = schedule.finish(&mut records).unwrap();
+        assert_eq!(refined.integrated + refined.filled, plan.cell_count());
+        assert!(records.iter().all(|r| (r.periods_run == 0) == (r.valid & valid::FILLED != 0)));
+        (records, refined)
+    }
+
+    fn wrong(records: &[Record], columns: usize, period: impl Fn(usize, usize) -> u32) -> usize {
+        let is_wrong = |(id, record): (usize, &Record)| {
+            classify(record) != Class::Periodic { period: period(id % columns, id / columns) }
+        };
+        records.iter().enumerate().filter(|&cell| is_wrong(cell)).count()
+    }
+
+    #[test]
+    fn a_smooth_border_is_found_cell_by_cell() {
+        let disc = |i: usize, j: usize| if i * i + j * j < 150 * 150 { 1 } else { 2 };
+        let plan = plan([257, 230], "minimum_grid = 16");
+        let (records, refined) = run(&plan, disc);
+        assert_eq!(wrong(&records, 257, disc), 0);
+        assert!(refined.integrated * 8 < plan.cell_count(), "{refined:?}");
+        assert_eq!(refined.audits.len(), 1);
+        assert_eq!(refined.audits[0].wrong, 0);
+    }
+
+    #[test]
+    fn a_uniform_map_costs_the_coarse_grid_and_the_audit() {
+        let plan = plan([101, 101], "minimum_grid = 20\naudit = 50");
+        let (records, refined) = run(&plan, |_, _| 4);
+        assert_eq!((refined.integrated, refined.rounds), (36 + 50, 2));
+        assert_eq!(wrong(&records, 101, |_, _| 4), 0);
+    }
+
+    /// Islands smaller than a block that the coarse grid misses altogether.
+    #[test]
+    fn the_audit_finds_planted_islands_and_mends_the_map() {
+        let islands =
+            |i: usize, j: usize| if (2..7).contains(&(i % 16)) && (3..9).contains(&(j % 16)) { 5 } else { 1 };
+        let plan = plan([241, 241], "minimum_grid = 16\nmax_error = 0.01");
+        let (records, refined) = run(&plan, islands);
+        assert!(refined.audits[0].rate() > 0.05, "{refined:?}");
+        assert!(refined.audits.len() > 1, "{refined:?}");
+        let last = refined.audits[refined.audits.len() - 1];
+        assert!(last.rate() <= 0.01);
+        assert!(wrong(&records, 241, islands) <= refined.filled / 100, "{refined:?}");
+        // One island too small to matter: what the audit hits of it is cut out.
+        let one = |i: usize, j: usize| if (40..48).contains(&i) && (40..48).contains(&j) { 5 } else { 1 };
+        let plan = self::plan([241, 241], "minimum_grid = 48\naudit = 4000");
+        let (records, refined) = run(&plan, one);
+        assert_eq!((refined.audits.len(), refined.audits[0].wrong > 0), (1, true), "{refined:?}");
+        assert_eq!(wrong(&records, 241, one), 0, "{refined:?}");
+    }
+
+    #[test]
+    fn rounds_bound_the_refinement() {
+        let plan = plan([129, 129], "minimum_grid = 16\nrounds = 2\nmax_error = 0.9\naudit = 1");
+        let half = |i: usize, _| if i < 57 { 1 } else { 2 };
+        let (records, refined) = run(&plan, half);
+        assert!(wrong(&records, 129, half) > 0);
+        assert!(refined.rounds <= 4, "{refined:?}");
+    }
+
+    #[test]
+    fn thin_maps_are_covered() {
+        for counts in [[2, 2], [2, 300], [300, 3], [9, 9]] {
+            let stripes = |i: usize, j: usize| 1 + ((i + j) / 5 % 2) as u32;
+            let (records, _) = run(&plan(counts, "minimum_grid = 8\nmax_error = 1e-6"), stripes);
+            assert_eq!(records.len(), counts[0] * counts[1]);
+        }
+    }
+}

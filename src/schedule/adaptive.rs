@@ -1,0 +1,220 @@
+//! Refinement: coarse blocks first, then only those whose corners differ or that touch one
+//! whose corners do, down to single cells; then an audit of what was not integrated.
+
+use super::audit::{Audit, sample};
+use super::blocks::{Block, coarse};
+use super::fill::filled;
+use super::label::Label;
+use crate::plan::{Needs, Plan};
+use crate::record::Record;
+use crate::scene::Refine;
+
+/// The state of an adaptive map between rounds.
+pub(super) struct Adaptive {
+    counts: [usize; 2],
+    refine: Refine,
+    needs: Needs,
+    /// By cell id; unknown where nothing was integrated.
+    labels: Vec<Label>,
+    /// Blocks whose corners are known or are being integrated, still to be judged.
+    open: Vec<Block>,
+    /// Blocks that are filled.
+    closed: Vec<Block>,
+    /// How often blocks have been halved since the coarse grid.
+    halvings: u32,
+    /// Cells of the audit under way.
+    audited: Vec<u32>,
+    audits: Vec<Audit>,
+    stage: Stage,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// The coarse grid, then halving blocks.
+    Halving,
+    /// The sample is being integrated.
+    Auditing,
+    /// The audit is passed; blocks around wrong cells are cut down.
+    Mending,
+    Done,
+}
+
+impl Adaptive {
+    pub(super) fn new(plan: &Plan, refine: Refine) -> Adaptive {
+        let counts = plan.axes().each_ref().map(|axis| axis.count());
+        Adaptive {
+            counts,
+            refine,
+            needs: *plan.needs(),
+            labels: vec![Label::default(); plan.cell_count()],
+            open: coarse(counts, refine.minimum_grid as usize),
+            closed: Vec::new(),
+            halvings: 0,
+            audited: Vec::new(),
+            audits: Vec::new(),
+            stage: Stage::Halving,
+        }
+    }
+
+    pub(super) fn audits(&self) -> &[Audit] {
+        &self.audits
+    }
+
+    /// The cells of the coarse grid.
+    pub(super) fn first(&self) -> Vec<u32> {
+        self.unknown_corners()
+    }
+
+    /// The next cells to integrate, now that those of the last call have their records; none
+    /// if the map is finished.
+    pub(super) fn next(&mut self, last: &[u32], records: &[Record]) -> Vec<u32> {
+        for &id in last {
+            self.labels[id as usize] = Label::of(&records[id as usize], &self.needs);
+        }
+        while self.stage != Stage::Done {
+            let cells = match self.stage {
+                Stage::Auditing => {
+                    self.judge_audit(records);
+                    self.unknown_corners()
+                }
+                _ if self.open.is_empty() => self.leave_stage(),
+                _ => {
+                    self.halve();
+                    self.unknown_corners()
+                }
+            };
+            if !cells.is_empty() {
+                return cells;
+            }
+        }
+        Vec::new()
+    }
+
+    /// No block is open any more: audits once, and again after every halving of all blocks.
+    fn leave_stage(&mut self) -> Vec<u32> {
+        if self.stage == Stage::Mending {
+            self.stage = Stage::Done;
+            return Vec::new();
+        }
+        let candidates: Vec<u32> =
+            (0..).zip(&self.labels).filter(|(_, label)| !label.is_known()).map(|(id, _)| id).collect();
+        let filled = candidates.len();
+        let seed = 1 + self.audits.len() as u64;
+        self.audited = sample(candidates, self.refine.audit as usize, seed);
+        self.stage = if self.audited.is_empty() { Stage::Done } else { Stage::Auditing };
+        if !self.audited.is_empty() {
+            self.audits.push(Audit { filled, sampled: self.audited.len(), wrong: 0 });
+        }
+        self.audited.clone()
+    }
+
+    /// Blocks that differ, or touch one of the same size that does, are halved; others are
+    /// closed.
+    fn halve(&mut self) {
+        let open = std::mem::take(&mut self.open);
+        let is_last =
+            self.stage == Stage::Halving && self.refine.rounds.is_some_and(|most| self.halvings >= most);
+        self.halvings += 1;
+        let mut touched = vec![false; if is_last { 0 } else { self.labels.len() }];
+        if !is_last {
+            for block in open.iter().filter(|block| self.has_border(block)) {
+                block.cells().for_each(|at| touched[self.id(at)] = true);
+            }
+        }
+        for block in open.into_iter().filter(Block::has_inside) {
+            let labels = self.corner_labels(&block);
+            let differs = labels.iter().any(|label| *label != labels[0]);
+            let is_touched = || block.corners().iter().any(|&at| touched[self.id(at)]);
+            if !is_last && (differs || is_touched()) {
+                self.open.extend(block.halves());
+            } else {
+                self.closed.push(block);
+            }
+        }
+    }
+
+    /// Counts the wrong cells of an audit. Too many of them: all blocks are halved. Else only
+    /// blocks with wrong cells are cut, right there.
+    fn judge_audit(&mut self, records: &[Record]) {
+        let mut wrong = vec![false; self.labels.len()];
+        let mut count = 0;
+        let closed = std::mem::take(&mut self.closed);
+        let mut is_audited = vec![false; self.labels.len()];
+        self.audited.iter().for_each(|&id| is_audited[id as usize] = true);
+        for block in &closed {
+            let corners = block.corners().map(|at| &records[self.id(at)]);
+            for at in block.cells() {
+                let id = self.id(at);
+                // A cell on a common border is judged once.
+                if !std::mem::take(&mut is_audited[id]) {
+                    continue;
+                }
+                let fill = Label::of(&filled(block, corners, at), &self.needs);
+                if fill != self.labels[id] {
+                    wrong[id] = true;
+                    count += 1;
+                }
+            }
+        }
+        self.audited.clear();
+        let rate = self.audits.last_mut().map_or(0.0, |audit| {
+            audit.wrong = count;
+            audit.rate()
+        });
+        let all = rate > self.refine.max_error && closed.iter().any(Block::has_inside);
+        self.stage = if all { Stage::Halving } else { Stage::Mending };
+        for block in closed {
+            let first_wrong = block.cells().find(|&at| wrong[self.id(at)]);
+            match first_wrong {
+                Some(at) => self.open.extend(block.cut(at)),
+                None if all => self.open.extend(block.halves()),
+                None => self.closed.push(block),
+            }
+        }
+    }
+
+    fn id(&self, [i, j]: [usize; 2]) -> usize {
+        j * self.counts[0] + i
+    }
+
+    fn label(&self, at: [usize; 2]) -> Label {
+        self.labels[self.id(at)]
+    }
+
+    fn corner_labels(&self, block: &Block) -> [Label; 4] {
+        block.corners().map(|at| self.label(at))
+    }
+
+    /// Whether the corners of a block differ in more than the word.
+    fn has_border(&self, block: &Block) -> bool {
+        let labels = self.corner_labels(block);
+        labels.iter().any(|label| label.kind != labels[0].kind)
+    }
+
+    /// Corners of open blocks that nothing is known of, neighbours one after the other.
+    fn unknown_corners(&self) -> Vec<u32> {
+        let corners =
+            self.open.iter().flat_map(|block| block.corners()).filter(|&at| !self.label(at).is_known());
+        let mut cells: Vec<[usize; 2]> = corners.collect();
+        cells.sort_by_cached_key(|&at| crate::plan::morton_key(at));
+        cells.dedup();
+        cells.into_iter().map(|at| self.id(at) as u32).collect()
+    }
+
+    /// Fills every cell that was not integrated; returns how many.
+    pub(super) fn fill(&self, records: &mut [Record]) -> usize {
+        let mut count = 0;
+        for block in &self.closed {
+            let corners = block.corners().map(|at| records[self.id(at)]);
+            for at in block.cells() {
+                let id = self.id(at);
+                // A cell on a common border is filled by the first of its blocks.
+                if !self.labels[id].is_known() && records[id] == Record::default() {
+                    records[id] = filled(block, corners.each_ref(), at);
+                    count += 1;
+                }
+            }
+        }
+        count
+    }
+}

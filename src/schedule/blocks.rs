@@ -1,0 +1,86 @@
+//! Blocks of cells between lattice lines, and how they are cut.
+
+/// A rectangle of cells, borders included, by its first and last indices on the two axes.
+/// Neighbours share their borders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Block {
+    pub(super) i: [usize; 2],
+    pub(super) j: [usize; 2],
+}
+
+impl Block {
+    /// Its corners, in the order (low, low), (high, low), (low, high), (high, high).
+    pub(super) fn corners(&self) -> [[usize; 2]; 4] {
+        let ([i0, i1], [j0, j1]) = (self.i, self.j);
+        [[i0, j0], [i1, j0], [i0, j1], [i1, j1]]
+    }
+
+    /// Whether it has cells beside its corners.
+    pub(super) fn has_inside(&self) -> bool {
+        self.i[1] - self.i[0] > 1 || self.j[1] - self.j[0] > 1
+    }
+
+    /// Its cells, corners included.
+    pub(super) fn cells(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let ([i0, i1], [j0, j1]) = (self.i, self.j);
+        (j0..=j1).flat_map(move |j| (i0..=i1).map(move |i| [i, j]))
+    }
+
+    /// The blocks that the lines through its middle leave.
+    pub(super) fn halves(&self) -> Vec<Block> {
+        self.cut([(self.i[0] + self.i[1]) / 2, (self.j[0] + self.j[1]) / 2])
+    }
+
+    /// The blocks that the lines through one of its cells leave.
+    pub(super) fn cut(&self, [i, j]: [usize; 2]) -> Vec<Block> {
+        let parts = |[from, to]: [usize; 2], at: usize| {
+            if from < at && at < to { vec![[from, at], [at, to]] } else { vec![[from, to]] }
+        };
+        let rows = parts(self.j, j);
+        parts(self.i, i).into_iter().flat_map(|i| rows.iter().map(move |&j| Block { i, j })).collect()
+    }
+}
+
+/// Every `step`-th index of an axis, and the last one.
+fn lattice(count: usize, step: usize) -> Vec<usize> {
+    let mut lines: Vec<usize> = (0..count).step_by(step).collect();
+    if lines.last() != Some(&(count - 1)) {
+        lines.push(count - 1);
+    }
+    lines
+}
+
+/// The blocks of a grid between every `step`-th line.
+pub(super) fn coarse([columns, rows]: [usize; 2], step: usize) -> Vec<Block> {
+    let (i, j) = (lattice(columns, step), lattice(rows, step));
+    j.windows(2).flat_map(|j| i.windows(2).map(move |i| Block { i: [i[0], i[1]], j: [j[0], j[1]] })).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coarse_blocks_cover_the_grid_and_share_borders() {
+        let mut seen = vec![0; 11 * 6];
+        for block in coarse([11, 6], 4) {
+            block.cells().for_each(|[i, j]| seen[j * 11 + i] += 1);
+        }
+        assert!(seen.iter().all(|&times| times > 0));
+        assert_eq!(seen[0], 1);
+        assert_eq!(seen[4 * 11 + 4], 4, "four blocks meet in a lattice point");
+    }
+
+    #[test]
+    fn cutting_goes_on_down_to_single_cells() {
+        let mut blocks = vec![Block { i: [0, 5], j: [2, 3] }];
+        let mut corners = std::collections::BTreeSet::new();
+        while let Some(block) = blocks.pop() {
+            corners.extend(block.corners());
+            if block.has_inside() {
+                blocks.extend(block.halves());
+            }
+        }
+        assert_eq!(corners.len(), 12);
+    }
+}

@@ -1,0 +1,64 @@
+//! Filling a block whose corners agree.
+
+use super::blocks::Block;
+use crate::classify::classify;
+use crate::orbit::Class;
+use crate::record::{Record, valid};
+
+/// The record of the cell `[i, j]` of a block, from the records of its corners (in the order
+/// of [`Block::corners`]): the nearest corner's, with bilinear averages of what varies
+/// continuously inside a region.
+pub(super) fn filled(block: &Block, corners: [&Record; 4], [i, j]: [usize; 2]) -> Record {
+    let share = |at: usize, [from, to]: [usize; 2]| {
+        if to > from { (at - from) as f64 / (to - from) as f64 } else { 0.0 }
+    };
+    let (u, v) = (share(i, block.i), share(j, block.j));
+    let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+    let nearest = usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5);
+    let average = |field: fn(&Record) -> f64| {
+        corners.iter().zip(weights).map(|(corner, weight)| weight * field(corner)).sum::<f64>()
+    };
+    let mut record = Record { periods_run: 0, strobe: [0.0; 4], ..*corners[nearest] };
+    let common = corners.iter().fold(u32::MAX, |bits, corner| bits & corner.valid);
+    record.valid &= common & !valid::STROBE;
+    record.valid |= valid::FILLED;
+    // Of undecided cells an average might be a decision.
+    let decided = matches!(classify(&record), Class::Periodic { .. } | Class::Chaotic);
+    if decided && corners.iter().all(|corner| classify(corner) == classify(&record)) {
+        record.lyapunov = average(|corner| corner.lyapunov);
+        record.lyapunov_error = average(|corner| corner.lyapunov_error);
+        record.impacts_per_period = average(|corner| corner.impacts_per_period);
+        record.mesh_fraction = average(|corner| corner.mesh_fraction);
+    }
+    record
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner(lyapunov: f64) -> Record {
+        let valid = valid::PERIOD | valid::LYAPUNOV | valid::STROBE;
+        Record { period: 2, lyapunov, valid, periods_run: 99, ..Record::default() }
+    }
+
+    #[test]
+    fn continuous_quantities_are_interpolated() {
+        let block = Block { i: [0, 4], j: [0, 2] };
+        let corners = [0.0, 4.0, 2.0, 6.0].map(corner);
+        for [i, j] in block.cells() {
+            let record = filled(&block, corners.each_ref(), [i, j]);
+            assert!((record.lyapunov - (i + j) as f64).abs() < 1e-12);
+            assert_eq!((record.period, record.periods_run), (2, 0));
+            assert_eq!(record.valid, valid::PERIOD | valid::LYAPUNOV | valid::FILLED);
+        }
+    }
+
+    #[test]
+    fn what_one_corner_does_not_know_is_not_filled() {
+        let block = Block { i: [0, 2], j: [0, 2] };
+        let mut corners = [0.0; 4].map(corner);
+        corners[3].valid &= !valid::LYAPUNOV;
+        assert_eq!(filled(&block, corners.each_ref(), [0, 0]).valid & valid::LYAPUNOV, 0);
+    }
+}
