@@ -194,12 +194,13 @@ fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64
         0 => String::new(),
         cells => format!(", {cells} of them before"),
     };
-    let per_step = lane_steps
-        .filter(|&steps| steps > 0)
-        .map_or(String::new(), |steps| format!(", {:.0} ns per lane-step", 1e9 * integrating / steps as f64));
+    let per_step = lane_steps.filter(|&steps| steps > 0).map_or(String::new(), |steps| {
+        format!(", {} ns per lane-step", rounded(1e9 * integrating / steps as f64))
+    });
     let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
     format!(
-        "{integrated} cells{resumed} on {} ({}) in {integrating:.1} s: {:.0} cells/s, {:.0} lane-periods/s{per_step}; outputs {:.1} s\n{refined}\
+        "{integrated} cells{resumed} on {} ({}) in {integrating:.3} s: {:.0} cells/s, {:.0} lane-periods/s\
+         {per_step}; outputs {:.3} s\n{refined}\
          {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
         run.engine,
         run.precision,
@@ -207,6 +208,12 @@ fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64
         periods / integrating,
         seconds - integrating,
     )
+}
+
+/// Three significant digits.
+fn rounded(x: f64) -> String {
+    let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{x:.digits$}")
 }
 
 /// How much an adaptive map left out, and what the audit says of it.

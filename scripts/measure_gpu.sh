@@ -1,0 +1,75 @@
+#!/usr/bin/env bash
+# Everything that is claimed of a GPU, measured in one go on a machine that has one.
+#
+#     scripts/measure_gpu.sh BINARY OUT [SIDE]
+#
+# BINARY is a release build of rattlemap; nothing else of the repository is needed but
+# scenes/, so that both can be carried to a machine without Rust. Checks first that the lanes
+# are right in both precisions, cell by cell against the reference; then times maps of
+# SIDE x SIDE cells (1024 unless given), each three times. Writes to OUT:
+#
+#     devices.txt             adapters, limits, drivers
+#     validation_*.json       correctness, 128 x 128, per precision
+#     speed.csv               one row per timed run
+#     summary.md              medians, and what they were measured on
+set -euo pipefail
+
+[[ $# -ge 2 ]] || { sed -n '2,15p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+binary="$(realpath "$1")"
+out="$2"
+side="${3:-1024}"
+scene="$(cd "$(dirname "$0")/.." && pwd)/scenes/e_omega.toml"
+mkdir -p "$out"
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+
+square() { printf -- '--set axis.0.count=%s --set axis.1.count=%s' "$1" "$1"; }
+
+"$binary" devices | tee "$out/devices.txt"
+
+for precision in f32 f64; do
+    # shellcheck disable=SC2046 # the words of square are meant to be split
+    "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/right" --force $(square 128)
+    "$binary" validate "$work/right" --samples 2000
+    cp "$work/right/validation.json" "$out/validation_$precision.json"
+done
+
+# name, precision, further settings
+timed() {
+    local name="$1" precision="$2"
+    shift 2
+    for run in 1 2 3; do
+        # shellcheck disable=SC2046
+        "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/timed" --force $(square "$side") \
+            "$@" 2>"$work/said"
+        # "N cells on gpu (f32) in S s: C cells/s, P lane-periods/s, K ns per lane-step; outputs O s"
+        grep -E '^[0-9]+ cells.* on gpu' "$work/said" |
+            sed -E 's/^([0-9]+) cells.* in ([0-9.]+) s: ([0-9]+) cells\/s, ([0-9]+) lane-periods\/s, ([0-9.]+) ns per lane-step; outputs ([0-9.]+) s.*/\1,\2,\3,\4,\5,\6/' |
+            sed "s/^/$name,$precision,$run,/" >>"$out/speed.csv"
+    done
+}
+
+echo "what,precision,run,cells,integration_s,cells_per_s,lane_periods_per_s,ns_per_lane_step,outputs_s" >"$out/speed.csv"
+for precision in f32 f64; do
+    timed brute_force "$precision" --set integration.early_stop=false
+    timed early_stop "$precision"
+    timed period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
+done
+
+{
+    echo "# rattlemap on a GPU"
+    echo
+    echo "$side x $side cells of scenes/e_omega.toml, medians of three runs (smallest and largest)."
+    echo
+    echo "| what | precision | integration, s | lane-periods/s | ns per lane-step | outputs, s |"
+    echo "| --- | --- | --- | --- | --- | --- |"
+    tail -n +2 "$out/speed.csv" | sort -t, -k1,2 -k5,5n | awk -F, '
+        { n = ($3, ++count[$1 "," $2]); key = $1 "," $2; s[key, count[key]] = $5; p[key, count[key]] = $7
+          k[key, count[key]] = $8; o[key, count[key]] = $9; seen[key] = 1 }
+        END { for (key in seen) { split(key, name, ",")
+              printf "| %s | %s | %s (%s, %s) | %s | %s | %s |\n", name[1], name[2], s[key, 2], s[key, 1], s[key, 3],
+                     p[key, 2], k[key, 2], o[key, 2] } }' | sort
+    echo
+    sed 's/^/    /' "$out/devices.txt"
+} >"$out/summary.md"
+cat "$out/summary.md"
