@@ -41,11 +41,13 @@ mod columns;
 mod energy;
 mod generator;
 mod linear;
+mod quiet;
 
 use nalgebra::Matrix2;
 
 pub(crate) use columns::add;
 pub use linear::LinearFlow;
+pub use quiet::Quiet;
 
 use crate::model::{Oscillator, Side, State};
 
@@ -83,6 +85,7 @@ pub struct Flow {
     gap: [f64; 2],
     masses: [f64; 2],
     symmetric: bool,
+    quiet: Option<Quiet>,
     free: LinearFlow,
     meshing: [LinearFlow; 2],
 }
@@ -105,6 +108,7 @@ impl Flow {
             gap: oscillator.gap,
             masses: oscillator.masses,
             symmetric: oscillator.mirror_symmetric(),
+            quiet: Quiet::new(oscillator),
             free,
             meshing: [linear(&oscillator.meshing[0]), linear(&oscillator.meshing[1])],
         }
@@ -113,6 +117,11 @@ impl Flow {
     /// Whether `(y, t) -> (-y, t + T/2)` takes solutions to solutions.
     pub fn mirror_symmetric(&self) -> bool {
         self.symmetric
+    }
+
+    /// The motion that never touches a wall, if there is one that attracts.
+    pub fn quiet(&self) -> Option<&Quiet> {
+        self.quiet.as_ref()
     }
 
     /// The linear flow of one domain.

@@ -140,6 +140,9 @@ impl<'a> Watch<'a> {
         if now == self.budget.settings.transient_periods {
             self.observed_from = counts;
         }
+        if self.budget.early_stop && self.is_quiet(trajectory) {
+            return Ok(Some(self.quiet()));
+        }
         if now < *look {
             return Ok(None);
         }
@@ -148,6 +151,28 @@ impl<'a> Watch<'a> {
             Some(orbit) => Ok(Some(self.periodic(orbit))),
             None if now == last => Ok(Some(self.aperiodic(counts))),
             None => Ok(None),
+        }
+    }
+
+    /// Whether the motion certainly has no event to come.
+    fn is_quiet<const N: usize>(&self, trajectory: &Trajectory<'a, N>) -> bool {
+        let quiet = self.analysis.flow.quiet();
+        trajectory.meshing().is_none() && quiet.is_some_and(|quiet| quiet.is_certain(trajectory.state()))
+    }
+
+    /// Contact-free motion: the steady response attracts it, and has no event.
+    fn quiet(&self) -> Measured {
+        let flow = self.analysis.flow;
+        Measured {
+            period: Some(1),
+            status: Status::Ok,
+            lyapunov: flow.quiet().map(|quiet| [quiet.exponent(), 0.0]),
+            impacts_per_period: 0.0,
+            mesh_fraction: 0.0,
+            symmetric: flow.mirror_symmetric().then_some(true),
+            word: Some(Word::default()),
+            strobe: self.strobes[self.strobes.len() - 1],
+            periods_run: self.strobes.len() as u32 - 1,
         }
     }
 
