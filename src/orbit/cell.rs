@@ -6,7 +6,7 @@
 
 use super::CHAOS_ERRORS;
 use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, TANGENT_PERIODS, status_of};
-use super::recurrence::{Metric, NEAR, candidates, lingers};
+use super::recurrence::{Metric, NEAR, candidates, lingering};
 use super::{Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
@@ -103,7 +103,7 @@ impl<'a> Watch<'a> {
     fn run(&mut self, start: State) -> Result<Measured, Stop> {
         let settings = &self.budget.settings;
         let last = settings.transient_periods.saturating_add(settings.observed_periods);
-        let exponent_from = EXPONENT_FROM.min(settings.transient_periods);
+        let exponent_from = self.exponent_from() as u32;
         let turning_from =
             if self.budget.exponent { exponent_from.saturating_sub(TANGENT_PERIODS) } else { last };
         let mut look = if self.budget.early_stop { FIRST_LOOK.min(last) } else { last };
@@ -123,6 +123,11 @@ impl<'a> Watch<'a> {
             }
         }
         unreachable!("the last period is looked at")
+    }
+
+    /// The period from which the exponent accumulates.
+    fn exponent_from(&self) -> usize {
+        EXPONENT_FROM.min(self.budget.settings.transient_periods) as usize
     }
 
     /// One forcing period, and a look at what has passed where one is due.
@@ -279,9 +284,11 @@ impl<'a> Watch<'a> {
         let lyapunov = self.budget.exponent.then(|| self.exponent.estimate(period));
         let surely = lyapunov.map(|(mean, error)| mean - CHAOS_ERRORS * error);
         // Banded chaos lingers at a cycle for ever, but no departure lasts through such growth.
-        let lasting = surely.is_some_and(|rate| rate * span * period > DEPARTURE);
-        let lingers = || lingers(window, &Metric::of(window, self.analysis.flow), max_period);
-        let slow = surely.is_some_and(|rate| rate <= 0.0) || !lasting && lingers();
+        let averaged = &self.strobes[self.exponent_from()..];
+        let lingered = lingering(averaged, &Metric::of(window, self.analysis.flow), max_period);
+        let is_departure = |rate: f64| rate * lingered as f64 * period < DEPARTURE;
+        let slow = surely.is_some_and(|rate| rate <= 0.0)
+            || 2.0 * lingered as f64 >= span && surely.is_none_or(is_departure);
         Measured {
             period: None,
             status: if slow { Status::Slow } else { Status::Ok },

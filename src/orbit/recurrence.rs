@@ -42,12 +42,13 @@ pub(super) struct Candidate {
     pub(super) distance: f64,
 }
 
-/// Whether the states have kept close to those of some lag for the last half of the window:
-/// they linger at a periodic orbit, attracting or not, and growth along them is no chaos.
-pub(super) fn lingers(strobes: &[State], metric: &Metric, max_period: u32) -> bool {
-    let half = strobes.len() / 2;
-    (1..=(max_period as usize).min(half))
-        .any(|lag| (half..strobes.len()).all(|i| metric.distance(&strobes[i], &strobes[i - lag]) < NEAR))
+/// For how many of the last periods the states have kept close to those of some lag: they
+/// linger at a periodic orbit, attracting or not.
+pub(super) fn lingering(strobes: &[State], metric: &Metric, max_period: u32) -> usize {
+    let n = strobes.len();
+    let is_near = |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < NEAR;
+    let lasted = |lag: usize| (lag..n).rev().take_while(|&i| is_near(i, lag)).count();
+    (1..=(max_period as usize).min(n / 2)).map(lasted).max().unwrap_or(0)
 }
 
 /// Lags up to `max_period` at which the last states recur, the most promising first: the
