@@ -94,6 +94,7 @@ impl Plan {
             budget: Budget {
                 settings: scene.orbit_settings(),
                 early_stop: integration.early_stop,
+                undecided_periods: integration.undecided_periods,
                 exponent: needs.exponent,
             },
             steps: integration.steps_per_period,

@@ -48,7 +48,8 @@ const CONFIRMATION: u32 = 192;
 /// Whether the reference decides within the periods that a lane has; a single orbit goes on.
 fn decides_in_time(pair: &GearPair) -> bool {
     let flow = Flow::new(&pair.oscillator().unwrap());
-    let budget = Budget { settings: Settings::default(), early_stop: false, exponent: true };
+    let budget =
+        Budget { settings: Settings::default(), early_stop: false, undecided_periods: 0, exponent: true };
     let measured = measure(&flow, pair.law(), REST, &budget);
     let grows = measured.lyapunov.is_some_and(|[mean, error]| mean > 3.0 * error);
     measured.period.is_some() || grows && measured.status == Status::Ok

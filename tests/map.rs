@@ -48,11 +48,11 @@ fn on_cpu(scene: &Scene) -> Vec<Record> {
     records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), 64)
 }
 
-/// Whether the motion from rest is still far from an orbit when a map's budget ends.
-fn is_elsewhere(pair: &GearPair, orbit: &Orbit, settings: &Settings) -> bool {
+/// Whether the motion from rest is still far from an orbit after `periods`.
+fn is_elsewhere(pair: &GearPair, orbit: &Orbit, periods: u32) -> bool {
     let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
-    for _ in 0..settings.transient_periods + settings.observed_periods {
+    for _ in 0..periods {
         trajectory.advance_period(&mut ()).unwrap();
     }
     let end = trajectory.state();
@@ -82,8 +82,8 @@ fn cells_are_what_single_orbits_are() {
             let orbit = analyse(&pair, REST, &settings);
             let at = format!("e = {}, omega = {}: {class:?}, {:?}", pair.e, pair.omega, orbit.class);
             if orbit.class != class {
-                // Transient chaos that outlives the budget; a single orbit waits for its end.
-                let transient = class == Class::Chaotic && is_elsewhere(&pair, &orbit, &settings);
+                // Transient chaos that outlives the cell; a single orbit waits for its end.
+                let transient = class == Class::Chaotic && is_elsewhere(&pair, &orbit, record.periods_run);
                 return (!transient).then_some(at);
             }
             if let Class::Periodic { .. } = class {

@@ -67,6 +67,7 @@ struct IntegrationObject {
     transient_periods: u32,
     observed_periods: u32,
     early_stop: bool,
+    undecided_periods: u32,
     max_period: u32,
 }
 
@@ -157,6 +158,7 @@ fn integration(scene: &Scene) -> IntegrationObject {
         transient_periods: settings.transient_periods,
         observed_periods: settings.observed_periods,
         early_stop: settings.early_stop,
+        undecided_periods: settings.undecided_periods,
         max_period: settings.max_period,
     }
 }

@@ -30,6 +30,7 @@ impl Scene {
         tell("integration.transient_periods".into(), integration.transient_periods.to_string());
         tell("integration.observed_periods".into(), integration.observed_periods.to_string());
         tell("integration.early_stop".into(), integration.early_stop.to_string());
+        tell("integration.undecided_periods".into(), integration.undecided_periods.to_string());
         tell("integration.max_period".into(), integration.max_period.to_string());
         let start = match self.start() {
             Start::Rest => "rest".to_owned(),

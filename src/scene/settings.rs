@@ -35,6 +35,8 @@ pub struct Integration {
     pub observed_periods: u32,
     /// Whether a lane may stop as soon as its class is certain.
     pub early_stop: bool,
+    /// Periods that undecided cells get beyond these; with early stops alone.
+    pub undecided_periods: u32,
     /// Longest cycle looked for, at most half the observed periods.
     pub max_period: u32,
 }
@@ -164,7 +166,14 @@ const FORMATS: [(&str, Format); 4] =
     [("csv", Format::Csv), ("npy", Format::Npy), ("png", Format::Png), ("html", Format::Html)];
 
 pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneError> {
-    let known = ["steps_per_period", "transient_periods", "observed_periods", "early_stop", "max_period"];
+    let known = [
+        "steps_per_period",
+        "transient_periods",
+        "observed_periods",
+        "early_stop",
+        "undecided_periods",
+        "max_period",
+    ];
     let section = root.section("integration", &known)?;
     let periods = |name, default| match section.get(name) {
         Some(field) => field.whole(1..=MAX_PERIODS),
@@ -182,6 +191,9 @@ pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneE
         transient_periods,
         observed_periods,
         early_stop: section.get("early_stop").map_or(Ok(true), |field| field.flag())?,
+        undecided_periods: section
+            .get("undecided_periods")
+            .map_or(Ok(0), |field| field.whole(0..=MAX_PERIODS))?,
         max_period: read_max_period(&section, observed_periods)?,
     })
 }
