@@ -183,6 +183,7 @@ pub struct Gpu {
     layout: wgpu::BindGroupLayout,
     pipelines: HashMap<Variant, wgpu::ComputePipeline>,
     trouble: device::Trouble,
+    rewrite: fn(String) -> String,
 }
 
 impl Gpu {
@@ -205,6 +206,14 @@ impl Gpu {
     /// The precision in use.
     pub fn precision(&self) -> Precision {
         self.precision
+    }
+
+    /// Compiles shaders from here on as `rewrite` turns them: measurements count work and
+    /// compare forms of a loop in this way.
+    #[doc(hidden)]
+    pub fn rewrite_shaders(&mut self, rewrite: fn(String) -> String) {
+        self.rewrite = rewrite;
+        self.pipelines.clear();
     }
 
     /// Integrates every lane and returns its record, in the same order.

@@ -101,7 +101,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
     let layout = bind_group_layout(&device);
     let trouble = Trouble::watch(&device);
-    Ok(Gpu { device, queue, info, precision, layout, pipelines: HashMap::new(), trouble })
+    Ok(Gpu { device, queue, info, precision, layout, pipelines: HashMap::new(), trouble, rewrite: |source| source })
 }
 
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
@@ -146,7 +146,7 @@ pub(super) async fn pipeline(gpu: &Gpu, variant: super::Variant) -> Result<wgpu:
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("lane"),
-        source: wgpu::ShaderSource::Wgsl(variant.source().into()),
+        source: wgpu::ShaderSource::Wgsl((gpu.rewrite)(variant.source()).into()),
     });
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("lane"),
