@@ -33,6 +33,12 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     motion = motions[i].now;
     tally = tallies[i].now;
     trips = 0u;
+    fetch_constants();
+    fetch_tangent();
+    if motion.bound == 0.0 {
+        // A start: no pass has bounded it yet.
+        renew_bound();
+    }
     // Scanning and acting are separate, so that lanes scan together and act together.
     while running() && trips < settings.trips {
         if scan() == SCAN_BUDGET {
@@ -43,6 +49,7 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
             tally.status = STATUS_TOO_STIFF;
         }
     }
+    keep_tangent();
     motions[i].now = motion;
     tallies[i].now = tally;
     if running() {

@@ -4,12 +4,8 @@
 pub(crate) type Rewrite = fn(String) -> String;
 
 /// Every loop pays for its trips; counting them function by function counts the work.
-pub(crate) const LOOPS: [(&str, &str); 4] = [
-    ("scan", "scan steps"),
-    ("careful", "careful passes"),
-    ("first_event", "looks"),
-    ("root", "root trips"),
-];
+pub(crate) const LOOPS: [(&str, &str); 4] =
+    [("scan", "scan steps"), ("careful", "careful passes"), ("first_event", "looks"), ("root", "root trips")];
 
 /// Forms that must give the same results; the first is the shader as it is.
 pub(crate) const CHECKS: [(&str, Rewrite); 2] = [("phased", |source| source), ("naive", naive)];
@@ -35,7 +31,11 @@ fn count_trips(source: &str, function: &str) -> String {
 
 /// One scan step, then what it asks for: event code inside the step loop.
 fn naive(source: String) -> String {
-    replace(&source, "if trips >= settings.trips {\n            verdict", "if taken > 0u {\n            verdict")
+    replace(
+        &source,
+        "if trips >= settings.trips {\n            verdict",
+        "if taken > 0u {\n            verdict",
+    )
 }
 
 fn replace(text: &str, from: &str, to: &str) -> String {

@@ -47,8 +47,9 @@ pub(super) async fn run(
             return Err(GpuError::NoSuchCell { lane: i, flow, law, flows: flows.len(), laws: laws.len() });
         }
     }
-    let variant =
-        Variant { precision: gpu.precision, workgroup: settings.workgroup, exponent: settings.exponent };
+    let keep = gpu.info.device_type == wgpu::DeviceType::Cpu;
+    let LaneSettings { workgroup, exponent, .. } = *settings;
+    let variant = Variant { precision: gpu.precision, workgroup, exponent, keep };
     if !gpu.pipelines.contains_key(&variant) {
         let pipeline = device::pipeline(gpu, variant).await?;
         gpu.pipelines.insert(variant, pipeline);

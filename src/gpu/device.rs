@@ -101,7 +101,16 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
     let layout = bind_group_layout(&device);
     let trouble = Trouble::watch(&device);
-    Ok(Gpu { device, queue, info, precision, layout, pipelines: HashMap::new(), trouble, rewrite: |source| source })
+    Ok(Gpu {
+        device,
+        queue,
+        info,
+        precision,
+        layout,
+        pipelines: HashMap::new(),
+        trouble,
+        rewrite: |source| source,
+    })
 }
 
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
