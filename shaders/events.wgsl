@@ -215,7 +215,8 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
 // Bound on the eighth derivative of the gap where the dip asks for it.
 var<private> pressing_bound: Real;
 
-fn careful() {
+// Moves on to the first event of the next step, or to its end, and acts on it; true at a mark.
+fn careful() -> bool {
     let d = domain_of(tally.mode);
     let substeps = here.substeps;
     let share = here.share;
@@ -258,11 +259,7 @@ fn careful() {
     if found.event {
         act(found.second, found.tau);
     }
-    if tally.step >= shape.steps {
-        begin_period();
-    } else if tally.step >= mark {
-        compare_mirror();
-    }
+    return tally.step >= mark;
 }
 
 // Acts on what ends the flight at the present state, `tau` after the expansion.
