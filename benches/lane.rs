@@ -119,7 +119,7 @@ fn main() {
             let times = seconds(&plane, &size, &mut gpus, exponent);
             for (time, (name, _)) in times.iter().zip(CHECKS) {
                 println!(
-                    "  {name:<8} {:8.0} lane-periods/s, {:6.1} ns per scan step, {:.2} of the first",
+                    "  {name:<9} {:8.0} lane-periods/s, {:6.1} ns per scan step, {:.2} of the first",
                     lane_periods / time,
                     1e9 * time / lane_periods / steps,
                     time / times[0],

@@ -34,7 +34,8 @@ fn close_chatter(side: u32, u: Real) {
     if lasts <= 0.0 || lasts >= to_mark(next_mark()) {
         return;
     }
-    close_tangents(sign, pressing, u);
+    crossing.pressing = sign * pressing;
+    crossing.leaving = sign * u;
     motion.q = array<Real, 4>(0.0, 0.0, closed[2] + lasts * (rate + 0.5 * lasts * v_rate), rate + lasts * v_rate);
     advance_phase(lasts);
     turn_phasor(lasts);
@@ -42,19 +43,4 @@ fn close_chatter(side: u32, u: Real) {
     tally.mode = MODE_PRESSED + side;
     tally.order = 2u;
     enter(domain_of(tally.mode));
-}
-
-// A neighbour leaves at another time and speed, so its series ends `late`; until then it
-// misses the pressing acceleration. Momentum is the same either way.
-fn close_tangents(sign: Real, pressing: Real, leaving: Real) {
-    if !EXPONENT {
-        return;
-    }
-    let e = law.restitution;
-    for (var i = 0u; i < tally.tangent_count; i++) {
-        let u = tangent(i);
-        let late = -sign * (2.0 * u[1] / pressing + (1.0 + e) * u[0] / leaving) / (1.0 - e);
-        let behind = -sign * pressing * late;
-        set_tangent(i, array<Real, 4>(0.0, behind, u[2] + kick * u[0], u[3] + kick * (u[1] - behind)));
-    }
 }

@@ -242,7 +242,6 @@ fn careful() -> bool {
     let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
     let found = first_event(len, here.growth, order);
     tally.passes_in_period += 1u;
-    glide_tangents(found.tau);
     motion.q = state_at(found.tau, substeps);
     motion.bound += here.growth;
     tally.order = 0u;
@@ -256,8 +255,13 @@ fn careful() -> bool {
     }
     check_finite();
     turn_phasor(found.tau);
+    crossing = Crossing();
+    let flown = Pull(here.gap_row, here.x_row, here.share, here.angle);
     if found.event {
         act(found.second, found.tau);
+    }
+    if EXPONENT {
+        carry_tangents(flown, found.tau);
     }
     return tally.step >= mark;
 }
@@ -268,7 +272,6 @@ fn act(second: bool, tau: Real) {
     let mode = tally.mode;
     var side = side_of(mode);
     var jump: Jump;
-    var before: array<Real, 4>;
     if mode == MODE_FREE {
         side = select(SIDE_RIGHT, SIDE_LEFT, second);
         motion.q[0] = walls[side];
@@ -276,7 +279,7 @@ fn act(second: bool, tau: Real) {
         motion.q[0] = 0.0;
     }
     if EXPONENT {
-        before = field();
+        crossing.before = field();
     }
     if mode == MODE_FREE {
         jump = contact(side, settling);
@@ -300,7 +303,8 @@ fn act(second: bool, tau: Real) {
         enter(domain_of(jump.mode));
     }
     if EXPONENT && jump.event {
-        saltate(before, field(), jump);
+        crossing.jump = jump;
+        crossing.after = field();
     }
     if jump.pressed_back > 0.0 {
         close_chatter(side, jump.pressed_back);

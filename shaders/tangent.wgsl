@@ -67,27 +67,45 @@ fn step_columns(count: u32) {
     }
 }
 
-// Carries every vector over a part of a step.
-fn glide_tangents(tau: Real) {
-    if !EXPONENT {
-        return;
-    }
+// What the tangent vectors pass through at the end of a careful step.
+struct Crossing {
+    // The event, and the vector fields around it.
+    jump: Jump,
+    before: array<Real, 4>,
+    after: array<Real, 4>,
+    // The closed series after it: the pressing acceleration and the leaving speed, signed
+    // into the wall; 0 if there is none.
+    pressing: Real,
+    leaving: Real,
+}
+
+var<private> crossing: Crossing;
+
+// Carries every vector over a part of a step and what follows it.
+fn carry_tangents(flown: Pull, tau: Real) {
+    let back = 1.0 / flown.share;
     for (var i = 0u; i < tally.tangent_count; i++) {
         trips += 1u;
         var u = tangent(i);
-        u[1] *= here.share;
-        u[3] *= here.share;
-        u = glide(u, tau);
-        u[1] *= here.substeps;
-        u[3] *= here.substeps;
+        u[1] *= flown.share;
+        u[3] *= flown.share;
+        u = glide(flown, u, tau);
+        u[1] *= back;
+        u[3] *= back;
+        if crossing.jump.event {
+            u = saltate(u);
+        }
+        if crossing.leaving != 0.0 {
+            u = close(u);
+        }
         set_tangent(i, u);
     }
 }
 
 // A part `tau` of a step: the series of the unforced motion.
-fn glide(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
-    let g = here.gap_row;
-    let r = here.x_row;
+fn glide(flown: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
+    let g = flown.gap_row;
+    let r = flown.x_row;
     var z = u[0];
     var w = u[1];
     var x = u[2];
@@ -122,25 +140,28 @@ fn field() -> array<Real, 4> {
 
 // `S u = R u + (f+ - R f-) (n . u) / (n . f-)`, with R the jump of rates by `kept` (-e at a
 // contact, 1 elsewhere) and `kick`.
-fn saltate(before: array<Real, 4>, after: array<Real, 4>, jump: Jump) {
-    let change = array<Real, 4>(
-        after[0] - before[0],
-        after[1] - jump.kept * before[1],
-        after[2] - before[2],
-        after[3] - before[3] - jump.kick * before[1],
-    );
-    let normal = jump.normal;
+fn saltate(u: array<Real, 4>) -> array<Real, 4> {
+    let jump = crossing.jump;
+    let before = crossing.before;
+    let after = crossing.after;
     let inverse = select(1.0 / jump.rate, Real(0.0), abs(jump.rate) < NO_RATE);
-    for (var i = 0u; i < tally.tangent_count; i++) {
-        let u = tangent(i);
-        let along = inverse * ((normal[0] * u[0] + normal[1] * u[1]) + (normal[2] * u[2] + normal[3] * u[3]));
-        set_tangent(i, array<Real, 4>(
-            u[0] + change[0] * along,
-            jump.kept * u[1] + change[1] * along,
-            u[2] + change[2] * along,
-            u[3] + jump.kick * u[1] + change[3] * along,
-        ));
-    }
+    let along = inverse * ((jump.normal[0] * u[0] + jump.normal[1] * u[1]) + (jump.normal[2] * u[2] + jump.normal[3] * u[3]));
+    return array<Real, 4>(
+        u[0] + (after[0] - before[0]) * along,
+        jump.kept * u[1] + (after[1] - jump.kept * before[1]) * along,
+        u[2] + (after[2] - before[2]) * along,
+        u[3] + jump.kick * u[1] + (after[3] - before[3] - jump.kick * before[1]) * along,
+    );
+}
+
+// Through an infinite series of impacts: a neighbour leaves at another time and speed, so its
+// series ends `late`; until then it misses the pressing acceleration. Momentum is the same
+// either way.
+fn close(u: array<Real, 4>) -> array<Real, 4> {
+    let e = law.restitution;
+    let late = -(2.0 * u[1] / crossing.pressing + (1.0 + e) * u[0] / crossing.leaving) / (1.0 - e);
+    let behind = -crossing.pressing * late;
+    return array<Real, 4>(0.0, behind, u[2] + kick * u[0], u[3] + kick * (u[1] - behind));
 }
 
 // Rates below this at an event leave the linearisation without meaning.

@@ -1,6 +1,6 @@
 //! Arithmetic in the shader's text, counted in naga's intermediate form.
 
-use naga::{Block, Expression, Function, Handle, Module, Statement};
+use naga::{Block, Expression, Function, Handle, Literal, Module, Statement};
 use rattlemap::gpu::Precision;
 
 /// Parts of the lane: function, and whether only its loop is meant.
@@ -49,7 +49,11 @@ fn statement_count(module: &Module, function: &Function, statement: &Statement) 
     match statement {
         Statement::Emit(range) => range.clone().filter(|&e| is_arithmetic(function, e)).count(),
         Statement::Block(body) => within(body),
-        Statement::If { accept, reject, .. } => within(accept) + within(reject),
+        Statement::If { condition, accept, reject } => match fixed(module, function, *condition) {
+            Some(true) => within(accept),
+            Some(false) => within(reject),
+            None => within(accept) + within(reject),
+        },
         Statement::Loop { body, continuing, .. } => within(body) + within(continuing),
         Statement::Switch { cases, .. } => cases.iter().map(|case| within(&case.body)).sum(),
         Statement::Call { function: called, .. } => {
@@ -57,6 +61,18 @@ fn statement_count(module: &Module, function: &Function, statement: &Statement) 
             block(module, called, &called.body)
         }
         _ => 0,
+    }
+}
+
+/// The value of a condition that the variant fixes.
+fn fixed(module: &Module, function: &Function, condition: Handle<Expression>) -> Option<bool> {
+    match function.expressions[condition] {
+        Expression::Literal(Literal::Bool(value)) => Some(value),
+        Expression::Constant(constant) => match module.global_expressions[module.constants[constant].init] {
+            Expression::Literal(Literal::Bool(value)) => Some(value),
+            _ => None,
+        },
+        _ => None,
     }
 }
 
