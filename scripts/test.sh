@@ -73,4 +73,5 @@ say "tests: cargo test"
 cargo test
 say "benchmarks: tiny sizes, so that they cannot rot"
 cargo test --quiet --bench reference
+cargo test --quiet --bench lane
 say "all passed"

@@ -21,7 +21,7 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     motions[lane] = Motion(motion, array<Real, 16>());
     tallies[lane] = Tally(tally, array<u32, 16>(), array<u32, 16>(), array<u32, 7>());
-    set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
+    store_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
 }
 
 // A start beyond a wall is meshing.

@@ -3,10 +3,22 @@
 // Squarings of the monodromy matrix. With `n = 2^SQUARINGS` the modulus of its largest
 // multiplier is `|M^n|^(1/n)` up to a factor of `kappa^(1/n)`, kappa the condition of its
 // eigenvectors.
-const SQUARINGS: u32 = 20u;
+const SQUARINGS: u32 = 40u;
 
 // A lane has settled once it is this close to its cycle, relative to the motion.
 const ON_CYCLE: f32 = 5e-4;
+
+// The binary logarithm of a number near 1e-30 to 1e30, to the precision of its type: f64 has no
+// logarithm of its own. `ln m = 2 artanh((m - 1) / (m + 1))`, m within a factor of sqrt 2 of 1.
+fn octaves_of(x: Real) -> Real {
+    let whole = round(log2(f32(x)));
+    let m = x * Real(ldexp(1.0, -i32(whole)));
+    let s = (m - 1.0) / (m + 1.0);
+    let q = s * s;
+    let series = 1.0 + q * (1.0 / 3.0 + q * (1.0 / 5.0 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q * (1.0 / 11.0
+        + q * (1.0 / 13.0 + q * (1.0 / 15.0 + q * (1.0 / 17.0 + q * (1.0 / 19.0 + q * (1.0 / 21.0))))))))));
+    return Real(whole) + (2.0 / LN_2) * s * series;
+}
 
 // The binary logarithm of the spectral radius of the monodromy matrix, whose columns the
 // tangent vectors are: they started as the unit vectors.
@@ -23,7 +35,7 @@ fn spectral_growth() -> Real {
             // Superstable, as far as can be told.
             return -100.0;
         }
-        growth += weight * Real(log2(f32(size)));
+        growth += weight * octaves_of(size);
         weight *= 0.5;
         let inverse = 1.0 / size;
         var square: array<Real, 16>;

@@ -63,7 +63,6 @@ fn watch(tau: Real) -> Watch {
 fn set_offsets() {
     let z = motion.q[0];
     if tally.mode == MODE_FREE {
-        let walls = flows[cell.flow_index].walls;
         offsets = vec2<Real>(walls[0] - z, z - walls[1]);
     } else {
         let sign = sign_of(side_of(tally.mode));
@@ -83,7 +82,9 @@ const LOOK_CAP: u32 = 200u;
 
 // The root of one distance in (lo, hi], where it falls from + to -; on the exact flow, with
 // the root at the start divided out.
-fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> Real {
+//
+// Returns the root and the slope there.
+fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<Real> {
     var lo = start;
     var hi = end;
     var t = guess;
@@ -101,18 +102,18 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> Real {
         var next = t - step;
         let converged = abs(f.z) * (step * step) <= ULP * t * abs(f.y) || abs(step) <= 4.0 * ULP * t;
         if converged && next >= start && next <= end {
-            return next;
+            return vec2<Real>(next, f.y);
         }
         if i >= NEWTON_CAP || !(next > lo && next < hi) {
             next = 0.5 * (lo + hi);
             if hi - lo <= 4.0 * ULP * hi {
-                return next;
+                return vec2<Real>(next, f.y);
             }
         }
         t = next;
     }
     tally.status = STATUS_CAP_ROOT;
-    return t;
+    return vec2<Real>(t, 0.0);
 }
 
 // What a careful step finds.
@@ -180,12 +181,10 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
                 let short = -2.0 * leaving.y / leaving.z;
                 guess = select(Real(0.5) * b, short, short > 0.0 && short < 0.5 * b);
             }
-            let tau = root(which, a, b, order, guess);
+            let found = root(which, a, b, order, guess);
             // Where the slope drowns in the remainder there may be three roots for one.
-            let there = watch(tau);
-            let slope = dt * abs(select(there.first.y, there.second.y, which));
-            if slope > STEEP * select(eps.x, eps.y, which) || dt <= SHORTEST {
-                return Find(true, which, tau);
+            if dt * abs(found.y) > STEEP * select(eps.x, eps.y, which) || dt <= SHORTEST {
+                return Find(true, which, found.x);
             }
             width = 0.5 * dt;
             continue;
@@ -216,21 +215,24 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
 // Bound on the eighth derivative of the gap where the dip asks for it.
 var<private> pressing_bound: Real;
 
-fn careful() {
-    let f = cell.flow_index;
+// Moves on to the first event of the next step, or to its end, and acts on it; true at a mark.
+fn careful() -> bool {
     let d = domain_of(tally.mode);
-    let substeps = flows[f].domains[d].substeps;
-    let growth = flows[f].domains[d].growth;
+    let substeps = here.substeps;
+    let share = here.share;
     sync_phasor();
     trips += 1u;
-    expand(d, motion.q);
+    expand();
     set_offsets();
     motion.bound =
-        derivative_bound(d, 120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
+        derivative_bound(120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
     if tally.mode >= MODE_DIP {
         pressing_bound =
-            derivative_bound(d, 5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
+            derivative_bound(5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
+    }
+    if tally.order == 2u && gap_terms[2] == 0.0 {
+        tally.order = 3u;
     }
     let mark = next_mark();
     let part = to_mark(mark) * substeps;
@@ -238,12 +240,10 @@ fn careful() {
     let len = min(part, Real(1.0));
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
     let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
-    let found = first_event(len, growth, order);
+    let found = first_event(len, here.growth, order);
     tally.passes_in_period += 1u;
-    let share = flows[f].domains[d].share;
-    carry_tangents(d, found.tau);
     motion.q = state_at(found.tau, substeps);
-    motion.bound += growth;
+    motion.bound += here.growth;
     tally.order = 0u;
     if d > 0u {
         count_meshing(found.tau * share);
@@ -254,72 +254,60 @@ fn careful() {
         motion.theta = 0.0;
     }
     check_finite();
-    sync_phasor();
+    turn_phasor(found.tau);
+    crossing = Crossing();
+    let flown = Pull(here.gap_row, here.x_row, here.share, here.angle);
     if found.event {
-        act(found.second, found.tau == 0.0);
+        act(found.second, found.tau);
     }
-    if tally.step >= shapes[f].steps {
-        begin_period();
-    } else if tally.step >= mark {
-        compare_mirror();
-    }
-}
-
-// Pressing ceases inside the dip: the event function is the acceleration itself.
-fn end_dip(side: u32) {
-    let f = cell.flow_index;
-    let before = motion.q;
-    tally.mode = MODE_FREE;
-    motion.q[0] += flows[f].walls[side];
     if EXPONENT {
-        let row = flows[f].domains[1u + side].gap_row;
-        let share = flows[f].domains[1u + side].share;
-        let normal = array<Real, 4>(row[0], share * row[1], row[2], share * row[3]);
-        expand(1u + side, before);
-        let rate = 6.0 * gap_terms[3] * flows[f].domains[1u + side].substeps;
-        saltate(field(1u + side, before), field(0u, motion.q), normal, rate, 1.0, 0.0);
+        carry_tangents(flown, found.tau);
     }
+    return tally.step >= mark;
 }
 
-// Acts on an event at the present state.
-fn act(second: bool, settling: bool) {
-    let f = cell.flow_index;
-    if tally.mode == MODE_FREE {
-        let side = select(SIDE_RIGHT, SIDE_LEFT, second);
-        motion.q[0] = flows[f].walls[side];
-        let closing = sign_of(side) * motion.q[1];
-        // On or beyond the wall by rounding, or by its start: a contact only if it closes.
-        if settling && (closing < 0.0 || (closing == 0.0 && !presses(0u, side, motion.q))) {
-            leave(side);
-        } else {
-            contact(side);
-        }
-        return;
+// Acts on what ends the flight at the present state, `tau` after the expansion.
+fn act(second: bool, tau: Real) {
+    let settling = tau == 0.0;
+    let mode = tally.mode;
+    var side = side_of(mode);
+    var jump: Jump;
+    if mode == MODE_FREE {
+        side = select(SIDE_RIGHT, SIDE_LEFT, second);
+        motion.q[0] = walls[side];
+    } else if !second {
+        motion.q[0] = 0.0;
     }
-    let side = side_of(tally.mode);
-    let sign = sign_of(side);
-    if tally.mode < MODE_DIP {
-        motion.q[0] = 0.0;
-        if settling && sign * motion.q[1] > 0.0 {
-            tally.order = 1u;
-            return;
-        }
-        motion.q[1] = -sign * max(-sign * motion.q[1], Real(0.0));
-        count_event(side);
-        let before = motion.q;
-        leave(side);
-        if EXPONENT {
-            saltate(field(1u + side, before), field(0u, motion.q), ALONG_GAP, before[1], 1.0, 0.0);
-        }
+    if EXPONENT {
+        crossing.before = field();
+    }
+    if mode == MODE_FREE {
+        jump = contact(side, settling);
+    } else if mode < MODE_DIP {
+        jump = end_meshing(side, settling);
     } else if second {
-        // Pressing ceases inside the dip.
-        count_event(side);
-        end_dip(side);
+        jump = end_dip(side, tau);
     } else {
-        // The dip is over; no event.
-        motion.q[0] = 0.0;
-        motion.q[1] = sign * max(sign * motion.q[1], Real(0.0));
-        tally.mode = MODE_PRESSED + side;
+        jump = emerge(side);
+    }
+    if jump.event {
+        count_event(side);
+    }
+    tally.origin = side;
+    // Where pressing has ceased inside the dip, the gap is off the wall.
+    if !(mode >= MODE_DIP && second) {
         tally.order = select(1u, 2u, motion.q[1] == 0.0);
     }
+    if jump.mode != mode {
+        tally.mode = jump.mode;
+        enter(domain_of(jump.mode));
+    }
+    if EXPONENT && jump.event {
+        crossing.jump = jump;
+        crossing.after = field();
+    }
+    if jump.pressed_back > 0.0 {
+        close_chatter(side, jump.pressed_back);
+    }
+    renew_bound();
 }

@@ -3,15 +3,17 @@
 // Certificate of a step for one pair of ends: how far the function certainly stays within
 // [low, high], from value, slope and curvature at both ends, in units of the step.
 // Quintic Hermite interpolation in Bernstein form of degree 6; its remainder is at most
-// `eps` times the middle basis polynomial.
-fn room(f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
+// `eps` times the middle basis polynomial. A start on the wall (`leaves`) is a root that is
+// divided out: its coefficient drops.
+fn room(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
     let c1 = f0 + s0 * (1.0 / 6.0);
     let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
     let c3 = 0.5 * ((f0 + 0.4 * s0 + 0.05 * a0) + (f1 - 0.4 * s1 + 0.05 * a1));
     let c4 = f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0));
     let c5 = f1 - s1 * (1.0 / 6.0);
-    let top = max(max(max(f0, f1), max(c1, c5)), max(max(c2, c4), c3 + eps));
-    let bottom = min(min(min(f0, f1), min(c1, c5)), min(min(c2, c4), c3 - eps));
+    let c0 = select(f0, c1, leaves);
+    let top = max(max(max(c0, f1), max(c1, c5)), max(max(c2, c4), c3 + eps));
+    let bottom = min(min(min(c0, f1), min(c1, c5)), min(min(c2, c4), c3 - eps));
     return min(high - top, bottom - low) - 8.0 * ULP * (abs(f0) + abs(f1));
 }
 
@@ -20,23 +22,22 @@ const SCAN_CAREFUL: u32 = 0u; // the next step needs a careful look
 const SCAN_BUDGET: u32 = 1u; // this dispatch has done its share
 
 fn scan() -> u32 {
-    // From a wall, and through the dip, every step is a careful one.
-    if tally.order > 0u || tally.mode >= MODE_DIP {
+    // From rest on a wall, and through the dip, every step is a careful one.
+    if tally.order > 1u || tally.mode >= MODE_DIP {
         return SCAN_CAREFUL;
     }
-    let f = cell.flow_index;
     let d = domain_of(tally.mode);
-    let m = flows[f].domains[d].step;
-    let row = flows[f].domains[d].gap_row;
-    let growth = flows[f].domains[d].growth;
-    let less = flows[f].domains[d].turn_less;
-    let sine = flows[f].domains[d].turn_sin;
-    let share = flows[f].domains[d].share;
-    let substeps = flows[f].domains[d].substeps;
+    let m = here.step;
+    let row = here.gap_row;
+    let growth = here.growth;
+    let less = here.turn_less;
+    let sine = here.turn_sin;
+    let share = here.share;
+    let substeps = here.substeps;
     let mark = next_mark();
     // Meshing measures from its wall and has but one.
-    var low = flows[f].walls[1];
-    var high = flows[f].walls[0];
+    var low = walls[1];
+    var high = walls[0];
     if d == 1u {
         low = 0.0;
         high = HUGE;
@@ -55,6 +56,13 @@ fn scan() -> u32 {
     var bound = motion.bound;
     var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + row[5]);
     var taken = 0u;
+    var leaves = tally.order > 0u;
+    // The tangent vector goes along; where a cycle is read, four follow.
+    var tz = tangent_now[0];
+    var tw = tangent_now[1] * share;
+    var tx = tangent_now[2];
+    var tv = tangent_now[3] * share;
+    let price = select(1u, 5u, tally.tangent_count > 1u);
     var verdict = SCAN_CAREFUL;
     loop {
         if trips >= settings.trips {
@@ -68,7 +76,7 @@ fn scan() -> u32 {
         if next_n >= mark {
             break;
         }
-        trips += 1u;
+        trips += price;
         let z1 = z + (((m[0] * z + m[1] * w) + (m[2] * x + m[3] * v)) + ((m[4] * c + m[5] * s) + m[6]));
         let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + m[13]));
         let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + m[20]));
@@ -77,9 +85,20 @@ fn scan() -> u32 {
         let s1 = s + (sine * c + less * s);
         let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + row[5]);
         let bound1 = bound + growth;
-        if !(room(z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
+        if !(room(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
             break;
         }
+        if EXPONENT {
+            let tz1 = tz + ((m[0] * tz + m[1] * tw) + (m[2] * tx + m[3] * tv));
+            let tw1 = tw + ((m[7] * tz + m[8] * tw) + (m[9] * tx + m[10] * tv));
+            let tx1 = tx + ((m[14] * tz + m[15] * tw) + (m[16] * tx + m[17] * tv));
+            let tv1 = tv + ((m[21] * tz + m[22] * tw) + (m[23] * tx + m[24] * tv));
+            tz = tz1;
+            tw = tw1;
+            tx = tx1;
+            tv = tv1;
+        }
+        leaves = false;
         z = z1;
         w = w1;
         x = x1;
@@ -102,7 +121,11 @@ fn scan() -> u32 {
     motion.bound = bound;
     tally.step = n;
     tally.passes_in_period += taken;
-    tally.pending += taken;
+    tally.order = select(0u, 1u, leaves);
+    if EXPONENT {
+        tangent_now = array<Real, 4>(tz, tw * substeps, tx, tv * substeps);
+        step_columns(taken);
+    }
     // Whole numbers, so that it does not matter where a dispatch ends.
     tally.mesh_right += select(0u, taken, d == 1u);
     tally.mesh_left += select(0u, taken, d == 2u);

@@ -15,93 +15,133 @@ fn sign_of(side: u32) -> Real {
     return select(Real(-1.0), Real(1.0), side == SIDE_RIGHT);
 }
 
-// Acceleration of the gap in a domain, in units of its step. `q` in lane units.
-fn gap_acceleration(d: u32, q: array<Real, 4>) -> Real {
-    let row = flows[cell.flow_index].domains[d].gap_row;
-    let share = flows[cell.flow_index].domains[d].share;
+// An acceleration from its row, in units of the domain's step. `q` in lane units.
+fn acceleration(row: array<Real, 6>, share: Real, q: array<Real, 4>) -> Real {
     return (row[0] * q[0] + row[2] * q[2]) + share * (row[1] * q[1] + row[3] * q[3])
         + (row[4] * motion.phasor[0] + row[5]);
 }
 
 // The first derivative of the gap from the second on that is not zero points into the wall.
-fn presses(d: u32, side: u32, q: array<Real, 4>) -> bool {
-    let a = gap_acceleration(d, q);
-    if a != 0.0 {
-        return sign_of(side) * a > 0.0;
+fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
+    var first = acceleration(pull.gap_row, pull.share, q);
+    if first == 0.0 {
+        first = later_derivative(pull, q);
     }
-    expand(d, q);
-    let first = select(select(gap_terms[5], gap_terms[4], gap_terms[4] != 0.0), gap_terms[3], gap_terms[3] != 0.0);
     return sign_of(side) * first > 0.0;
 }
 
-// Order of the root of the distance for a gap that rests on the wall.
-fn rest_order(d: u32, q: array<Real, 4>) -> u32 {
-    return select(2u, 3u, gap_acceleration(d, q) == 0.0);
+// The first of the derivatives of the gap from the third to the fifth that is not zero.
+fn later_derivative(pull: Pull, q: array<Real, 4>) -> Real {
+    let g = pull.gap_row;
+    let r = pull.x_row;
+    var first: Real = 0.0;
+    // Derivatives of order k and k + 1, that of the gap of order 2 being zero.
+    var z = pull.share * q[1];
+    var w: Real = 0.0;
+    var x = pull.share * q[3];
+    var v = acceleration(r, pull.share, q);
+    var c = -pull.angle * motion.phasor[1];
+    var s = pull.angle * motion.phasor[0];
+    //% for k in 3..6
+    {
+        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + g[4] * c;
+        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + r[4] * c;
+        first = select(first, a, first == 0.0);
+        z = w;
+        w = a;
+        x = v;
+        v = b;
+        let turned = -pull.angle * s;
+        s = pull.angle * c;
+        c = turned;
+    }
+    //% end
+    return first;
 }
 
-// Free motion reaches a wall: the impact law, then meshing or not. The gap is on the wall.
-fn contact(side: u32) {
-    let sign = sign_of(side);
-    let e = laws[cell.law_index].restitution;
-    let approach = max(sign * motion.q[1], Real(0.0));
-    let leaving = e * approach;
-    let before = motion.q;
-    motion.q[1] = -sign * leaving;
-    motion.q[3] += flows[cell.flow_index].kick * (sign * (1.0 + e) * approach);
-
-    motion.q[0] = flows[cell.flow_index].walls[side];
-    let pressed = presses(0u, side, motion.q);
-    var meshes = false;
-    if pressed && leaving <= laws[cell.law_index].mesh_speed * flows[cell.flow_index].h {
-        var on_wall = motion.q;
-        on_wall[0] = 0.0;
-        meshes = presses(1u + side, side, on_wall);
-    }
-    if !pressed && approach < GRAZING_SPEED * flows[cell.flow_index].h {
-        tally.grazes += 1u;
-    }
-    count_event(side);
-    if EXPONENT {
-        var next = motion.q;
-        next[0] = select(next[0], 0.0, meshes);
-        let after = field(select(0u, 1u + side, meshes), next);
-        let kick = flows[cell.flow_index].kick * (1.0 + e);
-        saltate(field(0u, before), after, ALONG_GAP, before[1], -e, kick);
-    }
-    if meshes {
-        start_meshing(side, leaving);
-    } else {
-        tally.impacts += 1u;
-        leave(side);
-    }
+// What an event does to the motion.
+struct Jump {
+    // Whether it is one; what governs the motion next.
+    event: bool,
+    mode: u32,
+    // The event function: its gradient and its rate, per free step.
+    normal: array<Real, 4>,
+    rate: Real,
+    // Factor of the gap's rate, and what the rate of x takes of the gap's.
+    kept: Real,
+    kick: Real,
+    // Leaving speed of an impact that the load presses back.
+    pressed_back: Real,
 }
-
-// Approach speeds below this, with the load pulling away, count as near grazing.
-const GRAZING_SPEED: Real = 1e-4;
 
 // The gradient of the gap.
 const ALONG_GAP = array<Real, 4>(1.0, 0.0, 0.0, 0.0);
 
-fn start_meshing(side: u32, leaving: Real) {
-    motion.q[0] = 0.0;
-    if leaving > 0.0 {
-        tally.mode = MODE_DIP + side;
-        tally.order = 1u;
-    } else {
-        tally.mode = MODE_PRESSED + side;
-        tally.order = rest_order(1u + side, motion.q);
+// Approach speeds below this, with the load pulling away, count as near grazing.
+const GRAZING_SPEED: Real = 1e-4;
+
+// Free motion reaches a wall: the impact law, then meshing or not. The gap is on the wall.
+fn contact(side: u32, settling: bool) -> Jump {
+    let sign = sign_of(side);
+    let e = law.restitution;
+    let closing = sign * motion.q[1];
+    let approach = max(closing, Real(0.0));
+    let leaving = e * approach;
+    var after = motion.q;
+    after[1] = -sign * leaving;
+    after[3] += kick * (sign * (1.0 + e) * approach);
+    let pressed = presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, after);
+    var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], -e, kick * (1.0 + e), 0.0);
+    // On or beyond the wall by rounding, or by its start: a contact only if it closes.
+    if settling && (closing < 0.0 || (closing == 0.0 && !pressed)) {
+        return jump;
     }
+    jump.event = true;
+    if !pressed && approach < GRAZING_SPEED * h {
+        tally.grazes += 1u;
+    }
+    motion.q = after;
+    if pressed && leaving <= law.mesh_speed * h {
+        after[0] = 0.0;
+        if presses(meshing_pull(side), side, after) {
+            jump.mode = select(MODE_PRESSED, MODE_DIP, leaving > 0.0) + side;
+            motion.q = after;
+            return jump;
+        }
+    }
+    tally.impacts += 1u;
+    jump.pressed_back = select(Real(0.0), leaving, pressed);
+    return jump;
 }
 
-// Free motion starts on a wall.
-fn leave(side: u32) {
-    tally.mode = MODE_FREE;
-    tally.origin = side;
-    motion.q[0] = flows[cell.flow_index].walls[side];
-    tally.order = 1u;
-    if motion.q[1] == 0.0 {
-        tally.order = rest_order(0u, motion.q);
+// The gap falls back through the wall.
+fn end_meshing(side: u32, settling: bool) -> Jump {
+    let sign = sign_of(side);
+    var jump = Jump(false, tally.mode, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
+    if settling && sign * motion.q[1] > 0.0 {
+        return jump;
     }
+    jump.event = true;
+    jump.mode = MODE_FREE;
+    motion.q[0] = walls[side];
+    motion.q[1] = -sign * max(-sign * motion.q[1], Real(0.0));
+    return jump;
+}
+
+// Pressing ceases inside the dip, `tau` after the expansion: the event function is the
+// acceleration itself.
+fn end_dip(side: u32, tau: Real) -> Jump {
+    let row = here.gap_row;
+    let normal = array<Real, 4>(row[0], here.share * row[1], row[2], here.share * row[3]);
+    motion.q[0] += walls[side];
+    return Jump(true, MODE_FREE, normal, here.substeps * pressing_jet(tau).y, 1.0, 0.0, 0.0);
+}
+
+// The dip is over; no event.
+fn emerge(side: u32) -> Jump {
+    let sign = sign_of(side);
+    motion.q[1] = sign * max(sign * motion.q[1], Real(0.0));
+    return Jump(false, MODE_PRESSED + side, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
 }
 
 fn count_event(side: u32) {

@@ -23,8 +23,6 @@ struct Domain {
     share: Real,
     // Steps of this domain per free step.
     substeps: Real,
-    // The homogeneous propagator (4 x 4) of 1, 2, 4, ... 128 steps, less the identity.
-    powers: array<Real, 128>,
 }
 
 // All that is common to the lanes that differ in the contact law alone.
@@ -37,6 +35,8 @@ struct Flow {
     kick: Real,
     // Length of a free step.
     h: Real,
+    // Infinite series of impacts are closed once they last less than this, in free steps.
+    closing: Real,
 }
 
 struct FlowShape {
@@ -150,8 +150,7 @@ struct TallyNow {
     cycle: u32,
     // Period at which counting began.
     counted_from: u32,
-    // Full steps that the tangent vectors have not taken yet, and how many vectors there are.
-    pending: u32,
+    // How many tangent vectors there are.
     tangent_count: u32,
     // Blocks of the exponent, and periods in the present one.
     blocks: u32,

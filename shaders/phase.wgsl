@@ -2,20 +2,26 @@
 
 // Phasor at `theta` of a free step after step `n`: table and angle addition.
 fn sync_phasor() {
-    let at = phasors[shapes[cell.flow_index].phasors + tally.step];
-    let angle = motion.theta * flows[cell.flow_index].domains[0].angle;
-    let turn = small_turn(angle);
-    motion.phasor[0] = at[0] + (turn.x * at[0] - turn.y * at[1]);
-    motion.phasor[1] = at[1] + (turn.y * at[0] + turn.x * at[1]);
+    motion.phasor = phasors[shape.phasors + tally.step];
+    turn_phasor(motion.theta * here.substeps);
 }
 
-// cos - 1 and sin of an angle of at most half a radian.
+// Turns the phasor by a part of a step.
+fn turn_phasor(part: Real) {
+    let turn = small_turn(part * here.angle);
+    let c = motion.phasor[0];
+    let s = motion.phasor[1];
+    motion.phasor[0] = c + (turn.x * c - turn.y * s);
+    motion.phasor[1] = s + (turn.y * c + turn.x * s);
+}
+
+// cos - 1 and sin of an angle of little more than a radian at most.
 fn small_turn(angle: Real) -> vec2<Real> {
     let s = angle * angle;
     let c = s * (-1.0 / 2.0 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40320.0
-        + s * (-1.0 / 3628800.0 + s * (1.0 / 479001600.0 - s * (1.0 / 87178291200.0)))))));
+        + s * (-1.0 / 3628800.0 + s * (1.0 / 479001600.0 + s * (-1.0 / 87178291200.0 + s * (1.0 / 20922789888000.0 - s * (1.0 / 6402373705728000.0)))))))));
     let sine = 1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s * (1.0 / 362880.0
-        + s * (-1.0 / 39916800.0 + s * (1.0 / 6227020800.0))))));
+        + s * (-1.0 / 39916800.0 + s * (1.0 / 6227020800.0 + s * (-1.0 / 1307674368000.0 + s * (1.0 / 355687428096000.0))))))));
     return vec2<Real>(c, angle * sine);
 }
 
@@ -39,7 +45,7 @@ fn to_mark(mark: u32) -> Real {
 // The step at which the lane must land: phase 0, or half a period where a cycle is read that
 // may be its own mirror image and stands halfway.
 fn next_mark() -> u32 {
-    let steps = shapes[cell.flow_index].steps;
+    let steps = shape.steps;
     let halfway = tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
     return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
 }

@@ -1,7 +1,7 @@
 // Single precision.
 alias Real = f32;
-// Terms of a Taylor expansion over one step of at most 0.35 rad: the rest is below rounding.
-const TERMS: u32 = 9u;
+// Terms of a Taylor expansion over one step of at most a radian: the rest is below rounding.
+const TERMS: u32 = 12u;
 // Half a unit in the last place of 1.
 const ULP: Real = 6e-8;
 // Steps are not halved below this: what touches a wall there does so within rounding.

@@ -1,7 +1,7 @@
 // Double precision; needs SHADER_F64.
 alias Real = f64;
-// Terms of a Taylor expansion over one step of at most 0.35 rad: the rest is below rounding.
-const TERMS: u32 = 14u;
+// Terms of a Taylor expansion over one step of at most a radian: the rest is below rounding.
+const TERMS: u32 = 20u;
 // Half a unit in the last place of 1.
 const ULP: Real = 1.2e-16;
 // Steps are not halved below this: what touches a wall there does so within rounding.

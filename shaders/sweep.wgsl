@@ -36,6 +36,23 @@ fn put_down() {
     tallies[lane].now = tally;
 }
 
+// From event to event to the next mark; false if the lane or its share of this dispatch ends
+// before.
+fn flight_to_mark() -> bool {
+    while running() && trips < settings.trips {
+        if scan() == SCAN_BUDGET {
+            break;
+        }
+        if careful() {
+            return true;
+        }
+        if tally.passes_in_period > settings.passes_per_period {
+            tally.status = STATUS_TOO_STIFF;
+        }
+    }
+    return false;
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * settings.row + id.x;
@@ -43,19 +60,27 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     take_up(i);
-    // Scanning and acting are separate, so that lanes scan together and act together.
+    fetch_constants();
+    fetch_tangent();
+    if motion.bound == 0.0 {
+        // A start: no pass has bounded it yet.
+        renew_bound();
+    }
+    // Scanning, acting and looking at strobes are separate, so that lanes scan together, act
+    // together and look together.
     while running() && trips < settings.trips {
-        if scan() == SCAN_BUDGET {
-            break;
-        }
-        careful();
-        if tally.passes_in_period > settings.passes_per_period {
-            tally.status = STATUS_TOO_STIFF;
+        if flight_to_mark() {
+            if tally.step >= shape.steps {
+                begin_period();
+            } else {
+                compare_mirror();
+            }
         }
     }
     if tally.stage == STAGE_READ {
         judge_cycle();
     }
+    keep_tangent();
     put_down();
     if running() {
         atomicAdd(&live, 1u);

@@ -1,61 +1,111 @@
-// Tangent vectors: the propagator once per flight, saltation at events. Only in variants
-// that are asked for an exponent.
+// Tangent vectors: the propagator along a flight, saltation at events. Only in variants that
+// are asked for an exponent.
+
+// The one vector that is carried for the exponent. The four columns of the monodromy matrix,
+// carried while a cycle is read, stay in the buffer.
+var<private> tangent_now: array<Real, 4>;
 
 fn tangent(i: u32) -> array<Real, 4> {
+    if tally.tangent_count == 1u {
+        return tangent_now;
+    }
     let k = 4u * i;
     return array<Real, 4>(motions[lane].tangents[k], motions[lane].tangents[k + 1u], motions[lane].tangents[k + 2u], motions[lane].tangents[k + 3u]);
 }
 
 fn set_tangent(i: u32, u: array<Real, 4>) {
-    for (var j = 0u; j < 4u; j++) {
-        motions[lane].tangents[4u * i + j] = u[j];
-    }
-}
-
-// Carries every vector over the pending full steps of domain `d` and a part of another.
-fn carry_tangents(d: u32, tau: Real) {
-    if !EXPONENT {
+    if tally.tangent_count == 1u {
+        tangent_now = u;
         return;
     }
-    let share = flows[cell.flow_index].domains[d].share;
-    let substeps = flows[cell.flow_index].domains[d].substeps;
-    for (var i = 0u; i < tally.tangent_count; i++) {
-        var u = tangent(i);
-        u[1] *= share;
-        u[3] *= share;
-        var pending = tally.pending;
-        for (var j = 8u; j > 0u; j--) {
-            while pending >= (1u << (j - 1u)) {
-                u = leap(d, j - 1u, u);
-                pending -= 1u << (j - 1u);
-                trips += 1u;
-            }
-        }
-        u = glide(d, u, tau);
-        u[1] *= substeps;
-        u[3] *= substeps;
-        set_tangent(i, u);
-    }
-    tally.pending = 0u;
+    store_tangent(i, u);
 }
 
-// `2^j` steps of domain `d`.
-fn leap(d: u32, j: u32, u: array<Real, 4>) -> array<Real, 4> {
-    var next = u;
-    for (var i = 0u; i < 4u; i++) {
-        let k = 16u * j + 4u * i;
-        next[i] += (flows[cell.flow_index].domains[d].powers[k] * u[0]
-            + flows[cell.flow_index].domains[d].powers[k + 1u] * u[1])
-            + (flows[cell.flow_index].domains[d].powers[k + 2u] * u[2]
-            + flows[cell.flow_index].domains[d].powers[k + 3u] * u[3]);
+fn store_tangent(i: u32, u: array<Real, 4>) {
+    let k = 4u * i;
+    motions[lane].tangents[k] = u[0];
+    motions[lane].tangents[k + 1u] = u[1];
+    motions[lane].tangents[k + 2u] = u[2];
+    motions[lane].tangents[k + 3u] = u[3];
+}
+
+// At the start and the end of a dispatch.
+fn fetch_tangent() {
+    if EXPONENT {
+        let t = motions[lane].tangents;
+        tangent_now = array<Real, 4>(t[0], t[1], t[2], t[3]);
     }
-    return next;
+}
+
+fn keep_tangent() {
+    if EXPONENT && tally.tangent_count == 1u {
+        store_tangent(0u, tangent_now);
+    }
+}
+
+// Carries the monodromy's columns over full steps; each costs a trip per vector.
+fn step_columns(count: u32) {
+    if tally.tangent_count == 1u {
+        return;
+    }
+    let m = here.step;
+    for (var i = 0u; i < tally.tangent_count; i++) {
+        var u = tangent(i);
+        u[1] *= here.share;
+        u[3] *= here.share;
+        for (var j = 0u; j < count; j++) {
+            u = array<Real, 4>(
+                u[0] + ((m[0] * u[0] + m[1] * u[1]) + (m[2] * u[2] + m[3] * u[3])),
+                u[1] + ((m[7] * u[0] + m[8] * u[1]) + (m[9] * u[2] + m[10] * u[3])),
+                u[2] + ((m[14] * u[0] + m[15] * u[1]) + (m[16] * u[2] + m[17] * u[3])),
+                u[3] + ((m[21] * u[0] + m[22] * u[1]) + (m[23] * u[2] + m[24] * u[3])),
+            );
+        }
+        u[1] *= here.substeps;
+        u[3] *= here.substeps;
+        set_tangent(i, u);
+    }
+}
+
+// What the tangent vectors pass through at the end of a careful step.
+struct Crossing {
+    // The event, and the vector fields around it.
+    jump: Jump,
+    before: array<Real, 4>,
+    after: array<Real, 4>,
+    // The closed series after it: the pressing acceleration and the leaving speed, signed
+    // into the wall; 0 if there is none.
+    pressing: Real,
+    leaving: Real,
+}
+
+var<private> crossing: Crossing;
+
+// Carries every vector over a part of a step and what follows it.
+fn carry_tangents(flown: Pull, tau: Real) {
+    let back = 1.0 / flown.share;
+    for (var i = 0u; i < tally.tangent_count; i++) {
+        trips += 1u;
+        var u = tangent(i);
+        u[1] *= flown.share;
+        u[3] *= flown.share;
+        u = glide(flown, u, tau);
+        u[1] *= back;
+        u[3] *= back;
+        if crossing.jump.event {
+            u = saltate(u);
+        }
+        if crossing.leaving != 0.0 {
+            u = close(u);
+        }
+        set_tangent(i, u);
+    }
 }
 
 // A part `tau` of a step: the series of the unforced motion.
-fn glide(d: u32, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
-    let g = flows[cell.flow_index].domains[d].gap_row;
-    let r = flows[cell.flow_index].domains[d].x_row;
+fn glide(flown: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
+    let g = flown.gap_row;
+    let r = flown.x_row;
     var z = u[0];
     var w = u[1];
     var x = u[2];
@@ -80,37 +130,38 @@ fn glide(d: u32, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
     return sum;
 }
 
-// The vector field of domain `d` at `q`, per free step.
-fn field(d: u32, q: array<Real, 4>) -> array<Real, 4> {
-    let row = flows[cell.flow_index].domains[d].x_row;
-    let share = flows[cell.flow_index].domains[d].share;
-    let substeps = flows[cell.flow_index].domains[d].substeps;
-    let square = substeps * substeps;
-    let b = (row[0] * q[0] + row[2] * q[2]) + share * (row[1] * q[1] + row[3] * q[3])
-        + (row[4] * motion.phasor[0] + row[5]);
-    return array<Real, 4>(q[1], square * gap_acceleration(d, q), q[3], square * b);
+// The present vector field, per free step.
+fn field() -> array<Real, 4> {
+    let square = here.substeps * here.substeps;
+    let a = acceleration(here.gap_row, here.share, motion.q);
+    let b = acceleration(here.x_row, here.share, motion.q);
+    return array<Real, 4>(motion.q[1], square * a, motion.q[3], square * b);
 }
 
 // `S u = R u + (f+ - R f-) (n . u) / (n . f-)`, with R the jump of rates by `kept` (-e at a
 // contact, 1 elsewhere) and `kick`.
-fn saltate(before: array<Real, 4>, after: array<Real, 4>, normal: array<Real, 4>, rate: Real, kept: Real, kick: Real) {
-    let jump = array<Real, 4>(
-        after[0] - before[0],
-        after[1] - kept * before[1],
-        after[2] - before[2],
-        after[3] - before[3] - kick * before[1],
+fn saltate(u: array<Real, 4>) -> array<Real, 4> {
+    let jump = crossing.jump;
+    let before = crossing.before;
+    let after = crossing.after;
+    let inverse = select(1.0 / jump.rate, Real(0.0), abs(jump.rate) < NO_RATE);
+    let along = inverse * ((jump.normal[0] * u[0] + jump.normal[1] * u[1]) + (jump.normal[2] * u[2] + jump.normal[3] * u[3]));
+    return array<Real, 4>(
+        u[0] + (after[0] - before[0]) * along,
+        jump.kept * u[1] + (after[1] - jump.kept * before[1]) * along,
+        u[2] + (after[2] - before[2]) * along,
+        u[3] + jump.kick * u[1] + (after[3] - before[3] - jump.kick * before[1]) * along,
     );
-    let inverse = select(1.0 / rate, Real(0.0), abs(rate) < NO_RATE);
-    for (var i = 0u; i < tally.tangent_count; i++) {
-        let u = tangent(i);
-        let along = inverse * ((normal[0] * u[0] + normal[1] * u[1]) + (normal[2] * u[2] + normal[3] * u[3]));
-        set_tangent(i, array<Real, 4>(
-            u[0] + jump[0] * along,
-            kept * u[1] + jump[1] * along,
-            u[2] + jump[2] * along,
-            u[3] + kick * u[1] + jump[3] * along,
-        ));
-    }
+}
+
+// Through an infinite series of impacts: a neighbour leaves at another time and speed, so its
+// series ends `late`; until then it misses the pressing acceleration. Momentum is the same
+// either way.
+fn close(u: array<Real, 4>) -> array<Real, 4> {
+    let e = law.restitution;
+    let late = -(2.0 * u[1] / crossing.pressing + (1.0 + e) * u[0] / crossing.leaving) / (1.0 - e);
+    let behind = -crossing.pressing * late;
+    return array<Real, 4>(0.0, behind, u[2] + kick * u[0], u[3] + kick * (u[1] - behind));
 }
 
 // Rates below this at an event leave the linearisation without meaning.

@@ -6,12 +6,13 @@
 var<private> gap_terms: array<Real, TERMS>;
 var<private> x_terms: array<Real, TERMS>;
 
-// Expands the motion in domain `d` about `q` (lane units) and the present phase.
-fn expand(d: u32, q: array<Real, 4>) {
-    let g = flows[cell.flow_index].domains[d].gap_row;
-    let r = flows[cell.flow_index].domains[d].x_row;
-    let share = flows[cell.flow_index].domains[d].share;
-    let angle = flows[cell.flow_index].domains[d].angle;
+// Expands the motion about the present state and phase.
+fn expand() {
+    let q = motion.q;
+    let g = here.gap_row;
+    let r = here.x_row;
+    let share = here.share;
+    let angle = here.angle;
     var c = motion.phasor[0];
     var s = motion.phasor[1];
     gap_terms[0] = q[0];
@@ -41,10 +42,41 @@ fn expand(d: u32, q: array<Real, 4>) {
 
 // Bound on the derivative of order n + 1 of the gap, from the derivatives of order n and
 // n + 1 of gap and x: the energy of the differentiated motion.
-fn derivative_bound(d: u32, z: Real, w: Real, x: Real, v: Real) -> Real {
-    let e = flows[cell.flow_index].domains[d].energy;
+fn derivative_bound(z: Real, w: Real, x: Real, v: Real) -> Real {
+    let e = here.energy;
     let square = (e[0] * w * w + e[1] * w * v + e[2] * v * v) + (e[3] * z * z + e[4] * z * x + e[5] * x * x);
     return 1.0001 * sqrt(max(square, Real(0.0)));
+}
+
+// Bound on the sixth derivative of the gap at the present state, from five derivatives.
+fn renew_bound() {
+    let g = here.gap_row;
+    let r = here.x_row;
+    // Derivatives of order k and k + 1; of the forcing, of order k.
+    var z = motion.q[0];
+    var w = here.share * motion.q[1];
+    var x = motion.q[2];
+    var v = here.share * motion.q[3];
+    var c = motion.phasor[0];
+    var s = motion.phasor[1];
+    var load_gap = g[5];
+    var load_x = r[5];
+    //% for k in 0..5
+    {
+        let a = ((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + load_gap);
+        let b = ((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + load_x);
+        z = w;
+        w = a;
+        x = v;
+        v = b;
+        load_gap = 0.0;
+        load_x = 0.0;
+        let turned = -here.angle * s;
+        s = here.angle * c;
+        c = turned;
+    }
+    //% end
+    motion.bound = derivative_bound(z, w, x, v);
 }
 
 // Displacement of the gap from the expansion point, slope and curvature at `tau`.

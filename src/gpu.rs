@@ -185,6 +185,7 @@ pub struct Gpu {
     precision: Precision,
     pipelines: HashMap<Variant, device::Pipelines>,
     trouble: device::Trouble,
+    rewrite: fn(String) -> String,
 }
 
 impl Gpu {
@@ -207,6 +208,14 @@ impl Gpu {
     /// The precision in use.
     pub fn precision(&self) -> Precision {
         self.precision
+    }
+
+    /// Compiles shaders from here on as `rewrite` turns them: measurements count work and
+    /// compare forms of a loop in this way.
+    #[doc(hidden)]
+    pub fn rewrite_shaders(&mut self, rewrite: fn(String) -> String) {
+        self.rewrite = rewrite;
+        self.pipelines.clear();
     }
 
     /// Integrates every lane and returns its record, in the same order.
@@ -258,8 +267,9 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
-        let variant =
-            Variant { precision: self.precision, workgroup: settings.workgroup, exponent: settings.exponent };
+        let LaneSettings { workgroup, exponent, .. } = *settings;
+        let keep = !is_hardware(&self.info);
+        let variant = Variant { precision: self.precision, workgroup, exponent, keep };
         if !self.pipelines.contains_key(&variant) {
             let pipelines = device::pipelines(self, variant).await?;
             self.pipelines.insert(variant, pipelines);

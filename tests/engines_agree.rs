@@ -5,9 +5,9 @@
 use rattlemap::flow::Flow;
 use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::model::{GearPair, State};
-use rattlemap::orbit::Status;
+use rattlemap::orbit::{Class, Settings, Status, analyse};
 use rattlemap::record::Record;
-use rattlemap::reference::Trajectory;
+use rattlemap::reference::{EventKind, Happening, Observer, Trajectory};
 use rayon::prelude::*;
 
 const REST: State = [0.0; 4];
@@ -166,6 +166,66 @@ fn scenarios_agree() {
     check(&[(pair(1.0, 3.0), REST)], 2, bar);
 }
 
+/// Impacts of the reference.
+struct Impacts(u32);
+
+impl Observer for Impacts {
+    fn event(&mut self, happening: &Happening) {
+        self.0 += u32::from(happening.kind == EventKind::Impact);
+    }
+}
+
+/// Without a meshing speed infinite series of impacts are closed by their limit: the same
+/// states, and as many impacts before.
+#[test]
+fn closed_chatter_agrees() {
+    const HORIZON: u32 = 4;
+    let endless = |e: f64, omega: f64| GearPair { mesh_speed: 0.0, ..pair(e, omega) };
+    let rows = [0.05, 0.2, 0.4, 0.6, 0.75].map(|e| [0.3, 1.0, 1.7, 2.5, 5.6].map(|omega| endless(e, omega)));
+    let cells: Vec<_> = rows.into_iter().flatten().map(|pair| (pair, REST)).collect();
+    check(&cells, HORIZON, bar);
+    let truth: Vec<u32> = cells
+        .iter()
+        .map(|(pair, start)| {
+            let flow = Flow::new(&pair.oscillator().unwrap());
+            let mut trajectory = Trajectory::new(&flow, pair.law(), *start);
+            let mut impacts = Impacts(0);
+            (0..HORIZON).for_each(|_| trajectory.advance_period(&mut impacts).unwrap());
+            impacts.0
+        })
+        .collect();
+    let meshing = run(&mut open(Precision::F64), &cells, &periods(HORIZON));
+    assert!(meshing.iter().filter(|record| record.mesh_fraction > 0.0).count() > 10, "too little chatter");
+    for precision in Precision::ALL {
+        let records = run(&mut open(precision), &cells, &periods(HORIZON));
+        for ((record, &impacts), (pair, _)) in records.iter().zip(&truth).zip(&cells) {
+            let counted = record.impacts_per_period * f64::from(HORIZON);
+            let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
+            assert!((counted - f64::from(impacts)).abs() < 0.5, "{at}: {counted} impacts, {impacts}");
+        }
+    }
+}
+
+/// The exponent of cycles that mesh after infinite series: the tangent goes through the limit.
+#[test]
+fn exponents_through_closed_chatter_agree() {
+    let cells: Vec<_> = [(0.3, 1.3), (0.2, 2.0), (0.1, 5.6), (0.5, 1.0)]
+        .map(|(e, omega)| (GearPair { mesh_speed: 0.0, ..pair(e, omega) }, REST))
+        .into();
+    for precision in Precision::ALL {
+        let records = run(&mut open(precision), &cells, &LaneSettings::default());
+        for (record, (pair, start)) in records.iter().zip(&cells) {
+            let truth = analyse(pair, *start, &Settings::default());
+            let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
+            println!("{at}: {} {} {:?}", record.lyapunov, truth.lyapunov, truth.class);
+            assert_eq!(Class::Periodic { period: record.period }, truth.class, "{at}");
+            assert!((record.impacts_per_period - truth.impacts_per_period).abs() < 1e-9, "{at}");
+            assert_eq!(record.word().as_ref(), Some(&truth.word), "{at}");
+            assert!((record.lyapunov - truth.lyapunov).abs() < 5e-3, "{at}");
+        }
+    }
+}
+
 /// `z = A cos(omega t)` with the amplitude a hair below or above the wall: free flight that
 /// misses it by less than any grid shows, and one that touches it.
 #[test]
@@ -242,7 +302,7 @@ fn hostile_lanes_end_in_a_status() {
     let hostile = [
         (GearPair { k: 1e13, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
         (GearPair { omega: 1e-6, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
-        (GearPair { mesh_speed: 0.0, ..pair(0.98, 0.1) }, REST, Status::CapEvents),
+        (GearPair { mesh_speed: 0.0, ..pair(0.9999, 0.1) }, REST, Status::CapEvents),
         (GearPair { force: 1e300, ..pair(0.5, 5.6) }, REST, Status::NonFinite),
         (pair(0.5, 5.6), [f64::NAN, 0.0, 0.0, 0.0], Status::NonFinite),
     ];

@@ -160,7 +160,8 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .await
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
     let trouble = Trouble::watch(&device);
-    Ok(Gpu { device, queue, info, precision, pipelines: HashMap::new(), trouble })
+    let pipelines = HashMap::new();
+    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: |source| source })
 }
 
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
@@ -204,7 +205,7 @@ pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipe
     let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("lane"),
-        source: wgpu::ShaderSource::Wgsl(variant.source().into()),
+        source: wgpu::ShaderSource::Wgsl((gpu.rewrite)(variant.source()).into()),
     });
     let pipelines = Pipelines {
         begin: pipeline(gpu, &module, BEGIN),

@@ -29,8 +29,6 @@ pub struct Domain {
     pub share: f64,
     /// Steps of this domain per free step.
     pub substeps: f64,
-    /// Homogeneous propagators of 1, 2, 4, ... 128 steps, less the identity.
-    pub powers: [f64; 128],
 }
 
 /// All that is common to lanes that differ in the contact law alone.
@@ -45,6 +43,8 @@ pub struct Flow {
     pub kick: f64,
     /// Length of a free step.
     pub h: f64,
+    /// Longest series of impacts that is closed in one jump, in free steps.
+    pub closing: f64,
 }
 
 /// Whole numbers that belong to a [`Flow`].
@@ -184,8 +184,6 @@ pub struct Tally {
     pub cycle: u32,
     /// Period at which counting began.
     pub counted_from: u32,
-    /// Full steps that the tangent vectors have not taken yet.
-    pub pending: u32,
     /// Tangent vectors carried.
     pub tangent_count: u32,
     /// Whole blocks of the exponent.

@@ -42,6 +42,8 @@ pub struct Variant {
     pub workgroup: u32,
     /// Whether tangent vectors are carried.
     pub exponent: bool,
+    /// Whether lanes keep copies of all their constants: for software drivers.
+    pub keep: bool,
 }
 
 /// Invocations per workgroup where nothing else is asked for.
@@ -50,11 +52,13 @@ pub const WORKGROUP: u32 = 64;
 /// All but the precision.
 const BODY: &str = concat!(
     include_str!("../../shaders/layout.wgsl"),
+    include_str!("../../shaders/domain.wgsl"),
     include_str!("../../shaders/phase.wgsl"),
     include_str!("../../shaders/gear_pair.wgsl"),
     include_str!("../../shaders/taylor.wgsl"),
     include_str!("../../shaders/flight.wgsl"),
     include_str!("../../shaders/events.wgsl"),
+    include_str!("../../shaders/chatter.wgsl"),
     include_str!("../../shaders/tangent.wgsl"),
     include_str!("../../shaders/observe.wgsl"),
     include_str!("../../shaders/cycle.wgsl"),
@@ -66,7 +70,7 @@ const BODY: &str = concat!(
 impl Variant {
     /// The variant of a precision with the usual workgroup.
     pub fn of(precision: Precision) -> Variant {
-        Variant { precision, workgroup: WORKGROUP, exponent: true }
+        Variant { precision, workgroup: WORKGROUP, exponent: true, keep: false }
     }
 
     /// Its WGSL source.
@@ -75,14 +79,14 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let Variant { workgroup, exponent, .. } = self;
+        let Variant { workgroup, exponent, keep, .. } = self;
         let terms = terms(real);
         let body = unroll(BODY, terms);
         let bits: String =
             VALID.iter().map(|(name, bits)| format!("const VALID_{name}: u32 = {bits}u;\n")).collect();
         format!(
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
-             const WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
+             const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
         )
     }
 }
