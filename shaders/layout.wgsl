@@ -37,6 +37,12 @@ struct Flow {
     h: Real,
     // Infinite series of impacts are closed once they last less than this, in free steps.
     closing: Real,
+    // Contact-free motion: its steady state at phase 0 in lane units, the size of transients
+    // (by the free domain's energy form) below which no event will come, negative where there
+    // is none, and its growth per period in octaves.
+    steady: array<Real, 4>,
+    reach: Real,
+    decay: Real,
 }
 
 struct FlowShape {
@@ -63,8 +69,11 @@ struct Cell {
 struct Settings {
     // Lanes in the buffers.
     lanes: u32,
-    // Forcing periods to integrate.
+    // Forcing periods to integrate, and the most that undecided lanes get.
     periods: u32,
+    longest: u32,
+    // The first period at which chaos may be called early.
+    chaos_from: u32,
     // Loop trips that one dispatch may spend on a lane.
     trips: u32,
     // Passes (scan steps and careful steps) allowed in one period.
@@ -80,7 +89,7 @@ struct Settings {
     exponent_block: u32,
     // Longest period looked for; 0 looks for none.
     max_period: u32,
-    // 1: lanes end once their period is decided.
+    // 1: lanes end once they are decided.
     early_stop: u32,
 }
 

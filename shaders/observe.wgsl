@@ -35,12 +35,46 @@ fn begin_period() {
     let decided = settings.max_period > 0u && recurs();
     // Reading the cycle belongs to the budget.
     let read_by = tally.period + tally.candidate;
-    let is_due = tally.streak >= STREAK && read_by == settings.periods;
-    if read_by <= settings.periods && (is_due || (decided && settings.early_stop == 1u)) {
+    let is_due = tally.streak >= STREAK && (read_by == settings.periods || read_by == settings.longest);
+    let early = settings.early_stop == 1u;
+    if read_by <= settings.longest && (is_due || (decided && early)) {
         begin_reading();
-    } else if tally.period >= settings.periods {
+    } else if early && is_quiet() {
+        end_quiet();
+    } else if tally.period >= settings.longest || (early && is_chaos()) {
         tally.stage = STAGE_DONE;
     }
+}
+
+// Standard errors by which the exponent must exceed zero: at half the budget, and after it.
+const EARLY_CHAOS_ERRORS: Real = 6.0;
+const CHAOS_ERRORS: Real = 3.0;
+
+// Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
+fn is_chaos() -> bool {
+    if !EXPONENT || tally.block_periods > 0u || tally.blocks < 2u || tally.streak > 0u || tally.period < settings.chaos_from {
+        return false;
+    }
+    let growth = mean_growth();
+    return growth.x > growth.y * select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
+}
+
+// The energy of the transient keeps the gap off the walls for good.
+fn is_quiet() -> bool {
+    if tally.mode != MODE_FREE || settings.max_period == 0u {
+        return false;
+    }
+    let s = flows[cell.flow_index].steady;
+    let q = motion.q;
+    return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].reach;
+}
+
+// Contact-free motion of period 1, with nothing left to read.
+fn end_quiet() {
+    begin_counting();
+    tally.cycle = 1u;
+    motion.cycle_growth = flows[cell.flow_index].decay;
+    tally.stage = STAGE_DONE;
 }
 
 // Averages start here.

@@ -59,10 +59,12 @@ fn mesh_fraction(periods: u32) -> Real {
 }
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
-    // On a slow approach a lost symmetry cannot be told from one not reached yet.
-    if shapes[cell.flow_index].mirror == 1u && is_on_cycle() {
+    // Contact-free motion has not been read. On a slow approach a lost symmetry cannot be told
+    // from one not reached yet.
+    let is_quiet = tally.has_read == 0u;
+    if shapes[cell.flow_index].mirror == 1u && (is_quiet || is_on_cycle()) {
         (*finding).valid |= VALID_SYMMETRIC;
-        (*finding).symmetric = tally.symmetric;
+        (*finding).symmetric = select(tally.symmetric, 1u, is_quiet);
     }
     if EXPONENT {
         (*finding).valid |= VALID_LYAPUNOV;
@@ -84,15 +86,4 @@ fn close_hash() {
         take_symbol((tallies[lane].word[0] >> (3u * n)) & 7u);
         add_stretch();
     }
-}
-
-const LN_2: Real = 0.6931471805599453;
-
-// Mean growth per period of the tangent vector, natural logarithms, and its standard error
-// from the means of blocks.
-fn mean_growth() -> vec2<Real> {
-    let blocks = Real(tally.blocks);
-    let mean = motion.growth_sum / blocks;
-    let variance = max(motion.growth_squares / blocks - mean * mean, Real(0.0)) / (blocks - 1.0);
-    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(mean, sqrt(variance));
 }

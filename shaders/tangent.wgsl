@@ -200,3 +200,14 @@ fn accumulate_growth() {
         tally.blocks += 1u;
     }
 }
+
+const LN_2: Real = 0.6931471805599453;
+
+// Mean growth per period of the tangent vector, natural logarithms, and its standard error
+// from the means of blocks.
+fn mean_growth() -> vec2<Real> {
+    let blocks = Real(tally.blocks);
+    let mean = motion.growth_sum / blocks;
+    let variance = max(motion.growth_squares / blocks - mean * mean, Real(0.0)) / (blocks - 1.0);
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(mean, sqrt(variance));
+}

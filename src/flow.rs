@@ -41,15 +41,13 @@ mod columns;
 mod energy;
 mod generator;
 mod linear;
-mod quiet;
 
 use nalgebra::Matrix2;
 
 pub(crate) use columns::add;
 pub use linear::LinearFlow;
-pub use quiet::Quiet;
 
-use crate::model::{Oscillator, Side, State};
+use crate::model::{Oscillator, Quiet, Side, State};
 
 /// Gap coordinates `(z, w, x2, v2)`.
 pub type Gap = [f64; 4];

@@ -133,12 +133,16 @@ pub struct LaneSettings {
     /// Forcing periods to integrate at most; the last of them read the cycle of a periodic
     /// cell.
     pub periods: u32,
-    /// Periods before averages are taken. Those of periodic cells are taken over one cycle.
+    /// Periods before averages are taken, or `exponent_from` if that is less and lanes stop
+    /// early. Those of periodic cells are taken over one cycle.
     pub transient_periods: u32,
     /// Longest period looked for, at most 64; 0 looks for none.
     pub max_period: u32,
-    /// Whether lanes end once their period is decided.
+    /// Whether lanes end once they are decided: a cycle confirmed and read, contact-free for
+    /// good, or chaotic by six standard errors after half the budget.
     pub early_stop: bool,
+    /// Periods beyond the budget for lanes that are undecided by then; with early stops alone.
+    pub undecided_periods: u32,
     /// Whether exponents are asked for.
     pub exponent: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
@@ -165,6 +169,7 @@ impl Default for LaneSettings {
             transient_periods: 400,
             max_period: 64,
             early_stop: true,
+            undecided_periods: 0,
             exponent: true,
             exponent_from: 100,
             steps_per_period: None,

@@ -8,11 +8,13 @@
 mod gear_pair;
 mod oscillator;
 mod parameter;
+mod quiet;
 mod stops;
 
 pub use gear_pair::GearPair;
 pub use oscillator::{Domain, Law, Oscillator};
 pub use parameter::{Parameter, ParameterError, Range};
+pub use quiet::Quiet;
 pub use stops::Stops;
 
 /// State of an oscillator of two degrees of freedom: `(x1, v1, x2, v2)`, dimensionless.

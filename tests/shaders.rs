@@ -68,7 +68,13 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 8,
                 [step, gap_row, x_row, energy, growth, angle, turn_less, turn_sin, share, substeps]
             );
-            same_layout!(module, layout::Flow, real, 8, [domains, walls, kick, h, closing]);
+            same_layout!(
+                module,
+                layout::Flow,
+                real,
+                8,
+                [domains, walls, kick, h, closing, steady, reach, decay]
+            );
             same_layout!(module, layout::Law, real, 8, [restitution, mesh_speed]);
             same_layout!(
                 module,
@@ -121,6 +127,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 [
                     lanes,
                     periods,
+                    longest,
+                    chaos_from,
                     trips,
                     passes_per_period,
                     events_per_period,

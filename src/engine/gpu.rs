@@ -140,6 +140,7 @@ fn lane_settings(plan: &Plan) -> LaneSettings {
         transient_periods: budget.settings.transient_periods,
         max_period: budget.settings.max_period,
         early_stop: budget.early_stop,
+        undecided_periods: budget.undecided_periods,
         exponent: budget.exponent,
         exponent_from: default.exponent_from.min(budget.settings.transient_periods),
         steps_per_period: match plan.steps_per_period() {

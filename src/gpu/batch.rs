@@ -210,18 +210,29 @@ impl Batch {
 }
 
 fn uniform(lanes: usize, groups: [u32; 2], settings: &LaneSettings) -> Settings {
+    let LaneSettings { periods, early_stop, .. } = *settings;
+    let more = if early_stop { settings.undecided_periods } else { 0 };
+    // Lanes that stop early may do so before a long transient is over.
+    let transient_periods = if early_stop {
+        settings.transient_periods.min(settings.exponent_from)
+    } else {
+        settings.transient_periods
+    };
+    let observed_periods = periods.saturating_sub(settings.transient_periods);
     Settings {
         lanes: lanes as u32,
-        periods: settings.periods,
+        periods,
+        longest: periods.saturating_add(more),
+        chaos_from: (periods / 2).max(observed_periods),
         trips: settings.trips,
         passes_per_period: settings.passes_per_period,
         events_per_period: settings.events_per_period,
         row: groups[0] * settings.workgroup,
-        transient_periods: settings.transient_periods,
+        transient_periods,
         exponent_from: settings.exponent_from,
         exponent_block: exponent_block(settings),
         max_period: settings.max_period.min(LONGEST_PERIOD),
-        early_stop: u32::from(settings.early_stop),
+        early_stop: u32::from(early_stop),
     }
 }
 

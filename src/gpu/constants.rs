@@ -1,5 +1,6 @@
 //! Constants of a lane, derived in f64 from the model's description.
 
+use bytemuck::Zeroable;
 use nalgebra::{SMatrix, Vector2};
 
 use super::layout::{Domain, Flow};
@@ -59,7 +60,15 @@ impl Constants {
         };
         let [right, left] = oscillator.meshing;
         let domain = |d: &model::Domain, wall: f64, substeps: f64| domain(oscillator, d, wall, h, substeps);
-        let flow = Flow {
+        let steps = steps as u32;
+        let mut constants = Constants {
+            flow: Zeroable::zeroed(),
+            steps,
+            phasors: phasors(steps),
+            mirror_symmetric: oscillator.mirror_symmetric(),
+            gap: oscillator.gap,
+        };
+        constants.flow = Flow {
             domains: [
                 domain(&oscillator.free, 0.0, 1.0),
                 domain(&right, oscillator.walls[0], substeps(&right)),
@@ -69,15 +78,18 @@ impl Constants {
             kick: kick(oscillator),
             h,
             closing: closing(oscillator) / h,
+            steady: [0.0; 4],
+            reach: -1.0,
+            decay: 0.0,
         };
-        let steps = steps as u32;
-        Some(Constants {
-            flow,
-            steps,
-            phasors: phasors(steps),
-            mirror_symmetric: oscillator.mirror_symmetric(),
-            gap: oscillator.gap,
-        })
+        if let Some(quiet) = model::Quiet::new(oscillator) {
+            let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses);
+            constants.flow.steady = constants.to_lane(quiet.steady());
+            // In units of the free domain's energy form.
+            constants.flow.reach = h * ((g0 * g0 / m1 + g1 * g1 / m2) * quiet.reach()).sqrt();
+            constants.flow.decay = quiet.exponent() * period / std::f64::consts::LN_2;
+        }
+        Some(constants)
     }
 
     /// Lane units `(z, z', x2, x2')` of a state `(x1, v1, x2, v2)`.

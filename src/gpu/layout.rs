@@ -45,6 +45,12 @@ pub struct Flow {
     pub h: f64,
     /// Longest series of impacts that is closed in one jump, in free steps.
     pub closing: f64,
+    /// Steady state of contact-free motion at phase 0, in lane units.
+    pub steady: [f64; 4],
+    /// Size of its transients below which no event will come; negative where there is none.
+    pub reach: f64,
+    /// Its growth per period, in octaves.
+    pub decay: f64,
 }
 
 /// Whole numbers that belong to a [`Flow`].
@@ -89,6 +95,10 @@ pub struct Settings {
     pub lanes: u32,
     /// Forcing periods to integrate.
     pub periods: u32,
+    /// The most that undecided lanes get.
+    pub longest: u32,
+    /// The first period at which chaos may be called early.
+    pub chaos_from: u32,
     /// Loop trips that one dispatch may spend on a lane.
     pub trips: u32,
     /// Passes allowed in one period.
@@ -105,7 +115,7 @@ pub struct Settings {
     pub exponent_block: u32,
     /// Longest period looked for; 0 looks for none.
     pub max_period: u32,
-    /// 1: lanes end once their period is decided.
+    /// 1: lanes end once they are decided.
     pub early_stop: u32,
 }
 

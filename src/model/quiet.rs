@@ -13,7 +13,7 @@
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 
-use crate::model::{Oscillator, State};
+use super::{Oscillator, State};
 
 /// Room for rounding, relative to the walls' distance.
 const ROUNDING: f64 = 1e-9;
@@ -69,6 +69,11 @@ impl Quiet {
     /// The steady state at phase 0.
     pub fn steady(&self) -> State {
         self.steady
+    }
+
+    /// Energy `2 E` of a transient, as [`Quiet`] measures it, up to which no event will come.
+    pub fn reach(&self) -> f64 {
+        self.reach * self.reach
     }
 
     /// Its Lyapunov exponent per unit time: the slowest decay of free motion.
