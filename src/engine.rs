@@ -10,6 +10,7 @@ mod fake;
 use thiserror::Error;
 
 pub use cpu::Cpu;
+pub(crate) use cpu::record as measured_record;
 pub use fake::Fake;
 
 use crate::plan::Batch;

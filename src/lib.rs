@@ -7,7 +7,8 @@
 //! what the reference meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a
 //! bifurcation diagram
 //! ([`bifurcation`]). A map's cells go through an engine ([`engine`], [`sweep`]) and come back
-//! as records ([`record`], [`classify`]). All of it is then written down ([`output`]).
+//! as records ([`record`], [`classify`]); a sample of them is replayed
+//! ([`mod@validate`]). All of it is then written down ([`output`]).
 
 pub mod bifurcation;
 pub mod certificate;
@@ -24,6 +25,7 @@ pub mod reference;
 pub mod scene;
 pub mod stability;
 pub mod sweep;
+pub mod validate;
 pub mod word;
 
 /// Compiles and runs the README's example as a doctest.
