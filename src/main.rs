@@ -5,6 +5,7 @@ mod cli;
 mod error;
 mod map_command;
 mod progress;
+mod validate_command;
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -23,6 +24,7 @@ fn main() -> ExitCode {
         Command::Map(ask) => map_command::run(&ask),
         Command::Orbit(ask) => run_orbit(&ask),
         Command::Bifurcation(ask) => run_bifurcation(&ask),
+        Command::Validate(ask) => validate_command::run(&ask),
     };
     done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
 }

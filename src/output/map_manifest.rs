@@ -14,6 +14,17 @@ use crate::orbit::Status;
 use crate::plan::count_classes;
 use crate::scene::{Scene, Steps};
 
+/// Who computed a map.
+#[derive(Clone, Copy, Debug)]
+pub struct Made<'a> {
+    /// The engine's name.
+    pub engine: &'a str,
+    /// Its precision.
+    pub precision: &'a str,
+    /// What it ran on.
+    pub device: &'a str,
+}
+
 /// Who computed a map and in what time.
 #[derive(Clone, Debug)]
 pub struct Run<'a> {

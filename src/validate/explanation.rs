@@ -68,6 +68,19 @@ impl Explanation {
         Explanation::Unsettled,
         Explanation::EngineCap,
     ];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Explanation::EngineCap => "engine_cap",
+            Explanation::UndecidedInBudget => "undecided_in_budget",
+            Explanation::CoexistingAttractor => "coexisting_attractor",
+            Explanation::Chaos => "chaos",
+            Explanation::Border => "border",
+            Explanation::Unsettled => "unsettled",
+            Explanation::NearGrazing => "near_grazing",
+        }
+    }
 }
 
 /// The explanation of a cell's differences: of its states and of its answer, if both differ.
