@@ -7,6 +7,7 @@ use rattlemap::gpu::Precision;
 use rattlemap::model::State;
 use rattlemap::orbit::Settings;
 use rattlemap::scene::REST;
+use rattlemap::validate::DEFAULT_SAMPLES;
 
 /// Restitution where `orbit` is not told any: the paper's last periodic motion before chaos.
 pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
@@ -14,7 +15,7 @@ pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
 /// Motion of a gear pair with backlash: flights between the tooth surfaces in closed form, every
 /// contact located, cycles named by their word, and the Lyapunov exponent of each.
 ///
-/// All quantities are dimensionless. Exit code 0: done; 1: the run failed; 2: bad usage or scene,
+/// All quantities are dimensionless. Exit code 0: done; 1: the run or a validation failed; 2: bad usage or scene,
 /// and nothing was computed.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
@@ -37,6 +38,7 @@ pub(crate) enum Command {
     /// A map is tried for a moment on each engine where nothing else decides. WGPU_ADAPTER_NAME (part of
     /// a name) and WGPU_BACKEND (vulkan, metal, dx12) in the environment narrow the adapters down.
     Devices,
+    Validate(Validate),
 }
 
 /// A map over two parameters: what every cell's motion is
@@ -219,6 +221,37 @@ impl Orbit {
 pub(crate) struct Bifurcation {
     #[command(flatten)]
     pub(crate) run: SceneOptions,
+}
+
+/// How right a finished map is: cells of it, replayed on the reference
+///
+/// Draws a sample (half of it from all cells, a quarter at class borders, the rest from every kind
+/// of status other than ok), replays it on the event-driven reference within the map's own budget
+/// and compares class, period, word, symmetry, exponent and averages; lanes of a graphics device
+/// are also run again over a few periods, and their states compared in units of an error budget.
+/// Every mismatch is explained by a check (a coexisting attractor, chaos, a border, grazing, a
+/// budget too short) or counts as unexplained: then the exit code is 1. Writes validation.json and
+/// a section of report.html.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, a thousand cells of the main map:\n  \
+    rattlemap validate out/e_omega --samples 1000")]
+pub(crate) struct Validate {
+    /// The folder of a finished map
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+
+    /// Cells to replay, all if the map has fewer
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SAMPLES as u32,
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) samples: u32,
+
+    /// Decides which cells: the same seed, the same sample
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(crate) seed: u64,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
 }
 
 #[cfg(test)]

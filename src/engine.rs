@@ -11,6 +11,7 @@ mod gpu;
 use thiserror::Error;
 
 pub use cpu::Cpu;
+pub(crate) use cpu::record as measured_record;
 pub use fake::Fake;
 pub use gpu::Gpu;
 

@@ -6,8 +6,10 @@
 //! ([`mod@reference`]), lanes on a graphics device do so on a grid of their own ([`gpu`]), and
 //! what the reference meets is read as an orbit ([`orbit`], [`word`], [`stability`]) or a
 //! bifurcation diagram
-//! ([`bifurcation`]). A map's cells are numbered ([`plan`]) and put in order ([`schedule`]), go through an
-//! engine ([`engine`], [`sweep`]) and come back as records ([`record`], [`classify`]). All of it is then written down ([`output`]).
+//! ([`bifurcation`]). A map's cells are numbered ([`plan`]) and put in order ([`schedule`]),
+//! go through an engine ([`engine`], [`sweep`]) and come back as records ([`record`],
+//! [`classify`]); a sample of them is replayed ([`mod@validate`]). All of it is then written
+//! down ([`output`]).
 
 pub mod bifurcation;
 pub mod certificate;
@@ -19,12 +21,14 @@ pub mod model;
 pub mod orbit;
 pub mod output;
 pub mod plan;
+mod random;
 pub mod record;
 pub mod reference;
 pub mod scene;
 pub mod schedule;
 pub mod stability;
 pub mod sweep;
+pub mod validate;
 pub mod word;
 
 /// Compiles and runs the README's example as a doctest.

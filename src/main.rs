@@ -7,6 +7,7 @@ mod engine_choice;
 mod error;
 mod map_command;
 mod progress;
+mod validate_command;
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         Command::Orbit(ask) => run_orbit(&ask),
         Command::Bifurcation(ask) => run_bifurcation(&ask),
         Command::Devices => devices_command::run(),
+        Command::Validate(ask) => validate_command::run(&ask),
     };
     done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
 }

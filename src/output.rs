@@ -19,7 +19,9 @@ mod orbit_json;
 mod orbit_summary;
 mod plot_style;
 mod record_file;
+mod replay;
 mod report;
+mod validation_json;
 
 pub use cells::Cells;
 pub use folder::{Folder, FolderError};

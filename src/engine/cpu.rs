@@ -49,7 +49,7 @@ impl<'p> Cpu<'p> {
 }
 
 /// What somebody asked for of what was measured.
-fn record(measured: &Measured, needs: &Needs) -> Record {
+pub(crate) fn record(measured: &Measured, needs: &Needs) -> Record {
     let mut record = Record {
         strobe: measured.strobe,
         periods_run: measured.periods_run,

@@ -9,7 +9,8 @@ use super::{Gpu, GpuError, Precision};
 /// Which adapter to take.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AdapterChoice {
-    /// Part of the adapter's name, in any case of letters; none takes the best.
+    /// Part of the adapter's name, or of what [`describe`] says of it, in any case of letters;
+    /// none takes the best.
     pub name: Option<String>,
 }
 
@@ -141,7 +142,7 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
 pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
     let all = all_adapters().await;
     let named = |adapter: &wgpu::Adapter| {
-        let name = adapter.get_info().name.to_lowercase();
+        let name = describe(&adapter.get_info()).to_lowercase();
         choice.name.as_ref().is_none_or(|wanted| name.contains(&wanted.to_lowercase()))
     };
     let fits = |adapter: &wgpu::Adapter| named(adapter) && has(adapter, precision);

@@ -5,19 +5,24 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::validation_json::ValidationObject;
 use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest, report};
 use crate::scene::Format;
+use crate::validate::Validation;
 
-pub use super::map_manifest::Run;
+pub use super::map_manifest::{Made, Run};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const HTML: &str = "report.html";
-const MANIFEST: &str = "manifest.json";
+const VALIDATION: &str = "validation.json";
+
+/// A map's manifest: the last file that a run writes.
+pub const MANIFEST: &str = "manifest.json";
 
 /// Every file that a map may have beside its records.
-const ALL: [&str; 9] =
-    [MANIFEST, CSV, NPY, "map.png", "lyapunov.png", "impacts.png", "mesh.png", "word.png", "report.html"];
+const ALL: [&str; 10] =
+    [MANIFEST, CSV, NPY, "map.png", "lyapunov.png", "impacts.png", "mesh.png", "word.png", HTML, VALIDATION];
 
 /// Removes what an earlier run left, but for its records: files must not stand beside a
 /// manifest that does not know them.
@@ -43,6 +48,29 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Resul
     let manifest = map_manifest::map(cells, run, &files)?;
     folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
     Ok(files)
+}
+
+/// Writes `validation.json` and, where the map has a report, the report again with a section
+/// on it. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_validation(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    made: &Made<'_>,
+    validation: &Validation,
+) -> anyhow::Result<Vec<&'static str>> {
+    let object = ValidationObject::new(cells, made, validation);
+    let json = serde_json::to_string_pretty(&object)?;
+    folder.replace(VALIDATION, |path| Ok(fs::write(path, json + "\n")?))?;
+    if !folder.path().join(HTML).is_file() {
+        return Ok(vec![VALIDATION]);
+    }
+    let words = layers::read_words(cells);
+    let layers = layers::of(cells, words.as_ref());
+    folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref(), Some(&object)))?;
+    Ok(vec![VALIDATION, HTML])
 }
 
 fn write_tables(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String>> {
@@ -77,7 +105,7 @@ fn write_pictures(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<Stri
         files.extend(names);
     }
     if wants(Format::Html) {
-        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref()))?;
+        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref(), None))?;
         files.push(HTML.to_owned());
     }
     Ok(files)

@@ -15,6 +15,17 @@ use crate::plan::count_classes;
 use crate::scene::{Scene, Steps};
 use crate::schedule::{Audit, Refined};
 
+/// Who computed a map.
+#[derive(Clone, Copy, Debug)]
+pub struct Made<'a> {
+    /// The engine's name.
+    pub engine: &'a str,
+    /// Its precision.
+    pub precision: &'a str,
+    /// What it ran on.
+    pub device: &'a str,
+}
+
 /// Who computed a map and in what time.
 #[derive(Clone, Debug)]
 pub struct Run<'a> {

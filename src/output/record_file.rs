@@ -198,6 +198,27 @@ impl RecordFile {
         Ok(RecordFile { file, path: path.to_owned(), places: done })
     }
 
+    /// Reads a file and leaves it alone; `take` is as for [`RecordFile::resume`]. Returns the
+    /// places read.
+    ///
+    /// # Errors
+    /// [`RecordFileError`] if the file is another run's, damaged or unreadable.
+    pub fn read(
+        path: &Path,
+        identity: &Identity,
+        take: impl FnMut(usize, &[Record]) -> bool,
+    ) -> Result<usize, RecordFileError> {
+        let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
+        let file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        let mut reader = Reader { input: BufReader::new(&file), path, at: 0, length };
+        let differences = reader.identity()?.differences(identity);
+        if !differences.is_empty() {
+            return Err(RecordFileError::OtherRun { path: path.to_owned(), differences });
+        }
+        Ok(reader.batches(take)?.0)
+    }
+
     /// Cells that the file holds: the place in the plan's order to go on from.
     pub fn places(&self) -> usize {
         self.places

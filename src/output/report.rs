@@ -19,17 +19,17 @@ use serde::Serialize;
 use super::cells::{Cells, Row};
 use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
-use super::names;
-use crate::model::GearPair;
-use crate::orbit::{Settings, Status};
-use crate::scene::{Quantity, Scene, Start};
+use super::validation_json::ValidationObject;
+use super::{names, replay};
+use crate::orbit::Status;
+use crate::scene::Quantity;
 
 const PAGE: &str = include_str!("report/page.html");
 const STYLE: &str = include_str!("report/page.css");
 const SCRIPT: &str = include_str!("report/page.js");
 
 #[derive(Serialize)]
-struct Data {
+struct Data<'a> {
     title: String,
     subtitle: String,
     axes: Vec<AxisData>,
@@ -40,6 +40,7 @@ struct Data {
     classes: [&'static str; 4],
     statuses: Vec<&'static str>,
     words: Vec<String>,
+    validation: Option<&'a ValidationObject>,
 }
 
 #[derive(Serialize)]
@@ -86,7 +87,7 @@ struct Packed {
     data: String,
 }
 
-/// Writes the page.
+/// Writes the page, with the section on validation if there is one.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -95,18 +96,20 @@ pub(super) fn write(
     cells: &Cells<'_>,
     layers: &[Layer],
     words: Option<&Words>,
+    validation: Option<&ValidationObject>,
 ) -> anyhow::Result<()> {
     let scene = cells.scene();
     let data = Data {
         title: scene.title().to_owned(),
         subtitle: subtitle(scene),
         axes: scene.axes().iter().map(AxisData::from).collect(),
-        replay: replay(scene),
+        replay: replay::arguments(scene),
         layers: layers.par_iter().map(LayerData::from).collect(),
         values: values(cells, words)?,
         classes: names::CLASSES,
         statuses: Status::ALL.iter().map(|&status| names::status(status)).collect(),
         words: words.map_or(Vec::new(), |words| words.list.iter().map(|(text, _)| text.clone()).collect()),
+        validation,
     };
     // `<` could end the script that holds the data.
     let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
@@ -124,32 +127,6 @@ pub(super) fn write(
     }
     page.push_str(rest);
     Ok(fs::write(path, page)?)
-}
-
-/// Parameters that differ from `orbit`'s own defaults, the start, and how long to integrate.
-fn replay(scene: &Scene) -> String {
-    let mut words = Vec::new();
-    let base = scene.base();
-    for parameter in GearPair::PARAMETERS {
-        let swept = scene.axes().iter().any(|axis| axis.parameter().name == parameter.name);
-        match base.get(parameter.name) {
-            Ok(value) if !swept && parameter.default != Some(value) => {
-                words.push(format!(" --set {}={value:?}", parameter.name));
-            }
-            _ => {}
-        }
-    }
-    if let Start::State([x1, v1, x2, v2]) = scene.start() {
-        words.push(format!(" --start {x1:?},{v1:?},{x2:?},{v2:?}"));
-    }
-    let (settings, default) = (scene.orbit_settings(), Settings::default());
-    if settings.transient_periods != default.transient_periods {
-        words.push(format!(" --transient {}", settings.transient_periods));
-    }
-    if settings.observed_periods != default.observed_periods {
-        words.push(format!(" --periods {}", settings.observed_periods));
-    }
-    words.concat()
 }
 
 /// What the page reads out for a cell, one array per quantity that the scene asks for.

@@ -1,5 +1,7 @@
 //! The audit of filled cells: how many of them are wrong?
 
+use crate::random::Random;
+
 /// What an audit measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Audit {
@@ -30,22 +32,9 @@ impl Audit {
     }
 }
 
-/// `count` of the `candidates`, chosen at random by `seed`: a partial shuffle with splitmix64
-/// (Steele, Lea, Flood, OOPSLA 2014), the same on every machine.
+/// `count` of the `candidates`, chosen at random by `seed`.
 pub(super) fn sample(mut candidates: Vec<u32>, count: usize, seed: u64) -> Vec<u32> {
-    let count = count.min(candidates.len());
-    let mut state = seed;
-    for place in 0..count {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = state;
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^= x >> 31;
-        let rest = (candidates.len() - place) as u64;
-        // The high half of the product: a number below `rest`, even to 2^-32.
-        let chosen = place + ((u128::from(x) * u128::from(rest)) >> 64) as usize;
-        candidates.swap(place, chosen);
-    }
+    Random::new(seed).draw(&mut candidates, count);
     candidates.truncate(count);
     candidates
 }
@@ -62,22 +51,5 @@ mod tests {
         assert!((low - 0.005_441).abs() < 1e-5 && (high - 0.018_309).abs() < 1e-5, "{low} {high}");
         let [low, high] = audit(0, 2000).interval();
         assert!(low < 1e-12 && (high - 0.001_917).abs() < 1e-5, "{high}");
-    }
-
-    #[test]
-    fn samples_are_even_and_repeatable() {
-        let all: Vec<u32> = (0..100).collect();
-        let mut counts = [0; 100];
-        for seed in 0..2000 {
-            let mut chosen = sample(all.clone(), 20, seed);
-            assert_eq!(chosen, sample(all.clone(), 20, seed));
-            chosen.sort_unstable();
-            chosen.dedup();
-            assert_eq!(chosen.len(), 20);
-            chosen.iter().for_each(|&id| counts[id as usize] += 1);
-        }
-        // 400 times each, standard deviation 18.
-        assert!(counts.iter().all(|&times| (310..490).contains(&times)), "{counts:?}");
-        assert_eq!(sample(all.clone(), 1000, 1).len(), 100);
     }
 }

@@ -353,6 +353,108 @@ byId("copy").addEventListener("click", async () => {
   setTimeout(() => { byId("copy").textContent = "Copy"; }, 1500);
 });
 
+// ---- validation
+
+const count = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
+const short = (value) => (typeof value === "number" ? Number(value.toPrecision(4)).toString() : String(value ?? "\u2013"));
+
+// A table with a caption; columns of numbers are named by their index.
+function table(caption, heads, lines, numbers = []) {
+  const made = element("table");
+  const cell = (tag, text, k) => {
+    const one = element(tag, text instanceof Node ? undefined : text, numbers.includes(k) ? "number" : undefined);
+    if (text instanceof Node) one.append(text);
+    return one;
+  };
+  const head = element("tr");
+  head.append(...heads.map((text, k) => cell("th", text, k)));
+  made.append(head, ...lines.map(({ cells, bad }) => {
+    const row = element("tr", undefined, bad ? "bad" : undefined);
+    row.append(...cells.map((text, k) => cell("td", text, k)));
+    return row;
+  }));
+  const box = element("div");
+  box.append(element("h3", caption), made);
+  return box;
+}
+
+const STRATA = { uniform: "from all cells", border: "at a border of classes" };
+const FIELDS = { class: "class", period: "period", word: "word, up to mirror image", symmetric: "symmetry",
+  lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing",
+  state: "state, within the error budget" };
+
+function stateText({ check, ...states }) {
+  if (check === "skipped") return `States were not compared: ${states.reason}.`;
+  if (check === "replay") {
+    return "The map was made by the reference itself, so this replay shows that the records are what they were, "
+      + `not that the reference is right: the last states of ${states.identical} of `
+      + `${count(states.cells, "cell")} are the same to the last bit`
+      + (states.absolute ? `, the largest difference is ${short(states.absolute.worst)}.` : ".");
+  }
+  return `The lanes were run again over ${states.horizon_periods} forcing periods and their states compared with the `
+    + "reference's. The budget is what rounding may amount to by an estimate made beforehand, from the precision, the "
+    + `number of steps and the growth of small errors along the motion: ${states.above_budget} of `
+    + `${count(states.cells, "cell")} are above it.`;
+}
+
+function explained(found) {
+  const meaning = Object.fromEntries(found.explanations.map(({ name, meaning }) => [name, meaning]));
+  const differs = ({ field, map, reference }) => field === "state"
+    ? `state off by ${short(map)} budgets` : `${field}: ${short(map)}, reference ${short(reference)}`;
+  const parameters = map.axes.map((axis) => axis.parameter);
+  const line = ({ i, j, values, differences, explanation, replay }) => {
+    const go = element("button", `${i}, ${j}`);
+    go.type = "button";
+    go.title = "show this cell on the map";
+    go.addEventListener("click", () => { choose({ i, j }); scrollTo({ top: 0, behavior: "smooth" }); });
+    const why = element("span", explanation?.replaceAll("_", " ") ?? "unexplained");
+    why.title = meaning[explanation] ?? "no check gives the map's answer";
+    return { bad: !explanation,
+      cells: [go, ...parameters.map((name) => short(values[name])), differences.map(differs).join("; "), why, element("code", replay)] };
+  };
+  const worstFirst = [...found.mismatches].sort((a, b) => Boolean(a.explanation) - Boolean(b.explanation));
+  return table("Cells that differ", ["cell", ...parameters, "what differs", "why", "replay"], worstFirst.map(line));
+}
+
+function tellValidation(found) {
+  const section = byId("validation");
+  document.body.classList.add("validated");
+  section.hidden = false;
+  const agreed = found.samples - found.mismatched;
+  const verdict = found.unexplained === 0
+    ? `${agreed} of ${count(found.samples, "replayed cell")} agree with the reference; `
+      + (found.mismatched === 0 ? "none differs." : `${count(found.mismatched, "differs", "differ")}, each for a reason that a check has shown.`)
+    : `${found.unexplained} of ${count(found.samples, "replayed cell")} differ from the reference and no check shows why: `
+      + "do not trust the map there.";
+  const tables = element("div");
+  tables.id = "tables";
+  tables.append(
+    table("Cells replayed", ["", "replayed", "in the map"], found.strata.map(({ name, sampled, cells }) =>
+      ({ cells: [STRATA[name] ?? name.replace(/^status (.*)/, "with status $1"), sampled, cells] })), [1, 2]),
+    table("Agreement", ["", "compared", "agree"], Object.keys(FIELDS).filter((name) => found.agreement[name]?.compared)
+      .map((name) => ({ cells: [FIELDS[name], found.agreement[name].compared, found.agreement[name].agreeing] })), [1, 2]),
+  );
+  const errors = [["in units of the budget", found.states.budgets], ["as they are", found.states.absolute]]
+    .filter(([, quantiles]) => quantiles);
+  if (errors.length) {
+    tables.append(table("Errors of states", ["", "median", "99 %", "worst"], errors.map(([name, q]) =>
+      ({ cells: [name, short(q.median), short(q.percentile_99), short(q.worst)] })), [1, 2, 3]));
+  }
+  const reasons = found.explanations.filter(({ mismatches }) => mismatches > 0);
+  if (reasons.length) {
+    tables.append(table("Why cells differ", ["", "cells", ""], reasons.map(({ name, mismatches, meaning }) =>
+      ({ cells: [name.replaceAll("_", " "), mismatches, meaning] })), [1]));
+  }
+  section.append(
+    element("h2", "Validation"),
+    element("p", verdict, found.unexplained ? "verdict bad" : "verdict"),
+    element("p", `A sample of ${found.samples} of ${found.cells} cells (seed ${found.seed}), made by the engine `
+      + `${found.engine} in ${found.precision} on ${found.device}, was computed again by the event-driven reference `
+      + "within the same number of periods."),
+    element("p", stateText(found.states)), tables);
+  if (found.mismatches.length) section.append(explained(found));
+}
+
 // ---- start
 
 async function start() {
@@ -365,6 +467,7 @@ async function start() {
     button.addEventListener("click", () => showLayer(k));
     return button;
   }));
+  if (map.validation) tellValidation(map.validation);
   const names = Object.keys(map.values);
   const unpacked = await Promise.all(names.map((name) => unpack(map.values[name])));
   values = Object.fromEntries(names.map((name, k) => [name, unpacked[k]]));

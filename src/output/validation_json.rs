@@ -1,0 +1,229 @@
+//! `validation.json`: what the replay of a map's cells on the reference showed.
+//!
+//! The report shows the same object.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::cells::Cells;
+use super::manifest::FORMAT;
+use super::map_manifest::Made;
+use super::{names, replay};
+use crate::validate::states::HORIZON;
+use crate::validate::{Explanation, Field, Mismatch, Quantiles, StateCheck, Stratum, Validation, Value};
+
+#[derive(Serialize)]
+pub(super) struct ValidationObject {
+    format: u32,
+    command: &'static str,
+    crate_version: &'static str,
+    engine: String,
+    precision: String,
+    device: String,
+    seed: u64,
+    cells: usize,
+    samples: usize,
+    strata: Vec<StratumObject>,
+    agreement: BTreeMap<&'static str, AgreementObject>,
+    states: StatesObject,
+    mismatched: usize,
+    explanations: Vec<ExplanationObject>,
+    unexplained: usize,
+    mismatches: Vec<MismatchObject>,
+}
+
+#[derive(Serialize)]
+struct StratumObject {
+    name: String,
+    cells: usize,
+    sampled: usize,
+}
+
+#[derive(Serialize)]
+struct AgreementObject {
+    compared: usize,
+    agreeing: usize,
+}
+
+#[derive(Serialize)]
+#[serde(tag = "check", rename_all = "snake_case")]
+enum StatesObject {
+    Lanes {
+        horizon_periods: u32,
+        cells: usize,
+        above_budget: usize,
+        budgets: Option<QuantilesObject>,
+        absolute: Option<QuantilesObject>,
+    },
+    Replay {
+        cells: usize,
+        identical: usize,
+        absolute: Option<QuantilesObject>,
+    },
+    Skipped {
+        reason: String,
+    },
+}
+
+#[derive(Serialize)]
+struct QuantilesObject {
+    median: f64,
+    percentile_99: f64,
+    worst: f64,
+}
+
+#[derive(Serialize)]
+struct ExplanationObject {
+    name: &'static str,
+    meaning: &'static str,
+    mismatches: usize,
+}
+
+#[derive(Serialize)]
+struct MismatchObject {
+    id: u32,
+    i: usize,
+    j: usize,
+    values: BTreeMap<&'static str, f64>,
+    differences: Vec<DifferenceObject>,
+    explanation: Option<&'static str>,
+    replay: String,
+}
+
+#[derive(Serialize)]
+struct DifferenceObject {
+    field: &'static str,
+    map: Value,
+    reference: Value,
+}
+
+impl ValidationObject {
+    pub(super) fn new(cells: &Cells<'_>, made: &Made<'_>, validation: &Validation) -> ValidationObject {
+        let strata = validation.strata.iter().map(|stratum| StratumObject {
+            name: stratum_name(stratum.stratum),
+            cells: stratum.cells,
+            sampled: stratum.sampled,
+        });
+        let agreement = validation.agreement.iter().map(|field| {
+            let counts = AgreementObject { compared: field.compared, agreeing: field.agreeing };
+            (field_name(field.field), counts)
+        });
+        let explanations = Explanation::ALL.into_iter().map(|explanation| ExplanationObject {
+            name: explanation.name(),
+            meaning: meaning(explanation),
+            mismatches: validation.explained_by(explanation),
+        });
+        ValidationObject {
+            format: FORMAT,
+            command: "validate",
+            crate_version: env!("CARGO_PKG_VERSION"),
+            engine: made.engine.to_owned(),
+            precision: made.precision.to_owned(),
+            device: made.device.to_owned(),
+            seed: validation.seed,
+            cells: cells.counts().iter().product(),
+            samples: validation.sampled(),
+            strata: strata.collect(),
+            agreement: agreement.collect(),
+            states: StatesObject::from(&validation.states),
+            mismatched: validation.mismatches.len(),
+            explanations: explanations.collect(),
+            unexplained: validation.unexplained(),
+            mismatches: validation.mismatches.iter().map(|mismatch| mismatched(cells, mismatch)).collect(),
+        }
+    }
+}
+
+fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
+    let row = cells.row(mismatch.id as usize);
+    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
+    let differences = mismatch.differences.iter().map(|difference| DifferenceObject {
+        field: field_name(difference.field),
+        map: difference.record.clone(),
+        reference: difference.reference.clone(),
+    });
+    MismatchObject {
+        id: mismatch.id,
+        i: row.indices[0],
+        j: row.indices[1],
+        values: axes.zip(row.values).collect(),
+        differences: differences.collect(),
+        explanation: mismatch.explanation.map(Explanation::name),
+        replay: replay::command(cells.scene(), row.indices),
+    }
+}
+
+impl From<&StateCheck> for StatesObject {
+    fn from(check: &StateCheck) -> StatesObject {
+        let object = |quantiles: &Option<Quantiles>| quantiles.as_ref().map(QuantilesObject::from);
+        match check {
+            StateCheck::Lanes { cells, above_budget, units, absolute } => StatesObject::Lanes {
+                horizon_periods: HORIZON,
+                cells: *cells,
+                above_budget: *above_budget,
+                budgets: object(units),
+                absolute: object(absolute),
+            },
+            StateCheck::Replay { cells, identical, absolute } => {
+                StatesObject::Replay { cells: *cells, identical: *identical, absolute: object(absolute) }
+            }
+            StateCheck::Skipped { reason } => StatesObject::Skipped { reason: reason.clone() },
+        }
+    }
+}
+
+impl From<&Quantiles> for QuantilesObject {
+    fn from(quantiles: &Quantiles) -> QuantilesObject {
+        let &Quantiles { median, percentile_99, worst } = quantiles;
+        QuantilesObject { median, percentile_99, worst }
+    }
+}
+
+fn stratum_name(stratum: Stratum) -> String {
+    match stratum {
+        Stratum::Uniform => "uniform".to_owned(),
+        Stratum::Border => "border".to_owned(),
+        Stratum::Status(status) => format!("status {}", names::status(status)),
+    }
+}
+
+fn field_name(field: Field) -> &'static str {
+    match field {
+        Field::Class => "class",
+        Field::Period => "period",
+        Field::Word => "word",
+        Field::Symmetric => "symmetric",
+        Field::Exponent => "lyapunov",
+        Field::Impacts => "impacts_per_period",
+        Field::Mesh => "mesh_fraction",
+        Field::State => "state",
+    }
+}
+
+/// The explanation for a reader who has not read the code.
+fn meaning(explanation: Explanation) -> &'static str {
+    match explanation {
+        Explanation::EngineCap => {
+            "the engine's caps ended the cell, as its status says, and it does need more"
+        }
+        Explanation::UndecidedInBudget => {
+            "one side does not decide within the periods allowed; with more of them both say the same"
+        }
+        Explanation::CoexistingAttractor => {
+            "another attractor of the same cell: the reference stays on it when started on the map's last state"
+        }
+        Explanation::Chaos => {
+            "a chaotic transient outlives the periods allowed, or averages over chaos scatter as much on the \
+             reference itself"
+        }
+        Explanation::Border => {
+            "the reference changes its answer to the map's within the rounding of parameters and start, or at a \
+             bifurcation"
+        }
+        Explanation::Unsettled => {
+            "the cycle was read before the motion had settled on it; the reference reads the same there"
+        }
+        Explanation::NearGrazing => "an event grazes more nearly than the precision resolves",
+    }
+}

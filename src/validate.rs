@@ -1,0 +1,174 @@
+//! How right is a finished map? Cells of it, replayed on the reference.
+//!
+//! A sample of cells ([`sample()`]) is measured again by [`crate::orbit::measure`] within the
+//! plan's own budget. Where class, period, word, symmetry, exponent or averages differ, other
+//! computations on the reference look for the reason ([`Explanation`]); a difference that none
+//! of them gives is unexplained, and the map is not to be trusted there. Lanes are also run
+//! again over a few periods, and their states compared with the reference's in units of an
+//! error budget ([`states`]).
+//!
+//! A map of the CPU engine was made by the reference: its replay shows that records are what
+//! they were, not that the reference is right. For that see the tests.
+
+mod answer;
+mod case;
+mod explanation;
+mod sample;
+pub mod states;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+pub use answer::{Difference, Field, Value};
+pub use explanation::Explanation;
+pub use sample::{Pick, Sample, Stratum, StratumCount, sample};
+pub use states::{Quantiles, StateCheck, StateSource};
+
+use crate::gpu::Precision;
+use crate::plan::Plan;
+use crate::record::Record;
+use case::Case;
+use states::Errors;
+
+/// Cells that a sample has unless something else is asked for.
+pub const DEFAULT_SAMPLES: usize = 400;
+
+/// A finished map, and what made it.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// Its cells.
+    pub plan: &'a Plan,
+    /// One record per cell, by id.
+    pub records: &'a [Record],
+    /// The precision that the records were computed in.
+    pub precision: Precision,
+    /// Whether lanes on a graphics device computed them; otherwise the reference itself did.
+    pub is_lane: bool,
+}
+
+/// Agreement of one field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Agreement {
+    /// What is compared.
+    pub field: Field,
+    /// Cells in which both sides have it.
+    pub compared: usize,
+    /// Cells in which they agree.
+    pub agreeing: usize,
+}
+
+/// A cell whose record is not what the reference says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mismatch {
+    /// The cell, `j * count0 + i`.
+    pub id: u32,
+    /// What differs.
+    pub differences: Vec<Difference>,
+    /// Why, if a check shows it.
+    pub explanation: Option<Explanation>,
+}
+
+/// What the replay of a sample showed.
+#[derive(Clone, Debug)]
+pub struct Validation {
+    /// Seed of the sample.
+    pub seed: u64,
+    /// Cells by stratum.
+    pub strata: Vec<StratumCount>,
+    /// Cells compared, by field.
+    pub agreement: Vec<Agreement>,
+    /// States against the reference's.
+    pub states: StateCheck,
+    /// Every cell that differs, by id.
+    pub mismatches: Vec<Mismatch>,
+}
+
+impl Validation {
+    /// Cells that were replayed.
+    pub fn sampled(&self) -> usize {
+        self.strata.iter().map(|stratum| stratum.sampled).sum()
+    }
+
+    /// Mismatches without an explanation.
+    pub fn unexplained(&self) -> usize {
+        self.mismatches.iter().filter(|mismatch| mismatch.explanation.is_none()).count()
+    }
+
+    /// How many mismatches have this explanation.
+    pub fn explained_by(&self, explanation: Explanation) -> usize {
+        self.mismatches.iter().filter(|mismatch| mismatch.explanation == Some(explanation)).count()
+    }
+}
+
+/// What one cell showed.
+struct Replayed {
+    /// Fields that were compared, and whether they agree.
+    fields: Vec<(Field, bool)>,
+    error: Option<states::Error>,
+    mismatch: Option<Mismatch>,
+}
+
+/// Replays a sample on the reference. `source` says where states come from; `report` is told
+/// how many cells are done, from any thread.
+///
+/// # Panics
+/// If `source` has lanes, and not one per cell of the sample.
+pub fn replay(
+    subject: &Subject<'_>,
+    sample: &Sample,
+    source: StateSource,
+    report: &(dyn Fn(usize) + Sync),
+) -> Validation {
+    if let StateSource::Lanes(lanes) = &source {
+        assert_eq!(lanes.len(), sample.picks.len(), "one lane per cell");
+    }
+    let done = AtomicUsize::new(0);
+    let replayed: Vec<Replayed> = sample
+        .picks
+        .par_iter()
+        .enumerate()
+        // Cells differ a thousandfold in cost: no task holds more than one.
+        .with_max_len(1)
+        .map(|(k, pick)| {
+            let lane = if let StateSource::Lanes(lanes) = &source { Some(&lanes[k]) } else { None };
+            let replayed = replay_cell(subject, pick.id, lane);
+            report(done.fetch_add(1, Ordering::Relaxed) + 1);
+            replayed
+        })
+        .collect();
+    let agreement = Field::ALL.map(|field| {
+        let of_field = || replayed.iter().flat_map(|cell| &cell.fields).filter(move |(f, _)| *f == field);
+        Agreement {
+            field,
+            compared: of_field().count(),
+            agreeing: of_field().filter(|(_, same)| *same).count(),
+        }
+    });
+    let errors: Errors = replayed.iter().filter_map(|cell| cell.error).collect();
+    let mut mismatches: Vec<Mismatch> = replayed.into_iter().filter_map(|cell| cell.mismatch).collect();
+    mismatches.sort_by_key(|mismatch| mismatch.id);
+    Validation {
+        seed: sample.seed,
+        strata: sample.strata.clone(),
+        agreement: agreement.to_vec(),
+        states: errors.check(source),
+        mismatches,
+    }
+}
+
+fn replay_cell(subject: &Subject<'_>, id: u32, lane: Option<&Record>) -> Replayed {
+    let case = Case::new(subject, id, lane);
+    let mut fields = case.truth.compare(case.record, &case.bars);
+    let error = if subject.is_lane { states::lane_error(&case) } else { states::replay_error(&case) };
+    if let (Some(error), Some(_)) = (error, lane) {
+        fields.push(error.compared());
+    }
+    let differences: Vec<Difference> = fields.iter().filter_map(|(_, differs)| differs.clone()).collect();
+    let mismatch = (!differences.is_empty()).then(|| {
+        let explanation = explanation::explain(&case, &differences);
+        Mismatch { id, differences, explanation }
+    });
+    let fields = fields.into_iter().map(|(field, differs)| (field, differs.is_none())).collect();
+    Replayed { fields, error, mismatch }
+}

@@ -1,0 +1,262 @@
+//! What the reference says of a cell, and where a record says something else.
+
+use serde::Serialize;
+
+use crate::classify::classify;
+use crate::engine::measured_record;
+use crate::gpu::Precision;
+use crate::orbit::{Class, Measured, Orbit, Status};
+use crate::plan::Needs;
+use crate::record::{Record, Spelling, valid, word_hash};
+use crate::word::Word;
+
+/// Standard errors by which two averages of the same chaos may differ.
+const CHAOS_ERRORS: f64 = 5.0;
+
+/// What two exponents of the same chaos may differ by beside that, per forcing period:
+/// standard errors from 16 blocks are themselves uncertain.
+const CHAOS_FLOOR: f64 = 0.01;
+
+/// What is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Field {
+    /// Periodic, chaotic, undecided or failed.
+    Class,
+    /// The period, where both are periodic.
+    Period,
+    /// The word, up to mirror image, where the period agrees.
+    Word,
+    /// Whether the cycle is its own mirror image, where the period agrees.
+    Symmetric,
+    /// The exponent: by the largest multiplier of cycles, within standard errors in chaos.
+    Exponent,
+    /// Impacts per forcing period of a cycle.
+    Impacts,
+    /// Fraction of time a cycle spends meshing.
+    Mesh,
+    /// The state after a few periods, in units of the error budget.
+    State,
+}
+
+impl Field {
+    /// Every field, in the order in which they are told.
+    pub const ALL: [Field; 8] = [
+        Field::Class,
+        Field::Period,
+        Field::Word,
+        Field::Symmetric,
+        Field::Exponent,
+        Field::Impacts,
+        Field::Mesh,
+        Field::State,
+    ];
+}
+
+/// A value of one side.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A class or a word.
+    Text(String),
+    /// An exponent, an average, an error.
+    Number(f64),
+    /// A period.
+    Count(u32),
+    /// A symmetry.
+    Flag(bool),
+}
+
+/// One field in which a record and the reference differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Which.
+    pub field: Field,
+    /// What the record says.
+    pub record: Value,
+    /// What the reference says.
+    pub reference: Value,
+}
+
+/// How far numbers may differ and still count as the same.
+///
+/// Lanes read a cycle where they have come near it, not on it, and carry tangents in their own
+/// precision. The bars are ten times or more of what is left on cycles that have settled.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bars {
+    /// Natural logarithm of the largest multiplier.
+    multiplier: f64,
+    /// Multipliers below this are rounding of the monodromy matrix: as good as zero.
+    no_multiplier: f64,
+    mesh: f64,
+    impacts: f64,
+    /// The forcing period.
+    forcing_period: f64,
+}
+
+impl Bars {
+    pub(super) fn new(precision: Precision, forcing_period: f64) -> Bars {
+        let (multiplier, no_multiplier, mesh) = match precision {
+            Precision::F32 => (5e-2, 1e-2, 5e-5),
+            Precision::F64 => (5e-3, 1e-5, 5e-5),
+        };
+        Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period }
+    }
+}
+
+/// What some computation on the reference says of a cell. Absent fields are not compared.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Answer {
+    pub(super) class: Class,
+    pub(super) status: Status,
+    /// Exponent and standard error, zero for a cycle.
+    pub(super) exponent: Option<[f64; 2]>,
+    pub(super) impacts_per_period: Option<f64>,
+    pub(super) mesh_fraction: Option<f64>,
+    pub(super) symmetric: Option<bool>,
+    pub(super) word: Option<Word>,
+}
+
+impl From<&Measured> for Answer {
+    fn from(measured: &Measured) -> Answer {
+        let everything = Needs { exponent: true, impacts: true, mesh: true, symmetric: true, word: true };
+        Answer {
+            class: classify(&measured_record(measured, &everything)),
+            status: measured.status,
+            exponent: measured.lyapunov,
+            impacts_per_period: Some(measured.impacts_per_period),
+            mesh_fraction: Some(measured.mesh_fraction),
+            symmetric: measured.symmetric,
+            word: measured.word.clone(),
+        }
+    }
+}
+
+impl From<&Orbit> for Answer {
+    fn from(orbit: &Orbit) -> Answer {
+        let is_cycle = matches!(orbit.class, Class::Periodic { .. });
+        Answer {
+            class: orbit.class,
+            status: orbit.status,
+            exponent: Some([orbit.lyapunov, orbit.lyapunov_error.unwrap_or(0.0)]),
+            impacts_per_period: Some(orbit.impacts_per_period),
+            mesh_fraction: Some(orbit.mesh_fraction),
+            symmetric: orbit.symmetric,
+            word: is_cycle.then(|| orbit.word.clone()),
+        }
+    }
+}
+
+/// A field that was compared, and what differs in it if anything does.
+pub(super) type Compared = (Field, Option<Difference>);
+
+impl Answer {
+    /// Compares a record with this answer, field by field as far as both have them.
+    pub(super) fn compare(&self, record: &Record, bars: &Bars) -> Vec<Compared> {
+        let class = classify(record);
+        let mut list = vec![compared(Field::Class, kind(class) == kind(self.class), || {
+            (Value::Text(kind(class).into()), Value::Text(kind(self.class).into()))
+        })];
+        match (class, self.class) {
+            (Class::Periodic { period: ours }, Class::Periodic { period: theirs }) => {
+                list.push(compared(Field::Period, ours == theirs, || {
+                    (Value::Count(ours), Value::Count(theirs))
+                }));
+                if ours == theirs {
+                    self.compare_cycle(record, f64::from(ours), bars, &mut list);
+                }
+            }
+            (Class::Chaotic, Class::Chaotic) => list.extend(self.compare_chaos(record, bars)),
+            _ => {}
+        }
+        list
+    }
+
+    /// Whether a record says the same in every field.
+    pub(super) fn agrees(&self, record: &Record, bars: &Bars) -> bool {
+        self.compare(record, bars).iter().all(|(_, differs)| differs.is_none())
+    }
+
+    fn compare_cycle(&self, record: &Record, period: f64, bars: &Bars, list: &mut Vec<Compared>) {
+        let has = |bit| record.valid & bit != 0;
+        if let (Some(spelling), Some(word)) = (record.spelling(), &self.word) {
+            let same = spells(&spelling, word) || spells(&spelling, &word.mirrored());
+            list.push(compared(Field::Word, same, || {
+                (Value::Text(spelling.text()), Value::Text(spelled(word).text()))
+            }));
+        }
+        if let (true, Some(symmetric)) = (has(valid::SYMMETRIC), self.symmetric) {
+            let ours = record.symmetric != 0;
+            let shown = || (Value::Flag(ours), Value::Flag(symmetric));
+            list.push(compared(Field::Symmetric, ours == symmetric, shown));
+        }
+        if let (true, Some([theirs, _])) = (has(valid::LYAPUNOV), self.exponent) {
+            let log = |exponent: f64| exponent * period * bars.forcing_period;
+            let none = bars.no_multiplier.ln();
+            let same = (log(record.lyapunov) - log(theirs)).abs() <= bars.multiplier
+                || log(record.lyapunov).max(log(theirs)) <= none;
+            list.push(compared(Field::Exponent, same, || {
+                (Value::Number(record.lyapunov), Value::Number(theirs))
+            }));
+        }
+        let averages = [
+            (
+                Field::Impacts,
+                valid::IMPACTS,
+                record.impacts_per_period,
+                self.impacts_per_period,
+                bars.impacts,
+            ),
+            (Field::Mesh, valid::MESH, record.mesh_fraction, self.mesh_fraction, bars.mesh),
+        ];
+        for (field, bit, ours, theirs, bar) in averages {
+            if let (true, Some(theirs)) = (has(bit), theirs) {
+                let shown = || (Value::Number(ours), Value::Number(theirs));
+                list.push(compared(field, (ours - theirs).abs() <= bar, shown));
+            }
+        }
+    }
+
+    fn compare_chaos(&self, record: &Record, bars: &Bars) -> Option<Compared> {
+        let [theirs, error] = self.exponent?;
+        (record.valid & valid::LYAPUNOV != 0).then(|| {
+            let bar = CHAOS_ERRORS * error.hypot(record.lyapunov_error) + CHAOS_FLOOR / bars.forcing_period;
+            compared(Field::Exponent, (record.lyapunov - theirs).abs() <= bar, || {
+                (Value::Number(record.lyapunov), Value::Number(theirs))
+            })
+        })
+    }
+}
+
+fn compared(field: Field, same: bool, shown: impl FnOnce() -> (Value, Value)) -> Compared {
+    let differs = (!same).then(|| {
+        let (record, reference) = shown();
+        Difference { field, record, reference }
+    });
+    (field, differs)
+}
+
+/// The class without its period.
+fn kind(class: Class) -> &'static str {
+    match class {
+        Class::Periodic { .. } => "periodic",
+        Class::Chaotic => "chaotic",
+        Class::Undecided => "undecided",
+        Class::Failed => "failed",
+    }
+}
+
+/// A word as a record would keep it.
+fn spelled(word: &Word) -> Spelling {
+    let mut record = Record::default();
+    record.set_word(word);
+    record.spelling().unwrap_or_else(|| Spelling::Whole(word.clone()))
+}
+
+fn spells(spelling: &Spelling, word: &Word) -> bool {
+    match spelling {
+        Spelling::Whole(whole) => whole == word,
+        Spelling::Hashed { hash, length } => {
+            *length as usize == word.len() && *hash == word_hash(word.symbols())
+        }
+    }
+}

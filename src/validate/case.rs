@@ -1,0 +1,163 @@
+//! One cell under examination, and what the reference can be asked about it.
+
+use super::Subject;
+use super::answer::{Answer, Bars};
+use crate::flow::Flow;
+use crate::gpu::Precision;
+use crate::model::{GearPair, Law, State};
+use crate::orbit::{Budget, Measured, analyse_flow, measure};
+use crate::record::Record;
+use crate::reference::{Happening, Stop, Trajectory};
+use crate::stability::{StrobeMap, multipliers};
+use crate::word::Word;
+
+/// Parameters and starts moved by this much, relatively, are the same within rounding of a
+/// lane. Some roundings of a precision: errors gather over the steps of a period.
+fn rounding(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-6,
+        Precision::F64 => 1e-12,
+    }
+}
+
+/// A cell, its record, and the reference's answer within the same budget.
+pub(super) struct Case<'a> {
+    pub(super) pair: GearPair,
+    pub(super) flow: Box<Flow>,
+    pub(super) law: Law,
+    pub(super) start: State,
+    pub(super) budget: Budget,
+    pub(super) record: &'a Record,
+    /// The lane after a few periods, if it was run again.
+    pub(super) lane: Option<&'a Record>,
+    pub(super) precision: Precision,
+    pub(super) is_lane: bool,
+    pub(super) measured: Measured,
+    pub(super) truth: Answer,
+    pub(super) bars: Bars,
+}
+
+impl<'a> Case<'a> {
+    pub(super) fn new(subject: &Subject<'a>, id: u32, lane: Option<&'a Record>) -> Case<'a> {
+        let plan = subject.plan;
+        let cell = plan.cell(id);
+        let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
+        let (law, start, budget) = (plan.law(cell.law), plan.start(), *plan.budget());
+        let measured = measure(&flow, law, start, &budget);
+        Case {
+            pair: plan.gear_pair(id),
+            law,
+            start,
+            budget,
+            record: &subject.records[id as usize],
+            lane,
+            precision: subject.precision,
+            is_lane: subject.is_lane,
+            truth: Answer::from(&measured),
+            measured,
+            bars: Bars::new(subject.precision, flow.period),
+            flow,
+        }
+    }
+
+    /// Whether an answer is the record's.
+    pub(super) fn is_the_records(&self, answer: &Answer) -> bool {
+        answer.agrees(self.record, &self.bars)
+    }
+
+    /// What the reference says of another start when it may take the time it needs.
+    pub(super) fn at_leisure(&self, start: State) -> Answer {
+        Answer::from(&analyse_flow(&self.flow, self.law, start, &self.budget.settings, 1))
+    }
+
+    /// Answers within the budget for starts and parameters that are the same within rounding.
+    pub(super) fn nudged(&self) -> impl Iterator<Item = Answer> + '_ {
+        let amount = rounding(self.precision);
+        let parameters = GearPair::PARAMETERS.iter().flat_map(move |parameter| {
+            [amount, -amount].into_iter().filter_map(move |relative| {
+                let mut pair = self.pair;
+                let value = pair.get(parameter.name).ok()?;
+                pair.set(parameter.name, value * (1.0 + relative)).ok()?;
+                let flow = Box::new(Flow::new(&pair.oscillator().ok()?));
+                Some(Answer::from(&measure(&flow, pair.law(), self.start, &self.budget)))
+            })
+        });
+        let starts = (0..8).map(move |k| {
+            let start = self.nudged_start(k);
+            Answer::from(&measure(&self.flow, self.law, start, &self.budget))
+        });
+        starts.chain(parameters)
+    }
+
+    /// The start moved within rounding along one coordinate, to either side.
+    pub(super) fn nudged_start(&self, k: usize) -> State {
+        let amount = rounding(self.precision) * if k < 4 { 1.0 } else { -1.0 };
+        let reach = 0.5 * (self.flow.walls[0] - self.flow.walls[1]);
+        let unit = if k.is_multiple_of(2) { reach } else { self.flow.omega * reach };
+        let mut start = self.start;
+        start[k % 4] += amount * unit.max(start[k % 4].abs());
+        start
+    }
+
+    /// The reference, some periods after a start.
+    pub(super) fn after(&self, start: State, periods: u32) -> Result<Trajectory<'_>, Stop> {
+        let mut trajectory = Trajectory::new(&self.flow, self.law, start);
+        for _ in 0..periods {
+            trajectory.advance_period(&mut ())?;
+        }
+        Ok(trajectory)
+    }
+
+    /// How far `period` more periods take a motion from where it is, relative to its size.
+    pub(super) fn unrest(&self, trajectory: &Trajectory<'_>, period: u32) -> f64 {
+        let before = trajectory.state();
+        let mut ahead = trajectory.clone();
+        for _ in 0..period {
+            if ahead.advance_period(&mut ()).is_err() {
+                return f64::INFINITY;
+            }
+        }
+        self.apart(&before, &ahead.state())
+    }
+
+    /// The distance of two states relative to the size of the first and to the walls.
+    pub(super) fn apart(&self, a: &State, b: &State) -> f64 {
+        let [position, velocity] = self.units(a);
+        let by = |i: usize| (a[i] - b[i]).abs();
+        (by(0).max(by(2)) / position).max(by(1).max(by(3)) / velocity)
+    }
+
+    /// Units of position and velocity: the state's own, but not less than half the backlash
+    /// and what that is as a velocity.
+    pub(super) fn units(&self, y: &State) -> [f64; 2] {
+        let reach = 0.5 * (self.flow.walls[0] - self.flow.walls[1]);
+        let position = y[0].abs().max(y[2].abs()).max(reach);
+        [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
+    }
+
+    /// What one cycle of `period` looks like from where a motion is, settled or not: read as
+    /// lanes read it, without Newton.
+    pub(super) fn read_as_is(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<Answer> {
+        let image = StrobeMap::Periods(period).apply(trajectory, trajectory.state()).ok()?;
+        let largest = multipliers(&image.scaled)?.first().map(|[re, im]| re.hypot(*im))?;
+        let span = f64::from(period) * self.flow.period;
+        // Once around, so that the first flight has its symbol.
+        let mut cycle = trajectory.clone();
+        for _ in 0..period {
+            cycle.advance_period(&mut ()).ok()?;
+        }
+        let (impacts, meshing) = (cycle.work().impacts, cycle.meshing_time());
+        let mut met: Vec<Happening> = Vec::new();
+        for _ in 0..period {
+            cycle.advance_period(&mut met).ok()?;
+        }
+        let symbols: Vec<u8> = met.iter().filter_map(|happening| happening.symbol).collect();
+        Some(Answer {
+            exponent: Some([(largest.ln() + image.log_scale) / span, 0.0]),
+            impacts_per_period: Some((cycle.work().impacts - impacts) as f64 / f64::from(period)),
+            mesh_fraction: Some((cycle.meshing_time() - meshing) / span),
+            word: Some(Word::cyclic(&symbols)),
+            ..self.truth.clone()
+        })
+    }
+}

@@ -1,0 +1,239 @@
+//! Why a record differs from the reference, if a check can show it.
+//!
+//! Every explanation is a computation on the reference that gives the record's own answer, in
+//! every field, or shows that neither answer could be reached. Nothing is explained by a
+//! share of cells that is allowed to be wrong.
+
+use super::answer::{Answer, Difference, Field};
+use super::case::Case;
+use crate::classify::{classify, status};
+use crate::gpu::{Constants, LaneSettings};
+use crate::model::State;
+use crate::orbit::{Class, Status};
+use crate::record::valid;
+use crate::reference::Trajectory;
+
+/// Exponents of a cycle below this per forcing period are those of a bifurcation: motion
+/// settles in hundreds of periods.
+const NEAR_BIFURCATION: f64 = 0.01;
+
+/// A motion this far from where it was a cycle ago, relative to its size, is not on the cycle.
+const ELSEWHERE: f64 = 1e-2;
+
+/// A motion this far from where it was a cycle ago has not settled.
+const UNSETTLED: f64 = 1e-4;
+
+/// Periods that lanes take to confirm a period: three windows of the longest they look for.
+const CONFIRMATION_WINDOWS: u32 = 3;
+
+/// Share of a state error that rounding at the start must make on the reference itself.
+const SENSITIVE: f64 = 0.1;
+
+/// Why a cell's record is not what the reference says within the same budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Explanation {
+    /// The lane's caps ended the cell, and its status says so; the reference, whose caps are
+    /// wider, was seen to need more.
+    EngineCap,
+    /// The reference does not decide within the budget, but gives the record's answer when it
+    /// may take longer; or the record says `undecided`, and the motion settles too late or
+    /// grows too little for it to say more.
+    UndecidedInBudget,
+    /// The reference, started on the record's own strobe state, has the record's class,
+    /// period, word, exponent and averages: another attractor of the same cell.
+    CoexistingAttractor,
+    /// Chaos: a transient of one side outlives the budget, or averages over it scatter as
+    /// much on the reference itself when its start moves within rounding.
+    Chaos,
+    /// The reference gives the record's answer when the start or a parameter moves within the
+    /// rounding of the precision; or the largest multiplier is within 1 % of one per period, a
+    /// bifurcation, and the motion does recur after the record's period.
+    Border,
+    /// The lane read its cycle before the motion had settled on it: the reference, read at
+    /// the same place or on the record's strobe state without settling, gives the same.
+    Unsettled,
+    /// An event is nearer to grazing than the precision resolves, where small errors become
+    /// their square roots, and the motion does recur after the record's period.
+    NearGrazing,
+}
+
+impl Explanation {
+    /// Every explanation, in the order in which they are told.
+    pub const ALL: [Explanation; 7] = [
+        Explanation::CoexistingAttractor,
+        Explanation::Chaos,
+        Explanation::Border,
+        Explanation::NearGrazing,
+        Explanation::UndecidedInBudget,
+        Explanation::Unsettled,
+        Explanation::EngineCap,
+    ];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Explanation::EngineCap => "engine_cap",
+            Explanation::UndecidedInBudget => "undecided_in_budget",
+            Explanation::CoexistingAttractor => "coexisting_attractor",
+            Explanation::Chaos => "chaos",
+            Explanation::Border => "border",
+            Explanation::Unsettled => "unsettled",
+            Explanation::NearGrazing => "near_grazing",
+        }
+    }
+}
+
+/// The explanation of a cell's differences: of its states and of its answer, if both differ.
+pub(super) fn explain(case: &Case<'_>, differences: &[Difference]) -> Option<Explanation> {
+    let (states, answers): (Vec<_>, Vec<_>) = differences.iter().partition(|d| d.field == Field::State);
+    let of_states = (!states.is_empty()).then(|| explain_states(case));
+    let of_answers = (!answers.is_empty()).then(|| explain_answer(case));
+    match (of_answers, of_states) {
+        // Both need one; the answer's tells more.
+        (Some(answer), Some(state)) => state.and(answer),
+        (answer, state) => answer.or(state).flatten(),
+    }
+}
+
+/// Rounding at the start moves the reference itself as far, beyond what tangents foresee.
+fn explain_states(case: &Case<'_>) -> Option<Explanation> {
+    let sensitivity = super::states::sensitivity(case)?;
+    let error = super::states::lane_distance(case)?;
+    (sensitivity >= SENSITIVE * error).then_some(Explanation::NearGrazing)
+}
+
+fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 8] =
+        [engine_cap, longer, other_attractor, within_rounding, unsettled, late, bifurcation, grazing];
+    CHECKS.iter().find_map(|check| check(case))
+}
+
+fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
+    if !case.is_lane {
+        return None;
+    }
+    let caps = LaneSettings::default();
+    let beyond = match status(case.record) {
+        Status::TooStiff => {
+            let constants = Constants::new(&case.pair.oscillator().ok()?, None);
+            constants.is_none_or(|constants| {
+                let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+                f64::from(constants.steps) * finest > f64::from(caps.passes_per_period)
+            })
+        }
+        Status::CapEvents => {
+            let mut trajectory = Trajectory::new(&case.flow, case.law, case.start);
+            let mut most = 0;
+            for _ in 0..=case.record.periods_run {
+                let before = trajectory.work().events;
+                if trajectory.advance_period(&mut ()).is_err() {
+                    break;
+                }
+                most = most.max(trajectory.work().events - before);
+            }
+            most > u64::from(caps.events_per_period)
+        }
+        _ => false,
+    };
+    beyond.then_some(Explanation::EngineCap)
+}
+
+/// The same start, and as long as it takes.
+fn longer(case: &Case<'_>) -> Option<Explanation> {
+    let because = match case.truth.class {
+        Class::Undecided => Explanation::UndecidedInBudget,
+        Class::Chaotic => Explanation::Chaos,
+        Class::Periodic { .. } | Class::Failed => return None,
+    };
+    let answer = case.at_leisure(case.start);
+    // Neither side claims anything, and neither can: both are right.
+    let silent = answer.class == Class::Undecided && classify(case.record) != Class::Failed;
+    let claims = matches!(classify(case.record), Class::Periodic { .. });
+    (case.is_the_records(&answer) || silent && !claims).then_some(because)
+}
+
+fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
+    let from = strobe(case)?;
+    case.is_the_records(&case.at_leisure(from)).then_some(match classify(case.record) {
+        Class::Undecided => Explanation::UndecidedInBudget,
+        _ => Explanation::CoexistingAttractor,
+    })
+}
+
+fn within_rounding(case: &Case<'_>) -> Option<Explanation> {
+    let chaotic = classify(case.record) == Class::Chaotic && case.truth.class == Class::Chaotic;
+    let because = if chaotic { Explanation::Chaos } else { Explanation::Border };
+    case.nudged().any(|answer| case.is_the_records(&answer)).then_some(because)
+}
+
+/// The same class and period, read off a motion that is still on its way.
+fn unsettled(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    if case.truth.class != classify(case.record) {
+        return None;
+    }
+    let before = case.record.periods_run.saturating_sub(period);
+    let places = [case.after(case.start, before).ok(), case.after(strobe(case)?, 0).ok()];
+    let same = |answer: Answer| case.is_the_records(&answer);
+    let read = |place: &Trajectory<'_>| case.read_as_is(place, period).is_some_and(same);
+    places.iter().flatten().any(read).then_some(Explanation::Unsettled)
+}
+
+/// The record has no period and the reference has one, or the other way round in chaos: the
+/// side that decided is right in the end, the other was still on its way.
+fn late(case: &Case<'_>) -> Option<Explanation> {
+    let (ours, from) = (classify(case.record), strobe(case)?);
+    let stands = case.after(from, 0).ok()?;
+    match (ours, case.truth.class) {
+        (Class::Chaotic, Class::Periodic { period }) => {
+            let wanders = case.unrest(&stands, period) > ELSEWHERE;
+            (wanders && case.at_leisure(from).class == case.truth.class).then_some(Explanation::Chaos)
+        }
+        (Class::Undecided, Class::Periodic { period }) => {
+            let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;
+            let began = case.after(case.start, case.record.periods_run.saturating_sub(confirming)).ok()?;
+            let late = case.unrest(&began, period) > UNSETTLED || case.unrest(&stands, period) > UNSETTLED;
+            late.then_some(Explanation::UndecidedInBudget)
+        }
+        (Class::Undecided, Class::Chaotic) => {
+            let [theirs, error] = case.truth.exponent?;
+            let bar = 5.0 * error.hypot(case.record.lyapunov_error);
+            let known = case.record.valid & valid::LYAPUNOV != 0;
+            (known && (case.record.lyapunov - theirs).abs() <= bar).then_some(Explanation::UndecidedInBudget)
+        }
+        _ => None,
+    }
+}
+
+fn bifurcation(case: &Case<'_>) -> Option<Explanation> {
+    let [exponent, _] = case.truth.exponent?;
+    (exponent.abs() * case.flow.period < NEAR_BIFURCATION && recurs(case)?).then_some(Explanation::Border)
+}
+
+fn grazing(case: &Case<'_>) -> Option<Explanation> {
+    let grazes = [case.truth.status, status(case.record)].contains(&Status::NearGrazing);
+    (grazes && recurs(case)?).then_some(Explanation::NearGrazing)
+}
+
+/// Whether the motion comes back after the record's period; a record without one claims none.
+fn recurs(case: &Case<'_>) -> Option<bool> {
+    let stands = case.after(strobe(case)?, 0).ok()?;
+    match classify(case.record) {
+        Class::Periodic { period } => {
+            // What a motion passes through at a bifurcation is its cycle, or twice or half of it.
+            let related = match case.truth.class {
+                Class::Periodic { period: p } => [p, 2 * p].contains(&period) || 2 * period == p,
+                _ => true,
+            };
+            Some(related && case.unrest(&stands, period) < ELSEWHERE)
+        }
+        Class::Undecided => Some(true),
+        Class::Chaotic | Class::Failed => Some(false),
+    }
+}
+
+/// Where the record says that its motion was at last.
+fn strobe(case: &Case<'_>) -> Option<State> {
+    let known = case.record.valid & valid::STROBE != 0 && case.record.strobe.iter().all(|x| x.is_finite());
+    known.then_some(case.record.strobe)
+}
