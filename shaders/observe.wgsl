@@ -4,8 +4,9 @@
 const OCTAVE: f32 = 4.0;
 // Recurrences farther apart than 2^-6 of the motion are none.
 const NEAR: u32 = 24u;
-// A lane has settled once its limit is estimated to lie within 2^-12 of the motion.
-const SETTLED: f32 = 48.0;
+// A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
+// comes within 2^-12 of a cycle by chance.
+const SETTLED: f32 = 56.0;
 // A distance must have shrunk by this much (a factor of 0.7) since the last window.
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
@@ -35,7 +36,9 @@ fn begin_period() {
     let decided = settings.max_period > 0u && recurs();
     // Reading the cycle belongs to the budget.
     let read_by = tally.period + tally.candidate;
-    let is_due = tally.streak >= STREAK && (read_by == settings.periods || read_by == settings.longest);
+    let is_last = read_by == settings.periods || read_by == settings.longest;
+    // What contracts by chance in the midst of growth has not settled.
+    let is_due = is_last && tally.streak >= STREAK && (tally.settled == 1u || !grows(CHAOS_ERRORS));
     let early = settings.early_stop == 1u;
     if read_by <= settings.longest && (is_due || (decided && early)) {
         begin_reading();
@@ -50,13 +53,39 @@ fn begin_period() {
 const EARLY_CHAOS_ERRORS: Real = 6.0;
 const CHAOS_ERRORS: Real = 3.0;
 
+// Growth of a tangent vector, natural logarithms, that no departure from an unstable cycle can
+// have lasted through: beyond the ratio of the largest to the smallest distance.
+const DEPARTURE: Real = 40.0;
+
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
-    if !EXPONENT || tally.block_periods > 0u || tally.blocks < 2u || tally.streak > 0u || tally.period < settings.chaos_from {
+    if tally.block_periods > 0u || tally.streak > 0u || tally.period < settings.chaos_from {
+        return false;
+    }
+    let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
+    return grows(errors) && !departs(errors);
+}
+
+// Whether the exponent exceeds zero by so many standard errors.
+fn grows(errors: Real) -> bool {
+    if !EXPONENT || tally.blocks < 2u {
         return false;
     }
     let growth = mean_growth();
-    return growth.x > growth.y * select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
+    return growth.x > errors * growth.y;
+}
+
+// Whether the motion lingers at some cycle and its growth may be that of leaving it.
+fn departs(errors: Real) -> bool {
+    // A lane that has just been sent on lingered.
+    var lingers = tally.known_lags == 0u;
+    for (var lag = 1u; lag <= tally.known_lags; lag++) {
+        trips += 1u;
+        lingers = lingers || last_distance_at(lag) >= NEAR;
+    }
+    let growth = mean_growth();
+    let periods = Real(tally.blocks * settings.exponent_block);
+    return lingers && (growth.x - errors * growth.y) * periods < DEPARTURE;
 }
 
 // The energy of the transient keeps the gap off the walls for good.
@@ -137,9 +166,10 @@ fn recurs() -> bool {
     let settled = judge_lag(found);
     tally.known_lags = tally.window;
     tallies[lane].last_distances = tallies[lane].distances;
-    // The next anchor lies at the same place of the cycle: only there do distances compare.
+    // The next anchor lies at the same place of the cycle: only there do distances compare. The
+    // points of a cycle may be so close that a shorter lag seems to recur.
     let lags = min(2u * tally.window, settings.max_period);
-    let cycle = max(select(closest_lag(), found, found > 0u), 1u);
+    let cycle = max(closest_lag(), 1u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
@@ -245,7 +275,7 @@ fn compare_mirror() {
 }
 
 // A cycle this close to its mirror image, relative to the motion, is symmetric.
-const MIRROR: Real = 0.001;
+const MIRROR: Real = 0.00025;
 
 // One flight ends on `side`: its symbol. The first flight of all comes from no wall.
 fn note_symbol(side: u32) {

@@ -38,8 +38,12 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 
 fn last_status() -> u32 {
-    if tally.status != STATUS_OK || tally.has_read == 0u || tally.stage != STAGE_DONE {
+    if tally.status != STATUS_OK || tally.stage != STAGE_DONE {
         return tally.status;
+    }
+    if tally.has_read == 0u {
+        let is_open = settings.max_period > 0u && tally.cycle == 0u && EXPONENT && tally.blocks > 1u;
+        return select(STATUS_OK, STATUS_SLOW, is_open && departs(CHAOS_ERRORS));
     }
     if tally.grazes > 0u {
         return STATUS_NEAR_GRAZING;

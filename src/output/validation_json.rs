@@ -224,6 +224,10 @@ fn meaning(explanation: Explanation) -> &'static str {
         Explanation::Unsettled => {
             "the cycle was read before the motion had settled on it; the reference reads the same there"
         }
+        Explanation::BelowResolution => {
+            "the reference's cycle has a multiple of the map's period, and is nearer to one of that period than \
+             lanes resolve"
+        }
         Explanation::NearGrazing => "an event grazes more nearly than the precision resolves",
     }
 }

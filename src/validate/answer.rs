@@ -83,7 +83,8 @@ pub struct Difference {
 /// precision. The bars are ten times or more of what is left on cycles that have settled.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bars {
-    /// Natural logarithm of the largest multiplier.
+    /// Natural logarithm of the largest multiplier, per forcing period and at least per five:
+    /// every period of a cycle adds its own error.
     multiplier: f64,
     /// Multipliers below this are rounding of the monodromy matrix: as good as zero.
     no_multiplier: f64,
@@ -96,8 +97,8 @@ pub(super) struct Bars {
 impl Bars {
     pub(super) fn new(precision: Precision, forcing_period: f64) -> Bars {
         let (multiplier, no_multiplier, mesh) = match precision {
-            Precision::F32 => (5e-2, 1e-2, 5e-5),
-            Precision::F64 => (5e-3, 1e-5, 5e-5),
+            Precision::F32 => (1e-2, 1e-2, 5e-5),
+            Precision::F64 => (1e-3, 1e-5, 5e-5),
         };
         Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period }
     }
@@ -192,7 +193,7 @@ impl Answer {
         if let (true, Some([theirs, _])) = (has(valid::LYAPUNOV), self.exponent) {
             let log = |exponent: f64| exponent * period * bars.forcing_period;
             let none = bars.no_multiplier.ln();
-            let same = (log(record.lyapunov) - log(theirs)).abs() <= bars.multiplier
+            let same = (log(record.lyapunov) - log(theirs)).abs() <= bars.multiplier * period.max(5.0)
                 || log(record.lyapunov).max(log(theirs)) <= none;
             list.push(compared(Field::Exponent, same, || {
                 (Value::Number(record.lyapunov), Value::Number(theirs))

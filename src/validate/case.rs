@@ -5,7 +5,7 @@ use super::answer::{Answer, Bars};
 use crate::flow::Flow;
 use crate::gpu::Precision;
 use crate::model::{GearPair, Law, State};
-use crate::orbit::{Budget, Measured, analyse_flow, measure};
+use crate::orbit::{Budget, Class, Measured, analyse_flow, measure};
 use crate::record::Record;
 use crate::reference::{Happening, Stop, Trajectory};
 use crate::stability::{StrobeMap, multipliers};
@@ -19,6 +19,9 @@ fn rounding(precision: Precision) -> f64 {
         Precision::F64 => 1e-12,
     }
 }
+
+/// States this close, relative to the motion, are the same to lanes (`MIRROR` in the shaders).
+pub(super) const LANE_RESOLUTION: f64 = 2.5e-4;
 
 /// A cell, its record, and the reference's answer within the same budget.
 pub(super) struct Case<'a> {
@@ -135,6 +138,20 @@ impl<'a> Case<'a> {
         [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
     }
 
+    /// Whether half a cycle takes a motion to its mirror image, as closely as lanes look.
+    fn looks_symmetric(&self, trajectory: &Trajectory<'_>, period: u32) -> bool {
+        let mut half = trajectory.clone();
+        let mut advance = || {
+            for _ in 0..period / 2 {
+                half.advance_period(&mut ())?;
+            }
+            half.advance_to(0.5 * self.flow.period, &mut ())
+        };
+        // Half an even number of periods is no half period.
+        let there = period % 2 == 1 && advance().is_ok();
+        there && self.apart(&trajectory.state(), &half.state().map(|x| -x)) < LANE_RESOLUTION
+    }
+
     /// What one cycle of `period` looks like from where a motion is, settled or not: read as
     /// lanes read it, without Newton.
     pub(super) fn read_as_is(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<Answer> {
@@ -153,7 +170,9 @@ impl<'a> Case<'a> {
         }
         let symbols: Vec<u8> = met.iter().filter_map(|happening| happening.symbol).collect();
         Some(Answer {
+            class: Class::Periodic { period },
             exponent: Some([(largest.ln() + image.log_scale) / span, 0.0]),
+            symmetric: self.flow.mirror_symmetric().then(|| self.looks_symmetric(trajectory, period)),
             impacts_per_period: Some((cycle.work().impacts - impacts) as f64 / f64::from(period)),
             mesh_fraction: Some((cycle.meshing_time() - meshing) / span),
             word: Some(Word::cyclic(&symbols)),

@@ -5,7 +5,7 @@
 //! share of cells that is allowed to be wrong.
 
 use super::answer::{Answer, Difference, Field};
-use super::case::Case;
+use super::case::{Case, LANE_RESOLUTION};
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
 use crate::model::State;
@@ -52,6 +52,9 @@ pub enum Explanation {
     /// The lane read its cycle before the motion had settled on it: the reference, read at
     /// the same place or on the record's strobe state without settling, gives the same.
     Unsettled,
+    /// The reference's cycle is within what lanes resolve (2.5e-4 of the motion) of one with the
+    /// record's period, a divisor of its own.
+    BelowResolution,
     /// An event is nearer to grazing than the precision resolves, where small errors become
     /// their square roots, and the motion does recur after the record's period.
     NearGrazing,
@@ -59,12 +62,13 @@ pub enum Explanation {
 
 impl Explanation {
     /// Every explanation, in the order in which they are told.
-    pub const ALL: [Explanation; 7] = [
+    pub const ALL: [Explanation; 8] = [
         Explanation::CoexistingAttractor,
         Explanation::Chaos,
         Explanation::Border,
         Explanation::NearGrazing,
         Explanation::UndecidedInBudget,
+        Explanation::BelowResolution,
         Explanation::Unsettled,
         Explanation::EngineCap,
     ];
@@ -78,6 +82,7 @@ impl Explanation {
             Explanation::Chaos => "chaos",
             Explanation::Border => "border",
             Explanation::Unsettled => "unsettled",
+            Explanation::BelowResolution => "below_resolution",
             Explanation::NearGrazing => "near_grazing",
         }
     }
@@ -103,8 +108,17 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 8] =
-        [engine_cap, longer, other_attractor, within_rounding, unsettled, late, bifurcation, grazing];
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 9] = [
+        engine_cap,
+        longer,
+        other_attractor,
+        within_rounding,
+        resolution,
+        unsettled,
+        late,
+        bifurcation,
+        grazing,
+    ];
     CHECKS.iter().find_map(|check| check(case))
 }
 
@@ -154,7 +168,16 @@ fn longer(case: &Case<'_>) -> Option<Explanation> {
 
 fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
     let from = strobe(case)?;
-    case.is_the_records(&case.at_leisure(from)).then_some(match classify(case.record) {
+    let answer = case.at_leisure(from);
+    // A cycle that is read before it has settled has averages of its own.
+    let read = || match classify(case.record) {
+        Class::Periodic { period } if answer.class == classify(case.record) => {
+            case.read_as_is(&case.after(from, 0).ok()?, period)
+        }
+        _ => None,
+    };
+    let same = case.is_the_records(&answer) || read().is_some_and(|answer| case.is_the_records(&answer));
+    same.then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
     })
@@ -179,6 +202,18 @@ fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     places.iter().flatten().any(read).then_some(Explanation::Unsettled)
 }
 
+/// Lanes do not tell the cycle from one of a shorter period.
+fn resolution(case: &Case<'_>) -> Option<Explanation> {
+    let (Class::Periodic { period }, Class::Periodic { period: theirs }) =
+        (classify(case.record), case.truth.class)
+    else {
+        return None;
+    };
+    let stands = case.after(strobe(case)?, 0).ok()?;
+    let divides = period < theirs && theirs.is_multiple_of(period);
+    (divides && case.unrest(&stands, period) < LANE_RESOLUTION).then_some(Explanation::BelowResolution)
+}
+
 /// The record has no period and the reference has one, or the other way round in chaos: the
 /// side that decided is right in the end, the other was still on its way.
 fn late(case: &Case<'_>) -> Option<Explanation> {
@@ -188,6 +223,10 @@ fn late(case: &Case<'_>) -> Option<Explanation> {
         (Class::Chaotic, Class::Periodic { period }) => {
             let wanders = case.unrest(&stands, period) > ELSEWHERE;
             (wanders && case.at_leisure(from).class == case.truth.class).then_some(Explanation::Chaos)
+        }
+        // The reference, too, is still on its way.
+        (Class::Undecided, Class::Periodic { .. }) if case.truth.status == Status::Slow => {
+            Some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Periodic { period }) => {
             let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;
