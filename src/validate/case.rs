@@ -93,7 +93,7 @@ impl<'a> Case<'a> {
     pub(super) fn nudged_start(&self, k: usize) -> State {
         let amount = rounding(self.precision) * if k < 4 { 1.0 } else { -1.0 };
         let reach = 0.5 * (self.flow.walls[0] - self.flow.walls[1]);
-        let unit = if k % 2 == 0 { reach } else { self.flow.omega * reach };
+        let unit = if k.is_multiple_of(2) { reach } else { self.flow.omega * reach };
         let mut start = self.start;
         start[k % 4] += amount * unit.max(start[k % 4].abs());
         start
