@@ -13,7 +13,7 @@ use crate::word::Word;
 
 /// Parameters and starts moved by this much, relatively, are the same within rounding of a
 /// lane. Some roundings of a precision: errors gather over the steps of a period.
-fn rounding(precision: Precision) -> f64 {
+pub(super) fn rounding(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 1e-6,
         Precision::F64 => 1e-12,
