@@ -77,11 +77,15 @@ fn grows(errors: Real) -> bool {
 
 // Whether the motion lingers at some cycle and its growth may be that of leaving it.
 fn departs(errors: Real) -> bool {
-    // A lane that has just been sent on lingered.
+    // A lane that has just been sent on lingered. A single lag comes near by chance, its
+    // multiples with it do not.
     var lingers = tally.known_lags == 0u;
-    for (var lag = 1u; lag <= tally.known_lags; lag++) {
-        trips += 1u;
-        lingers = lingers || last_distance_at(lag) >= NEAR;
+    for (var lag = 1u; 2u * lag <= tally.known_lags && !lingers; lag++) {
+        lingers = true;
+        for (var multiple = lag; multiple <= tally.known_lags && lingers; multiple += lag) {
+            trips += 1u;
+            lingers = last_distance_at(multiple) >= NEAR;
+        }
     }
     let growth = mean_growth();
     let periods = Real(tally.blocks * settings.exponent_block);

@@ -176,6 +176,9 @@ fn check_manifest(out: &Path, rows: &[Vec<String>]) {
     assert_eq!(manifest["scene"], SCENE);
     assert_eq!((&manifest["engine"], &manifest["precision"]), (&"cpu".into(), &"f64".into()));
     assert_eq!(manifest["cells"], 320);
+    let commit = manifest["commit"].as_str().unwrap();
+    let is_hash = commit.len() == 40 && commit.chars().all(|c| c.is_ascii_hexdigit());
+    assert!(is_hash || commit == "unknown", "{commit}");
     assert_eq!(manifest["codes"]["class"]["chaotic"], 1);
     assert_eq!(manifest["codes"]["status"]["slow"], 1);
     assert_eq!(manifest["codes"]["source"]["integrated"], 0);

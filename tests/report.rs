@@ -149,6 +149,29 @@ fn the_report_is_one_page_that_works() {
     assert_eq!(said["legend"], "largest Lyapunov exponent");
     assert!(said["colors"].as_u64().unwrap() > 20, "{said}");
     replay(said["command"].as_str().unwrap(), &row);
+    validated(browser, folder.path(), &out);
+}
+
+/// Once the map has been validated, the page says so and works as before.
+fn validated(browser: &str, folder: &Path, out: &Path) {
+    let validate = ["validate", "o", "--samples", "60", "--quiet"];
+    Cargo::cargo_bin("rattlemap").unwrap().current_dir(folder).args(validate).assert().success();
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert_eq!(page.matches("</script>").count(), 2, "the validation got out of its script");
+    let visited = out.join("visited.html");
+    let read = "said.validation = text(\"validation\"); said.verdict = text(\"verdict\"); const result";
+    fs::write(&visited, page.replace("</body>", &VISIT.replacen("const result", read, 1))).unwrap();
+    let said = visit(browser, &visited);
+    assert_eq!(said["verdict"], "60 cells replayed on the reference: all agree.");
+    let section = said["validation"].as_str().unwrap();
+    for part in [
+        "60 of 60 replayed cells agree with the reference; none differs.",
+        "at a border of classes",
+        "seed 1",
+    ] {
+        assert!(section.contains(part), "{part}: {section}");
+    }
+    assert_eq!((&said["stays"], &said["zoomed"]), (&"6, 8".into(), &true.into()));
 }
 
 /// The command that the page shows gives the cell's class and word.

@@ -50,6 +50,8 @@ struct Manifest<'a> {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
+    /// Of the program; `unknown` where it was built outside of its repository.
+    commit: &'static str,
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
@@ -136,6 +138,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, files: &[String]) -> serde_j
         format: FORMAT,
         command: "map",
         crate_version: env!("CARGO_PKG_VERSION"),
+        commit: env!("RATTLEMAP_COMMIT"),
         engine: run.engine,
         precision: run.precision,
         device: run.device,

@@ -222,7 +222,11 @@ fn meaning(explanation: Explanation) -> &'static str {
              bifurcation"
         }
         Explanation::Unsettled => {
-            "the cycle was read before the motion had settled on it; the reference reads the same there"
+            "the cycle was read before the motion had settled on it, or rounding keeps it from settling; the \
+             reference reads the same there"
+        }
+        Explanation::NearlySymmetric => {
+            "the cycle differs from its mirror image by less than 2.5e-4 of its size, all that lanes look for"
         }
         Explanation::BelowResolution => {
             "the reference's cycle has a multiple of the map's period, and is nearer to one of that period than \

@@ -13,7 +13,7 @@ use crate::word::Word;
 
 /// Parameters and starts moved by this much, relatively, are the same within rounding of a
 /// lane. Some roundings of a precision: errors gather over the steps of a period.
-fn rounding(precision: Precision) -> f64 {
+pub(super) fn rounding(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 1e-6,
         Precision::F64 => 1e-12,
@@ -73,17 +73,27 @@ impl<'a> Case<'a> {
         Answer::from(&analyse_flow(&self.flow, self.law, start, &self.budget.settings, 1))
     }
 
-    /// Answers within the budget for starts and parameters that are the same within rounding.
-    pub(super) fn nudged(&self) -> impl Iterator<Item = Answer> + '_ {
+    /// The pair with one parameter moved to either side within rounding.
+    pub(super) fn nudged_pairs(&self) -> impl Iterator<Item = GearPair> + '_ {
         let amount = rounding(self.precision);
-        let parameters = GearPair::PARAMETERS.iter().flat_map(move |parameter| {
+        // Leaving speeds carry the rounding of the whole motion's velocity.
+        let speed = self.units(&self.record.strobe)[1] / self.law.mesh_speed.max(f64::MIN_POSITIVE);
+        GearPair::PARAMETERS.iter().flat_map(move |parameter| {
+            let amount = if parameter.name == "mesh_speed" { amount * speed.clamp(1.0, 1e4) } else { amount };
             [amount, -amount].into_iter().filter_map(move |relative| {
                 let mut pair = self.pair;
                 let value = pair.get(parameter.name).ok()?;
                 pair.set(parameter.name, value * (1.0 + relative)).ok()?;
-                let flow = Box::new(Flow::new(&pair.oscillator().ok()?));
-                Some(Answer::from(&measure(&flow, pair.law(), self.start, &self.budget)))
+                Some(pair)
             })
+        })
+    }
+
+    /// Answers within the budget for starts and parameters that are the same within rounding.
+    pub(super) fn nudged(&self) -> impl Iterator<Item = Answer> + '_ {
+        let parameters = self.nudged_pairs().filter_map(|pair| {
+            let flow = Box::new(Flow::new(&pair.oscillator().ok()?));
+            Some(Answer::from(&measure(&flow, pair.law(), self.start, &self.budget)))
         });
         let starts = (0..8).map(move |k| {
             let start = self.nudged_start(k);
@@ -138,20 +148,6 @@ impl<'a> Case<'a> {
         [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
     }
 
-    /// Whether half a cycle takes a motion to its mirror image, as closely as lanes look.
-    fn looks_symmetric(&self, trajectory: &Trajectory<'_>, period: u32) -> bool {
-        let mut half = trajectory.clone();
-        let mut advance = || {
-            for _ in 0..period / 2 {
-                half.advance_period(&mut ())?;
-            }
-            half.advance_to(0.5 * self.flow.period, &mut ())
-        };
-        // Half an even number of periods is no half period.
-        let there = period % 2 == 1 && advance().is_ok();
-        there && self.apart(&trajectory.state(), &half.state().map(|x| -x)) < LANE_RESOLUTION
-    }
-
     /// What one cycle of `period` looks like from where a motion is, settled or not: read as
     /// lanes read it, without Newton.
     pub(super) fn read_as_is(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<Answer> {
@@ -172,7 +168,6 @@ impl<'a> Case<'a> {
         Some(Answer {
             class: Class::Periodic { period },
             exponent: Some([(largest.ln() + image.log_scale) / span, 0.0]),
-            symmetric: self.flow.mirror_symmetric().then(|| self.looks_symmetric(trajectory, period)),
             impacts_per_period: Some((cycle.work().impacts - impacts) as f64 / f64::from(period)),
             mesh_fraction: Some((cycle.meshing_time() - meshing) / span),
             word: Some(Word::cyclic(&symbols)),

@@ -5,13 +5,14 @@
 //! share of cells that is allowed to be wrong.
 
 use super::answer::{Answer, Difference, Field};
-use super::case::{Case, LANE_RESOLUTION};
+use super::case::{Case, LANE_RESOLUTION, rounding};
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
 use crate::model::State;
-use crate::orbit::{Class, Status};
+use crate::orbit::{Class, Status, analyse};
 use crate::record::valid;
 use crate::reference::Trajectory;
+use crate::stability::{StrobeMap, multipliers};
 
 /// Exponents of a cycle below this per forcing period are those of a bifurcation: motion
 /// settles in hundreds of periods.
@@ -25,6 +26,12 @@ const UNSETTLED: f64 = 1e-4;
 
 /// Periods that lanes take to confirm a period: three windows of the longest they look for.
 const CONFIRMATION_WINDOWS: u32 = 3;
+
+/// Multipliers below this belong to a cycle that is about to double its period.
+const NEAR_FLIP: f64 = -0.9;
+
+/// Periods in which a confirmed cycle is reached well enough to see its symmetry.
+const SETTLING_PERIODS: u32 = 400;
 
 /// Share of a state error that rounding at the start must make on the reference itself.
 const SENSITIVE: f64 = 0.1;
@@ -47,14 +54,20 @@ pub enum Explanation {
     Chaos,
     /// The reference gives the record's answer when the start or a parameter moves within the
     /// rounding of the precision; or the largest multiplier is within 1 % of one per period, a
-    /// bifurcation, and the motion does recur after the record's period.
+    /// bifurcation, and the motion does recur after the record's period; or the multiplier is
+    /// below -0.9, and rounding, which the cycle amplifies, keeps the lane alternating about it
+    /// with twice its period.
     Border,
-    /// The lane read its cycle before the motion had settled on it: the reference, read at
-    /// the same place or on the record's strobe state without settling, gives the same.
+    /// The lane read its cycle before the motion had settled on it, or rounding keeps it from
+    /// settling: the reference, read at the same place, on the record's strobe state, or as far
+    /// from it as a cycle takes it, gives the same.
     Unsettled,
     /// The reference's cycle is within what lanes resolve (2.5e-4 of the motion) of one with the
     /// record's period, a divisor of its own.
     BelowResolution,
+    /// Lanes call a cycle symmetric that is its own mirror image to 2.5e-4 of its size; this one
+    /// is, but not quite.
+    NearlySymmetric,
     /// An event is nearer to grazing than the precision resolves, where small errors become
     /// their square roots, and the motion does recur after the record's period.
     NearGrazing,
@@ -62,7 +75,7 @@ pub enum Explanation {
 
 impl Explanation {
     /// Every explanation, in the order in which they are told.
-    pub const ALL: [Explanation; 8] = [
+    pub const ALL: [Explanation; 9] = [
         Explanation::CoexistingAttractor,
         Explanation::Chaos,
         Explanation::Border,
@@ -70,6 +83,7 @@ impl Explanation {
         Explanation::UndecidedInBudget,
         Explanation::BelowResolution,
         Explanation::Unsettled,
+        Explanation::NearlySymmetric,
         Explanation::EngineCap,
     ];
 
@@ -84,6 +98,7 @@ impl Explanation {
             Explanation::Unsettled => "unsettled",
             Explanation::BelowResolution => "below_resolution",
             Explanation::NearGrazing => "near_grazing",
+            Explanation::NearlySymmetric => "nearly_symmetric",
         }
     }
 }
@@ -108,15 +123,17 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 9] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 11] = [
         engine_cap,
         longer,
         other_attractor,
         within_rounding,
         resolution,
         unsettled,
+        nearly_symmetric,
         late,
         bifurcation,
+        flip,
         grazing,
     ];
     CHECKS.iter().find_map(|check| check(case))
@@ -176,7 +193,9 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         }
         _ => None,
     };
-    let same = case.is_the_records(&answer) || read().is_some_and(|answer| case.is_the_records(&answer));
+    let same = case.is_the_records(&answer)
+        || read().is_some_and(|answer| case.is_the_records(&answer))
+        || rounding_hides_it(case, from, &answer);
     same.then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
@@ -199,7 +218,63 @@ fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     let places = [case.after(case.start, before).ok(), case.after(strobe(case)?, 0).ok()];
     let same = |answer: Answer| case.is_the_records(&answer);
     let read = |place: &Trajectory<'_>| case.read_as_is(place, period).is_some_and(same);
-    places.iter().flatten().any(read).then_some(Explanation::Unsettled)
+    let as_is = places.iter().flatten().any(read);
+    (as_is || unrest_hides_it(case, period)?).then_some(Explanation::Unsettled)
+}
+
+/// Whether the exponent is within what the reference reads about the record's strobe state, as
+/// far from it as one cycle takes the motion; all other fields must be as they are.
+fn unrest_hides_it(case: &Case<'_>, period: u32) -> Option<bool> {
+    let from = strobe(case)?;
+    let stands = case.after(from, 0).ok()?;
+    let unrest = case.unrest(&stands, period);
+    let units = case.units(&from);
+    let read = |k: usize| {
+        let mut state = from;
+        state[k % 4] += units[k % 2] * if k < 4 { unrest } else { -unrest };
+        case.read_as_is(&stands.at(state, []), period)?.exponent.map(|[exponent, _]| exponent)
+    };
+    let exponents: Vec<f64> = (0..8).filter_map(read).collect();
+    let low = exponents.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = exponents.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let read = Answer { exponent: Some([case.record.lyapunov, 0.0]), ..case.truth.clone() };
+    let hidden = unrest < ELSEWHERE && (low..=high).contains(&case.record.lyapunov);
+    Some(hidden && case.is_the_records(&read))
+}
+
+/// Whether an answer is the record's but for the exponent, and rounding of the parameters moves
+/// the exponent of the same cycle to either side of the record's.
+fn rounding_hides_it(case: &Case<'_>, from: State, answer: &Answer) -> bool {
+    let read = Answer { exponent: Some([case.record.lyapunov, 0.0]), ..answer.clone() };
+    if !matches!(answer.class, Class::Periodic { .. }) || !case.is_the_records(&read) {
+        return false;
+    }
+    let same = |other: Answer| (other.class == answer.class && other.word == answer.word).then_some(other);
+    let exponents: Vec<f64> = case
+        .nudged_pairs()
+        .filter_map(|pair| same(Answer::from(&analyse(&pair, from, &case.budget.settings))))
+        .filter_map(|other| other.exponent.map(|[exponent, _]| exponent))
+        .collect();
+    let below = exponents.iter().any(|&exponent| exponent <= case.record.lyapunov);
+    below && exponents.iter().any(|&exponent| exponent >= case.record.lyapunov)
+}
+
+/// The reference's cycle differs from its mirror image by less than lanes look for.
+fn nearly_symmetric(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = case.truth.class else { return None };
+    let claimed = Answer { symmetric: Some(case.record.symmetric != 0), ..case.truth.clone() };
+    let says_symmetric = case.is_lane && case.record.symmetric != 0;
+    if period.is_multiple_of(2) || !says_symmetric || !case.is_the_records(&claimed) {
+        return None;
+    }
+    let settled = case.after(case.start, case.measured.periods_run + SETTLING_PERIODS).ok()?;
+    let mut opposite = settled.clone();
+    for _ in 0..period / 2 {
+        opposite.advance_period(&mut ()).ok()?;
+    }
+    opposite.advance_to(0.5 * case.flow.period, &mut ()).ok()?;
+    let apart = case.apart(&settled.state(), &opposite.state().map(|x| -x));
+    (apart < LANE_RESOLUTION).then_some(Explanation::NearlySymmetric)
 }
 
 /// Lanes do not tell the cycle from one of a shorter period.
@@ -247,6 +322,27 @@ fn late(case: &Case<'_>) -> Option<Explanation> {
 fn bifurcation(case: &Case<'_>) -> Option<Explanation> {
     let [exponent, _] = case.truth.exponent?;
     (exponent.abs() * case.flow.period < NEAR_BIFURCATION && recurs(case)?).then_some(Explanation::Border)
+}
+
+/// A flip is near, and rounding, amplified by the cycle, is as large as the alternation.
+fn flip(case: &Case<'_>) -> Option<Explanation> {
+    let (Class::Periodic { period: ours }, Class::Periodic { period }) =
+        (classify(case.record), case.truth.class)
+    else {
+        return None;
+    };
+    if ours != 2 * period || !case.is_lane {
+        return None;
+    }
+    let from = strobe(case)?;
+    let stands = case.after(from, 0).ok()?;
+    let image = StrobeMap::Periods(period).apply(&stands, from).ok()?;
+    let [re, im] = *multipliers(&image.derivative())?.first()?;
+    let gain = image.derivative().singular_values().max() / (1.0 + re);
+    let flips = im == 0.0 && re > -1.0 && re < NEAR_FLIP;
+    let alternates = case.unrest(&stands, period) <= rounding(case.precision) * gain;
+    let settles = case.at_leisure(from).class == case.truth.class;
+    (flips && alternates && settles).then_some(Explanation::Border)
 }
 
 fn grazing(case: &Case<'_>) -> Option<Explanation> {

@@ -383,7 +383,7 @@ const FIELDS = { class: "class", period: "period", word: "word, up to mirror ima
   lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing",
   state: "state, within the error budget" };
 
-function stateText({ check, ...states }) {
+function stateText({ check, ...states }, samples) {
   if (check === "skipped") return `States were not compared: ${states.reason}.`;
   if (check === "replay") {
     return "The map was made by the reference itself, so this replay shows that the records are what they were, "
@@ -394,7 +394,8 @@ function stateText({ check, ...states }) {
   return `The lanes were run again over ${states.horizon_periods} forcing periods and their states compared with the `
     + "reference's. The budget is what rounding may amount to by an estimate made beforehand, from the precision, the "
     + `number of steps and the growth of small errors along the motion: ${states.above_budget} of `
-    + `${count(states.cells, "cell")} are above it.`;
+    + `${count(states.cells, "cell")} are above it`
+    + (states.cells < samples ? `; in the other ${samples - states.cells} the budget is as large as the motion, or the cell failed.` : ".");
 }
 
 function explained(found) {
@@ -426,6 +427,11 @@ function tellValidation(found) {
       + (found.mismatched === 0 ? "none differs." : `${count(found.mismatched, "differs", "differ")}, each for a reason that a check has shown.`)
     : `${found.unexplained} of ${count(found.samples, "replayed cell")} differ from the reference and no check shows why: `
       + "do not trust the map there.";
+  byId("validated").hidden = false;
+  byId("verdict").textContent = found.unexplained === 0
+    ? `${count(found.samples, "cell")} replayed on the reference: ${found.mismatched === 0 ? "all agree" : `${found.mismatched} differ, all explained`}.`
+    : `${found.unexplained} of ${count(found.samples, "replayed cell")} differ without an explanation.`;
+  byId("details").addEventListener("click", () => section.scrollIntoView({ behavior: "smooth" }));
   const tables = element("div");
   tables.id = "tables";
   tables.append(
@@ -451,7 +457,7 @@ function tellValidation(found) {
     element("p", `A sample of ${found.samples} of ${found.cells} cells (seed ${found.seed}), made by the engine `
       + `${found.engine} in ${found.precision} on ${found.device}, was computed again by the event-driven reference `
       + "within the same number of periods."),
-    element("p", stateText(found.states)), tables);
+    element("p", stateText(found.states, found.samples)), tables);
   if (found.mismatches.length) section.append(explained(found));
 }
 
