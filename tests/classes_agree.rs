@@ -31,16 +31,20 @@ fn class(record: &Record) -> Class {
     }
 }
 
-/// A map of the plane by lanes, every cell replayed on the reference: no mismatch without an
-/// explanation, and those with one are few.
-fn check_plane(side: usize, precision: Precision) {
-    let axis = |name, min, max| {
-        format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = {side}\n")
+/// An axis: parameter, ends, count.
+type Axis<'a> = (&'a str, [f64; 2], usize);
+
+/// A map by lanes, every cell replayed on the reference: no mismatch without an explanation,
+/// and at most one cell of a hundred with one.
+fn check_map(axes: [Axis<'_>; 2], sets: &[&str], precision: Precision) {
+    let axis = |(name, [min, max], count): Axis<'_>| {
+        format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = {count}\n")
     };
     let everything =
         "[outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n";
-    let text = axis("e", 0.0, 1.0) + &axis("omega", 1.0, 12.0) + everything;
-    let plan = Plan::new(&Scene::parse(&text, "plane", &[], Purpose::Map).unwrap());
+    let text = axes.map(axis).concat() + everything;
+    let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+    let plan = Plan::new(&Scene::parse(&text, "plane", &sets, Purpose::Map).unwrap());
     let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
     let mut engine = Engine::Gpu(Box::new(engine::Gpu::new(&plan, device).unwrap()));
     let batch = Schedule::new(&plan).batch(&plan, 0, plan.cell_count());
@@ -61,21 +65,39 @@ fn check_plane(side: usize, precision: Precision) {
     }
     assert_eq!(validation.unexplained(), 0, "{precision:?}");
     let (mismatches, cells) = (validation.mismatches.len(), plan.cell_count());
-    assert!(mismatches * 100 < cells, "{precision:?}: {mismatches} mismatches of {cells} cells are too many");
+    assert!(
+        mismatches * 100 <= cells,
+        "{precision:?}: {mismatches} mismatches of {cells} cells are too many"
+    );
     let symmetries = records.iter().filter(|record| record.valid & valid::SYMMETRIC != 0).count();
     assert!(symmetries * 10 > 8 * cells, "{precision:?}: symmetry known of {symmetries} cells only");
 }
 
+/// Restitution against frequency.
+fn plane(side: usize) -> [Axis<'static>; 2] {
+    [("e", [0.0, 1.0], side), ("omega", [1.0, 12.0], side)]
+}
+
 #[test]
 fn the_plane_is_classified_as_the_reference_does() {
-    Precision::ALL.into_iter().for_each(|precision| check_plane(48, precision));
+    Precision::ALL.into_iter().for_each(|precision| check_map(plane(48), &[], precision));
 }
 
 /// The same with 16,384 cells.
 #[test]
 #[ignore = "takes a minute"]
 fn the_whole_plane_is_classified_as_the_reference_does() {
-    Precision::ALL.into_iter().for_each(|precision| check_plane(128, precision));
+    Precision::ALL.into_iter().for_each(|precision| check_map(plane(128), &[], precision));
+}
+
+/// Any two parameters: flows of their own for every cell, laws of their own, or both shared.
+#[test]
+fn other_planes_are_classified_as_the_reference_does() {
+    for precision in Precision::ALL {
+        check_map([("k", [300.0, 3000.0], 20), ("omega", [2.0, 9.0], 20)], &["e=0.4"], precision);
+        check_map([("mesh_speed", [0.0, 0.05], 20), ("e", [0.05, 0.5], 20)], &["omega=3"], precision);
+        check_map([("b", [0.2, 0.8], 20), ("F", [20.0, 80.0], 20)], &["e=0.3"], precision);
+    }
 }
 
 /// Every row of the independent program's table.
