@@ -72,10 +72,19 @@ pub(super) fn subtitle(scene: &Scene) -> String {
         Start::State([x1, v1, x2, v2]) => format!("from ({x1}, {v1}, {x2}, {v2})"),
         Start::Up | Start::Down => "following the attractor".to_owned(),
     };
-    let settings = scene.orbit_settings();
-    let upper = if scene.integration().early_stop { "at most " } else { "" };
-    let (transient, observed) = (settings.transient_periods, settings.observed_periods);
-    format!("every cell {start}, {upper}{transient} + {observed} forcing periods")
+    let integration = scene.integration();
+    let (transient, observed) = (integration.transient_periods, integration.observed_periods);
+    let upper = if integration.early_stop { "at most " } else { "" };
+    let more = match integration.undecided_periods {
+        more if more > 0 && integration.early_stop => format!(", undecided cells up to {more} more"),
+        _ => String::new(),
+    };
+    // What was not integrated must not look as if it had been.
+    let filled = match scene.refine() {
+        Some(_) => "; refined at borders, the rest filled and audited",
+        None => "",
+    };
+    format!("every cell {start}, {upper}{transient} + {observed} forcing periods{more}{filled}")
 }
 
 /// An axis on which cells lie at their values: it reaches half a cell further.
