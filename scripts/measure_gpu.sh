@@ -27,10 +27,14 @@ square() { printf -- '--set axis.0.count=%s --set axis.1.count=%s' "$1" "$1"; }
 
 "$binary" devices | tee "$out/devices.txt"
 
+precisions=()
 for precision in f32 f64; do
+    grep -q "precision .*$precision" <(grep -A3 '^gpu:' "$out/devices.txt") || continue
+    precisions+=("$precision")
     # shellcheck disable=SC2046 # the words of square are meant to be split
     "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/right" --force $(square 128)
-    "$binary" validate "$work/right" --samples 2000
+    # What it finds is a finding; the machine is there to be measured all the same.
+    "$binary" validate "$work/right" --samples 2000 || echo "validate: $precision has unexplained cells" >>"$out/failed"
     cp "$work/right/validation.json" "$out/validation_$precision.json"
 done
 
@@ -50,7 +54,7 @@ timed() {
 }
 
 echo "what,precision,run,cells,integration_s,cells_per_s,lane_periods_per_s,ns_per_lane_step,outputs_s" >"$out/speed.csv"
-for precision in f32 f64; do
+for precision in "${precisions[@]}"; do
     timed brute_force "$precision" --set integration.early_stop=false
     timed early_stop "$precision"
     timed period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
@@ -73,3 +77,4 @@ done
     sed 's/^/    /' "$out/devices.txt"
 } >"$out/summary.md"
 cat "$out/summary.md"
+[[ ! -e "$out/failed" ]] || { cat "$out/failed" >&2; exit 1; }

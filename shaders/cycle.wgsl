@@ -6,7 +6,7 @@
 const SQUARINGS: u32 = 40u;
 
 // A lane has settled once it is this close to its cycle, relative to the motion.
-const ON_CYCLE: f32 = 5e-4;
+const ON_CYCLE: f32 = 1e-4;
 
 // The binary logarithm of a number near 1e-30 to 1e30, to the precision of its type: f64 has no
 // logarithm of its own. `ln m = 2 artanh((m - 1) / (m + 1))`, m within a factor of sqrt 2 of 1.
@@ -51,7 +51,8 @@ fn spectral_growth() -> Real {
 }
 
 // Without exponents recurrence alone must do. A lane that has read a cycle which does not
-// attract goes on while it has periods left: chaos lingers at such cycles.
+// attract, or which it has not come close to as its multiplier tells now, goes on while it has
+// periods left: chaos lingers at unstable cycles, and where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
     if !EXPONENT {
@@ -59,9 +60,10 @@ fn judge_cycle() {
         return;
     }
     motion.cycle_growth = spectral_growth();
-    if motion.cycle_growth < 0.0 {
+    let is_last = tally.period >= settings.longest;
+    if motion.cycle_growth < 0.0 && (is_last || is_on_cycle()) {
         tally.cycle = tally.candidate;
-    } else if tally.period < settings.periods {
+    } else if !is_last {
         search_on();
     }
 }
@@ -81,9 +83,18 @@ fn search_on() {
 }
 
 // Whether the lane has come so near to its cycle that its symmetry shows.
-fn is_on_cycle() -> bool {
+fn is_near_cycle() -> bool {
     // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
     let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
-    let distance = exp2(-f32(last_distance_at(max(tally.candidate, 1u))) / OCTAVE);
-    return tally.settled != 0u && distance < ON_CYCLE * (1.0 - mu);
+    return tally.settled != 0u && exp2(-f32(octaves_apart()) / OCTAVE) < ON_CYCLE * (1.0 - mu);
+}
+
+// Near, or as near as rounding lets it.
+fn is_on_cycle() -> bool {
+    return is_near_cycle() || (tally.settled != 0u && octaves_apart() >= AT_REST);
+}
+
+// How far the last cycle took the lane, in quarter octaves below 1.
+fn octaves_apart() -> u32 {
+    return last_distance_at(max(tally.candidate, 1u));
 }

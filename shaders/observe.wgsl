@@ -38,7 +38,7 @@ fn begin_period() {
     let read_by = tally.period + tally.candidate;
     let is_last = read_by == settings.periods || read_by == settings.longest;
     // What contracts by chance in the midst of growth has not settled.
-    let is_due = is_last && tally.streak >= STREAK && (tally.settled == 1u || !grows(CHAOS_ERRORS));
+    let is_due = is_last && tally.streak >= STREAK && (tally.settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
     if read_by <= settings.longest && (is_due || (decided && early)) {
         begin_reading();
@@ -52,6 +52,8 @@ fn begin_period() {
 // Standard errors by which the exponent must exceed zero: at half the budget, and after it.
 const EARLY_CHAOS_ERRORS: Real = 6.0;
 const CHAOS_ERRORS: Real = 3.0;
+// And those that cast doubt on a cycle that has not settled.
+const DOUBT: Real = 1.0;
 
 // Growth of a tangent vector, natural logarithms, that no departure from an unstable cycle can
 // have lasted through: beyond the ratio of the largest to the smallest distance.

@@ -10,5 +10,7 @@ const SHORTEST: Real = 0.001;
 const HUGE: Real = 1e15;
 // Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
 const RESOLVED: u32 = 60u;
+// And these are rounding itself: a motion this near to its last strobes is at rest.
+const AT_REST: u32 = 70u;
 // Events this close to phase 0, in turns, lie on it.
 const ON_STROBE: Real = 1e-6;

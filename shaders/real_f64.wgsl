@@ -10,5 +10,7 @@ const SHORTEST: Real = 1e-8;
 const HUGE: Real = 1e150;
 // Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
 const RESOLVED: u32 = 160u;
+// And these are rounding itself: a motion this near to its last strobes is at rest.
+const AT_REST: u32 = RESOLVED;
 // Events this close to phase 0, in turns, lie on it.
 const ON_STROBE: Real = 1e-9;

@@ -41,7 +41,7 @@ fn last_status() -> u32 {
     if tally.status != STATUS_OK || tally.stage != STAGE_DONE {
         return tally.status;
     }
-    if tally.has_read == 0u {
+    if tally.has_read == 0u || tally.cycle == 0u {
         let is_open = settings.max_period > 0u && tally.cycle == 0u && EXPONENT && tally.blocks > 1u;
         return select(STATUS_OK, STATUS_SLOW, is_open && departs(CHAOS_ERRORS));
     }
@@ -51,7 +51,7 @@ fn last_status() -> u32 {
     if tally.on_strobe > 0u {
         return STATUS_STROBE_ON_EVENT;
     }
-    return select(STATUS_SLOW, STATUS_OK, is_on_cycle());
+    return select(STATUS_SLOW, STATUS_OK, is_near_cycle());
 }
 
 fn mesh_fraction(periods: u32) -> Real {
@@ -66,7 +66,7 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     // Contact-free motion has not been read. On a slow approach a lost symmetry cannot be told
     // from one not reached yet.
     let is_quiet = tally.has_read == 0u;
-    if shapes[cell.flow_index].mirror == 1u && (is_quiet || is_on_cycle()) {
+    if shapes[cell.flow_index].mirror == 1u && (is_quiet || is_near_cycle()) {
         (*finding).valid |= VALID_SYMMETRIC;
         (*finding).symmetric = select(tally.symmetric, 1u, is_quiet);
     }

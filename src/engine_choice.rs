@@ -13,8 +13,12 @@ use crate::error::Failure;
 /// How long engines are tried that cannot be told apart otherwise.
 const TRIAL: Duration = Duration::from_millis(200);
 
-/// Cells of one batch of a trial.
+/// Cells of one batch of a trial, and forcing periods that each may take.
 const TRIAL_CELLS: usize = 128;
+const TRIAL_PERIODS: u32 = 64;
+
+/// Smaller maps than this are done before a trial would be.
+const WORTH_A_TRIAL: usize = 4096;
 
 /// An engine, and why it was taken.
 pub(crate) struct Chosen<'p> {
@@ -47,58 +51,62 @@ pub(crate) fn open<'p>(plan: &'p Plan, asked: &EngineOptions) -> Result<Chosen<'
 }
 
 fn open_gpu(plan: &Plan, precision: Precision) -> Result<Engine<'_>, Failure> {
-    let device = pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::from_environment()))
-        .map_err(|error| Failure::Usage(error.into()))?;
-    let engine = Gpu::new(plan, device).map_err(|error| Failure::Run(error.into()))?;
+    let engine = Gpu::new(plan, open_device(precision)?).map_err(|error| Failure::Run(error.into()))?;
     Ok(Engine::Gpu(Box::new(engine)))
+}
+
+fn open_device(precision: Precision) -> Result<gpu::Gpu, Failure> {
+    pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::from_environment()))
+        .map_err(|error| Failure::Usage(error.into()))
 }
 
 fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, Failure> {
     let wanted = precision.unwrap_or(Precision::F32);
+    let choice = AdapterChoice::from_environment();
     let adapters = pollster::block_on(gpu::adapters());
-    let best = adapters.iter().find(|adapter| adapter.precisions.contains(&wanted));
-    if precision == Some(Precision::F32) || best.is_some_and(is_hardware) {
-        let only = if best.is_some_and(is_hardware) { "a hardware GPU" } else { "the CPU engine has no f32" };
-        return match open_gpu(plan, wanted) {
-            Ok(engine) => Ok(Chosen { why: only.to_owned(), engine }),
-            // The reference needs no driver.
-            Err(failure) if precision != Some(Precision::F32) => {
-                Ok(Chosen { engine: Engine::Cpu(Cpu::new(plan)), why: failure.to_string() })
-            }
-            Err(failure) => Err(failure),
-        };
+    let fits =
+        |adapter: &&AdapterReport| choice.allows(&adapter.info) && adapter.precisions.contains(&wanted);
+    let best = adapters.iter().find(fits);
+    if choice.name.is_some() && best.is_none() || precision == Some(Precision::F32) {
+        let why = "the CPU engine has no f32".to_owned();
+        return open_gpu(plan, wanted).map(|engine| Chosen { engine, why });
     }
-    let cpu = Engine::Cpu(Cpu::new(plan));
-    if best.is_none() {
-        let why = format!("no graphics adapter with {}", wanted.name());
-        return Ok(Chosen { engine: cpu, why });
-    }
-    match open_gpu(plan, wanted) {
-        Ok(gpu) => faster(plan, cpu, gpu),
-        Err(failure) => Ok(Chosen { engine: cpu, why: failure.to_string() }),
+    let cpu = |why| Chosen { engine: Engine::Cpu(Cpu::new(plan)), why };
+    match best {
+        None => Ok(cpu(format!("no graphics adapter with {}", wanted.name()))),
+        // The reference needs no driver.
+        Some(best) if gpu::is_hardware(&best.info) => Ok(open_gpu(plan, wanted).map_or_else(
+            |failure| cpu(failure.to_string()),
+            |engine| Chosen { engine, why: "a hardware GPU".to_owned() },
+        )),
+        Some(_) if plan.cell_count() < WORTH_A_TRIAL => {
+            Ok(cpu("a small map, and no hardware GPU".to_owned()))
+        }
+        Some(_) => Ok(faster(plan, wanted).unwrap_or_else(|failure| cpu(failure.to_string()))),
     }
 }
 
-fn is_hardware(adapter: &AdapterReport) -> bool {
-    gpu::is_hardware(&adapter.info)
-}
-
-/// The faster of two engines on the same cells.
-fn faster<'p>(plan: &'p Plan, cpu: Engine<'p>, gpu: Engine<'p>) -> Result<Chosen<'p>, Failure> {
-    let mut tried = Vec::new();
-    for mut engine in [cpu, gpu] {
-        let rate = rate(plan, &mut engine).map_err(|error| Failure::Run(error.into()))?;
-        tried.push((rate, engine));
-    }
-    let says = |(rate, engine): &(f64, Engine<'_>)| {
-        format!("{rate:.0} cells/s on {} ({})", engine.name(), engine.precision())
+/// The faster of the CPU and a software GPU on the same cells, for a few periods each.
+fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, Failure> {
+    let brief = plan.brief(TRIAL_PERIODS);
+    let device = open_device(precision)?;
+    let failed = |error: EngineError| Failure::Run(error.into());
+    let on_cpu = rate(&brief, &mut Engine::Cpu(Cpu::new(&brief))).map_err(failed)?;
+    let mut lanes = Engine::Gpu(Box::new(Gpu::new(&brief, device).map_err(failed)?));
+    // The first batch compiles the shader.
+    pollster::block_on(lanes.run(&spread(&brief, 0, 1))).map_err(failed)?;
+    let on_gpu = rate(&brief, &mut lanes).map_err(failed)?;
+    let name = precision.name();
+    let why = format!(
+        "on trial {on_cpu:.0} cells/s on cpu (f64), {on_gpu:.0} cells/s on gpu ({name}), {TRIAL_PERIODS} periods each"
+    );
+    let engine = match lanes {
+        Engine::Gpu(lanes) if on_gpu > on_cpu => {
+            Engine::Gpu(Box::new(Gpu::new(plan, lanes.into_device()).map_err(failed)?))
+        }
+        _ => Engine::Cpu(Cpu::new(plan)),
     };
-    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let why = format!("on trial {}", tried.iter().map(says).collect::<Vec<_>>().join(", "));
-    match tried.into_iter().next() {
-        Some((_, engine)) => Ok(Chosen { engine, why }),
-        None => unreachable!("two were tried"),
-    }
+    Ok(Chosen { engine, why })
 }
 
 /// Cells per second on cells spread over the plan.
@@ -106,17 +114,16 @@ fn rate(plan: &Plan, engine: &mut Engine<'_>) -> Result<f64, EngineError> {
     let clock = Instant::now();
     let mut cells = 0;
     while clock.elapsed() < TRIAL {
-        pollster::block_on(engine.run(&spread(plan, cells)))?;
+        pollster::block_on(engine.run(&spread(plan, cells, TRIAL_CELLS)))?;
         cells += TRIAL_CELLS;
     }
     Ok(cells as f64 / clock.elapsed().as_secs_f64())
 }
 
 /// Cells at places far from each other.
-fn spread(plan: &Plan, from: usize) -> Batch {
+fn spread(plan: &Plan, from: usize, cells: usize) -> Batch {
     let count = plan.cell_count() as u64;
     // An odd multiplier near the golden section of 2^32 scatters consecutive numbers.
     let id = |n: usize| plan.order()[(((n as u64 * 2_654_435_761) % (1 << 32) * count) >> 32) as usize];
-    let cells = (from..from + TRIAL_CELLS).map(|n| plan.cell(id(n))).collect();
-    Batch { places: 0..TRIAL_CELLS, cells }
+    Batch { places: 0..cells, cells: (from..from + cells).map(|n| plan.cell(id(n))).collect() }
 }

@@ -23,7 +23,7 @@ mod unroll;
 
 use std::collections::HashMap;
 
-pub use constants::{Constants, STEP_ANGLE};
+pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
 pub use device::{AdapterChoice, AdapterReport, adapters, describe, is_hardware};
 pub use shader::{Precision, Variant, WORKGROUP};
 pub use tables::Tables;
@@ -176,7 +176,7 @@ impl Default for LaneSettings {
             batch: None,
             trips: 4000,
             workgroup: WORKGROUP,
-            passes_per_period: 20_000,
+            passes_per_period: MOST_STEPS,
             events_per_period: 10_000,
         }
     }

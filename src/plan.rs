@@ -104,6 +104,18 @@ impl Plan {
         }
     }
 
+    /// The same cells with at most `periods` forcing periods each, half of them observed: for
+    /// trials.
+    pub fn brief(&self, periods: u32) -> Plan {
+        let mut brief = self.clone();
+        let settings = &mut brief.budget.settings;
+        settings.transient_periods = settings.transient_periods.min(periods / 2);
+        settings.observed_periods = settings.observed_periods.min(periods / 2);
+        settings.max_period = settings.max_period.min(settings.observed_periods / 2);
+        brief.budget.undecided_periods = 0;
+        brief
+    }
+
     /// The two axes.
     pub fn axes(&self) -> &[Axis; 2] {
         &self.axes

@@ -35,14 +35,16 @@ fn class(record: &Record) -> Class {
 type Axis<'a> = (&'a str, [f64; 2], usize);
 
 /// A map by lanes, every cell replayed on the reference: no mismatch without an explanation,
-/// and at most one cell of a hundred with one.
+/// and less than one cell of a hundred with one.
 fn check_map(axes: [Axis<'_>; 2], sets: &[&str], precision: Precision) {
     let axis = |(name, [min, max], count): Axis<'_>| {
         format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = {count}\n")
     };
     let everything =
         "[outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n";
-    let text = axes.map(axis).concat() + everything;
+    // As in scenes/e_omega.toml.
+    let integration = "[integration]\nundecided_periods = 1584\n";
+    let text = axes.map(axis).concat() + integration + everything;
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
     let plan = Plan::new(&Scene::parse(&text, "plane", &sets, Purpose::Map).unwrap());
     let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
@@ -65,10 +67,7 @@ fn check_map(axes: [Axis<'_>; 2], sets: &[&str], precision: Precision) {
     }
     assert_eq!(validation.unexplained(), 0, "{precision:?}");
     let (mismatches, cells) = (validation.mismatches.len(), plan.cell_count());
-    assert!(
-        mismatches * 100 <= cells,
-        "{precision:?}: {mismatches} mismatches of {cells} cells are too many"
-    );
+    assert!(mismatches * 100 < cells, "{precision:?}: {mismatches} mismatches of {cells} cells are too many");
     let symmetries = records.iter().filter(|record| record.valid & valid::SYMMETRIC != 0).count();
     assert!(symmetries * 10 > 8 * cells, "{precision:?}: symmetry known of {symmetries} cells only");
 }
@@ -94,9 +93,9 @@ fn the_whole_plane_is_classified_as_the_reference_does() {
 #[test]
 fn other_planes_are_classified_as_the_reference_does() {
     for precision in Precision::ALL {
-        check_map([("k", [300.0, 3000.0], 20), ("omega", [2.0, 9.0], 20)], &["e=0.4"], precision);
-        check_map([("mesh_speed", [0.0, 0.05], 20), ("e", [0.05, 0.5], 20)], &["omega=3"], precision);
-        check_map([("b", [0.2, 0.8], 20), ("F", [20.0, 80.0], 20)], &["e=0.3"], precision);
+        check_map([("k", [300.0, 3000.0], 23), ("omega", [2.0, 9.0], 23)], &["e=0.4"], precision);
+        check_map([("mesh_speed", [0.0, 0.05], 23), ("e", [0.05, 0.5], 23)], &["omega=3"], precision);
+        check_map([("b", [0.2, 0.8], 23), ("F", [20.0, 80.0], 23)], &["e=0.3"], precision);
     }
 }
 

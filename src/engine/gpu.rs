@@ -48,6 +48,11 @@ impl<'p> Gpu<'p> {
         Ok(engine)
     }
 
+    /// The device, for another plan.
+    pub fn into_device(self) -> gpu::Gpu {
+        self.device
+    }
+
     pub(super) fn precision(&self) -> &'static str {
         self.device.precision().name()
     }

@@ -14,6 +14,9 @@ pub const STEP_ANGLE: f64 = 1.0;
 /// reference's, so that both count the same impacts before.
 const CLOSING_ANGLE: f64 = 1.6e-4;
 
+/// Most free steps per forcing period: a lane that takes more is refused as too stiff.
+pub const MOST_STEPS: u32 = 20_000;
+
 /// Terms of the matrix exponential over one step; rates times steps are below 1.
 const EXPONENTIAL_TERMS: u32 = 30;
 
@@ -44,14 +47,13 @@ struct Equations {
 
 impl Constants {
     /// Derives the constants, with `steps` free steps per period or as many as the motion
-    /// needs. None if a step would be longer than the series carry, or shorter than a lane
-    /// can count.
+    /// needs. None if a lane would be refused for their number.
     pub fn new(oscillator: &model::Oscillator, steps: Option<u32>) -> Option<Constants> {
         let period = oscillator.period();
         let needed = (period * rate(oscillator, &oscillator.free) / STEP_ANGLE).ceil().max(8.0);
         // Even, so that half a period is a step, too.
         let steps = 2.0 * (0.5 * f64::from(steps.unwrap_or(0)).max(needed)).ceil();
-        if !(steps.is_finite() && steps < f64::from(1u32 << 24)) {
+        if !(steps.is_finite() && steps <= f64::from(MOST_STEPS)) {
             return None;
         }
         let h = period / steps;

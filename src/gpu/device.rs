@@ -45,6 +45,12 @@ pub(super) struct Pipelines {
 pub(super) struct Trouble(Arc<Mutex<Option<String>>>);
 
 impl AdapterChoice {
+    /// Whether an adapter may be taken.
+    pub fn allows(&self, info: &wgpu::AdapterInfo) -> bool {
+        let name = describe(info).to_lowercase();
+        self.name.as_ref().is_none_or(|wanted| name.contains(&wanted.to_lowercase()))
+    }
+
     /// The adapter that the environment names by `WGPU_ADAPTER_NAME`, else the best.
     pub fn from_environment() -> AdapterChoice {
         AdapterChoice { name: std::env::var("WGPU_ADAPTER_NAME").ok().filter(|name| !name.is_empty()) }
@@ -141,11 +147,7 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
 
 pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
     let all = all_adapters().await;
-    let named = |adapter: &wgpu::Adapter| {
-        let name = describe(&adapter.get_info()).to_lowercase();
-        choice.name.as_ref().is_none_or(|wanted| name.contains(&wanted.to_lowercase()))
-    };
-    let fits = |adapter: &wgpu::Adapter| named(adapter) && has(adapter, precision);
+    let fits = |adapter: &wgpu::Adapter| choice.allows(&adapter.get_info()) && has(adapter, precision);
     let Some(adapter) = all.iter().find(|adapter| fits(adapter)) else {
         return Err(no_adapter(precision, choice, &all));
     };

@@ -12,8 +12,8 @@ use crate::orbit;
 const MAX_PERIODS: u32 = 1_000_000_000;
 /// The longest cycle, in forcing periods, that engines have memory for.
 const MAX_CYCLE: u32 = 64;
-/// The most steps per forcing period.
-const MAX_STEPS: u32 = 1_000_000;
+/// The most steps per forcing period: lanes that take more are refused.
+const MAX_STEPS: u32 = crate::gpu::MOST_STEPS;
 
 /// How fine the lanes' time grid is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

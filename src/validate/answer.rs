@@ -17,6 +17,12 @@ const CHAOS_ERRORS: f64 = 5.0;
 /// standard errors from 16 blocks are themselves uncertain.
 const CHAOS_FLOOR: f64 = 0.01;
 
+/// Impacts per period over chaos may differ by this share and this number, mesh fractions by
+/// this much.
+const CHAOS_SHARE: f64 = 0.25;
+const CHAOS_IMPACTS: f64 = 0.3;
+const CHAOS_MESH: f64 = 0.1;
+
 /// What is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Field {
@@ -168,7 +174,7 @@ impl Answer {
                     self.compare_cycle(record, f64::from(ours), bars, &mut list);
                 }
             }
-            (Class::Chaotic, Class::Chaotic) => list.extend(self.compare_chaos(record, bars)),
+            (Class::Chaotic, Class::Chaotic) => self.compare_chaos(record, bars, &mut list),
             _ => {}
         }
         list
@@ -219,14 +225,24 @@ impl Answer {
         }
     }
 
-    fn compare_chaos(&self, record: &Record, bars: &Bars) -> Option<Compared> {
-        let [theirs, error] = self.exponent?;
-        (record.valid & valid::LYAPUNOV != 0).then(|| {
+    fn compare_chaos(&self, record: &Record, bars: &Bars, list: &mut Vec<Compared>) {
+        let has = |bit| record.valid & bit != 0;
+        let mut compare = |field, ours: f64, theirs: f64, bar: f64| {
+            let shown = || (Value::Number(ours), Value::Number(theirs));
+            list.push(compared(field, (ours - theirs).abs() <= bar, shown));
+        };
+        if let (true, Some([theirs, error])) = (has(valid::LYAPUNOV), self.exponent) {
             let bar = CHAOS_ERRORS * error.hypot(record.lyapunov_error) + CHAOS_FLOOR / bars.forcing_period;
-            compared(Field::Exponent, (record.lyapunov - theirs).abs() <= bar, || {
-                (Value::Number(record.lyapunov), Value::Number(theirs))
-            })
-        })
+            compare(Field::Exponent, record.lyapunov, theirs, bar);
+        }
+        // Averages over chaos have no error of their own; these are far beyond their scatter.
+        if let (true, Some(theirs)) = (has(valid::IMPACTS), self.impacts_per_period) {
+            let bar = CHAOS_SHARE * theirs.max(record.impacts_per_period) + CHAOS_IMPACTS;
+            compare(Field::Impacts, record.impacts_per_period, theirs, bar);
+        }
+        if let (true, Some(theirs)) = (has(valid::MESH), self.mesh_fraction) {
+            compare(Field::Mesh, record.mesh_fraction, theirs, CHAOS_MESH);
+        }
     }
 }
 

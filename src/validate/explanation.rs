@@ -9,7 +9,7 @@ use super::case::{Case, LANE_RESOLUTION, rounding};
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
 use crate::model::State;
-use crate::orbit::{Class, Status, analyse};
+use crate::orbit::{CHAOS_ERRORS, Class, Status, analyse};
 use crate::record::valid;
 use crate::reference::Trajectory;
 use crate::stability::{StrobeMap, multipliers};
@@ -24,11 +24,14 @@ const ELSEWHERE: f64 = 1e-2;
 /// A motion this far from where it was a cycle ago has not settled.
 const UNSETTLED: f64 = 1e-4;
 
+/// A motion this close to where it was some periods ago may be lingering at a cycle.
+const LINGERING: f64 = 0.03;
+
 /// Periods that lanes take to confirm a period: three windows of the longest they look for.
 const CONFIRMATION_WINDOWS: u32 = 3;
 
 /// Multipliers below this belong to a cycle that is about to double its period.
-const NEAR_FLIP: f64 = -0.9;
+const NEAR_FLIP: f64 = -0.8;
 
 /// Periods in which a confirmed cycle is reached well enough to see its symmetry.
 const SETTLING_PERIODS: u32 = 400;
@@ -55,7 +58,7 @@ pub enum Explanation {
     /// The reference gives the record's answer when the start or a parameter moves within the
     /// rounding of the precision; or the largest multiplier is within 1 % of one per period, a
     /// bifurcation, and the motion does recur after the record's period; or the multiplier is
-    /// below -0.9, and rounding, which the cycle amplifies, keeps the lane alternating about it
+    /// below -0.8, and rounding, which the cycle amplifies, keeps the lane alternating about it
     /// with twice its period.
     Border,
     /// The lane read its cycle before the motion had settled on it, or rounding keeps it from
@@ -178,9 +181,8 @@ fn longer(case: &Case<'_>) -> Option<Explanation> {
     };
     let answer = case.at_leisure(case.start);
     // Neither side claims anything, and neither can: both are right.
-    let silent = answer.class == Class::Undecided && classify(case.record) != Class::Failed;
-    let claims = matches!(classify(case.record), Class::Periodic { .. });
-    (case.is_the_records(&answer) || silent && !claims).then_some(because)
+    let silent = answer.class == Class::Undecided && is_spent(case);
+    (case.is_the_records(&answer) || silent).then_some(because)
 }
 
 fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
@@ -296,27 +298,55 @@ fn late(case: &Case<'_>) -> Option<Explanation> {
     let stands = case.after(from, 0).ok()?;
     match (ours, case.truth.class) {
         (Class::Chaotic, Class::Periodic { period }) => {
-            let wanders = case.unrest(&stands, period) > ELSEWHERE;
-            (wanders && case.at_leisure(from).class == case.truth.class).then_some(Explanation::Chaos)
+            let early = 2 * case.record.periods_run < whole_budget(case);
+            let wanders = || case.unrest(&stands, period) > ELSEWHERE;
+            let is_transient = || wanders_within_rounding(case, case.record.periods_run, period, ELSEWHERE);
+            let settles = || case.at_leisure(from).class == case.truth.class;
+            (!early && wanders() && is_transient() && settles()).then_some(Explanation::Chaos)
         }
+        _ if !is_spent(case) => None,
         // The reference, too, is still on its way.
         (Class::Undecided, Class::Periodic { .. }) if case.truth.status == Status::Slow => {
             Some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Periodic { period }) => {
             let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;
-            let began = case.after(case.start, case.record.periods_run.saturating_sub(confirming)).ok()?;
-            let late = case.unrest(&began, period) > UNSETTLED || case.unrest(&stands, period) > UNSETTLED;
-            late.then_some(Explanation::UndecidedInBudget)
+            let began = case.record.periods_run.saturating_sub(confirming);
+            let late = wanders_within_rounding(case, began, period, UNSETTLED);
+            // The lane's last state is off the cycle, and the reference goes on from there to it.
+            let is_off = || case.unrest(&stands, period) > UNSETTLED;
+            let settles = || case.at_leisure(from).class == case.truth.class;
+            (late || is_off() && settles()).then_some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Chaotic) => {
             let [theirs, error] = case.truth.exponent?;
-            let bar = 5.0 * error.hypot(case.record.lyapunov_error);
-            let known = case.record.valid & valid::LYAPUNOV != 0;
-            (known && (case.record.lyapunov - theirs).abs() <= bar).then_some(Explanation::UndecidedInBudget)
+            let (ours, bar) = (case.record.lyapunov, 5.0 * error.hypot(case.record.lyapunov_error));
+            let known = case.record.valid & valid::LYAPUNOV != 0 && (ours - theirs).abs() <= bar;
+            let is_weak = ours <= CHAOS_ERRORS * case.record.lyapunov_error;
+            let lags = case.budget.settings.max_period / 2;
+            let lingers = || (1..=lags).any(|lag| case.unrest(&stands, lag) < LINGERING);
+            (known && (is_weak || lingers())).then_some(Explanation::UndecidedInBudget)
         }
         _ => None,
     }
+}
+
+/// Periods that a cell may take whatever becomes of it.
+fn whole_budget(case: &Case<'_>) -> u32 {
+    case.budget.settings.transient_periods + case.budget.settings.observed_periods
+}
+
+/// Whether a record is undecided and has had all its periods: before, there is no such thing.
+fn is_spent(case: &Case<'_>) -> bool {
+    classify(case.record) == Class::Undecided && case.record.periods_run >= whole_budget(case)
+}
+
+/// Whether the reference itself, from the start or from one that is the same within rounding,
+/// is off its cycle of `period` by more than `bar` after some periods.
+fn wanders_within_rounding(case: &Case<'_>, periods: u32, period: u32, bar: f64) -> bool {
+    let mut starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
+    let wanders = |start| case.after(start, periods).is_ok_and(|at| case.unrest(&at, period) > bar);
+    starts.any(wanders)
 }
 
 fn bifurcation(case: &Case<'_>) -> Option<Explanation> {
@@ -345,9 +375,10 @@ fn flip(case: &Case<'_>) -> Option<Explanation> {
     (flips && alternates && settles).then_some(Explanation::Border)
 }
 
+/// The reference meets the graze: what the record says of itself is no evidence.
 fn grazing(case: &Case<'_>) -> Option<Explanation> {
-    let grazes = [case.truth.status, status(case.record)].contains(&Status::NearGrazing);
-    (grazes && recurs(case)?).then_some(Explanation::NearGrazing)
+    (case.truth.status == Status::NearGrazing && recurs(case)? && is_least(case)?)
+        .then_some(Explanation::NearGrazing)
 }
 
 /// Whether the motion comes back after the record's period; a record without one claims none.
@@ -362,9 +393,17 @@ fn recurs(case: &Case<'_>) -> Option<bool> {
             };
             Some(related && case.unrest(&stands, period) < ELSEWHERE)
         }
-        Class::Undecided => Some(true),
+        Class::Undecided => Some(is_spent(case)),
         Class::Chaotic | Class::Failed => Some(false),
     }
+}
+
+/// Whether no part of the record's period recurs: a multiple of a period always does.
+fn is_least(case: &Case<'_>) -> Option<bool> {
+    let Class::Periodic { period } = classify(case.record) else { return Some(true) };
+    let stands = case.after(strobe(case)?, 0).ok()?;
+    let mut parts = (1..period).filter(|&part| period.is_multiple_of(part));
+    Some(parts.all(|part| case.unrest(&stands, part) > LANE_RESOLUTION))
 }
 
 /// Where the record says that its motion was at last.
