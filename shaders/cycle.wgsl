@@ -72,6 +72,7 @@ fn judge_cycle() {
 fn search_on() {
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
+    tally.tries += 1u;
     tally.tangent_count = 1u;
     set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
     tally.window = 0u;

@@ -157,6 +157,8 @@ struct TallyNow {
     // 1 once a cycle is being read or has been, and its period if it attracts.
     has_read: u32,
     cycle: u32,
+    // Cycles that were read in vain.
+    tries: u32,
     // Period at which counting began.
     counted_from: u32,
     // How many tangent vectors there are.

@@ -164,6 +164,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     to_read,
                     has_read,
                     cycle,
+                    tries,
                     counted_from,
                     tangent_count,
                     blocks,

@@ -192,6 +192,8 @@ pub struct Tally {
     pub has_read: u32,
     /// Period of the cycle that was read, if it attracts.
     pub cycle: u32,
+    /// Cycles that were read in vain.
+    pub tries: u32,
     /// Period at which counting began.
     pub counted_from: u32,
     /// Tangent vectors carried.
