@@ -87,7 +87,9 @@ fn search_on() {
 fn is_near_cycle() -> bool {
     // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
     let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
-    return tally.settled != 0u && exp2(-f32(octaves_apart()) / OCTAVE) < ON_CYCLE * (1.0 - mu);
+    // Rounding may hold a lane still before it is there.
+    let apart = max(exp2(-f32(octaves_apart()) / OCTAVE), NOISE);
+    return tally.settled != 0u && apart < ON_CYCLE * (1.0 - mu);
 }
 
 // Near, or as near as rounding lets it.

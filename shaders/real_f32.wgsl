@@ -11,6 +11,8 @@ const HUGE: Real = 1e15;
 // Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
 const RESOLVED: u32 = 60u;
 // And these are rounding itself: a motion this near to its last strobes is at rest.
-const AT_REST: u32 = 70u;
+const AT_REST: u32 = 64u;
+// What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
+const NOISE: f32 = 4e-6;
 // Events this close to phase 0, in turns, lie on it.
 const ON_STROBE: Real = 1e-6;

@@ -12,5 +12,7 @@ const HUGE: Real = 1e150;
 const RESOLVED: u32 = 160u;
 // And these are rounding itself: a motion this near to its last strobes is at rest.
 const AT_REST: u32 = RESOLVED;
+// What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
+const NOISE: f32 = 1e-14;
 // Events this close to phase 0, in turns, lie on it.
 const ON_STROBE: Real = 1e-9;

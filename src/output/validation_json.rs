@@ -229,8 +229,7 @@ fn meaning(explanation: Explanation) -> &'static str {
             "the cycle differs from its mirror image by less than 2.5e-4 of its size, all that lanes look for"
         }
         Explanation::BelowResolution => {
-            "the reference's cycle has a multiple of the map's period, and is nearer to one of that period than \
-             lanes resolve"
+            "one period is a multiple of the other, and the cycles are nearer to each other than lanes resolve"
         }
         Explanation::NearGrazing => "an event grazes more nearly than the precision resolves",
     }

@@ -24,6 +24,9 @@ const ELSEWHERE: f64 = 1e-2;
 /// A motion this far from where it was a cycle ago has not settled.
 const UNSETTLED: f64 = 1e-4;
 
+/// A motion this close to where it was a cycle ago rests on it as nearly as lanes in f32 can.
+const AT_REST: f64 = 1e-5;
+
 /// A motion this close to where it was some periods ago may be lingering at a cycle.
 const LINGERING: f64 = 0.03;
 
@@ -66,7 +69,8 @@ pub enum Explanation {
     /// from it as a cycle takes it, gives the same.
     Unsettled,
     /// The reference's cycle is within what lanes resolve (2.5e-4 of the motion) of one with the
-    /// record's period, a divisor of its own.
+    /// record's period, a divisor of its own; or rounding keeps the lane that much off the cycle,
+    /// in a pattern whose period is a multiple.
     BelowResolution,
     /// Lanes call a cycle symmetric that is its own mirror image to 2.5e-4 of its size; this one
     /// is, but not quite.
@@ -288,7 +292,11 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     };
     let stands = case.after(strobe(case)?, 0).ok()?;
     let divides = period < theirs && theirs.is_multiple_of(period);
-    (divides && case.unrest(&stands, period) < LANE_RESOLUTION).then_some(Explanation::BelowResolution)
+    let hides = divides && case.unrest(&stands, period) < LANE_RESOLUTION;
+    // Or rounding keeps the lane off its cycle in a pattern of its own.
+    let multiplies = period > theirs && period.is_multiple_of(theirs);
+    let scatters = multiplies && (AT_REST..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
+    (hides || scatters).then_some(Explanation::BelowResolution)
 }
 
 /// The record has no period and the reference has one, or the other way round in chaos: the
@@ -370,7 +378,9 @@ fn flip(case: &Case<'_>) -> Option<Explanation> {
     let [re, im] = *multipliers(&image.derivative())?.first()?;
     let gain = image.derivative().singular_values().max() / (1.0 + re);
     let flips = im == 0.0 && re > -1.0 && re < NEAR_FLIP;
-    let alternates = case.unrest(&stands, period) <= rounding(case.precision) * gain;
+    // Every event rounds.
+    let events = 1.0 + case.truth.impacts_per_period.unwrap_or(0.0) * f64::from(period);
+    let alternates = case.unrest(&stands, period) <= rounding(case.precision) * events * gain;
     let settles = case.at_leisure(from).class == case.truth.class;
     (flips && alternates && settles).then_some(Explanation::Border)
 }
