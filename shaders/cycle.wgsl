@@ -83,13 +83,24 @@ fn search_on() {
     tallies[lane].last_distances = array<u32, 16>();
 }
 
-// Whether the lane has come so near to its cycle that its symmetry shows.
-fn is_near_cycle() -> bool {
+// How far the lane is from its cycle at most, relative to the motion.
+fn away() -> f32 {
     // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
     let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
     // Rounding may hold a lane still before it is there.
     let apart = max(exp2(-f32(octaves_apart()) / OCTAVE), NOISE);
-    return tally.settled != 0u && apart < ON_CYCLE * (1.0 - mu);
+    return apart / max(1.0 - mu, 1e-6);
+}
+
+// Whether the lane has come so near to its cycle that its symmetry shows.
+fn is_near_cycle() -> bool {
+    return tally.settled != 0u && away() < ON_CYCLE;
+}
+
+// Whether the cycle is farther from its mirror image than the lane can be from the cycle: twice
+// that far for the state and as much for the image it is compared with.
+fn is_surely_unsymmetric() -> bool {
+    return tally.settled != 0u && exp2(-f32(tally.mirror) / OCTAVE) > 4.0 * max(away(), ON_CYCLE);
 }
 
 // Near, or as near as rounding lets it.

@@ -182,8 +182,8 @@ struct TallyNow {
     recent: u32,
     // Events on the strobe phase.
     on_strobe: u32,
-    // Whether the cycle is its own mirror image.
-    symmetric: u32,
+    // Distance of the cycle from its mirror image, in quarter octaves below 1.
+    mirror: u32,
 }
 
 struct Tally {

@@ -136,6 +136,8 @@ fn begin_reading() {
     tally.stage = STAGE_READING;
     tally.to_read = tally.candidate;
     tally.has_read = 1u;
+    // A cycle of even period is never compared: it cannot be symmetric.
+    tally.mirror = 0u;
     motion.anchor = strobe_state();
     if EXPONENT {
         tally.tangent_count = 4u;
@@ -272,18 +274,17 @@ fn judge_lag(found: u32) -> bool {
     return settled;
 }
 
-// Half a period after the middle of a cycle of odd period: is the state the mirror image of
-// the cycle's start?
+// Half a period after the middle of a cycle of odd period: how far is the state from the mirror
+// image of the cycle's start?
 fn compare_mirror() {
     let q = strobe_state();
-    let p = max(abs(q[0] + motion.anchor[0]), abs(q[2] + motion.anchor[2]));
-    let r = max(abs(q[1] + motion.anchor[1]), abs(q[3] + motion.anchor[3]));
-    let near = p <= MIRROR * motion.position_scale && r <= MIRROR * motion.rate_scale;
-    tally.symmetric = select(0u, 1u, near);
+    let p = max(abs(q[0] + motion.anchor[0]), abs(q[2] + motion.anchor[2])) / max(motion.position_scale, Real(1e-30));
+    let r = max(abs(q[1] + motion.anchor[1]), abs(q[3] + motion.anchor[3])) / max(motion.rate_scale, Real(1e-30));
+    tally.mirror = octaves(max(p, r));
 }
 
-// A cycle this close to its mirror image, relative to the motion, is symmetric.
-const MIRROR: Real = 0.00025;
+// A cycle this close to its mirror image, 2^-12 of the motion, is symmetric.
+const MIRROR: u32 = 48u;
 
 // One flight ends on `side`: its symbol. The first flight of all comes from no wall.
 fn note_symbol(side: u32) {

@@ -64,11 +64,11 @@ fn mesh_fraction(periods: u32) -> Real {
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
     // Contact-free motion has not been read. On a slow approach a lost symmetry cannot be told
-    // from one not reached yet.
+    // from one not reached yet, unless it is lost by far.
     let is_quiet = tally.has_read == 0u;
-    if shapes[cell.flow_index].mirror == 1u && (is_quiet || is_near_cycle()) {
+    if shapes[cell.flow_index].mirror == 1u && (is_quiet || is_near_cycle() || is_surely_unsymmetric()) {
         (*finding).valid |= VALID_SYMMETRIC;
-        (*finding).symmetric = select(tally.symmetric, 1u, is_quiet);
+        (*finding).symmetric = select(0u, 1u, is_quiet || tally.mirror >= MIRROR);
     }
     if EXPONENT {
         (*finding).valid |= VALID_LYAPUNOV;

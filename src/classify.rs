@@ -9,7 +9,6 @@
 //! - `chaotic` if there is none, the exponent exceeds zero by [`CHAOS_ERRORS`] standard
 //!   errors, and the engine did not see it linger at a cycle (status `slow`);
 //! - `undecided` otherwise: near bifurcations, and in long transients.
-
 //!
 //! This misleads in one way that is known: transient chaos that outlives the budget is
 //! called chaotic.

@@ -180,7 +180,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     hash_high,
                     recent,
                     on_strobe,
-                    symmetric,
+                    mirror,
                     distances,
                     last_distances,
                     word

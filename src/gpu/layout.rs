@@ -224,8 +224,8 @@ pub struct Tally {
     pub recent: u32,
     /// Events on the strobe phase.
     pub on_strobe: u32,
-    /// Whether the cycle is its own mirror image.
-    pub symmetric: u32,
+    /// Distance of the cycle from its mirror image, in quarter octaves below 1.
+    pub mirror: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.

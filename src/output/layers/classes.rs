@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::colors::{self, FAILED, NO_CONTACT, SYMMETRIC, UNDECIDED, UNSYMMETRIC, chaos};
+use super::colors::{self, FAILED, NO_CONTACT, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC, chaos};
 use super::scale::nice_bound;
 use super::{Bar, Color, Entry, Layer, ids};
 use crate::classify::classify;
@@ -11,9 +11,9 @@ use crate::output::cells::Cells;
 use crate::record::{Record, valid};
 use crate::scene::Quantity;
 
-/// Places in the palette: three kinds of period 1, periods 2 to 64, the two exceptions, then
+/// Places in the palette: four kinds of period 1, periods 2 to 64, the two exceptions, then
 /// shades of chaos.
-const FIRST_PERIOD: u8 = 3;
+const FIRST_PERIOD: u8 = 4;
 const EXCEPTIONS: u8 = FIRST_PERIOD + 63;
 const FIRST_SHADE: u8 = EXCEPTIONS + 2;
 const SHADES: u8 = 64;
@@ -26,7 +26,7 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
     let exponents = cells.classes().enumerate().filter(|(_, class)| *class == Class::Chaotic);
     let high = nice_bound(exponents.map(|(id, _)| cells.record(id).lyapunov));
     let place = |record: &Record| match classify(record) {
-        Class::Periodic { period: 1 } => first_period(record),
+        Class::Periodic { period: 1 } => first_period(record, cells.asks(Quantity::Symmetric)),
         Class::Periodic { period } => FIRST_PERIOD + (period.min(64) - 2) as u8,
         Class::Undecided => EXCEPTIONS,
         Class::Failed => EXCEPTIONS + 1,
@@ -57,14 +57,16 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
     }
 }
 
-/// Which kind of period 1, as far as it was measured.
-fn first_period(record: &Record) -> u8 {
+/// Which kind of period 1, as far as it was measured; on a slow approach lanes do not know.
+fn first_period(record: &Record, asks_symmetry: bool) -> u8 {
     let measured = |bit| record.valid & bit != 0;
     let no_impacts = measured(valid::IMPACTS) && record.impacts_per_period == 0.0;
     let no_meshing = measured(valid::MESH) && record.mesh_fraction == 0.0;
     if no_impacts && no_meshing {
         0
-    } else if measured(valid::SYMMETRIC) && record.symmetric == 0 {
+    } else if asks_symmetry && !measured(valid::SYMMETRIC) {
+        3
+    } else if asks_symmetry && record.symmetric == 0 {
         2
     } else {
         1
@@ -72,7 +74,7 @@ fn first_period(record: &Record) -> u8 {
 }
 
 fn palette() -> Vec<Color> {
-    let mut palette = vec![NO_CONTACT, SYMMETRIC, UNSYMMETRIC];
+    let mut palette = vec![NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
     palette.extend((2..=64).map(colors::period));
     palette.extend([UNDECIDED, FAILED]);
     palette.extend((0..SHADES).map(|shade| chaos(f64::from(shade) / f64::from(SHADES - 1))));
@@ -90,12 +92,13 @@ fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool) -> Vec<Entry> {
     );
     let counts = counts.reduce(|| [0; 256], |a, b| std::array::from_fn(|i| a[i] + b[i]));
     let entry = |index: usize, text: String| Entry { color: palette[index], text, cells: counts[index] };
-    let has_kinds = counts[0] + counts[2] > 0;
+    let has_kinds = counts[0] + counts[2] + counts[3] > 0;
     let symmetric = if has_kinds { "period 1, symmetric" } else { "period 1" };
     let mut list = vec![
         entry(0, "period 1, no contact".to_owned()),
         entry(1, symmetric.to_owned()),
         entry(2, "period 1, unsymmetric".to_owned()),
+        entry(3, "period 1, symmetry unknown".to_owned()),
     ];
     let periods = usize::from(FIRST_PERIOD)..usize::from(EXCEPTIONS);
     list.extend(

@@ -11,6 +11,8 @@ const fn hex(rgb: u32) -> Color {
 pub(super) const NO_CONTACT: Color = hex(0xeef2f6);
 pub(super) const SYMMETRIC: Color = hex(0xc0d9ee);
 pub(super) const UNSYMMETRIC: Color = hex(0x7fb0da);
+/// Period 1 that is too slow an approach to tell.
+pub(super) const SYMMETRY_UNKNOWN: Color = hex(0x5b6f8c);
 
 /// Periods 2 to 12: Okabe and Ito's colour-blind safe set first, then colours that stand
 /// apart from it and from each other in lightness, too.
@@ -119,7 +121,7 @@ mod tests {
     #[test]
     fn periods_have_colours_of_their_own() {
         let mut colors: Vec<Color> = (2..=64).map(period).collect();
-        colors.extend([NO_CONTACT, SYMMETRIC, UNSYMMETRIC, UNDECIDED, FAILED]);
+        colors.extend([NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, FAILED]);
         let count = colors.len();
         colors.sort_unstable();
         colors.dedup();
