@@ -39,6 +39,67 @@ pub(crate) enum Command {
     /// a name) and WGPU_BACKEND (vulkan, metal, dx12) in the environment narrow the adapters down.
     Devices,
     Validate(Validate),
+    /// Instruments: run time against error, engine against engine, numerical stress
+    ///
+    /// Each writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
+    #[command(subcommand)]
+    Bench(Bench),
+}
+
+/// What is measured.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Bench {
+    WorkPrecision(WorkPrecision),
+    Engines(Engines),
+    Stability(Stability),
+}
+
+/// Error of strobe states and event times against run time per period, for every method
+#[derive(Debug, Args)]
+pub(crate) struct WorkPrecision {
+    #[command(flatten)]
+    pub(crate) run: BenchOptions,
+}
+
+/// The same scene on every engine: same answers, and where the time goes
+#[derive(Debug, Args)]
+pub(crate) struct Engines {
+    #[command(flatten)]
+    pub(crate) run: BenchOptions,
+}
+
+/// Long runs, grazing, chatter, stiff meshing, coarse grids and random parameters on every engine
+#[derive(Debug, Args)]
+pub(crate) struct Stability {
+    #[command(flatten)]
+    pub(crate) run: BenchOptions,
+}
+
+/// Where measurements go, and how thorough they are.
+#[derive(Debug, Args)]
+pub(crate) struct BenchOptions {
+    /// Where to write [default: out/bench/<what is measured>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Replace the files of an earlier run; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Tiny sizes: does everything work? The figures mean nothing
+    #[arg(long)]
+    pub(crate) quick: bool,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl BenchOptions {
+    /// The folder to write to.
+    pub(crate) fn out(&self, what: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("out/bench").join(what))
+    }
 }
 
 /// A map over two parameters: what every cell's motion is

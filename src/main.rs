@@ -1,5 +1,6 @@
 //! The commands, each a pipeline: ask, check, compute, write.
 
+mod bench_command;
 mod capacity;
 mod cli;
 mod devices_command;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         Command::Bifurcation(ask) => run_bifurcation(&ask),
         Command::Devices => devices_command::run(),
         Command::Validate(ask) => validate_command::run(&ask),
+        Command::Bench(ask) => bench_command::run(&ask),
     };
     done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
 }

@@ -1,0 +1,10 @@
+//! `rattlemap bench engines`.
+
+use anyhow::anyhow;
+
+use crate::cli::BenchOptions;
+use crate::error::Failure;
+
+pub(crate) fn run(ask: &BenchOptions) -> Result<(), Failure> {
+    Err(anyhow!("{}: not there yet", ask.out("engines").display()).into())
+}
