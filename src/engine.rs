@@ -6,6 +6,7 @@
 
 mod cpu;
 mod fake;
+mod flows;
 mod gpu;
 
 use thiserror::Error;
@@ -13,6 +14,7 @@ use thiserror::Error;
 pub use cpu::Cpu;
 pub(crate) use cpu::record as measured_record;
 pub use fake::Fake;
+pub(crate) use flows::Flows;
 pub use gpu::Gpu;
 
 use crate::plan::Batch;

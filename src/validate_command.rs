@@ -100,7 +100,7 @@ fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
     }
 }
 
-/// One record per cell, by id.
+/// One record per run.
 fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> anyhow::Result<Vec<Record>> {
     let path = dir.join(RECORDS);
     if !path.is_file() {
@@ -112,7 +112,7 @@ fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> 
     }
     let identity = Identity::new(&manifest.engine, &manifest.precision, &manifest.device, scene.identity());
     let mut schedule = Schedule::new(plan);
-    let mut records = vec![Record::default(); plan.cell_count()];
+    let mut records = vec![Record::default(); plan.run_count()];
     let take =
         |place: usize, batch: &[Record]| sweep::replay(plan, &mut schedule, &mut records, place, batch);
     let again = "make the map again with `rattlemap map SCENE --force`";
@@ -126,8 +126,8 @@ fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> 
         other => other.into(),
     })?;
     if done < schedule.sequence().len() || schedule.extend(&records) {
-        let cells = schedule.sequence().len();
-        return Err(anyhow!("{} holds {done} of {cells} cells; {again}", path.display()));
+        let cells = schedule.expected();
+        return Err(anyhow!("{} holds {done} of {cells} runs; {again}", path.display()));
     }
     schedule.finish(&mut records);
     Ok(records)
@@ -156,7 +156,8 @@ fn states(
         Steps::Auto => None,
         Steps::PerPeriod(steps) => Some(steps),
     };
-    let lanes = pollster::block_on(validate::states::lane_states(&mut gpu, subject.plan, &ids, steps))
+    let Subject { plan, records, .. } = *subject;
+    let lanes = pollster::block_on(validate::states::lane_states(&mut gpu, plan, records, &ids, steps))
         .context("cannot run the sample's lanes again")?;
     Ok(StateSource::Lanes(lanes))
 }

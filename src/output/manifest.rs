@@ -50,6 +50,10 @@ impl From<&Axis> for AxisObject {
 pub(super) struct StartObject {
     policy: &'static str,
     state: Option<State>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    count: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u32>,
 }
 
 #[derive(Serialize)]
@@ -83,7 +87,7 @@ pub(super) fn bifurcation(
         set: sets,
         axis: axis.into(),
         parameters: Parameters { pair: &scene.base(), except: &[axis.parameter().name] },
-        start: start(scene.start()),
+        start: start(scene),
         integration: IntegrationObject {
             transient_periods: settings.transient_periods,
             observed_periods: settings.observed_periods,
@@ -95,14 +99,15 @@ pub(super) fn bifurcation(
     })
 }
 
-pub(super) fn start(start: Start) -> StartObject {
-    let (policy, state) = match start {
+pub(super) fn start(scene: &Scene) -> StartObject {
+    let (policy, state) = match scene.start() {
         Start::Rest => ("rest", None),
         Start::State(state) => ("state", Some(state)),
         Start::Up => ("up", None),
         Start::Down => ("down", None),
     };
-    StartObject { policy, state }
+    let (count, seed) = scene.draw().map(|draw| (draw.count, draw.seed)).unzip();
+    StartObject { policy, state, count, seed }
 }
 
 fn count(columns: &[Column]) -> BTreeMap<&'static str, usize> {
