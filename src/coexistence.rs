@@ -8,8 +8,8 @@
 //! Contact-free motion is one attractor however far it still is from it. Runs that are undecided
 //! or failed count for nothing.
 //!
-//! So the number is a lower bound: of those attractors that the starts found, and of those that
-//! there are.
+//! So the number is a lower bound, with one exception: a chaotic transient that outlives the
+//! budget is called chaos, and counts beside the cycle that it ends on.
 
 use rayon::prelude::*;
 

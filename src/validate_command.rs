@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
+use rattlemap::coexistence;
 use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
 use rattlemap::output::map::{MANIFEST, Made, write_validation};
 use rattlemap::output::{Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
@@ -51,7 +52,8 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let progress = Progress::new(sample.picks.len(), 0, "cells replayed", ask.quiet);
     let validation =
         validate::replay(&subject, &sample, source, &|done| progress.report(done, sample.picks.len()));
-    let cells = Cells::new(&scene, &plan, &records);
+    let attractors = coexistence::attractors(&plan, &records);
+    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let files = write_validation(&folder, &cells, &made, &validation)?;
     progress.finish(&format!("{}\n{}: {}", summary(&validation), dir.display(), files.join(", ")));

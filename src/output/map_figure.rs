@@ -75,7 +75,7 @@ pub(super) fn subtitle(scene: &Scene) -> String {
         Start::Down => format!("from the attractor at the next higher {last}"),
     };
     let more_starts = match scene.draw() {
-        Some(draw) => format!(" and {} random states", draw.count - 1),
+        Some(draw) => format!(", attractors counted with {} random states more", draw.count - 1),
         None => String::new(),
     };
     let integration = scene.integration();

@@ -85,7 +85,8 @@ mod tests {
             let gap = a[0] - a[2];
             assert!(gap.abs() < 0.5 && a[2].abs() < 2.0, "{a:?}");
             // Twice the backlash and twice the frequency.
-            for (a, b, scale) in [(a[0], b[0], 2.0), (a[1], b[1], 4.0), (a[2], b[2], 2.0), (a[3], b[3], 4.0)] {
+            for (a, b, scale) in [(a[0], b[0], 2.0), (a[1], b[1], 4.0), (a[2], b[2], 2.0), (a[3], b[3], 4.0)]
+            {
                 assert!((b - scale * a).abs() < 1e-12 * (1.0 + b.abs()));
             }
             for (range, x) in seen.iter_mut().zip([gap / 0.5, a[3] / (2.0 * small.omega)]) {

@@ -117,7 +117,8 @@ pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<D
     };
     match (section.get("count").filter(|_| count > 1), section.get("seed")) {
         (Some(field), _) if purpose == Purpose::Bifurcation => {
-            Err(field.conflict("`bifurcation` follows one motion per column; drop it, or draw a `map`".into()))
+            Err(field
+                .conflict("`bifurcation` follows one motion per column; drop it, or draw a `map`".into()))
         }
         (None, Some(field)) => Err(field.conflict("it draws nothing without start.count above 1".into())),
         (None, None) => Ok(None),
