@@ -1,0 +1,261 @@
+//! Figures of `bench engines`: throughput against lanes, and where the time goes.
+
+use std::path::Path;
+
+use anyhow::Result;
+use plotters::style::RGBColor;
+
+use super::plot_style::axes::{Axis, Frame};
+use super::plot_style::legend::{Entry, Key, draw_head};
+use super::plot_style::{Align, Canvas, DARK, GRID, MEDIUM, Marker, Rect, SMALL, Shape, save_figure};
+use crate::bench::engines::{Engine, Point, Run, Series, Times};
+use crate::gpu::Precision;
+
+const SIZE: (u32, u32) = (1700, 1150);
+const LEFT: f64 = 190.0;
+const RIGHT: f64 = 60.0;
+const BELOW: f64 = 110.0;
+const TICK: f64 = 7.0;
+const WIDTH: f64 = 3.0;
+const RADIUS: f64 = 7.0;
+/// Half the width of the bars' ends.
+const END: f64 = 6.0;
+
+/// Hardware in f32 and f64, then software.
+const ON_DEVICE: [RGBColor; 4] = [
+    RGBColor(0xd5, 0x5e, 0x00),
+    RGBColor(0x00, 0x72, 0xb2),
+    RGBColor(0xe6, 0x9f, 0x00),
+    RGBColor(0x56, 0xb4, 0xe9),
+];
+/// Processor threads, from few to many.
+const ON_CPU: [RGBColor; 2] = [RGBColor(0xb8, 0xdc, 0xc8), RGBColor(0x00, 0x5a, 0x3c)];
+
+/// A stage: its name, its colour and its time.
+type StageOf = (&'static str, RGBColor, fn(&Times) -> f64);
+
+/// Stages in their order.
+const STAGES: [StageOf; 5] = [
+    ("set-up", RGBColor(0x96, 0x96, 0x96), |times| times.prepare),
+    ("upload", RGBColor(0xe6, 0x9f, 0x00), |times| times.upload),
+    ("integration", RGBColor(0x00, 0x72, 0xb2), |times| times.integrate),
+    ("read-back", RGBColor(0xcc, 0x79, 0xa7), |times| times.read),
+    ("writing the table", RGBColor(0x00, 0x9e, 0x73), |times| times.write),
+];
+
+/// Draws throughput against lanes, a curve per engine.
+///
+/// # Errors
+/// A file that cannot be written, by name.
+pub(super) fn write_rates(path: &Path, all: &[Series], processor: &str) -> Result<()> {
+    save_figure(path, SIZE, |canvas| {
+        let colors = colors(all);
+        let entries: Vec<Entry> = all
+            .iter()
+            .zip(&colors)
+            .map(|(series, &color)| Entry::new(Key::Line { color, width: WIDTH }, &series.engine.label()))
+            .collect();
+        let title = "Forcing periods per second on every engine: higher is better";
+        let subtitle = format!(
+            "restitution x frequency, from lanes handed over to records read; medians, bars from the slowest run to \
+             the fastest; processor: {processor}"
+        );
+        let top = draw_head(canvas, title, &subtitle, &entries)? + 10.0;
+        let frame = frame(canvas, top, all);
+        grid(canvas, &frame)?;
+        for (series, &color) in all.iter().zip(&colors) {
+            curve(canvas, &frame, series, color)?;
+        }
+        axes(canvas, &frame)
+    })
+}
+
+fn colors(all: &[Series]) -> Vec<RGBColor> {
+    let most = all.iter().filter_map(|series| series.engine.threads()).max().unwrap_or(1);
+    let color = |series: &Series| match series.engine {
+        Engine::Gpu { precision, is_hardware, .. } => {
+            ON_DEVICE[usize::from(precision == Precision::F64) + if is_hardware { 0 } else { 2 }]
+        }
+        Engine::Cpu { threads } => {
+            let share = if most > 1 { (threads as f64).ln() / (most as f64).ln() } else { 1.0 };
+            let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
+            let [RGBColor(a, b, c), RGBColor(d, e, f)] = ON_CPU;
+            RGBColor(mix(a, d), mix(b, e), mix(c, f))
+        }
+    };
+    all.iter().map(color).collect()
+}
+
+/// Powers of ten around all points; coordinates are decimal logarithms.
+fn frame(canvas: &Canvas<'_>, top: f64, all: &[Series]) -> Frame {
+    let (width, height) = canvas.size();
+    let rect = Rect { left: LEFT, top, right: width - RIGHT, bottom: height - BELOW };
+    let points = || all.iter().flat_map(|series| &series.points);
+    let lanes = points().map(|point| (point.lanes as f64).log10());
+    let rates = points().flat_map(|point| {
+        let spread = point.spread(Run::rate);
+        [spread.low, spread.high].map(f64::log10)
+    });
+    let decades = |values: &mut dyn Iterator<Item = f64>, room: f64| {
+        let (low, high) =
+            values.filter(|x| x.is_finite()).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+        if low > high { (0.0, 1.0) } else { ((low - room).floor(), (high + room).ceil()) }
+    };
+    let mut lanes: Vec<f64> = lanes.collect();
+    lanes.sort_by(f64::total_cmp);
+    let x = match (lanes.first(), lanes.last()) {
+        (Some(&first), Some(&last)) => (first - 0.15, last + 0.15),
+        _ => (0.0, 1.0),
+    };
+    let y = decades(&mut rates.into_iter(), 0.05);
+    Frame {
+        rect,
+        x: Axis::exact("lanes", x.0, x.1),
+        y: Axis::exact("forcing periods per second, over all lanes", y.0, y.1),
+    }
+}
+
+/// Powers of ten on an axis of logarithms.
+fn decades(axis: &Axis) -> impl Iterator<Item = i32> + use<> {
+    (axis.low - 1e-9).ceil() as i32..=(axis.high + 1e-9).floor() as i32
+}
+
+fn grid(canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
+    let Rect { left, top, right, bottom } = frame.rect;
+    for decade in decades(&frame.x) {
+        let x = frame.at(decade.into(), 0.0).0;
+        canvas.stroke(&[(x, top), (x, bottom)], 1.0, GRID)?;
+    }
+    for decade in decades(&frame.y) {
+        let y = frame.at(0.0, decade.into()).1;
+        canvas.stroke(&[(left, y), (right, y)], 1.5, GRID)?;
+        for part in 2..10 {
+            let y = frame.at(0.0, f64::from(decade) + f64::from(part).log10()).1;
+            if y > top {
+                canvas.stroke(&[(left, y), (right, y)], 0.5, GRID)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn axes(canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
+    let Rect { left, top, right, bottom } = frame.rect;
+    canvas.stroke(
+        &[(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)],
+        1.5,
+        DARK,
+    )?;
+    for decade in decades(&frame.x) {
+        let x = frame.at(decade.into(), 0.0).0;
+        canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
+        canvas.text(&power(decade), (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
+    }
+    for decade in decades(&frame.y) {
+        let y = frame.at(0.0, decade.into()).1;
+        canvas.stroke(&[(left - TICK, y), (left, y)], 1.5, DARK)?;
+        canvas.text(&power(decade), (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
+    }
+    let middle = ((left + right) / 2.0, bottom + TICK + 56.0);
+    canvas.text(&frame.x.label, middle, MEDIUM, Align::Center, DARK)?;
+    canvas.text(&frame.y.label, (left - 145.0, (top + bottom) / 2.0), MEDIUM, Align::Upwards, DARK)
+}
+
+/// A power of ten as people say it.
+fn power(decade: i32) -> String {
+    match decade {
+        0..=2 => 10u32.pow(decade as u32).to_string(),
+        3..=5 => format!("{} 000", 10u32.pow(decade as u32 - 3)),
+        6..=8 => format!("{} million", 10u32.pow(decade as u32 - 6)),
+        9..=11 => format!("{} billion", 10u32.pow(decade as u32 - 9)),
+        _ => format!("1e{decade}"),
+    }
+}
+
+fn curve(canvas: &Canvas<'_>, frame: &Frame, series: &Series, color: RGBColor) -> Result<()> {
+    let place = |point: &Point, rate: f64| frame.at((point.lanes as f64).log10(), rate.log10());
+    let line: Vec<_> =
+        series.points.iter().map(|point| place(point, point.spread(Run::rate).median)).collect();
+    canvas.stroke(&line, WIDTH, color)?;
+    for (point, &at) in series.points.iter().zip(&line) {
+        let spread = point.spread(Run::rate);
+        let (low, high) = (place(point, spread.low), place(point, spread.high));
+        canvas.stroke(&[low, high], 1.5, color)?;
+        for end in [low, high] {
+            canvas.stroke(&[(end.0 - END, end.1), (end.0 + END, end.1)], 1.5, color)?;
+        }
+        let marker = Marker { shape: Shape::Circle, color, radius: RADIUS, hollow: false };
+        canvas.marker(at, marker)?;
+    }
+    Ok(())
+}
+
+const BAR: f64 = 44.0;
+const ROW: f64 = 96.0;
+
+/// Draws, for the largest map of every engine, how its time is shared among the stages.
+///
+/// # Errors
+/// A file that cannot be written, by name.
+pub(super) fn write_stages(path: &Path, all: &[Series]) -> Result<()> {
+    let rows: Vec<(&Series, &Point)> =
+        all.iter().filter_map(|series| Some((series, series.largest()?))).collect();
+    let height = 320.0 + ROW * rows.len() as f64;
+    save_figure(path, (SIZE.0, height as u32), |canvas| {
+        let entries: Vec<Entry> = STAGES
+            .iter()
+            .map(|&(name, color, _)| Entry::new(Key::Patch { color, opacity: 1.0 }, name))
+            .collect();
+        let title = "Where the time goes: the more of it is integration, the better";
+        let subtitle = "the largest map of every engine; medians";
+        let top = draw_head(canvas, title, subtitle, &entries)? + 10.0;
+        let rect = Rect { left: LEFT - 110.0, top, right: canvas.size().0 - RIGHT, bottom: height - BELOW };
+        let x = Axis::exact("share of the time, %", 0.0, 100.0);
+        let frame = Frame { rect, x, y: Axis::exact("", 0.0, 1.0) };
+        for (nth, (series, point)) in rows.iter().enumerate() {
+            stages(canvas, &frame, top + ROW * nth as f64, series, point)?;
+        }
+        let Rect { left, right, bottom, .. } = rect;
+        canvas.stroke(&[(left, bottom), (right, bottom)], 1.5, DARK)?;
+        for percent in (0..=100).step_by(20) {
+            let x = frame.at(percent.into(), 0.0).0;
+            canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
+            canvas.text(&percent.to_string(), (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
+        }
+        let middle = ((left + right) / 2.0, bottom + TICK + 56.0);
+        canvas.text(&frame.x.label, middle, MEDIUM, Align::Center, DARK)
+    })
+}
+
+fn stages(canvas: &Canvas<'_>, frame: &Frame, top: f64, series: &Series, point: &Point) -> Result<()> {
+    let medians = STAGES.map(|(_, _, of)| point.spread(|run| of(&run.times)).median);
+    let total: f64 = medians.iter().sum();
+    let text = format!("{}: {} lanes in {} s", series.engine.label(), grouped(point.lanes), seconds(total));
+    canvas.text(&text, (frame.rect.left, top + 20.0), SMALL, Align::Left, DARK)?;
+    let mut from = 0.0;
+    for ((_, color, _), time) in STAGES.iter().zip(medians) {
+        let to = from + 100.0 * time / total;
+        let column = frame.column(from, to);
+        canvas.fill(Rect { top: top + 38.0, bottom: top + 38.0 + BAR, ..column }, *color, 1.0)?;
+        from = to;
+    }
+    Ok(())
+}
+
+/// Three significant digits.
+fn seconds(x: f64) -> String {
+    let digits = (2.0 - x.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{x:.digits$}")
+}
+
+/// Digits in groups of three.
+fn grouped(n: usize) -> String {
+    let digits = n.to_string();
+    let groups: Vec<&str> = digits
+        .as_bytes()
+        .rchunks(3)
+        .rev()
+        .map(|group| std::str::from_utf8(group).unwrap_or_default())
+        .collect();
+    groups.join(" ")
+}
