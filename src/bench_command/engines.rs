@@ -109,8 +109,8 @@ fn measure(
     let extent = Extent { sides, runs, seconds, misfit: &misfit };
     let report = &mut |_: &Engine, point: &Point| say(ask, &progress(point));
     let mut series = Series::measure(&mut bench, &extent, answers, report)?;
-    for (lanes, why) in &series.skipped {
-        say(ask, &format!("{lanes:>10} lanes left out: {why}"));
+    if let Some((lanes, why)) = series.skipped.first() {
+        say(ask, &format!("{lanes:>10} lanes and more are left out: {why}"));
     }
     // The reference on fewer threads is the same reference.
     if engine.threads().is_none_or(|threads| threads == cores()) {

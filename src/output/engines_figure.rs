@@ -18,6 +18,9 @@ const BELOW: f64 = 110.0;
 const TICK: f64 = 7.0;
 const WIDTH: f64 = 3.0;
 const RADIUS: f64 = 7.0;
+/// Axes span this many decades at least, and name all their ticks below the other number.
+const LEAST_DECADES: f64 = 0.8;
+const SHORT: f64 = 2.5;
 /// Half the width of the bars' ends.
 const END: f64 = 6.0;
 
@@ -86,7 +89,7 @@ fn colors(all: &[Series]) -> Vec<RGBColor> {
     all.iter().map(color).collect()
 }
 
-/// Powers of ten around all points; coordinates are decimal logarithms.
+/// All points with some room; coordinates are decimal logarithms.
 fn frame(canvas: &Canvas<'_>, top: f64, all: &[Series]) -> Frame {
     let (width, height) = canvas.size();
     let rect = Rect { left: LEFT, top, right: width - RIGHT, bottom: height - BELOW };
@@ -96,45 +99,37 @@ fn frame(canvas: &Canvas<'_>, top: f64, all: &[Series]) -> Frame {
         let spread = point.spread(Run::rate);
         [spread.low, spread.high].map(f64::log10)
     });
-    let decades = |values: &mut dyn Iterator<Item = f64>, room: f64| {
-        let (low, high) =
-            values.filter(|x| x.is_finite()).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
-        if low > high { (0.0, 1.0) } else { ((low - room).floor(), (high + room).ceil()) }
-    };
-    let mut lanes: Vec<f64> = lanes.collect();
-    lanes.sort_by(f64::total_cmp);
-    let x = match (lanes.first(), lanes.last()) {
-        (Some(&first), Some(&last)) => (first - 0.15, last + 0.15),
-        _ => (0.0, 1.0),
-    };
-    let y = decades(&mut rates.into_iter(), 0.05);
     Frame {
         rect,
-        x: Axis::exact("lanes", x.0, x.1),
-        y: Axis::exact("forcing periods per second, over all lanes", y.0, y.1),
+        x: Axis::around("lanes", lanes, LEAST_DECADES),
+        y: Axis::around("forcing periods per second, over all lanes", rates, LEAST_DECADES),
     }
 }
 
-/// Powers of ten on an axis of logarithms.
-fn decades(axis: &Axis) -> impl Iterator<Item = i32> + use<> {
-    (axis.low - 1e-9).ceil() as i32..=(axis.high + 1e-9).floor() as i32
+/// One, two and five times powers of ten on an axis of logarithms, and which of them are named:
+/// all of them on a short axis, else the powers alone.
+fn ticks(axis: &Axis) -> impl Iterator<Item = (f64, bool, String)> + use<> {
+    let Axis { low, high, .. } = *axis;
+    let names_all = high - low < SHORT;
+    (low.floor() as i32..=high.ceil() as i32)
+        .flat_map(|decade| [1, 2, 5].map(|part| (decade, part)))
+        .map(move |(decade, part)| {
+            let at = f64::from(decade) + f64::from(part).log10();
+            (at, part == 1 || names_all, named(part, decade))
+        })
+        .filter(move |(at, ..)| (low..=high).contains(at))
 }
 
 fn grid(canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
     let Rect { left, top, right, bottom } = frame.rect;
-    for decade in decades(&frame.x) {
-        let x = frame.at(decade.into(), 0.0).0;
-        canvas.stroke(&[(x, top), (x, bottom)], 1.0, GRID)?;
+    let width = |is_named| if is_named { 1.5 } else { 0.7 };
+    for (at, is_named, _) in ticks(&frame.x) {
+        let x = frame.at(at, 0.0).0;
+        canvas.stroke(&[(x, top), (x, bottom)], width(is_named), GRID)?;
     }
-    for decade in decades(&frame.y) {
-        let y = frame.at(0.0, decade.into()).1;
-        canvas.stroke(&[(left, y), (right, y)], 1.5, GRID)?;
-        for part in 2..10 {
-            let y = frame.at(0.0, f64::from(decade) + f64::from(part).log10()).1;
-            if y > top {
-                canvas.stroke(&[(left, y), (right, y)], 0.5, GRID)?;
-            }
-        }
+    for (at, is_named, _) in ticks(&frame.y) {
+        let y = frame.at(0.0, at).1;
+        canvas.stroke(&[(left, y), (right, y)], width(is_named), GRID)?;
     }
     Ok(())
 }
@@ -146,29 +141,29 @@ fn axes(canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
         1.5,
         DARK,
     )?;
-    for decade in decades(&frame.x) {
-        let x = frame.at(decade.into(), 0.0).0;
+    for (at, _, name) in ticks(&frame.x).filter(|(_, is_named, _)| *is_named) {
+        let x = frame.at(at, 0.0).0;
         canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
-        canvas.text(&power(decade), (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
+        canvas.text(&name, (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
     }
-    for decade in decades(&frame.y) {
-        let y = frame.at(0.0, decade.into()).1;
+    for (at, _, name) in ticks(&frame.y).filter(|(_, is_named, _)| *is_named) {
+        let y = frame.at(0.0, at).1;
         canvas.stroke(&[(left - TICK, y), (left, y)], 1.5, DARK)?;
-        canvas.text(&power(decade), (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
+        canvas.text(&name, (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
     }
     let middle = ((left + right) / 2.0, bottom + TICK + 56.0);
     canvas.text(&frame.x.label, middle, MEDIUM, Align::Center, DARK)?;
     canvas.text(&frame.y.label, (left - 145.0, (top + bottom) / 2.0), MEDIUM, Align::Upwards, DARK)
 }
 
-/// A power of ten as people say it.
-fn power(decade: i32) -> String {
+/// `part` times a power of ten as people say it.
+fn named(part: u32, decade: i32) -> String {
     match decade {
-        0..=2 => 10u32.pow(decade as u32).to_string(),
-        3..=5 => format!("{} 000", 10u32.pow(decade as u32 - 3)),
-        6..=8 => format!("{} million", 10u32.pow(decade as u32 - 6)),
-        9..=11 => format!("{} billion", 10u32.pow(decade as u32 - 9)),
-        _ => format!("1e{decade}"),
+        0..=2 => (part * 10u32.pow(decade as u32)).to_string(),
+        3..=5 => format!("{} 000", part * 10u32.pow(decade as u32 - 3)),
+        6..=8 => format!("{} million", part * 10u32.pow(decade as u32 - 6)),
+        9..=11 => format!("{} billion", part * 10u32.pow(decade as u32 - 9)),
+        _ => format!("{part}e{decade}"),
     }
 }
 
@@ -230,7 +225,7 @@ pub(super) fn write_stages(path: &Path, all: &[Series]) -> Result<()> {
 fn stages(canvas: &Canvas<'_>, frame: &Frame, top: f64, series: &Series, point: &Point) -> Result<()> {
     let medians = STAGES.map(|(_, _, of)| point.spread(|run| of(&run.times)).median);
     let total: f64 = medians.iter().sum();
-    let text = format!("{}: {} lanes in {} s", series.engine.label(), grouped(point.lanes), seconds(total));
+    let text = format!("{}: {} lanes, {} s", series.engine.label(), grouped(point.lanes), seconds(total));
     canvas.text(&text, (frame.rect.left, top + 20.0), SMALL, Align::Left, DARK)?;
     let mut from = 0.0;
     for ((_, color, _), time) in STAGES.iter().zip(medians) {

@@ -229,7 +229,9 @@ impl<'a> Bench<'a> {
                 pool.install(|| sweep(plan, &mut engine, &split, clock))
             }
             Machine::Gpu(device) => {
-                let Some(opened) = device.take() else { return Err("the device is lost".to_owned()) };
+                let Some(opened) = device.take() else {
+                    return Err("no device is left after the failure before".to_owned());
+                };
                 let lanes = engine::Gpu::new(plan, *opened).map_err(|error| error.to_string())?;
                 let mut engine = engine::Engine::Gpu(Box::new(lanes));
                 let swept = sweep(plan, &mut engine, &split, clock);
