@@ -185,7 +185,7 @@ fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
 }
 
 /// What is counted while a map is made.
-fn unit(plan: &Plan) -> &'static str {
+pub(crate) fn unit(plan: &Plan) -> &'static str {
     if plan.start_count() > 1 { "runs" } else { "cells" }
 }
 

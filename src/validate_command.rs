@@ -18,6 +18,7 @@ use serde::Deserialize;
 
 use crate::cli::Validate;
 use crate::error::Failure;
+use crate::map_command::unit;
 use crate::progress::Progress;
 
 /// What a manifest has to say.
@@ -129,7 +130,7 @@ fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> 
     })?;
     if done < schedule.sequence().len() || schedule.extend(&records) {
         let cells = schedule.expected();
-        return Err(anyhow!("{} holds {done} of {cells} runs; {again}", path.display()));
+        return Err(anyhow!("{} holds {done} of {cells} {}; {again}", path.display(), unit(plan)));
     }
     schedule.finish(&mut records);
     Ok(records)

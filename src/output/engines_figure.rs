@@ -51,31 +51,42 @@ const STAGES: [StageOf; 5] = [
 /// # Errors
 /// A file that cannot be written, by name.
 pub(super) fn write_rates(path: &Path, all: &[Series], processor: &str) -> Result<()> {
+    let all = fastest_first(all);
     save_figure(path, SIZE, |canvas| {
-        let colors = colors(all);
+        let colors = colors(&all);
         let entries: Vec<Entry> = all
             .iter()
             .zip(&colors)
             .map(|(series, &color)| Entry::new(Key::Line { color, width: WIDTH }, &series.engine.label()))
             .collect();
-        let title = "Forcing periods per second on every engine: higher is better";
+        let title = "One map on every engine, forcing periods per second: higher is better";
         let subtitle = format!(
             "restitution x frequency, from lanes handed over to records read; medians, bars from the slowest run to \
              the fastest; processor: {processor}"
         );
         let top = draw_head(canvas, title, &subtitle, &entries)? + 10.0;
-        let frame = frame(canvas, top, all);
+        let frame = frame(canvas, top, &all);
         grid(canvas, &frame)?;
-        for (series, &color) in all.iter().zip(&colors) {
+        for (&series, &color) in all.iter().zip(&colors) {
             curve(canvas, &frame, series, color)?;
         }
         axes(canvas, &frame)
     })
 }
 
-fn colors(all: &[Series]) -> Vec<RGBColor> {
+/// By the best median of any size.
+fn fastest_first(all: &[Series]) -> Vec<&Series> {
+    let best = |series: &Series| {
+        series.points.iter().map(|point| point.spread(Run::rate).median).fold(0.0, f64::max)
+    };
+    let mut sorted: Vec<&Series> = all.iter().collect();
+    sorted.sort_by(|a, b| best(b).total_cmp(&best(a)));
+    sorted
+}
+
+fn colors(all: &[&Series]) -> Vec<RGBColor> {
     let most = all.iter().filter_map(|series| series.engine.threads()).max().unwrap_or(1);
-    let color = |series: &Series| match series.engine {
+    let color = |series: &&Series| match series.engine {
         Engine::Gpu { precision, is_hardware, .. } => {
             ON_DEVICE[usize::from(precision == Precision::F64) + if is_hardware { 0 } else { 2 }]
         }
@@ -90,7 +101,7 @@ fn colors(all: &[Series]) -> Vec<RGBColor> {
 }
 
 /// All points with some room; coordinates are decimal logarithms.
-fn frame(canvas: &Canvas<'_>, top: f64, all: &[Series]) -> Frame {
+fn frame(canvas: &Canvas<'_>, top: f64, all: &[&Series]) -> Frame {
     let (width, height) = canvas.size();
     let rect = Rect { left: LEFT, top, right: width - RIGHT, bottom: height - BELOW };
     let points = || all.iter().flat_map(|series| &series.points);
@@ -194,7 +205,7 @@ const ROW: f64 = 96.0;
 /// A file that cannot be written, by name.
 pub(super) fn write_stages(path: &Path, all: &[Series]) -> Result<()> {
     let rows: Vec<(&Series, &Point)> =
-        all.iter().filter_map(|series| Some((series, series.largest()?))).collect();
+        fastest_first(all).into_iter().filter_map(|series| Some((series, series.largest()?))).collect();
     let height = 320.0 + ROW * rows.len() as f64;
     save_figure(path, (SIZE.0, height as u32), |canvas| {
         let entries: Vec<Entry> = STAGES
@@ -253,4 +264,21 @@ fn grouped(n: usize) -> String {
         .map(|group| std::str::from_utf8(group).unwrap_or_default())
         .collect();
     groups.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_powers_of_ten_and_on_short_axes_their_parts() {
+        let names = |low: f64, high: f64| -> Vec<String> {
+            let named = ticks(&Axis::exact("", low, high)).filter(|(_, is_named, _)| *is_named);
+            named.map(|(_, _, name)| name).collect()
+        };
+        assert_eq!(names(2.9, 7.1), ["1 000", "10 000", "100 000", "1 million", "10 million"]);
+        assert_eq!(names(4.8, 6.5), ["100 000", "200 000", "500 000", "1 million", "2 million"]);
+        assert_eq!(grouped(9_998_244), "9 998 244");
+        assert_eq!([2.516, 31.77, 0.00123].map(seconds), ["2.52", "31.8", "0.00123"]);
+    }
 }
