@@ -74,7 +74,7 @@ done
     echo "| what | precision | integration, s | lane-periods/s | ns per lane-step | outputs, s |"
     echo "| --- | --- | --- | --- | --- | --- |"
     tail -n +2 "$out/speed.csv" | sort -t, -k1,2 -k5,5n | awk -F, '
-        { n = ($3, ++count[$1 "," $2]); key = $1 "," $2; s[key, count[key]] = $5; p[key, count[key]] = $7
+        { key = $1 "," $2; count[key]++; s[key, count[key]] = $5; p[key, count[key]] = $7
           k[key, count[key]] = $8; o[key, count[key]] = $9; seen[key] = 1 }
         END { for (key in seen) { split(key, name, ",")
               printf "| %s | %s | %s (%s, %s) | %s | %s | %s |\n", name[1], name[2], s[key, 2], s[key, 1], s[key, 3],

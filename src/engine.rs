@@ -1,7 +1,7 @@
 //! Who computes: one seam between what is asked and what measures it.
 //!
 //! An [`Engine`] takes batches of a plan's cells and returns one record per cell, in the
-//! batch's order. A record depends on its cell and the plan alone: not on the batch, its
+//! batch's order. A record depends on its cell, its start and the plan alone: not on the batch, its
 //! size, the neighbours, or the number of threads.
 
 mod cpu;

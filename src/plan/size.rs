@@ -14,6 +14,8 @@ const PER_PERIOD: u64 = 40;
 const CSV: u64 = 190;
 const NPY: u64 = 132;
 const HTML: u64 = 24;
+/// Starts of cells that follow their neighbours, in the report.
+const HTML_START: u64 = 44;
 
 /// The size of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +41,7 @@ impl Size {
         let per_file = |format: &Format| match format {
             Format::Csv => CSV,
             Format::Npy => NPY,
+            Format::Html if scene.start().follows() => HTML + HTML_START,
             Format::Html => HTML,
             Format::Png => 1,
         };
