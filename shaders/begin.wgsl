@@ -10,7 +10,6 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     tally.status = cell.refused;
     tally.mode = MODE_FREE;
     tally.origin = SIDE_NONE;
-    tally.tangent_count = 1u;
     motion.q = starts[lane];
     motion.phasor = array<Real, 2>(1.0, 0.0);
     let walls = flows[cell.flow_index].walls;
@@ -21,7 +20,6 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     motions[lane] = Motion(motion, array<Real, 16>());
     tallies[lane] = Tally(tally, array<u32, 16>(), array<u32, 16>(), array<u32, 7>());
-    store_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
 }
 
 // A start beyond a wall is meshing.

@@ -72,6 +72,14 @@ fn judge_cycle() {
         tally.stage = STAGE_READING;
         return;
     }
+    if is_multiple() {
+        // Beyond the last period it stays undecided.
+        if !is_last {
+            tally.candidate = tally.divisor;
+            begin_reading();
+        }
+        return;
+    }
     if is_last || (is_on_cycle() && is_own()) {
         tally.cycle = tally.candidate;
         return;
@@ -84,8 +92,7 @@ fn judge_cycle() {
 fn look_again() {
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
-    tally.tangent_count = 1u;
-    set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
+    forget_growth();
     begin_window(strobe_state(), tally.window);
 }
 
@@ -94,14 +101,18 @@ fn search_on() {
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
     tally.tries += 1u;
-    tally.tangent_count = 1u;
-    set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
+    forget_growth();
     tally.window = 0u;
     tally.candidate = 0u;
     tally.streak = 0u;
     tally.known_lags = 0u;
     tally.settled = 0u;
     tallies[lane].last_distances = array<u32, 16>();
+}
+
+// Whether the cycle closes earlier, as far as the lane's distance from it lets one tell.
+fn is_multiple() -> bool {
+    return tally.divisor > 0u && exp2(-f32(tally.divisor_apart) / OCTAVE) < 4.0 * away();
 }
 
 // How far the lane is from its cycle at most, relative to the motion.
@@ -115,16 +126,16 @@ fn away() -> f32 {
 
 // Whether the lane has come so near to its cycle that its symmetry shows.
 fn is_near_cycle() -> bool {
-    return tally.settled != 0u && away() < ON_CYCLE;
+    return away() < ON_CYCLE;
 }
 
 // Whether the cycle is farther from its mirror image than the lane can be from the cycle: twice
 // that far for the state and as much for the image it is compared with.
 fn is_surely_unsymmetric() -> bool {
-    return tally.settled != 0u && exp2(-f32(tally.mirror) / OCTAVE) > 4.0 * max(away(), ON_CYCLE);
+    return exp2(-f32(tally.mirror) / OCTAVE) > 4.0 * max(away(), ON_CYCLE);
 }
 
 // Near, or as near as rounding lets it.
 fn is_on_cycle() -> bool {
-    return is_near_cycle() || (tally.settled != 0u && tally.apart >= AT_REST);
+    return is_near_cycle() || tally.apart >= AT_REST;
 }

@@ -88,7 +88,7 @@ fn scan() -> u32 {
         if !(room(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
             break;
         }
-        if EXPONENT {
+        if GROWTH {
             let tz1 = tz + ((m[0] * tz + m[1] * tw) + (m[2] * tx + m[3] * tv));
             let tw1 = tw + ((m[7] * tz + m[8] * tw) + (m[9] * tx + m[10] * tv));
             let tx1 = tx + ((m[14] * tz + m[15] * tw) + (m[16] * tx + m[17] * tv));
@@ -122,8 +122,10 @@ fn scan() -> u32 {
     tally.step = n;
     tally.passes_in_period += taken;
     tally.order = select(0u, 1u, leaves);
-    if EXPONENT {
+    if GROWTH {
         tangent_now = array<Real, 4>(tz, tw * substeps, tx, tv * substeps);
+    }
+    if EXPONENT {
         step_columns(taken);
     }
     // Whole numbers, so that it does not matter where a dispatch ends.

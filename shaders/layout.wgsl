@@ -84,6 +84,8 @@ struct Settings {
     row: u32,
     // Periods before averages are taken.
     transient_periods: u32,
+    // Lanes without a tangent vector wait here for the variant that carries it.
+    growth_from: u32,
     // Periods before the exponent is accumulated, and periods per block of it.
     exponent_from: u32,
     exponent_block: u32,
@@ -192,6 +194,9 @@ struct TallyNow {
     // Newton steps towards the cycle, and the events on it before the first.
     refinements: u32,
     branch: u32,
+    // The divisor of its period after which it came nearest to its start, and how near.
+    divisor: u32,
+    divisor_apart: u32,
 }
 
 struct Tally {
@@ -232,6 +237,16 @@ struct Finding {
     word: array<u32, 7>,
 }
 
+// Lanes that are still running, in the order in which they were handed in.
+struct Queue {
+    // How many, and which half of `lanes` they are in.
+    count: u32,
+    half: u32,
+    // How many are left of them.
+    left: u32,
+    lanes: array<u32>,
+}
+
 const STAGE_RUNNING: u32 = 0u;
 const STAGE_READING: u32 = 1u; // the period is decided, its cycle is being read
 const STAGE_READ: u32 = 2u; // its cycle has been read and is to be judged
@@ -245,10 +260,11 @@ const STAGE_DONE: u32 = 3u;
 @group(0) @binding(5) var<storage, read> cells: array<Cell>;
 @group(0) @binding(6) var<storage, read_write> motions: array<Motion>;
 @group(0) @binding(7) var<storage, read_write> tallies: array<Tally>;
-@group(0) @binding(8) var<storage, read_write> live: atomic<u32>;
+@group(0) @binding(8) var<storage, read_write> queue: Queue;
 @group(0) @binding(9) var<storage, read> starts: array<array<Real, 4>>;
 @group(0) @binding(10) var<storage, read_write> readings: array<Reading>;
 @group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
+@group(0) @binding(12) var<storage, read_write> starts_of_blocks: array<u32>;
 
 const MODE_FREE: u32 = 0u;
 const MODE_PRESSED: u32 = 1u; // + side

@@ -22,8 +22,6 @@ const STREAK: u32 = 2u;
 const FIRST_WINDOW: u32 = 4u;
 // Windows need not be longer than so many cycles that contract.
 const LAGS_PER_CYCLE: u32 = 4u;
-// A refined cycle closes where a strobe comes this near to its start, in quarter octaves.
-const CLOSED: u32 = 48u;
 
 // Phase 0: a forcing period is complete.
 fn begin_period() {
@@ -37,14 +35,12 @@ fn begin_period() {
         tally.to_read -= 1u;
         let read = tally.candidate - tally.to_read;
         let apart = octaves(distance_between(strobe_state(), motion.anchor));
-        // On the cycle itself the smallest divisor that closes is the period.
-        let closes = tally.refinements > 0u && tally.candidate % read == 0u && apart >= CLOSED
-            && apart + 8u >= tally.apart_before;
-        if tally.to_read == 0u || closes {
-            tally.candidate = read;
-            tally.to_read = 0u;
+        if tally.to_read == 0u {
             tally.apart = apart;
             tally.stage = STAGE_READ;
+        } else if tally.candidate % read == 0u && apart > tally.divisor_apart {
+            tally.divisor = read;
+            tally.divisor_apart = apart;
         }
         return;
     }
@@ -157,6 +153,8 @@ fn begin_reading() {
     tally.has_read = 1u;
     // A cycle of even period is never compared: it cannot be symmetric.
     tally.mirror = 0u;
+    tally.divisor = 0u;
+    tally.divisor_apart = 0u;
     motion.anchor = strobe_state();
     if EXPONENT {
         tally.tangent_count = 4u;
@@ -281,10 +279,15 @@ fn has_settled(lag: u32) -> bool {
     }
     // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), 1e-6, 1.0);
-    if EXPONENT && settings.early_stop == 1u {
-        return f32(now) >= REFINABLE - OCTAVE * log2(max(away, SLOWEST));
-    }
     return f32(now) >= SETTLED - OCTAVE * log2(away);
+}
+
+// Whether Newton's method may show what the limit is.
+fn is_refinable(lag: u32) -> bool {
+    let now = f32(distance_at(lag));
+    let shrunk = now - f32(last_distance_at(lag));
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), SLOWEST, 1.0);
+    return EXPONENT && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
 }
 
 // Natural logarithm of a quarter octave.
@@ -302,9 +305,9 @@ fn judge_lag(found: u32) -> bool {
     tally.candidate = found;
     // Weak chaos contracts by chance, the oftener it is looked at: ask for more of it.
     let windows = STREAK + tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
-    let settled = tally.streak >= windows && has_settled(found);
-    tally.settled = select(0u, 1u, settled);
-    return settled;
+    let has_contracted = tally.streak >= windows;
+    tally.settled = select(0u, 1u, has_contracted && has_settled(found));
+    return has_contracted && (tally.settled != 0u || is_refinable(found));
 }
 
 // Half a period after the middle of a cycle of odd period: how far is the state from the mirror

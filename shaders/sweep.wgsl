@@ -18,8 +18,11 @@ fn check_finite() {
     }
 }
 
+// Whether there is work for this variant: without the tangent vector for the exponent, lanes go
+// on until they need it, and whoever reads a cycle reads it to its end.
 fn running() -> bool {
-    return tally.status == STATUS_OK && tally.stage < STAGE_READ;
+    let waits = EXPONENT && !GROWTH && tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from;
+    return tally.status == STATUS_OK && tally.stage < STAGE_READ && !waits;
 }
 
 // Takes lane `i` into registers.
@@ -56,10 +59,10 @@ fn flight_to_mark() -> bool {
 @compute @workgroup_size(WORKGROUP)
 fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * settings.row + id.x;
-    if i >= settings.lanes {
+    if i >= queue.count {
         return;
     }
-    take_up(i);
+    take_up(queued(i));
     fetch_constants();
     fetch_tangent();
     if motion.bound == 0.0 {
@@ -82,7 +85,4 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     keep_tangent();
     put_down();
-    if running() {
-        atomicAdd(&live, 1u);
-    }
 }

@@ -29,23 +29,33 @@ fn store_tangent(i: u32, u: array<Real, 4>) {
     motions[lane].tangents[k + 3u] = u[3];
 }
 
-// At the start and the end of a dispatch.
+// At the start and the end of a dispatch. The first one with the vector begins it.
 fn fetch_tangent() {
-    if EXPONENT {
+    if GROWTH {
+        if tally.tangent_count == 0u {
+            forget_growth();
+            keep_tangent();
+        }
         let t = motions[lane].tangents;
         tangent_now = array<Real, 4>(t[0], t[1], t[2], t[3]);
     }
 }
 
+// The vector starts anew, in no direction in particular.
+fn forget_growth() {
+    tally.tangent_count = select(0u, 1u, GROWTH);
+    tangent_now = array<Real, 4>(0.5, 0.5, 0.5, 0.5);
+}
+
 fn keep_tangent() {
-    if EXPONENT && tally.tangent_count == 1u {
+    if GROWTH && tally.tangent_count == 1u {
         store_tangent(0u, tangent_now);
     }
 }
 
 // Carries the monodromy's columns over full steps; each costs a trip per vector.
 fn step_columns(count: u32) {
-    if tally.tangent_count == 1u {
+    if tally.tangent_count <= 1u {
         return;
     }
     let m = here.step;
@@ -183,7 +193,7 @@ fn renormalise() -> Real {
 }
 
 fn accumulate_growth() {
-    if !EXPONENT {
+    if !GROWTH {
         return;
     }
     let growth = renormalise();

@@ -14,6 +14,7 @@ mod constants;
 mod device;
 pub mod layout;
 mod reading;
+mod rounds;
 mod self_test;
 mod shader;
 mod signal;
@@ -291,11 +292,17 @@ impl Gpu {
     ) -> Result<Vec<Record>, GpuError> {
         let LaneSettings { workgroup, exponent, .. } = *settings;
         let keep = !is_hardware(&self.info);
-        let variant = Variant { precision: self.precision, workgroup, exponent, keep };
-        if !self.pipelines.contains_key(&variant) {
-            let pipelines = device::pipelines(self, variant).await?;
-            self.pipelines.insert(variant, pipelines);
+        // Until they need it, lanes go on without the tangent vector.
+        let growths: &[bool] = if exponent { &[false, true] } else { &[false] };
+        let variant = |growth| Variant { precision: self.precision, workgroup, exponent, growth, keep };
+        let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
+        for &variant in &variants {
+            if !self.pipelines.contains_key(&variant) {
+                let pipelines = device::pipelines(self, variant).await?;
+                self.pipelines.insert(variant, pipelines);
+            }
         }
-        batch::run(self, &self.pipelines[&variant], tables, lanes, settings).await
+        let pipelines: Vec<_> = variants.iter().map(|variant| &self.pipelines[variant]).collect();
+        batch::run(self, &pipelines, tables, lanes, settings).await
     }
 }

@@ -56,10 +56,14 @@ macro_rules! same_layout {
 #[test]
 fn every_variant_is_valid_and_lies_as_the_host_says() {
     for precision in Precision::ALL {
-        for (workgroup, exponent, keep) in
-            [(32, false, true), (64, true, false), (64, false, false), (256, true, true)]
-        {
-            let (module, _) = &module(Variant { precision, workgroup, exponent, keep });
+        for (workgroup, exponent, growth, keep) in [
+            (32, false, false, true),
+            (64, true, true, false),
+            (64, true, false, false),
+            (64, false, false, false),
+            (256, true, true, true),
+        ] {
+            let (module, _) = &module(Variant { precision, workgroup, exponent, growth, keep });
             let real = precision.bytes();
             same_layout!(
                 module,
@@ -135,6 +139,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     events_per_period,
                     row,
                     transient_periods,
+                    growth_from,
                     exponent_from,
                     exponent_block,
                     max_period,
@@ -186,6 +191,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     apart_before,
                     refinements,
                     branch,
+                    divisor,
+                    divisor_apart,
                     distances,
                     last_distances,
                     word

@@ -15,8 +15,8 @@ pub struct AdapterChoice {
 }
 
 /// Storage bindings of the shader by number: flows, shapes, phasors, laws, cells, motions,
-/// tallies, live, starts, readings, findings; `true` where it writes.
-const WRITES: [bool; 11] = [false, false, false, false, false, true, true, true, false, true, true];
+/// tallies, queue, starts, readings, findings, blocks; `true` where it writes.
+const WRITES: [bool; 12] = [false, false, false, false, false, true, true, true, false, true, true, true];
 
 /// An entry point of the shader and the storage that it touches: no more than eight buffers,
 /// which every adapter has.
@@ -30,6 +30,13 @@ pub(super) struct EntryPoint {
 pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 5, 6, 7, 9] };
 /// Integrates.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
+/// Compacts the queue, one after the other.
+pub(super) const COMPACT: [EntryPoint; 4] = [
+    EntryPoint { name: "count_left", storage: &[7, 8, 12] },
+    EntryPoint { name: "sum_left", storage: &[8, 12] },
+    EntryPoint { name: "move_left", storage: &[7, 8, 12] },
+    EntryPoint { name: "turn_over", storage: &[8] },
+];
 /// Makes records.
 pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 10, 11] };
 
@@ -37,6 +44,7 @@ pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: 
 pub(super) struct Pipelines {
     pub(super) begin: wgpu::ComputePipeline,
     pub(super) sweep: wgpu::ComputePipeline,
+    pub(super) compact: [wgpu::ComputePipeline; 4],
     pub(super) conclude: wgpu::ComputePipeline,
 }
 
@@ -213,6 +221,7 @@ pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipe
     let pipelines = Pipelines {
         begin: pipeline(gpu, &module, BEGIN),
         sweep: pipeline(gpu, &module, SWEEP),
+        compact: COMPACT.map(|entry_point| pipeline(gpu, &module, entry_point)),
         conclude: pipeline(gpu, &module, CONCLUDE),
     };
     match scope.pop().await {

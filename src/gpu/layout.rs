@@ -109,6 +109,8 @@ pub struct Settings {
     pub row: u32,
     /// Periods before averages are taken.
     pub transient_periods: u32,
+    /// Periods before the tangent vector is carried.
+    pub growth_from: u32,
     /// Periods before the exponent is accumulated.
     pub exponent_from: u32,
     /// Periods per block of the exponent.
@@ -236,6 +238,10 @@ pub struct Tally {
     pub refinements: u32,
     /// The events on it before the first, hashed.
     pub branch: u32,
+    /// Divisor of its period after which it came nearest to its start.
+    pub divisor: u32,
+    /// How near, in quarter octaves below 1.
+    pub divisor_apart: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.

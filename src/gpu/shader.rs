@@ -40,8 +40,10 @@ pub struct Variant {
     pub precision: Precision,
     /// Invocations per workgroup.
     pub workgroup: u32,
-    /// Whether tangent vectors are carried.
+    /// Whether cycles are read with their monodromy matrix.
     pub exponent: bool,
+    /// Whether a tangent vector is carried for the exponent of motion at no cycle.
+    pub growth: bool,
     /// Whether lanes keep copies of all their constants: for software drivers.
     pub keep: bool,
 }
@@ -64,6 +66,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/cycle.wgsl"),
     include_str!("../../shaders/refine.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
+    include_str!("../../shaders/compact.wgsl"),
     include_str!("../../shaders/begin.wgsl"),
     include_str!("../../shaders/record.wgsl"),
 );
@@ -71,7 +74,7 @@ const BODY: &str = concat!(
 impl Variant {
     /// The variant of a precision with the usual workgroup.
     pub fn of(precision: Precision) -> Variant {
-        Variant { precision, workgroup: WORKGROUP, exponent: true, keep: false }
+        Variant { precision, workgroup: WORKGROUP, exponent: true, growth: true, keep: false }
     }
 
     /// Its WGSL source.
@@ -80,13 +83,14 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let Variant { workgroup, exponent, keep, .. } = self;
+        let Variant { workgroup, exponent, growth, keep, .. } = self;
         let terms = terms(real);
         let body = unroll(BODY, terms);
         let bits: String =
             VALID.iter().map(|(name, bits)| format!("const VALID_{name}: u32 = {bits}u;\n")).collect();
         format!(
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
+             const GROWTH: bool = {growth};\n\
              const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
         )
     }
