@@ -9,8 +9,9 @@
 //! ([`bifurcation`]). A map's cells are numbered ([`plan`]) and put in order ([`schedule`]),
 //! go through an engine ([`engine`], [`sweep`]) and come back as records ([`record`],
 //! [`classify`]); a sample of them is replayed ([`mod@validate`]). All of it is then written
-//! down ([`output`]).
+//! down ([`output`]). How fast and how right that is, [`mod@bench`] measures.
 
+pub mod bench;
 pub mod bifurcation;
 pub mod certificate;
 pub mod classify;

@@ -70,7 +70,7 @@ pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, sh
     analysis.run(start).unwrap_or_else(|stop| failed(status_of(stop), start, flow.period))
 }
 
-pub(super) fn status_of(stop: Stop) -> Status {
+pub(crate) fn status_of(stop: Stop) -> Status {
     match stop {
         Stop::CapEvents => Status::CapEvents,
         Stop::CapRoot => Status::CapRoot,

@@ -1,0 +1,3 @@
+//! Instruments: measurements that anybody can repeat. `rattlemap bench` runs them.
+
+pub mod stability;
