@@ -359,6 +359,16 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if finite { Ok(()) } else { Err(Stop::NonFinite) }
     }
 
+    /// Rates whose powers leave the range of f64 leave nothing that bounds a step.
+    fn check_bounds(&self, linear: &LinearFlow) -> Result<(), Stop> {
+        let bound = match self.mode {
+            Mode::Free | Mode::Pressed(_) => &linear.gap_bound,
+            Mode::Dip(_) => &linear.pressing_bound,
+        };
+        let finite = bound.remainder(&self.q, &self.phasor, 1.0).is_finite();
+        if finite { Ok(()) } else { Err(Stop::NonFinite) }
+    }
+
     /// One step: as far as it is clear, or to its event, or to `until`.
     #[inline(always)]
     fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
@@ -403,6 +413,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 Outlook::Unclear if level + 1 == linear.steps.len() => {
                     // What is not a number is never clear.
                     self.check_finite()?;
+                    self.check_bounds(linear)?;
                     self.settle_graze(linear, level, until, observer);
                     return Ok(());
                 }

@@ -40,7 +40,9 @@ fn one(precision: Precision, pair: GearPair, start: State, record: &Record) -> O
     let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
     let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
     let sample = Sample { seed: 0, picks, strata: Vec::new() };
+    let clock = std::time::Instant::now();
     let validation = replay(&subject, &sample, StateSource::None(String::new()), &|_| ());
+    if clock.elapsed().as_secs_f64() > 2.0 { eprintln!("SLOW compare {:?} {:?} {pair:?} {start:?} {:?}", clock.elapsed(), precision, validation.mismatches); }
     let mismatch = validation.mismatches.into_iter().next()?;
     let (differences, explanation) = (mismatch.differences, mismatch.explanation);
     Some(Mismatch { engine: precision.into(), pair, start, differences, explanation })

@@ -1,13 +1,19 @@
 //! Where random cells come from: the whole valid space, its edges more often than by chance.
 
-use super::super::cells::REST;
+use super::super::cells::{REST, flow_of};
 use super::super::lanes::Start;
 use crate::gpu::Constants;
 use crate::model::GearPair;
 use crate::random::Random;
+use crate::reference::Trajectory;
 
-/// Bounded cells take fewer steps per forcing period, on the finest grid they need.
+/// Bounded cells take fewer steps per forcing period on the finest grid they need, and fewer
+/// steps and root iterations on the reference in the first few periods: where the backlash is
+/// tiny beside the motion there may be a million impacts in a period.
 const TRIPS: u64 = 2000;
+const TRIAL_PERIODS: u32 = 3;
+/// Looks at a trial per period.
+const LOOKS: u32 = 32;
 
 /// Wild cells turn fewer radians of their fastest rate in one forcing period: about as many
 /// steps on the reference, which would else take its 2 * 10^8 steps per period before it stops.
@@ -59,10 +65,33 @@ pub(super) fn bounded(random: &mut Random) -> Start {
             e: restitution(random),
             mesh_speed: or_none(random, 0.2, -6.0, 2.0),
         };
-        if trips(&pair).is_some_and(|trips| trips < TRIPS) {
-            return (pair, start(&pair, random));
+        let cell = (pair, start(&pair, random));
+        if trips(&pair).is_some_and(|trips| trips < TRIPS) && is_bounded(&cell) {
+            return cell;
         }
     }
+}
+
+/// Whether the reference has little enough to do.
+fn is_bounded((pair, start): &Start) -> bool {
+    let flow = flow_of(pair);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), *start);
+    let mut before = 0;
+    for _ in 0..TRIAL_PERIODS {
+        for look in 1..=LOOKS {
+            let until = flow.period * f64::from(look) / f64::from(LOOKS);
+            let ended = trajectory.advance_to(until, &mut ());
+            let work = trajectory.work();
+            if ended.is_err() || work.steps + work.root_iterations - before > TRIPS {
+                return false;
+            }
+        }
+        if trajectory.advance_period(&mut ()).is_err() {
+            return false;
+        }
+        before = trajectory.work().steps + trajectory.work().root_iterations;
+    }
+    true
 }
 
 /// At rest, between the walls, on a wall or beyond it.
