@@ -65,7 +65,7 @@ fn is_chaos() -> bool {
         return false;
     }
     let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
-    return grows(errors) && !departs(errors);
+    return grows(errors) && outgrows(errors) && !departs(errors);
 }
 
 // Whether the exponent exceeds zero by so many standard errors.
@@ -75,6 +75,18 @@ fn grows(errors: Real) -> bool {
     }
     let growth = mean_growth();
     return growth.x > errors * growth.y;
+}
+
+// Neutral motion grows, too: tangents of a free body, of a torus or of an undamped swing in
+// proportion to time, at a double root to its square. Chaos has to outgrow that.
+const NEUTRAL_ORDER: f32 = 2.0;
+
+fn outgrows(errors: Real) -> bool {
+    let growth = mean_growth();
+    let periods = tally.blocks * settings.exponent_block;
+    let began = max(settings.exponent_from, 1u);
+    let neutral = NEUTRAL_ORDER * log(f32(began + periods) / f32(began));
+    return (growth.x - errors * growth.y) * Real(periods) > Real(neutral);
 }
 
 // Whether the motion lingers at some cycle and its growth may be that of leaving it.

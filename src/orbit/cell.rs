@@ -30,6 +30,9 @@ const SETTLED: f64 = 1e-6;
 /// transients were taken for chaos then, 13 at the end of the budget.
 const EARLY_CHAOS_ERRORS: f64 = 6.0;
 
+/// Chaos has to outgrow this power of time.
+const NEUTRAL_ORDER: f64 = 2.0;
+
 /// Cycles, at least, over which an approach must have been seen.
 const APPROACH_CYCLES: usize = 4;
 
@@ -315,7 +318,8 @@ impl<'a> Watch<'a> {
         let averaged = &self.strobes[self.exponent_from()..];
         let lingered = lingering(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_departure = |rate: f64| rate * lingered as f64 * period < DEPARTURE;
-        let slow = surely.is_some_and(|rate| rate <= 0.0)
+        let is_neutral = |rate: f64| rate * (averaged.len() - 1) as f64 * period <= self.neutral_growth();
+        let slow = surely.is_some_and(is_neutral)
             || 2.0 * lingered as f64 >= span && surely.is_none_or(is_departure);
         Measured {
             period: None,
@@ -328,6 +332,13 @@ impl<'a> Watch<'a> {
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,
         }
+    }
+
+    /// What tangents of neutral motion may grow by, as a logarithm: those of a free body, of a
+    /// torus or of an undamped swing in proportion to time, at a double root to its square.
+    fn neutral_growth(&self) -> f64 {
+        let from = self.exponent_from().max(1) as f64;
+        NEUTRAL_ORDER * ((self.strobes.len() - 1) as f64 / from).ln()
     }
 
     /// A cell that could not be continued: nothing was measured but how far it came.
