@@ -157,6 +157,12 @@ pub fn replay(
     }
 }
 
+/// Where the record of one cell differs from the reference, without asking why.
+pub fn differences(subject: &Subject<'_>, id: u32) -> Vec<Difference> {
+    let case = Case::new(subject, id, None);
+    case.truth.compare(case.record, &case.bars).into_iter().filter_map(|(_, differs)| differs).collect()
+}
+
 fn replay_cell(subject: &Subject<'_>, id: u32, lane: Option<&Record>) -> Replayed {
     let case = Case::new(subject, id, lane);
     let mut fields = case.truth.compare(case.record, &case.bars);

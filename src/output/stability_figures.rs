@@ -200,7 +200,9 @@ pub(super) fn grid(path: &Path, device: &str, rows: &[grid::Swings]) -> Result<(
     let mut depths: Vec<f64> = rows.iter().map(|row| row.depth).collect();
     depths.sort_by(|a, b| b.total_cmp(a));
     depths.dedup();
-    let least = 0.1 / rows.iter().map(|row| row.swings).max().unwrap_or(1) as f64;
+    // A whole decade below a single contact: the lower edge.
+    let swings = rows.iter().map(|row| row.swings).max().unwrap_or(1);
+    let least = 10f64.powf((0.5 / swings as f64).log10().floor());
     let share = |count: usize, row: &grid::Swings| (count as f64 / row.swings as f64).max(least);
     let first = rows.first().map(|row| row.engine);
     let by_ends = depths.iter().zip(DEPTH_COLORS).map(|(&depth, color)| {

@@ -2,15 +2,19 @@
 
 use rayon::prelude::*;
 
-use super::SETTINGS;
+use super::{SETTINGS, lane_settings};
 use super::super::cells::EngineName;
 use super::super::lanes::Start;
+use crate::classify::classify;
 use crate::gpu::Precision;
 use crate::model::{GearPair, State};
+use crate::orbit::Class;
 use crate::plan::Plan;
 use crate::record::Record;
 use crate::scene::{Purpose, Scene};
-use crate::validate::{Difference, Explanation, Pick, Sample, StateSource, Stratum, Subject, replay};
+use crate::validate::{
+    Difference, Explanation, Pick, Sample, StateSource, Stratum, Subject, differences, replay,
+};
 
 /// A lane whose record is not what the reference says.
 #[derive(Clone, Debug)]
@@ -27,25 +31,84 @@ pub struct Mismatch {
     pub explanation: Option<Explanation>,
 }
 
-/// Every lane that differs from the reference, in the order of the cells.
-pub(super) fn all(precision: Precision, cells: &[Start], records: &[Record]) -> Vec<Mismatch> {
-    let one = |(&(pair, start), record): (&Start, &Record)| one(precision, pair, start, record);
-    cells.par_iter().zip(records).with_max_len(1).filter_map(one).collect()
+/// Lanes against the reference.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Comparison {
+    /// Lanes that decide nothing within their periods where the reference does: they claim
+    /// nothing that could be wrong.
+    pub(super) silent: usize,
+    /// Lanes that say something else than the reference and were examined.
+    pub(super) mismatches: Vec<Mismatch>,
+    /// Those that were not, beyond the number asked for.
+    pub(super) left: usize,
 }
 
-fn one(precision: Precision, pair: GearPair, start: State, record: &Record) -> Option<Mismatch> {
-    let plan = plan(&pair, start);
-    let mut records = vec![Record::default(); plan.cell_count()];
-    records[0] = *record;
-    let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
-    let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
-    let sample = Sample { seed: 0, picks, strata: Vec::new() };
-    let clock = std::time::Instant::now();
-    let validation = replay(&subject, &sample, StateSource::None(String::new()), &|_| ());
-    if clock.elapsed().as_secs_f64() > 2.0 { eprintln!("SLOW compare {:?} {:?} {pair:?} {start:?} {:?}", clock.elapsed(), precision, validation.mismatches); }
-    let mismatch = validation.mismatches.into_iter().next()?;
-    let (differences, explanation) = (mismatch.differences, mismatch.explanation);
-    Some(Mismatch { engine: precision.into(), pair, start, differences, explanation })
+/// Compares every lane, and examines at most so many of those that differ: the first in the
+/// order of `ranks`, which is random.
+pub(super) fn all(
+    precision: Precision,
+    cells: &[Start],
+    records: &[Record],
+    ranks: &[u64],
+    most: usize,
+) -> Comparison {
+    let ids = (0..cells.len()).into_par_iter().with_max_len(1);
+    let mut different: Vec<usize> = ids.filter(|&i| Cell::new(precision, cells[i], records[i]).differs()).collect();
+    let mut comparison = Comparison::default();
+    let is_silent = |i: &usize| {
+        classify(&records[*i]) == Class::Undecided && records[*i].periods_run >= lane_settings().periods
+    };
+    comparison.silent = different.iter().filter(|i| is_silent(i)).count();
+    different.retain(|i| !is_silent(i));
+    different.sort_by_key(|&i| ranks[i]);
+    comparison.left = different.len().saturating_sub(most);
+    different.truncate(most);
+    comparison.mismatches = different
+        .par_iter()
+        .with_max_len(1)
+        .filter_map(|&i| Cell::new(precision, cells[i], records[i]).examine())
+        .collect();
+    comparison
+}
+
+/// A cell and its record as a map of which it is the first cell.
+struct Cell {
+    precision: Precision,
+    pair: GearPair,
+    start: State,
+    plan: Plan,
+    records: Vec<Record>,
+}
+
+impl Cell {
+    fn new(precision: Precision, (pair, start): Start, record: Record) -> Cell {
+        let plan = plan(&pair, start);
+        let mut records = vec![Record::default(); plan.cell_count()];
+        records[0] = record;
+        Cell { precision, pair, start, plan, records }
+    }
+
+    fn subject(&self) -> Subject<'_> {
+        Subject { plan: &self.plan, records: &self.records, precision: self.precision, is_lane: true }
+    }
+
+    fn differs(&self) -> bool {
+        !differences(&self.subject(), 0).is_empty()
+    }
+
+    fn examine(&self) -> Option<Mismatch> {
+        let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
+        let sample = Sample { seed: 0, picks, strata: Vec::new() };
+        let validation = replay(&self.subject(), &sample, StateSource::None(String::new()), &|_| ());
+        let mismatch = validation.mismatches.into_iter().next()?;
+        Some(Mismatch {
+            engine: self.precision.into(),
+            pair: self.pair,
+            start: self.start,
+            differences: mismatch.differences,
+            explanation: mismatch.explanation,
+        })
+    }
 }
 
 /// A plan whose first cell is this one: the swept parameters have no upper bound.
