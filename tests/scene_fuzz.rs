@@ -191,6 +191,6 @@ fn mutants_reach_both_sides() {
         }
     }
     println!("{accepted} accepted, refused: {kinds:?}");
-    assert!(accepted > 100, "{accepted}");
+    assert!(accepted > 60, "{accepted}");
     assert_eq!(kinds.len(), 8, "{kinds:?}");
 }
