@@ -59,9 +59,12 @@ const DOUBT: Real = 1.0;
 // have lasted through: beyond the ratio of the largest to the smallest distance.
 const DEPARTURE: Real = 40.0;
 
+// A standard error of fewer blocks is none; short budgets would be called chaos by two.
+const FEWEST_BLOCKS: u32 = 6u;
+
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
-    if tally.block_periods > 0u || tally.streak > 0u || tally.period < settings.chaos_from {
+    if tally.block_periods > 0u || tally.blocks < FEWEST_BLOCKS || tally.streak > 0u || tally.period < settings.chaos_from {
         return false;
     }
     let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);

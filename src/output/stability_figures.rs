@@ -167,23 +167,36 @@ pub(super) fn stiffness(path: &Path, device: &str, rows: &[stiffness::Row]) -> R
         curve
     };
     let errors = |engine: EngineName| Group {
-        label: format!("{}: error", engine.name()),
+        label: format!("{} against the reference", engine.name()),
         color: color(engine),
         look: Look::Points(shape(engine)),
         curves: vec![worst(engine, |row| row.error)],
     };
     let rounding = |engine: EngineName| Group {
-        label: format!("{}: four roundings of all that is given", engine.name()),
+        label: format!("four roundings of all that is given, {}", engine.name()),
         color: color(engine),
         look: Look::Dashes,
-        curves: vec![worst(engine, |row| Some(row.sensitivity))],
+        curves: vec![worst(engine, |row| Some(row.conditioning))],
+    };
+    let spread = Group {
+        label: "lanes f64 against twice their steps".to_owned(),
+        color: RGBColor(0x00, 0x9e, 0x73),
+        look: Look::Points(Shape::Circle),
+        curves: vec![worst(EngineName::LanesF64, |row| row.spread)],
+    };
+    let scatter = Group {
+        label: "scatter of the reference itself".to_owned(),
+        color: DARK,
+        look: Look::Points(Shape::Square),
+        curves: vec![worst(EngineName::Reference, |row| Some(row.scatter))],
     };
     let lanes = [EngineName::LanesF32, EngineName::LanesF64];
-    let groups: Vec<Group> = lanes.map(errors).into_iter().chain(lanes.map(rounding)).collect();
+    let groups: Vec<Group> =
+        lanes.map(errors).into_iter().chain([spread, scatter]).chain(lanes.map(rounding)).collect();
     let figure = Figure {
         title: "Error against meshing stiffness, 8 forcing periods from rest: level is good, lower is better",
         subtitle: &format!("the worst of four motions that mesh; the supports' stiffness is 30; {device}"),
-        labels: ["meshing stiffness k", "largest distance from the reference"],
+        labels: ["meshing stiffness k", "largest difference of states"],
     };
     save(path, &figure, &groups)
 }

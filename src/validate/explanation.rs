@@ -221,7 +221,13 @@ fn unsettled(case: &Case<'_>) -> Option<Explanation> {
         return None;
     }
     let before = case.record.periods_run.saturating_sub(period);
-    let places = [case.after(case.start, before).ok(), case.after(strobe(case)?, 0).ok()];
+    // Averages are read one cycle after the multipliers.
+    let earlier = before.saturating_sub(period);
+    let places = [
+        case.after(case.start, before).ok(),
+        case.after(case.start, earlier).ok(),
+        case.after(strobe(case)?, 0).ok(),
+    ];
     let same = |answer: Answer| case.is_the_records(&answer);
     let read = |place: &Trajectory<'_>| case.read_as_is(place, period).is_some_and(same);
     let as_is = places.iter().flatten().any(read);
@@ -311,6 +317,14 @@ fn late(case: &Case<'_>) -> Option<Explanation> {
             let is_transient = || wanders_within_rounding(case, case.record.periods_run, period, ELSEWHERE);
             let settles = || case.at_leisure(from).class == case.truth.class;
             (!early && wanders() && is_transient() && settles()).then_some(Explanation::Chaos)
+        }
+        // The same average, which exceeds zero by enough errors on one side and not on the other.
+        (Class::Chaotic, Class::Undecided) => {
+            let [theirs, error] = case.truth.exponent?;
+            let [ours, own] = [case.record.lyapunov, case.record.lyapunov_error];
+            let is_weak = ours <= 2.0 * CHAOS_ERRORS * own;
+            (is_weak && (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own))
+                .then_some(Explanation::UndecidedInBudget)
         }
         _ if !is_spent(case) => None,
         // The reference, too, is still on its way.
