@@ -13,6 +13,7 @@
 mod answer;
 mod case;
 mod explanation;
+mod limits;
 mod sample;
 pub mod states;
 

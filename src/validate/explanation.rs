@@ -6,6 +6,7 @@
 
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
+use super::limits::{hidden_symmetry, undecided_chaos};
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
 use crate::model::State;
@@ -70,7 +71,8 @@ pub enum Explanation {
     Unsettled,
     /// The reference's cycle is within what lanes resolve (2.5e-4 of the motion) of one with the
     /// record's period, a divisor of its own; or rounding keeps the lane that much off the cycle,
-    /// in a pattern whose period is a multiple.
+    /// in a pattern whose period is a multiple; or the steps of a cycle round by more than lanes
+    /// tell a symmetric one from an unsymmetric one by.
     BelowResolution,
     /// Lanes call a cycle symmetric that is its own mirror image to 2.5e-4 of its size; this one
     /// is, but not quite.
@@ -130,7 +132,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 11] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 13] = [
         engine_cap,
         longer,
         other_attractor,
@@ -138,6 +140,8 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         resolution,
         unsettled,
         nearly_symmetric,
+        hidden_symmetry,
+        undecided_chaos,
         late,
         bifurcation,
         flip,
@@ -317,14 +321,6 @@ fn late(case: &Case<'_>) -> Option<Explanation> {
             let is_transient = || wanders_within_rounding(case, case.record.periods_run, period, ELSEWHERE);
             let settles = || case.at_leisure(from).class == case.truth.class;
             (!early && wanders() && is_transient() && settles()).then_some(Explanation::Chaos)
-        }
-        // The same average, which exceeds zero by enough errors on one side and not on the other.
-        (Class::Chaotic, Class::Undecided) => {
-            let [theirs, error] = case.truth.exponent?;
-            let [ours, own] = [case.record.lyapunov, case.record.lyapunov_error];
-            let is_weak = ours <= 2.0 * CHAOS_ERRORS * own;
-            (is_weak && (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own))
-                .then_some(Explanation::UndecidedInBudget)
         }
         _ if !is_spent(case) => None,
         // The reference, too, is still on its way.
