@@ -7,8 +7,8 @@
 //! else from the reference, and what an error may be from how far the reference itself moves
 //! when starts and parameters move within rounding.
 
-pub mod chatter;
 mod cells;
+pub mod chatter;
 pub mod fuzz;
 pub mod grazing;
 pub mod grid;

@@ -16,7 +16,8 @@ const SEED: u64 = 1;
 pub(crate) fn run(ask: &BenchOptions) -> Result<(), Failure> {
     let folder = Folder::open(&ask.out("stability"), ask.force)?;
     let (size, name) = if ask.quick { (Size::Quick, "quick") } else { (Size::Full, "full") };
-    let mut lanes = pollster::block_on(Lanes::open(&AdapterChoice::default())).context("no lanes to look at")?;
+    let mut lanes =
+        pollster::block_on(Lanes::open(&AdapterChoice::default())).context("no lanes to look at")?;
     let clock = Instant::now();
     let report = stability::run(size, SEED, &mut lanes, &mut |verdict| {
         if !ask.quiet || !verdict.holds {

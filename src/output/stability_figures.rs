@@ -42,7 +42,9 @@ enum Look {
 impl Group {
     fn key(&self) -> Key {
         match self.look {
-            Look::Points(shape) => Key::Marker(Marker { shape, color: self.color, radius: 6.0, hollow: false }),
+            Look::Points(shape) => {
+                Key::Marker(Marker { shape, color: self.color, radius: 6.0, hollow: false })
+            }
             Look::Dashes => Key::Dashes { color: self.color },
         }
     }

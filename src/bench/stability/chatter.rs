@@ -73,11 +73,17 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
     let mut rows: Vec<Row> = cases.par_iter().map(on_reference).collect();
     for precision in lanes.precisions() {
         let records = lanes.run(precision, &starts, &periods(1))?;
-        rows.extend(cases.par_iter().zip(records).map(|(case, record)| {
-            let status = Status::from_code(record.status).unwrap_or(Status::NonFinite);
-            let state = (status == Status::Ok).then_some(record.strobe);
-            row(case, precision.into(), status, state)
-        }).collect::<Vec<_>>());
+        rows.extend(
+            cases
+                .par_iter()
+                .zip(records)
+                .map(|(case, record)| {
+                    let status = Status::from_code(record.status).unwrap_or(Status::NonFinite);
+                    let state = (status == Status::Ok).then_some(record.strobe);
+                    row(case, precision.into(), status, state)
+                })
+                .collect::<Vec<_>>(),
+        );
     }
     Ok(rows)
 }

@@ -79,7 +79,8 @@ pub struct Rows {
 /// A [`GpuError`].
 pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Rows, GpuError> {
     let mut random = Random::new(seed);
-    let mut cells: Vec<Start> = (0..size.pick(64, 1000, 100_000)).map(|_| space::bounded(&mut random)).collect();
+    let mut cells: Vec<Start> =
+        (0..size.pick(64, 1000, 100_000)).map(|_| space::bounded(&mut random)).collect();
     // Lanes that take as many steps run side by side.
     cells.sort_by_cached_key(|(pair, _)| space::trips(pair));
     let ranks: Vec<u64> = cells.iter().map(|_| random.next()).collect();

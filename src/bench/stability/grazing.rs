@@ -138,9 +138,13 @@ fn tabulate(engine: EngineName, distances: &[f64], starts: &[Start], speeds: &[O
 /// none that ends short of the wall is made up.
 pub fn judge(rows: &[Row]) -> Verdict {
     let resolved = |row: &Row| row.distance.abs() > ROUNDINGS * row.engine.unit_roundoff();
-    let missed: usize =
-        rows.iter().filter(|row| resolved(row) && row.distance > 0.0).map(|row| row.cells - row.contacts).sum();
-    let made_up: usize = rows.iter().filter(|row| resolved(row) && row.distance < 0.0).map(|row| row.contacts).sum();
+    let missed: usize = rows
+        .iter()
+        .filter(|row| resolved(row) && row.distance > 0.0)
+        .map(|row| row.cells - row.contacts)
+        .sum();
+    let made_up: usize =
+        rows.iter().filter(|row| resolved(row) && row.distance < 0.0).map(|row| row.contacts).sum();
     let worst = rows.iter().map(|row| row.speed_error / row.law).fold(0.0, f64::max);
     let holds = missed == 0 && made_up == 0 && worst <= 1.0;
     let cells: usize = rows.iter().map(|row| row.cells).sum();

@@ -113,8 +113,10 @@ fn measure_swings(
     rows: &mut Vec<Swings>,
 ) -> Result<(), GpuError> {
     let mut random = Random::new(seed);
-    let starts: Vec<Start> =
-        DEPTHS.iter().flat_map(|&depth| (0..per_depth).map(|_| swing(depth, &mut random)).collect::<Vec<_>>()).collect();
+    let starts: Vec<Start> = DEPTHS
+        .iter()
+        .flat_map(|&depth| (0..per_depth).map(|_| swing(depth, &mut random)).collect::<Vec<_>>())
+        .collect();
     lanes.rewrite(readout::first_contact);
     for precision in lanes.precisions() {
         for &steps_asked in asked {
@@ -132,7 +134,9 @@ fn measure_swings(
                     depth,
                     swings: per_depth,
                     missed: here.clone().filter(|k| !met(k)).count(),
-                    missed_by_ends: here.filter(|&k| !is_seen_at_ends(&starts[k], depth, steps_asked)).count(),
+                    missed_by_ends: here
+                        .filter(|&k| !is_seen_at_ends(&starts[k], depth, steps_asked))
+                        .count(),
                 });
             }
         }
@@ -211,12 +215,16 @@ pub fn judge(rows: &Rows) -> Verdict {
     let by_ends: usize = rows.swings.iter().map(|row| row.missed_by_ends).sum();
     let swings: usize = rows.swings.iter().map(|row| row.swings).sum();
     let good = |row: &&Motion| {
-        row.status == "ok" && row.impacts == row.impacts_of_reference && row.error <= row.bar && row.steps >= row.steps_asked
+        row.status == "ok"
+            && row.impacts == row.impacts_of_reference
+            && row.error <= row.bar
+            && row.steps >= row.steps_asked
     };
     let bad = rows.motions.iter().filter(|row| !good(row)).count();
     let steps = || rows.swings.iter().map(|row| row.steps_asked);
     let (least, most) = (steps().min().unwrap_or(0), steps().max().unwrap_or(0));
-    let obeyed = rows.swings.iter().all(|row| row.steps_least >= row.steps_asked && row.steps_most <= MOST_STEPS);
+    let obeyed =
+        rows.swings.iter().all(|row| row.steps_least >= row.steps_asked && row.steps_most <= MOST_STEPS);
     Verdict {
         part: "grid",
         holds: missed == 0 && bad == 0 && obeyed && swings > 0,

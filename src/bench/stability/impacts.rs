@@ -67,10 +67,10 @@ impl Worst<'_> {
         let energy = |[w, v2]: [f64; 2]| m1 * (w + v2) * (w + v2) + m2 * v2 * v2;
         let moduli = |rates: [f64; 2]| rates.map(f64::abs);
         let law = (1.0 - e * e) * (m1 * m2 / (m1 + m2)) * before[0] * before[0];
-        let momentum_error = (momentum(after) - momentum(before)).abs()
-            / (momentum(moduli(before)) + momentum(moduli(after)));
-        let energy_error = (energy(before) - energy(after) - law).abs()
-            / (energy(moduli(before)) + energy(moduli(after)));
+        let momentum_error =
+            (momentum(after) - momentum(before)).abs() / (momentum(moduli(before)) + momentum(moduli(after)));
+        let energy_error =
+            (energy(before) - energy(after) - law).abs() / (energy(moduli(before)) + energy(moduli(after)));
         // `f64::max` would swallow a NaN.
         let worse = |worst: f64, error: f64| if error / unit <= worst { worst } else { error / unit };
         self.row.momentum_error = worse(self.row.momentum_error, momentum_error);
@@ -97,8 +97,10 @@ impl Observer for Contacts<'_, '_> {
 /// # Errors
 /// A [`GpuError`].
 pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
-    let pairs: Vec<GearPair> =
-        MASSES.iter().flat_map(|&[m1, m2]| RESTITUTIONS.map(|e| GearPair { m1, m2, ..paper(e, 5.6) })).collect();
+    let pairs: Vec<GearPair> = MASSES
+        .iter()
+        .flat_map(|&[m1, m2]| RESTITUTIONS.map(|e| GearPair { m1, m2, ..paper(e, 5.6) }))
+        .collect();
     let horizon = size.pick(20, 200, 2000);
     let starts_per_pair = size.pick(8, 64, 1024);
     let mut rows: Vec<Row> = pairs.par_iter().map(|pair| on_reference(pair, horizon)).collect();
@@ -150,9 +152,9 @@ fn closing(pair: &GearPair, random: &mut Random) -> State {
 
 /// Both laws hold to rounding, and there were contacts to see it at.
 pub fn judge(rows: &[Row]) -> Verdict {
-    let holds = rows.iter().all(|row| {
-        row.contacts > 0 && row.momentum_error <= ROUNDINGS && row.energy_error <= ROUNDINGS
-    });
+    let holds = rows
+        .iter()
+        .all(|row| row.contacts > 0 && row.momentum_error <= ROUNDINGS && row.energy_error <= ROUNDINGS);
     let told = EngineName::ALL.into_iter().filter_map(|engine| {
         let of_engine = || rows.iter().filter(move |row| row.engine == engine);
         of_engine().next()?;

@@ -17,8 +17,7 @@ use crate::orbit::Status;
 use crate::reference::Trajectory;
 use crate::stability::{Cycle, StrobeMap, refine};
 
-/// Restitution and frequency of the cells. Their cycles last one forcing period, all but the
-/// second's, which has two.
+/// Restitution and frequency of the cells; their cycles last one or two forcing periods.
 const CELLS: [(f64, f64); 8] =
     [(0.56, 5.6), (0.06, 5.6), (0.0, 5.6), (0.2, 9.2), (0.56, 3.4), (0.2, 2.5), (0.56, 1.5), (0.5, 11.0)];
 
@@ -65,15 +64,19 @@ struct Settled {
 /// # Errors
 /// A [`GpuError`].
 pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
-    let horizons: &[u32] =
-        size.pick(&[10, 30, 100], &[100, 300, 1000, 10_000], &[100, 300, 1000, 3000, 10_000, 30_000, 100_000]);
+    let horizons: &[u32] = size.pick(
+        &[10, 30, 100],
+        &[100, 300, 1000, 10_000],
+        &[100, 300, 1000, 3000, 10_000, 30_000, 100_000],
+    );
     let longest = size.pick(1000, 100_000, 1_000_000);
     let cells: Vec<Settled> = CELLS.par_iter().map(|&(e, omega)| settled(paper(e, omega))).collect();
     let starts: Vec<Start> =
         cells.iter().flat_map(|cell| cell.starts.iter().map(|&start| (cell.pair, start))).collect();
     let mut rows = Vec::new();
     for &horizon in horizons {
-        let truth: Vec<State> = starts.par_iter().map(|(pair, start)| reference(pair, *start, horizon)).collect();
+        let truth: Vec<State> =
+            starts.par_iter().map(|(pair, start)| reference(pair, *start, horizon)).collect();
         for precision in lanes.precisions() {
             let records = lanes.run(precision, &starts, &periods(horizon))?;
             let per_cell = cells[0].starts.len();
@@ -105,7 +108,8 @@ fn settled(pair: GearPair) -> Settled {
         trajectory.advance_period(&mut ()).expect("a stable cell");
     }
     let map = [1, 2].map(StrobeMap::Periods);
-    let near = |cycle: &Cycle| apart(&cycle.state, &trajectory.state()) < 1e-6 && cycle.spectral_radius() < 1.0;
+    let near =
+        |cycle: &Cycle| apart(&cycle.state, &trajectory.state()) < 1e-6 && cycle.spectral_radius() < 1.0;
     let cycle = map.into_iter().filter_map(|map| refine(&trajectory, map)).find(near);
     let cycle = cycle.expect("the cell has a stable cycle of one or two periods");
     let starts = (0..8).map(|k| {
@@ -134,7 +138,12 @@ fn on_reference(cell: &Settled, longest: u32) -> Vec<Row> {
         horizon *= 10;
         let turns = f64::from(period) / f64::from(cell.cycle.period);
         if OFF * cell.cycle.spectral_radius().powf(turns) < GONE {
-            rows.push(row(cell, EngineName::Reference, period, apart(&trajectory.state(), &cell.cycle.state)));
+            rows.push(row(
+                cell,
+                EngineName::Reference,
+                period,
+                apart(&trajectory.state(), &cell.cycle.state),
+            ));
         }
     }
     rows
@@ -162,5 +171,9 @@ pub fn judge(rows: &[Row]) -> Verdict {
         told.push(format!("{} {:.1e} after {longest} periods", engine.name(), at(longest)));
     }
     let grows = if holds { "no error grows" } else { "an error GROWS" };
-    Verdict { part: "long_runs", holds, sentence: format!("{grows} on 8 stable cycles: largest {}", told.join(", ")) }
+    Verdict {
+        part: "long_runs",
+        holds,
+        sentence: format!("{grows} on 8 stable cycles: largest {}", told.join(", ")),
+    }
 }

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::{SETTINGS, lane_settings};
 use super::super::cells::EngineName;
 use super::super::lanes::Start;
+use super::{SETTINGS, lane_settings};
 use crate::classify::classify;
 use crate::gpu::Precision;
 use crate::model::{GearPair, State};
@@ -53,7 +53,8 @@ pub(super) fn all(
     most: usize,
 ) -> Comparison {
     let ids = (0..cells.len()).into_par_iter().with_max_len(1);
-    let mut different: Vec<usize> = ids.filter(|&i| Cell::new(precision, cells[i], records[i]).differs()).collect();
+    let mut different: Vec<usize> =
+        ids.filter(|&i| Cell::new(precision, cells[i], records[i]).differs()).collect();
     let mut comparison = Comparison::default();
     let is_silent = |i: &usize| {
         classify(&records[*i]) == Class::Undecided && records[*i].periods_run >= lane_settings().periods
@@ -116,8 +117,10 @@ fn plan(pair: &GearPair, start: State) -> Plan {
     const SWEPT: [&str; 2] = ["omega", "mesh_speed"];
     let value = |name: &str| pair.get(name).expect("a parameter of the table");
     let names = GearPair::PARAMETERS.iter().map(|parameter| parameter.name);
-    let fixed: String =
-        names.filter(|name| !SWEPT.contains(name)).map(|name| format!("{name} = {:?}\n", value(name))).collect();
+    let fixed: String = names
+        .filter(|name| !SWEPT.contains(name))
+        .map(|name| format!("{name} = {:?}\n", value(name)))
+        .collect();
     let axis = |name: &str| {
         let min = value(name);
         format!("[[axis]]\nparameter = '{name}'\nmin = {min:?}\nmax = {:?}\ncount = 2\n", 2.0 * min + 1.0)
