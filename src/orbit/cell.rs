@@ -11,7 +11,7 @@ use super::{Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, refine};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine};
 use crate::word::Word;
 
 /// The exponent accumulates from this period on, or from the end of a shorter transient.
@@ -132,7 +132,7 @@ impl<'a> Watch<'a> {
                 return Ok(measured);
             }
         }
-        let mut carrier = bare.carrying([[0.5; 4]]);
+        let mut carrier = bare.carrying([FRESH_TANGENT]);
         while carrier.period() < u64::from(last) {
             if carrier.period() == u64::from(exponent_from) {
                 self.exponent.forget();

@@ -25,9 +25,9 @@ use crate::random::Random;
 use crate::record::Record;
 use crate::reference::{Happening, Trajectory};
 
-/// Roundings of the gap that an engine is allowed: parameters and start are rounded to its
-/// precision, and the amplitude is up to three times as sensitive as they are.
-pub const ROUNDINGS: f64 = 32.0;
+/// Roundings of the gap that an engine is allowed: a dozen steps come before the contact, and a
+/// step rounds eight times.
+pub const ROUNDINGS: f64 = 96.0;
 
 /// One distance on one engine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
