@@ -102,15 +102,23 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Rows, GpuErro
 }
 
 fn budget() -> Budget {
-    Budget { settings: SETTINGS, early_stop: true, undecided_periods: 0, exponent: true }
+    Budget {
+        settings: SETTINGS,
+        early_stop: true,
+        undecided_periods: 0,
+        exponent: true,
+        shows_exponent: true,
+    }
 }
 
 pub(super) fn lane_settings() -> LaneSettings {
+    let budget = budget();
     LaneSettings {
-        periods: SETTINGS.transient_periods + SETTINGS.observed_periods,
+        periods: budget.periods(),
         transient_periods: SETTINGS.transient_periods,
         max_period: SETTINGS.max_period,
-        exponent_from: SETTINGS.transient_periods,
+        exponent_from: budget.exponent_from(),
+        chaos_from: budget.chaos_from(),
         ..LaneSettings::default()
     }
 }
