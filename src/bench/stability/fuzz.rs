@@ -125,7 +125,8 @@ pub(super) fn lane_settings() -> LaneSettings {
 
 /// As the CPU engine does it.
 fn on_reference((pair, start): &Start) -> Record {
-    let everything = Needs { exponent: true, impacts: true, mesh: true, symmetric: true, word: true };
+    let everything =
+        Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
     measured_record(&measure_cell(&flow_of(pair), pair.law(), *start, &budget()), &everything)
 }
 
