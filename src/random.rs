@@ -22,9 +22,9 @@ impl Random {
         ((u128::from(self.next()) * bound as u128) >> 64) as usize
     }
 
-    /// A number in `[0, 1)`, evenly spread over multiples of `2^-53`.
+    /// A number from 0 (included) to 1 (excluded), one of 2^53.
     pub(crate) fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 * 0.5f64.powi(53)
+        (self.next() >> 11) as f64 * 2f64.powi(-53)
     }
 
     /// Moves `count` entries to the front, every choice and order of them equally likely.

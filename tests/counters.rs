@@ -7,16 +7,13 @@
 //! digits: drivers and processors that round otherwise give the same, 2 % more work does not.
 
 mod common;
-#[allow(dead_code, reason = "the benchmark compares forms of the shader, too")]
-#[path = "../benches/lane/rewrite.rs"]
-mod rewrite;
 
 use std::fmt::Write;
 
 use common::{REST, flow_of, paper, work_since};
+use rattlemap::bench::engines::{LOOPS, counting};
 use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::reference::Trajectory;
-use rewrite::{LOOPS, counting};
 
 /// Stable cycles of every kind: what they are, restitution, frequency.
 const CELLS: [(&str, f64, f64); 6] = [
