@@ -149,7 +149,7 @@ mod tests {
         for _ in 0..200 {
             let (pair, start) = space::bounded(&mut random);
             let plan = plan(&pair, start);
-            assert_eq!((plan.gear_pair(0), plan.start()), (pair, start));
+            assert_eq!((plan.gear_pair(0), plan.start(0, &[])), (pair, start));
         }
     }
 }
