@@ -74,13 +74,16 @@ const DOUBT: Real = 1.0;
 // have lasted through: beyond the ratio of the largest to the smallest distance.
 const DEPARTURE: Real = 40.0;
 
+// A standard error of fewer blocks is none; short budgets would be called chaos by two.
+const FEWEST_BLOCKS: u32 = 6u;
+
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
-    if tally.block_periods > 0u || tally.streak >= STREAK || tally.period < settings.chaos_from {
+    if tally.block_periods > 0u || tally.blocks < FEWEST_BLOCKS || tally.streak >= STREAK || tally.period < settings.chaos_from {
         return false;
     }
     let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
-    return grows(errors) && !departs(errors);
+    return grows(errors) && outgrows(errors) && !departs(errors);
 }
 
 // Whether the exponent exceeds zero by so many standard errors.
@@ -90,6 +93,18 @@ fn grows(errors: Real) -> bool {
     }
     let growth = mean_growth();
     return growth.x > errors * growth.y;
+}
+
+// Neutral motion grows, too: tangents of a free body, of a torus or of an undamped swing in
+// proportion to time, at a double root to its square. Chaos has to outgrow that.
+const NEUTRAL_ORDER: f32 = 2.0;
+
+fn outgrows(errors: Real) -> bool {
+    let growth = mean_growth();
+    let periods = tally.blocks * settings.exponent_block;
+    let began = max(settings.exponent_from, 1u);
+    let neutral = NEUTRAL_ORDER * log(f32(began + periods) / f32(began));
+    return (growth.x - errors * growth.y) * Real(periods) > Real(neutral);
 }
 
 // Whether the motion lingers at some cycle and its growth may be that of leaving it.

@@ -43,7 +43,7 @@ fn last_status() -> u32 {
     }
     if tally.has_read == 0u || tally.cycle == 0u {
         let is_open = settings.max_period > 0u && tally.cycle == 0u && EXPONENT && tally.blocks > 1u;
-        return select(STATUS_OK, STATUS_SLOW, is_open && departs(CHAOS_ERRORS));
+        return select(STATUS_OK, STATUS_SLOW, is_open && (departs(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
     }
     if tally.grazes > 0u {
         return STATUS_NEAR_GRAZING;

@@ -110,6 +110,30 @@ fn carry_tangents(flown: Pull, tau: Real) {
         }
         set_tangent(i, u);
     }
+    if tally.tangent_count == 1u {
+        tame();
+    }
+}
+
+// A period of many events may take the vector out of single precision's range: what is taken
+// out of it counts as growth of the period under way.
+const LARGE: Real = 1099511627776.0;
+const LARGE_OCTAVES: Real = 40.0;
+
+fn tame() {
+    let u = tangent_now;
+    if !(largest(u) > LARGE) {
+        return;
+    }
+    let inverse = 1.0 / LARGE;
+    tangent_now = array<Real, 4>(inverse * u[0], inverse * u[1], inverse * u[2], inverse * u[3]);
+    if tally.period >= settings.exponent_from {
+        motion.block_growth += LARGE_OCTAVES;
+    }
+}
+
+fn largest(u: array<Real, 4>) -> Real {
+    return max(max(abs(u[0]), abs(u[1])), max(abs(u[2]), abs(u[3])));
 }
 
 // A part `tau` of a step: the series of the unforced motion.
@@ -180,16 +204,20 @@ const NO_RATE: Real = 1e-14;
 // Growth of the one vector since the last strobe, in octaves; it is given unit length.
 fn renormalise() -> Real {
     let u = tangent(0u);
-    let length = sqrt((u[0] * u[0] + u[1] * u[1]) + (u[2] * u[2] + u[3] * u[3]));
-    if !(length > 1e-30) {
+    // Squares would leave the range.
+    let size = largest(u);
+    if !(size > 1e-30) {
         // Superstable: as large a loss as can be told. Start anew.
         set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
         return -100.0;
     }
+    let scale = 1.0 / size;
+    let v = array<Real, 4>(scale * u[0], scale * u[1], scale * u[2], scale * u[3]);
+    let length = sqrt((v[0] * v[0] + v[1] * v[1]) + (v[2] * v[2] + v[3] * v[3]));
     let inverse = 1.0 / length;
-    set_tangent(0u, array<Real, 4>(inverse * u[0], inverse * u[1], inverse * u[2], inverse * u[3]));
+    set_tangent(0u, array<Real, 4>(inverse * v[0], inverse * v[1], inverse * v[2], inverse * v[3]));
     // Averages alone are made of it: single precision will do, and f64 has no logarithm.
-    return Real(log2(f32(length)));
+    return Real(log2(f32(size)) + log2(f32(length)));
 }
 
 fn accumulate_growth() {

@@ -1,3 +1,4 @@
 //! Instruments: measurements that anybody can repeat. `rattlemap bench` runs them.
 
 pub mod engines;
+pub mod stability;

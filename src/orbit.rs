@@ -12,6 +12,7 @@ mod reading;
 mod recurrence;
 mod trace;
 
+pub(crate) use analysis::status_of;
 pub use analysis::{CHAOS_ERRORS, analyse, analyse_flow, analyse_over};
 pub use cell::{Budget, Measured, measure};
 pub use trace::trace;
@@ -87,6 +88,20 @@ impl Status {
         Status::TooStiff,
         Status::NonFinite,
     ];
+
+    /// The name in tables and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Ok => "ok",
+            Status::Slow => "slow",
+            Status::NearGrazing => "near_grazing",
+            Status::StrobeOnEvent => "strobe_on_event",
+            Status::CapEvents => "cap_events",
+            Status::CapRoot => "cap_root",
+            Status::TooStiff => "too_stiff",
+            Status::NonFinite => "non_finite",
+        }
+    }
 
     /// Whether the integration could not be continued.
     pub fn is_failure(self) -> bool {

@@ -23,6 +23,8 @@ mod plot_style;
 mod record_file;
 mod replay;
 mod report;
+pub mod stability;
+mod stability_figures;
 mod validation_json;
 
 pub use cells::Cells;

@@ -359,6 +359,20 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if finite { Ok(()) } else { Err(Stop::NonFinite) }
     }
 
+    fn check_events(&self) -> Result<(), Stop> {
+        if self.events_in_period > EVENTS_PER_PERIOD_CAP { Err(Stop::CapEvents) } else { Ok(()) }
+    }
+
+    /// Rates whose powers leave the range of f64 leave nothing that bounds a step.
+    fn check_bounds(&self, linear: &LinearFlow) -> Result<(), Stop> {
+        let bound = match self.mode {
+            Mode::Free | Mode::Pressed(_) => &linear.gap_bound,
+            Mode::Dip(_) => &linear.pressing_bound,
+        };
+        let finite = bound.remainder(&self.q, &self.phasor, 1.0).is_finite();
+        if finite { Ok(()) } else { Err(Stop::NonFinite) }
+    }
+
     /// One step: as far as it is clear, or to its event, or to `until`.
     #[inline(always)]
     fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
@@ -399,12 +413,13 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                     self.level[slot] = level;
                     return self.cross(linear, linear.steps[level].u, crossing, bracket, until, observer);
                 }
-                Outlook::Unclear if self.settle_start(observer) => return Ok(()),
+                Outlook::Unclear if self.settle_start(observer) => return self.check_events(),
                 Outlook::Unclear if level + 1 == linear.steps.len() => {
                     // What is not a number is never clear.
                     self.check_finite()?;
+                    self.check_bounds(linear)?;
                     self.settle_graze(linear, level, until, observer);
-                    return Ok(());
+                    return self.check_events();
                 }
                 Outlook::Unclear => {
                     self.work.halvings += 1;

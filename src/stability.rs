@@ -11,6 +11,7 @@ mod exponent;
 mod newton;
 
 pub use exponent::Exponent;
+pub(crate) use exponent::FRESH_TANGENT;
 pub use newton::{pitchfork, refine};
 
 use nalgebra::linalg::Schur;

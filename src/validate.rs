@@ -13,6 +13,7 @@
 mod answer;
 mod case;
 mod explanation;
+mod limits;
 mod sample;
 pub mod states;
 
@@ -155,6 +156,12 @@ pub fn replay(
         states: errors.check(source),
         mismatches,
     }
+}
+
+/// Where the record of one cell differs from the reference, without asking why.
+pub fn differences(subject: &Subject<'_>, id: u32) -> Vec<Difference> {
+    let case = Case::new(subject, id, None);
+    case.truth.compare(case.record, &case.bars).into_iter().filter_map(|(_, differs)| differs).collect()
 }
 
 fn replay_cell(subject: &Subject<'_>, id: u32, lane: Option<&Record>) -> Replayed {

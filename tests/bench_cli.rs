@@ -72,3 +72,24 @@ fn engines_agree_and_say_where_their_time_goes() {
     }
     run(&[]).code(2);
 }
+
+#[test]
+fn stability_judges_every_part_and_writes_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::cargo_bin("rattlemap").unwrap();
+    command.current_dir(folder.path()).args(["bench", "stability", "--quick"]);
+    let said = command.assert().success().stdout("").get_output().stderr.clone();
+    let said = String::from_utf8(said).unwrap();
+    for part in ["long_runs", "impacts", "grazing", "chatter", "stiffness", "grid", "fuzz"] {
+        let line = said.lines().find(|line| line.starts_with(part));
+        assert!(line.is_some_and(|line| line.contains("holds: ")), "{part}: {said}");
+    }
+    let out = folder.path().join("out/bench/stability");
+    let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    assert_eq!(manifest["command"], "bench stability");
+    for file in manifest["files"].as_array().unwrap() {
+        let size = out.join(file.as_str().unwrap()).metadata().unwrap().len();
+        assert!(size > 0, "{file} is empty");
+    }
+}

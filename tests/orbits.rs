@@ -109,9 +109,43 @@ fn a_strobe_at_the_turning_point_is_no_noise() {
 
 #[test]
 fn neutral_motion_is_not_chaos() {
-    // Unsupported and undamped gears: nearby motions separate in proportion to time.
-    let pair = GearPair { k1: 0.0, k2: 0.0, r1: 0.0, r2: 0.0, ..cell(0.605, 5.6) };
+    // Unsupported and undamped gears that never meet: nearby motions separate in proportion to
+    // time.
+    let pair = GearPair { k1: 0.0, k2: 0.0, r1: 0.0, r2: 0.0, b: 5.0, ..cell(0.605, 5.6) };
     assert_ne!(orbit(&pair).class, Class::Chaotic);
+}
+
+/// Without supports the pair's common translation keeps to itself: a tangent vector along it
+/// would never see that the teeth clatter chaotically.
+#[test]
+fn chaos_of_a_pair_without_supports_is_seen() {
+    let pair = GearPair {
+        m1: 16.0,
+        m2: 0.26,
+        r1: 0.0,
+        r2: 0.0,
+        k1: 0.0,
+        k2: 0.0,
+        force: -730.0,
+        b: 0.0155,
+        mesh_speed: 0.0,
+        ..cell(1.0, 7.3)
+    };
+    let clattering = GearPair { k1: 0.0, k2: 0.0, r1: 0.0, r2: 0.0, ..cell(0.605, 5.6) };
+    let settings = Settings { transient_periods: 20, observed_periods: 200, max_period: 64 };
+    for pair in [pair, clattering] {
+        let orbit = analyse(&pair, REST, &settings);
+        assert_eq!(orbit.class, Class::Chaotic, "{pair:?}");
+        // Two motions themselves, a hair apart: their gaps part company.
+        let flow = Flow::new(&pair.oscillator().unwrap());
+        let gap = |hair: f64| {
+            let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, hair, 0.0, 0.0]);
+            (0..200).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+            let [x1, _, x2, _] = trajectory.state();
+            x1 - x2
+        };
+        assert!((gap(1e-10) - gap(0.0)).abs() > 1e-3 * pair.b, "{pair:?}");
+    }
 }
 
 #[test]

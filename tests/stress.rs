@@ -202,6 +202,35 @@ fn states_that_are_not_finite_are_named() {
     }
 }
 
+/// Where powers of the rates leave the range of f64 no step can be certified: that is said at
+/// once, and not after as many steps as a period may have.
+#[test]
+fn rates_out_of_range_are_named_at_once() {
+    for (what, pair) in [
+        ("frequency", paper(0.5, 1e80)),
+        ("damping", GearPair { r1: 1e70, ..paper(0.5, 1e60) }),
+        ("stiffness", GearPair { k1: 1e140, ..paper(0.5, 1e60) }),
+    ] {
+        let flow = flow_of(&pair);
+        let mut trajectory = Trajectory::new(&flow, pair.law(), [0.1, 1.0, 0.0, 0.0]);
+        let ended = trajectory.advance_period(&mut ());
+        assert_eq!(ended, Err(Stop::NonFinite), "{what}");
+        assert!(trajectory.work().steps < 1000, "{what}: {:?}", trajectory.work());
+    }
+}
+
+/// Motion so large that the walls' distance is less than its rounding meets them on every
+/// shortest step: those events, too, are counted against the cap.
+#[test]
+fn events_within_rounding_are_capped() {
+    let pair = GearPair { force: 5e112, b: 0.01, e: 0.0, mesh_speed: 14.0, ..paper(0.0, 0.6) };
+    let flow = flow_of(&pair);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
+    let ended = (0..8).try_for_each(|_| trajectory.advance_period(&mut ()));
+    assert!(matches!(ended, Ok(()) | Err(Stop::CapEvents)), "{ended:?}");
+    assert!(trajectory.work().events <= 8 * (EVENTS_PER_PERIOD_CAP + 1), "{:?}", trajectory.work());
+}
+
 /// However small the threshold, chatter reaches it: 60 impacts halve a speed by `1e18`.
 #[test]
 fn chatter_ends_at_a_tiny_threshold() {

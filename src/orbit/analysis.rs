@@ -6,7 +6,7 @@ use super::{Class, Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{GearPair, Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, StrobeMap, refine};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, StrobeMap, refine};
 use crate::word::Word;
 
 /// Forcing periods whose events are shown where the motion is not periodic.
@@ -70,7 +70,7 @@ pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, sh
     analysis.run(start).unwrap_or_else(|stop| failed(status_of(stop), start, flow.period))
 }
 
-pub(super) fn status_of(stop: Stop) -> Status {
+pub(crate) fn status_of(stop: Stop) -> Status {
     match stop {
         Stop::CapEvents => Status::CapEvents,
         Stop::CapRoot => Status::CapRoot,
@@ -160,7 +160,7 @@ impl Analysis<'_> {
 
     /// Watches strobe states, the exponent and the averages for `length` periods.
     fn observe(&self, trajectory: &mut Trajectory<'_, 0>, length: u32) -> Result<Window, Stop> {
-        let mut carrier = trajectory.carrying([[0.5; 4]]);
+        let mut carrier = trajectory.carrying([FRESH_TANGENT]);
         let mut exponent = Exponent::default();
         for _ in 0..TANGENT_PERIODS.min(length) {
             self.advance(&mut carrier)?;

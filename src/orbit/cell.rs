@@ -11,7 +11,7 @@ use super::{Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, refine};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine};
 use crate::word::Word;
 
 /// An exponent that is shown accumulates from this period on, or from the end of a shorter
@@ -40,6 +40,9 @@ const HASTY_CHAOS_ERRORS: f64 = 5.0;
 /// for chaos so, 33 if it is half, 17 if all of it is spent. Without an exponent to show, 46.
 const EARLY_CHAOS_FROM: u32 = 3;
 const HASTY_CHAOS_FROM: u32 = 2;
+
+/// Chaos has to outgrow this power of time.
+const NEUTRAL_ORDER: f64 = 2.0;
 
 /// Cycles, at least, over which an approach must have been seen.
 const APPROACH_CYCLES: usize = 4;
@@ -165,7 +168,7 @@ impl<'a> Watch<'a> {
                 return Ok(measured);
             }
         }
-        let mut carrier = bare.carrying([[0.5; 4]]);
+        let mut carrier = bare.carrying([FRESH_TANGENT]);
         while carrier.period() < u64::from(last) {
             if carrier.period() == u64::from(exponent_from) {
                 self.exponent.forget();
@@ -357,7 +360,8 @@ impl<'a> Watch<'a> {
         let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let lingered = lingering(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_departure = |rate: f64| rate * lingered as f64 * period < DEPARTURE;
-        let slow = surely.is_some_and(|rate| rate <= 0.0)
+        let is_neutral = |rate: f64| rate * (averaged.len() - 1) as f64 * period <= self.neutral_growth();
+        let slow = surely.is_some_and(is_neutral)
             || 2.0 * lingered as f64 >= span && surely.is_none_or(is_departure);
         Measured {
             period: None,
@@ -370,6 +374,13 @@ impl<'a> Watch<'a> {
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,
         }
+    }
+
+    /// What tangents of neutral motion may grow by, as a logarithm: those of a free body, of a
+    /// torus or of an undamped swing in proportion to time, at a double root to its square.
+    fn neutral_growth(&self) -> f64 {
+        let from = f64::from(self.budget.exponent_from().max(1));
+        NEUTRAL_ORDER * ((self.strobes.len() - 1) as f64 / from).ln()
     }
 
     /// A cell that could not be continued: nothing was measured but how far it came.

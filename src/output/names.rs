@@ -35,16 +35,7 @@ pub(super) fn period(class: Class) -> Option<u32> {
 }
 
 pub(super) fn status(status: Status) -> &'static str {
-    match status {
-        Status::Ok => "ok",
-        Status::Slow => "slow",
-        Status::NearGrazing => "near_grazing",
-        Status::StrobeOnEvent => "strobe_on_event",
-        Status::CapEvents => "cap_events",
-        Status::CapRoot => "cap_root",
-        Status::TooStiff => "too_stiff",
-        Status::NonFinite => "non_finite",
-    }
+    status.name()
 }
 
 pub(super) fn kind(kind: EventKind) -> &'static str {

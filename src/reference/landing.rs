@@ -1,6 +1,6 @@
 //! Landing on an event: the root of the event function on the exact flow.
 
-use super::{Crossing, EVENTS_PER_PERIOD_CAP, Observer, Stop, Trajectory};
+use super::{Crossing, Observer, Stop, Trajectory};
 use crate::certificate::Bracket;
 use crate::flow::{Gap, LinearFlow, Phasor, add};
 
@@ -72,7 +72,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.count_meshing(landing.s);
         self.from_wall = None;
         self.act(crossing, observer);
-        if self.events_in_period > EVENTS_PER_PERIOD_CAP { Err(Stop::CapEvents) } else { Ok(()) }
+        self.check_events()
     }
 
     /// Whether a point lies clearly before a crossing, given that there is only one.

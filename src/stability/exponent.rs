@@ -1,9 +1,14 @@
 //! The largest Lyapunov exponent as an average, with its standard error.
 
+use crate::model::State;
 use crate::reference::Trajectory;
 
 /// Blocks whose means give the standard error.
 const BLOCKS: usize = 16;
+
+/// A fresh tangent vector: no direction that a gear pair keeps to itself. All entries alike would
+/// be a common translation, which without supports never meets a wall.
+pub(crate) const FRESH_TANGENT: State = [0.64, -0.36, 0.28, 0.61];
 
 /// Collects the growth of one tangent vector, period by period.
 #[derive(Clone, Debug, Default)]
@@ -21,7 +26,7 @@ impl Exponent {
         let length = u.iter().map(|x| x * x).sum::<f64>().sqrt();
         self.growth.push(length.max(f64::MIN_POSITIVE).ln() + trajectory.log_scale());
         trajectory
-            .set_tangents(tangents.map(|u| if length > 0.0 { u.map(|x| x / length) } else { [0.5; 4] }));
+            .set_tangents(tangents.map(|u| if length > 0.0 { u.map(|x| x / length) } else { FRESH_TANGENT }));
     }
 
     /// Forgets what was collected: the vector needs a while to turn to its direction.

@@ -6,6 +6,7 @@
 
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
+use super::limits::{hidden_symmetry, undecided_chaos};
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
 use crate::model::State;
@@ -71,7 +72,8 @@ pub enum Explanation {
     Unsettled,
     /// The reference's cycle is within what lanes resolve (2.5e-4 of the motion) of one with the
     /// record's period, a divisor of its own; or rounding keeps the lane that much off the cycle,
-    /// in a pattern whose period is a multiple.
+    /// in a pattern whose period is a multiple; or the steps of a cycle round by more than lanes
+    /// tell a symmetric one from an unsymmetric one by.
     BelowResolution,
     /// Lanes call a cycle symmetric that is its own mirror image to 2.5e-4 of its size; this one
     /// is, but not quite.
@@ -131,7 +133,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 11] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 13] = [
         engine_cap,
         longer,
         other_attractor,
@@ -139,6 +141,8 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         resolution,
         unsettled,
         nearly_symmetric,
+        hidden_symmetry,
+        undecided_chaos,
         late,
         bifurcation,
         flip,
@@ -222,7 +226,13 @@ fn unsettled(case: &Case<'_>) -> Option<Explanation> {
         return None;
     }
     let before = case.record.periods_run.saturating_sub(period);
-    let places = [case.after(case.start, before).ok(), case.after(strobe(case)?, 0).ok()];
+    // Averages are read one cycle after the multipliers.
+    let earlier = before.saturating_sub(period);
+    let places = [
+        case.after(case.start, before).ok(),
+        case.after(case.start, earlier).ok(),
+        case.after(strobe(case)?, 0).ok(),
+    ];
     let same = |answer: Answer| case.is_the_records(&answer);
     let read = |place: &Trajectory<'_>| case.read_as_is(place, period).is_some_and(same);
     let as_is = places.iter().flatten().any(read);

@@ -29,7 +29,7 @@ use nalgebra::{Matrix4, Vector4};
 pub const HORIZON: u32 = 4;
 
 /// Roundings of one product with seven columns, summed.
-const ROUNDINGS_PER_STEP: f64 = 8.0;
+pub(super) const ROUNDINGS_PER_STEP: f64 = 8.0;
 
 /// Budgets above this share of the motion foresee nothing.
 const LARGEST_BUDGET: f64 = 0.1;
@@ -239,7 +239,7 @@ fn largest(a: &State, b: &State) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn unit_roundoff(precision: Precision) -> f64 {
+pub(super) fn unit_roundoff(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 0.5 * f64::from(f32::EPSILON),
         Precision::F64 => 0.5 * f64::EPSILON,

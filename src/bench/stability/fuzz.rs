@@ -1,0 +1,238 @@
+//! Random parameters over the whole valid space, on every engine.
+//!
+//! Bounded cells take fewer than 2,000 steps per forcing period and run for 64 of them on lanes in
+//! every precision and on the reference as the CPU engine runs it: each must end in a named
+//! status with finite numbers, and where a lane's class, period, word, symmetry, exponent or
+//! averages are not the reference's, [`crate::validate`] must find out why by a computation. Wild
+//! cells, of any magnitude at all, run on the reference alone.
+
+mod compare;
+mod space;
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+pub use compare::Mismatch;
+
+use super::cells::{EngineName, flow_of};
+use super::lanes::{Lanes, Start};
+use super::{Size, Verdict};
+use crate::classify::{classify, status};
+use crate::engine::measured_record;
+use crate::gpu::{GpuError, LaneSettings};
+use crate::model::GearPair;
+use crate::orbit::{Budget, Class, Settings, Status, measure as measure_cell, status_of};
+use crate::plan::Needs;
+use crate::random::Random;
+use crate::record::Record;
+use crate::reference::Trajectory;
+
+/// Periods of bounded cells: half of them transient.
+pub(super) const SETTINGS: Settings =
+    Settings { transient_periods: 32, observed_periods: 32, max_period: 16 };
+
+/// Periods of wild cells.
+const WILD_PERIODS: u32 = 4;
+
+/// A cell that takes longer than this hangs.
+const HANGS: Duration = Duration::from_secs(120);
+
+/// How many cells of an engine ended in one status and class.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Count {
+    /// `bounded` or `wild`.
+    pub kind: &'static str,
+    /// Who computed them.
+    pub engine: EngineName,
+    /// A status's name.
+    pub status: &'static str,
+    /// A class's name; none for wild cells, which are not classified.
+    pub class: Option<&'static str>,
+    /// Cells.
+    pub cells: usize,
+}
+
+/// What came of all cells.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// How cells ended.
+    pub counts: Vec<Count>,
+    /// Lanes that decide nothing where the reference does: they claim nothing.
+    pub silent: usize,
+    /// Lanes that say something else than the reference, as far as they were examined: a
+    /// random choice of them.
+    pub mismatches: Vec<Mismatch>,
+    /// Those that were not examined.
+    pub left: usize,
+    /// Records that hold a number that is not finite, by engine, and wild states.
+    pub not_finite: usize,
+    /// The longest that one wild cell took.
+    pub longest: Duration,
+}
+
+/// Runs every cell.
+///
+/// # Errors
+/// A [`GpuError`].
+pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Rows, GpuError> {
+    let mut random = Random::new(seed);
+    let mut cells: Vec<Start> =
+        (0..size.pick(64, 1000, 100_000)).map(|_| space::bounded(&mut random)).collect();
+    // Lanes that take as many steps run side by side.
+    cells.sort_by_cached_key(|(pair, _)| space::trips(pair));
+    let ranks: Vec<u64> = cells.iter().map(|_| random.next()).collect();
+    let mut rows = Rows::default();
+    let truth: Vec<Record> = cells.par_iter().with_max_len(1).map(on_reference).collect();
+    rows.count("bounded", EngineName::Reference, &truth);
+    for precision in lanes.precisions() {
+        let records = lanes.run(precision, &cells, &lane_settings())?;
+        rows.count("bounded", precision.into(), &records);
+        let compared = compare::all(precision, &cells, &records, &ranks, size.pick(8, 60, 1000));
+        rows.silent += compared.silent;
+        rows.left += compared.left;
+        rows.mismatches.extend(compared.mismatches);
+    }
+    let wild: Vec<GearPair> = (0..size.pick(20, 100, 1000)).map(|_| space::wild(&mut random)).collect();
+    let ends: Vec<_> = wild.par_iter().with_max_len(1).map(on_reference_for_a_while).collect();
+    rows.count_wild(&ends);
+    Ok(rows)
+}
+
+fn budget() -> Budget {
+    Budget {
+        settings: SETTINGS,
+        early_stop: true,
+        undecided_periods: 0,
+        exponent: true,
+        shows_exponent: true,
+    }
+}
+
+pub(super) fn lane_settings() -> LaneSettings {
+    let budget = budget();
+    LaneSettings {
+        periods: budget.periods(),
+        transient_periods: SETTINGS.transient_periods,
+        max_period: SETTINGS.max_period,
+        exponent_from: budget.exponent_from(),
+        chaos_from: budget.chaos_from(),
+        ..LaneSettings::default()
+    }
+}
+
+/// As the CPU engine does it.
+fn on_reference((pair, start): &Start) -> Record {
+    let everything =
+        Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
+    measured_record(&measure_cell(&flow_of(pair), pair.law(), *start, &budget()), &everything)
+}
+
+/// How a wild cell ends, whether its state is finite, and how long it took.
+fn on_reference_for_a_while(pair: &GearPair) -> (Status, bool, Duration) {
+    let clock = Instant::now();
+    let flow = flow_of(pair);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0; 4]);
+    let ended = (0..WILD_PERIODS).try_for_each(|_| trajectory.advance_period(&mut ()));
+    let status = ended.map_or_else(status_of, |()| Status::Ok);
+    let is_finite = status != Status::Ok || trajectory.state().iter().all(|x| x.is_finite());
+    (status, is_finite, clock.elapsed())
+}
+
+impl Rows {
+    fn count(&mut self, kind: &'static str, engine: EngineName, records: &[Record]) {
+        let mut counts = BTreeMap::new();
+        for record in records {
+            let key = (record.status, class_name(classify(record)));
+            counts.entry(key).or_insert((status(record).name(), 0usize)).1 += 1;
+        }
+        self.counts.extend(counts.into_iter().map(|((_, class), (status, cells))| Count {
+            kind,
+            engine,
+            status,
+            class: Some(class),
+            cells,
+        }));
+        self.not_finite += records.iter().filter(|record| !is_finite(record)).count();
+    }
+
+    fn count_wild(&mut self, ends: &[(Status, bool, Duration)]) {
+        for status in Status::ALL {
+            let cells = ends.iter().filter(|end| end.0 == status).count();
+            let engine = EngineName::Reference;
+            if cells > 0 {
+                self.counts.push(Count { kind: "wild", engine, status: status.name(), class: None, cells });
+            }
+        }
+        self.not_finite += ends.iter().filter(|end| !end.1).count();
+        self.longest = ends.iter().map(|end| end.2).max().unwrap_or_default();
+    }
+
+    /// Cells of one kind on one engine.
+    pub fn cells(&self, kind: &str, engine: EngineName) -> usize {
+        let here = self.counts.iter().filter(|count| count.kind == kind && count.engine == engine);
+        here.map(|count| count.cells).sum()
+    }
+
+    /// How many of them ended in which status.
+    fn statuses(&self, kind: &str, engine: EngineName) -> String {
+        let here = || self.counts.iter().filter(|count| count.kind == kind && count.engine == engine);
+        let names = Status::ALL.into_iter().map(Status::name).filter_map(|status| {
+            let cells: usize = here().filter(|count| count.status == status).map(|count| count.cells).sum();
+            (cells > 0).then(|| format!("{cells} {status}"))
+        });
+        names.collect::<Vec<_>>().join(", ")
+    }
+
+    /// Mismatches that no computation explains.
+    pub fn unexplained(&self) -> usize {
+        self.mismatches.iter().filter(|mismatch| mismatch.explanation.is_none()).count()
+    }
+}
+
+/// A superstable cycle has the exponent minus infinity; nothing else is not finite.
+fn is_finite(record: &Record) -> bool {
+    let numbers = [record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
+    let superstable = record.lyapunov == f64::NEG_INFINITY && record.period > 0;
+    (record.lyapunov.is_finite() || superstable)
+        && numbers.iter().chain(&record.strobe).all(|number| number.is_finite())
+}
+
+fn class_name(class: Class) -> &'static str {
+    match class {
+        Class::Periodic { .. } => "periodic",
+        Class::Chaotic => "chaotic",
+        Class::Undecided => "undecided",
+        Class::Failed => "failed",
+    }
+}
+
+/// No hang, nothing that is not finite, and no mismatch without an explanation.
+pub fn judge(rows: &Rows) -> Verdict {
+    let bounded = rows.cells("bounded", EngineName::Reference);
+    let wild = rows.cells("wild", EngineName::Reference);
+    let (examined, unexplained) = (rows.mismatches.len(), rows.unexplained());
+    let holds = rows.not_finite == 0 && unexplained == 0 && rows.longest < HANGS && bounded > 0 && wild > 0;
+    let ended: Vec<String> = EngineName::ALL
+        .into_iter()
+        .filter(|&engine| rows.cells("bounded", engine) > 0)
+        .map(|engine| format!("{} ({})", engine.name(), rows.statuses("bounded", engine)))
+        .collect();
+    Verdict {
+        part: "fuzz",
+        holds,
+        sentence: format!(
+            "{bounded} random cells on every engine, {}; {} lanes decide nothing where the reference does, {} say \
+             something else, {examined} of them examined, {unexplained} without an explanation; {wild} wild cells on \
+             the reference ({}), the longest in {:.1} s; {} records with a number that is not finite",
+            ended.join(", "),
+            rows.silent,
+            examined + rows.left,
+            rows.statuses("wild", EngineName::Reference),
+            rows.longest.as_secs_f64(),
+            rows.not_finite
+        ),
+    }
+}

@@ -1,0 +1,155 @@
+//! Lanes against the reference, cell by cell, with the machinery of [`crate::validate`].
+
+use rayon::prelude::*;
+
+use super::super::cells::EngineName;
+use super::super::lanes::Start;
+use super::{SETTINGS, lane_settings};
+use crate::classify::classify;
+use crate::gpu::Precision;
+use crate::model::{GearPair, State};
+use crate::orbit::Class;
+use crate::plan::Plan;
+use crate::record::Record;
+use crate::scene::{Purpose, Scene};
+use crate::validate::{
+    Difference, Explanation, Pick, Sample, StateSource, Stratum, Subject, differences, replay,
+};
+
+/// A lane whose record is not what the reference says.
+#[derive(Clone, Debug)]
+pub struct Mismatch {
+    /// Who computed it.
+    pub engine: EngineName,
+    /// The cell.
+    pub pair: GearPair,
+    /// Where it starts.
+    pub start: State,
+    /// What differs.
+    pub differences: Vec<Difference>,
+    /// Why, if a computation shows it.
+    pub explanation: Option<Explanation>,
+}
+
+/// Lanes against the reference.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Comparison {
+    /// Lanes that decide nothing within their periods where the reference does: they claim
+    /// nothing that could be wrong.
+    pub(super) silent: usize,
+    /// Lanes that say something else than the reference and were examined.
+    pub(super) mismatches: Vec<Mismatch>,
+    /// Those that were not, beyond the number asked for.
+    pub(super) left: usize,
+}
+
+/// Compares every lane, and examines at most so many of those that differ: the first in the
+/// order of `ranks`, which is random.
+pub(super) fn all(
+    precision: Precision,
+    cells: &[Start],
+    records: &[Record],
+    ranks: &[u64],
+    most: usize,
+) -> Comparison {
+    let ids = (0..cells.len()).into_par_iter().with_max_len(1);
+    let mut different: Vec<usize> =
+        ids.filter(|&i| Cell::new(precision, cells[i], records[i]).differs()).collect();
+    let mut comparison = Comparison::default();
+    let is_silent = |i: &usize| {
+        classify(&records[*i]) == Class::Undecided && records[*i].periods_run >= lane_settings().periods
+    };
+    comparison.silent = different.iter().filter(|i| is_silent(i)).count();
+    different.retain(|i| !is_silent(i));
+    different.sort_by_key(|&i| ranks[i]);
+    comparison.left = different.len().saturating_sub(most);
+    different.truncate(most);
+    comparison.mismatches = different
+        .par_iter()
+        .with_max_len(1)
+        .filter_map(|&i| Cell::new(precision, cells[i], records[i]).examine())
+        .collect();
+    comparison
+}
+
+/// A cell and its record as a map of which it is the first cell.
+struct Cell {
+    precision: Precision,
+    pair: GearPair,
+    start: State,
+    plan: Plan,
+    records: Vec<Record>,
+}
+
+impl Cell {
+    fn new(precision: Precision, (pair, start): Start, record: Record) -> Cell {
+        let plan = plan(&pair, start);
+        let mut records = vec![Record::default(); plan.cell_count()];
+        records[0] = record;
+        Cell { precision, pair, start, plan, records }
+    }
+
+    fn subject(&self) -> Subject<'_> {
+        Subject { plan: &self.plan, records: &self.records, precision: self.precision, is_lane: true }
+    }
+
+    fn differs(&self) -> bool {
+        !differences(&self.subject(), 0).is_empty()
+    }
+
+    fn examine(&self) -> Option<Mismatch> {
+        let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
+        let sample = Sample { seed: 0, picks, strata: Vec::new() };
+        let validation = replay(&self.subject(), &sample, StateSource::None(String::new()), &|_| ());
+        let mismatch = validation.mismatches.into_iter().next()?;
+        Some(Mismatch {
+            engine: self.precision.into(),
+            pair: self.pair,
+            start: self.start,
+            differences: mismatch.differences,
+            explanation: mismatch.explanation,
+        })
+    }
+}
+
+/// A plan whose first cell is this one: the swept parameters have no upper bound.
+fn plan(pair: &GearPair, start: State) -> Plan {
+    const SWEPT: [&str; 2] = ["omega", "mesh_speed"];
+    let value = |name: &str| pair.get(name).expect("a parameter of the table");
+    let names = GearPair::PARAMETERS.iter().map(|parameter| parameter.name);
+    let fixed: String = names
+        .filter(|name| !SWEPT.contains(name))
+        .map(|name| format!("{name} = {:?}\n", value(name)))
+        .collect();
+    let axis = |name: &str| {
+        let min = value(name);
+        format!("[[axis]]\nparameter = '{name}'\nmin = {min:?}\nmax = {:?}\ncount = 2\n", 2.0 * min + 1.0)
+    };
+    let axes = SWEPT.map(axis).concat();
+    let crate::orbit::Settings { transient_periods, observed_periods, max_period } = SETTINGS;
+    let text = format!(
+        "[parameters]\n{fixed}{axes}[integration]\ntransient_periods = {transient_periods}\n\
+         observed_periods = {observed_periods}\nmax_period = {max_period}\n\
+         [start]\npolicy = 'state'\nstate = {start:?}\n\
+         [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n"
+    );
+    let scene = Scene::parse(&text, "cell", &[], Purpose::Map).expect("a valid cell makes a valid scene");
+    Plan::new(&scene)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::space;
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn the_first_cell_of_the_plan_is_the_cell() {
+        let mut random = Random::new(3);
+        for _ in 0..200 {
+            let (pair, start) = space::bounded(&mut random);
+            let plan = plan(&pair, start);
+            assert_eq!((plan.gear_pair(0), plan.start(0, &[])), (pair, start));
+        }
+    }
+}

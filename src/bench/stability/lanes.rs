@@ -1,0 +1,86 @@
+//! Lanes in every precision that the device has.
+
+use crate::gpu::{self, AdapterChoice, Gpu, GpuError, Lane, LaneSettings, Precision};
+use crate::model::{GearPair, State};
+use crate::record::Record;
+
+/// Cells are handed to a device so many at a time: every one has its own flow.
+const CHUNK: usize = 4096;
+
+/// A cell and where it starts.
+pub(super) type Start = (GearPair, State);
+
+/// Open devices, one per precision.
+pub struct Lanes {
+    devices: Vec<Gpu>,
+}
+
+impl Lanes {
+    /// Opens the adapter that `map` would take, in f32 and, where it can, in f64.
+    ///
+    /// # Errors
+    /// [`GpuError`] if there is no adapter, or it computes wrongly.
+    pub async fn open(choice: &AdapterChoice) -> Result<Lanes, GpuError> {
+        let mut devices = vec![Gpu::open(Precision::F32, choice).await?];
+        match Gpu::open(Precision::F64, choice).await {
+            Ok(device) => devices.push(device),
+            // Not every device has double precision.
+            Err(GpuError::NoAdapter { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        Ok(Lanes { devices })
+    }
+
+    /// The precisions there are.
+    pub fn precisions(&self) -> Vec<Precision> {
+        self.devices.iter().map(Gpu::precision).collect()
+    }
+
+    /// What the lanes run on, in words.
+    pub fn device(&self) -> String {
+        gpu::describe(self.devices[0].adapter())
+    }
+
+    /// Compiles shaders from here on as `rewrite` turns them.
+    pub(super) fn rewrite(&mut self, rewrite: fn(String) -> String) {
+        self.devices.iter_mut().for_each(|gpu| gpu.rewrite_shaders(rewrite));
+    }
+
+    /// One record per cell.
+    pub(super) fn run(
+        &mut self,
+        precision: Precision,
+        cells: &[Start],
+        settings: &LaneSettings,
+    ) -> Result<Vec<Record>, GpuError> {
+        let mut records = Vec::with_capacity(cells.len());
+        for chunk in cells.chunks(CHUNK) {
+            let flows: Vec<_> =
+                chunk.iter().map(|(pair, _)| pair.oscillator().expect("cells are made valid")).collect();
+            let laws: Vec<_> = chunk.iter().map(|(pair, _)| pair.law()).collect();
+            let lanes: Vec<_> =
+                (0..).zip(chunk).map(|(i, &(_, start))| Lane { flow: i, law: i, start }).collect();
+            let gpu = self.device_mut(precision);
+            records.extend(pollster::block_on(gpu.run(&flows, &laws, &lanes, settings))?);
+        }
+        Ok(records)
+    }
+
+    fn device_mut(&mut self, precision: Precision) -> &mut Gpu {
+        let found = self.devices.iter_mut().find(|gpu| gpu.precision() == precision);
+        found.expect("the precision is one of `precisions`")
+    }
+}
+
+/// So many periods and nothing else.
+pub(super) fn periods(periods: u32) -> LaneSettings {
+    LaneSettings {
+        periods,
+        transient_periods: 0,
+        max_period: 0,
+        early_stop: false,
+        exponent: false,
+        exponent_from: 0,
+        ..LaneSettings::default()
+    }
+}

@@ -1,0 +1,133 @@
+//! The folder of `rattlemap bench stability`: a table per part, figures, and the manifest.
+
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::Folder;
+use super::manifest::FORMAT;
+use super::stability_figures as figures;
+use crate::bench::stability::{Report, Verdict, fuzz};
+use crate::model::GearPair;
+
+const MANIFEST: &str = "manifest.json";
+
+/// How a report was made.
+#[derive(Clone, Copy, Debug)]
+pub struct Made<'a> {
+    /// `quick` or `full`.
+    pub size: &'a str,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// What the lanes ran on.
+    pub device: &'a str,
+    /// How long it took.
+    pub elapsed: Duration,
+}
+
+#[derive(Serialize)]
+struct Manifest<'a> {
+    format: u32,
+    command: &'static str,
+    crate_version: &'static str,
+    commit: &'static str,
+    size: &'a str,
+    seed: u64,
+    device: &'a str,
+    threads: usize,
+    elapsed_seconds: f64,
+    verdicts: Vec<VerdictObject<'a>>,
+    files: &'a [&'static str],
+}
+
+#[derive(Serialize)]
+struct VerdictObject<'a> {
+    part: &'a str,
+    holds: bool,
+    sentence: &'a str,
+}
+
+impl<'a> From<&'a Verdict> for VerdictObject<'a> {
+    fn from(Verdict { part, holds, sentence }: &'a Verdict) -> Self {
+        VerdictObject { part, holds: *holds, sentence }
+    }
+}
+
+/// Writes tables and figures, and the manifest last: a folder that has one is complete.
+/// Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> anyhow::Result<Vec<&'static str>> {
+    folder.remove(&[MANIFEST])?;
+    let mut files = Vec::new();
+    let mut file = |name: &'static str, write: &dyn Fn(&Path) -> anyhow::Result<()>| {
+        files.push(name);
+        folder.replace(name, write)
+    };
+    file("long_runs.csv", &|path| rows(path, &report.long_runs))?;
+    file("impacts.csv", &|path| rows(path, &report.impacts))?;
+    file("grazing.csv", &|path| rows(path, &report.grazing))?;
+    file("chatter.csv", &|path| rows(path, &report.chatter))?;
+    file("stiffness.csv", &|path| rows(path, &report.stiffness))?;
+    file("grid_swings.csv", &|path| rows(path, &report.grid.swings))?;
+    file("grid_motions.csv", &|path| rows(path, &report.grid.motions))?;
+    file("fuzz.csv", &|path| rows(path, &report.fuzz.counts))?;
+    file("fuzz_mismatches.csv", &|path| mismatches(path, &report.fuzz.mismatches))?;
+    let device = made.device;
+    file("long_runs.png", &|path| figures::long_runs(path, device, &report.long_runs))?;
+    file("grazing.png", &|path| figures::grazing(path, device, &report.grazing))?;
+    file("stiffness.png", &|path| figures::stiffness(path, device, &report.stiffness))?;
+    file("grid.png", &|path| figures::grid(path, device, &report.grid.swings))?;
+    files.push(MANIFEST);
+    let manifest = serde_json::to_string_pretty(&Manifest {
+        format: FORMAT,
+        command: "bench stability",
+        crate_version: env!("CARGO_PKG_VERSION"),
+        commit: env!("RATTLEMAP_COMMIT"),
+        size: made.size,
+        seed: made.seed,
+        device: made.device,
+        threads: rayon::current_num_threads(),
+        elapsed_seconds: made.elapsed.as_secs_f64(),
+        verdicts: report.verdicts.iter().map(VerdictObject::from).collect(),
+        files: &files,
+    })?;
+    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    Ok(files)
+}
+
+/// One line per row, under the names of its fields.
+fn rows<R: Serialize>(path: &Path, rows: &[R]) -> anyhow::Result<()> {
+    let mut writer = csv::Writer::from_path(path)?;
+    rows.iter().try_for_each(|row| writer.serialize(row))?;
+    Ok(writer.flush()?)
+}
+
+/// Cells that differ from the reference: what they are, in what, and why.
+fn mismatches(path: &Path, mismatches: &[fuzz::Mismatch]) -> anyhow::Result<()> {
+    let mut writer = csv::Writer::from_path(path)?;
+    let names = GearPair::PARAMETERS.iter().map(|parameter| parameter.name);
+    let header = std::iter::once("engine").chain(names);
+    writer.write_record(header.chain(["x1", "v1", "x2", "v2", "differences", "explanation"]))?;
+    for mismatch in mismatches {
+        let values = GearPair::PARAMETERS.iter().map(|parameter| mismatch.pair.get(parameter.name));
+        let values = values.collect::<Result<Vec<f64>, _>>()?;
+        let numbers = values.iter().chain(&mismatch.start).map(|number| format!("{number:?}"));
+        let told = mismatch.differences.iter().map(|difference| {
+            let side = |value| serde_json::to_string(value).unwrap_or_default().replace('"', "");
+            let field = format!("{:?}", difference.field).to_lowercase();
+            format!("{field}: {} for {}", side(&difference.record), side(&difference.reference))
+        });
+        let told: Vec<String> = told.collect();
+        let explanation = mismatch.explanation.map_or("unexplained", |explanation| explanation.name());
+        writer.write_record(
+            std::iter::once(mismatch.engine.name().to_owned())
+                .chain(numbers)
+                .chain([told.join("; "), explanation.to_owned()]),
+        )?;
+    }
+    Ok(writer.flush()?)
+}

@@ -1,0 +1,101 @@
+//! What cells cost in work, not in time: a change in cost shows in review, however noisy the
+//! machine.
+//!
+//! A snapshot that differs is a change in cost. Where it is meant, accept it with
+//! `INSTA_UPDATE=always cargo test --test counters` (or `cargo insta review`) and say why in the
+//! commit. Counts are means over 100 forcing periods of settled cycles, to three significant
+//! digits: drivers and processors that round otherwise give the same, 2 % more work does not.
+
+mod common;
+
+use std::fmt::Write;
+
+use common::{REST, flow_of, paper, work_since};
+use rattlemap::bench::engines::{LOOPS, counting};
+use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::reference::Trajectory;
+
+/// Stable cycles of every kind: what they are, restitution, frequency.
+const CELLS: [(&str, f64, f64); 6] = [
+    ("no contact", 0.5, 11.0),
+    ("one impact a side", 0.56, 5.6),
+    ("impacts, chatter, meshing", 0.06, 5.6),
+    ("plastic, meshing", 0.0, 4.2),
+    ("chatter into meshing", 0.56, 1.5),
+    ("long chatter", 0.72, 1.5),
+];
+
+/// Forcing periods to settle, and to count over.
+const SETTLING: u32 = 200;
+const COUNTED: u32 = 100;
+
+/// Three significant digits.
+fn rounded(count: f64) -> String {
+    if count == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (2.0 - count.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{count:.digits$}")
+}
+
+/// A table of work per forcing period.
+fn table(heads: &[&str], rows: impl Iterator<Item = (String, Vec<f64>)>) -> String {
+    let mut text = format!("{:<28}", "");
+    heads.iter().for_each(|head| write!(text, "{head:>17}").unwrap());
+    for (name, counts) in rows {
+        write!(text, "\n{name:<28}").unwrap();
+        counts.iter().for_each(|&count| write!(text, "{:>17}", rounded(count)).unwrap());
+    }
+    text
+}
+
+/// Every step tried is judged by one certificate.
+#[test]
+fn the_reference_does_as_much_work_as_before() {
+    let rows = CELLS.map(|(name, e, omega)| {
+        let pair = paper(e, omega);
+        let flow = flow_of(&pair);
+        let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
+        let advance = |trajectory: &mut Trajectory<'_>, periods: u32| {
+            (0..periods).for_each(|_| trajectory.advance_period(&mut ()).expect("an ordinary cell"));
+            trajectory.work()
+        };
+        let before = advance(&mut trajectory, SETTLING);
+        let work = work_since(advance(&mut trajectory, COUNTED), before);
+        let counts = [work.steps, work.halvings, work.events, work.root_iterations];
+        (name.to_owned(), counts.map(|count| count as f64 / f64::from(COUNTED)).to_vec())
+    });
+    let heads = ["certificates", "halvings", "events", "root iterations"];
+    insta::assert_snapshot!(table(&heads, rows.into_iter()));
+}
+
+/// Loop trips, function by function: forms of the shader report them in place of impacts.
+#[test]
+fn lanes_do_as_much_work_as_before() {
+    let pairs = CELLS.map(|(_, e, omega)| paper(e, omega));
+    let flows = pairs.map(|pair| pair.oscillator().unwrap());
+    let laws = pairs.map(|pair| pair.law());
+    let lanes: Vec<_> = (0..pairs.len() as u32).map(|i| Lane { flow: i, law: i, start: REST }).collect();
+    let settings = LaneSettings {
+        periods: SETTLING + COUNTED,
+        transient_periods: SETTLING,
+        max_period: 0,
+        early_stop: false,
+        exponent: false,
+        ..LaneSettings::default()
+    };
+    let mut rows = Vec::new();
+    for precision in Precision::ALL {
+        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+        let counts = LOOPS.map(|(function, _)| {
+            gpu.rewrite_shaders(counting(function));
+            let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
+            records.iter().map(|record| record.impacts_per_period).collect::<Vec<_>>()
+        });
+        for (i, (name, ..)) in CELLS.iter().enumerate() {
+            let of_cell = counts.iter().map(|by_cell| by_cell[i]).collect();
+            rows.push((format!("{} {name}", precision.name()), of_cell));
+        }
+    }
+    insta::assert_snapshot!(table(&LOOPS.map(|(_, what)| what), rows.into_iter()));
+}
