@@ -198,17 +198,18 @@ fn checked(series: &Series) -> Option<String> {
 }
 
 fn verdict(all: &[Series]) -> Result<(), Failure> {
-    let unexplained: usize = all
-        .iter()
-        .filter_map(|series| series.check.as_ref())
-        .map(|check| check.validation.unexplained())
-        .sum();
-    match (all.iter().any(|series| !series.points.is_empty()), unexplained) {
-        (false, _) => Err(Failure::Run(anyhow!("nothing could be measured"))),
-        (true, 0) => Ok(()),
-        (true, count) => Err(Failure::Run(anyhow!(
-            "{count} cells differ from the reference without an explanation: a map of the same size and \
-             `rattlemap validate` list them"
-        ))),
+    if all.iter().all(|series| series.points.is_empty()) {
+        return Err(Failure::Run(anyhow!("nothing could be measured")));
     }
+    let of = |series: &Series| {
+        let cells = &series.check.as_ref()?.unexplained;
+        let named: Vec<String> = cells.iter().map(|[e, omega]| format!("e = {e}, omega = {omega}")).collect();
+        (!named.is_empty()).then(|| format!("{}: {}", series.engine.label(), named.join("; ")))
+    };
+    let unexplained: Vec<String> = all.iter().filter_map(of).collect();
+    if unexplained.is_empty() {
+        return Ok(());
+    }
+    let cells = unexplained.join(". ");
+    Err(Failure::Run(anyhow!("cells differ from the reference without an explanation. {cells}")))
 }

@@ -207,10 +207,12 @@ struct CheckObject {
     mismatched: usize,
     explanations: BTreeMap<&'static str, usize>,
     unexplained: usize,
+    /// Restitution and frequency of these cells.
+    unexplained_cells: Vec<[f64; 2]>,
 }
 
 impl From<&Check> for CheckObject {
-    fn from(Check { lanes, validation }: &Check) -> CheckObject {
+    fn from(Check { lanes, validation, unexplained }: &Check) -> CheckObject {
         let explained = |explanation: Explanation| (explanation.name(), validation.explained_by(explanation));
         CheckObject {
             lanes: *lanes,
@@ -221,7 +223,8 @@ impl From<&Check> for CheckObject {
                 .map(explained)
                 .filter(|(_, count)| *count > 0)
                 .collect(),
-            unexplained: validation.unexplained(),
+            unexplained: unexplained.len(),
+            unexplained_cells: unexplained.clone(),
         }
     }
 }

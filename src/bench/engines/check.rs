@@ -17,6 +17,8 @@ pub struct Check {
     pub lanes: usize,
     /// Its validation.
     pub validation: Validation,
+    /// Restitution and frequency of cells that differ without an explanation.
+    pub unexplained: Vec<[f64; 2]>,
 }
 
 /// Replays `samples` cells of the map that was made last; none if none was made.
@@ -35,5 +37,8 @@ fn replay(scene: &Scene, records: &[Record], device: Option<&mut Gpu>, samples: 
         pollster::block_on(states::lane_states(device, &plan, records, &ids, None))
             .map_or_else(|error| StateSource::None(error.to_string()), StateSource::Lanes)
     });
-    Check { lanes: records.len(), validation: validate::replay(&subject, &sample, source, &|_| {}) }
+    let validation = validate::replay(&subject, &sample, source, &|_| {});
+    let without = validation.mismatches.iter().filter(|mismatch| mismatch.explanation.is_none());
+    let unexplained = without.map(|mismatch| plan.gear_pair(mismatch.id)).map(|pair| [pair.e, pair.omega]);
+    Check { lanes: records.len(), unexplained: unexplained.collect(), validation }
 }
