@@ -11,6 +11,7 @@
 //! [`classify`]); a sample of them is replayed ([`mod@validate`]). All of it is then written
 //! down ([`output`]).
 
+pub mod bench;
 pub mod bifurcation;
 pub mod certificate;
 pub mod classify;

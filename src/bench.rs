@@ -1,0 +1,3 @@
+//! Instruments: what the project measures about itself.
+
+pub mod work_precision;

@@ -1,0 +1,85 @@
+//! Time against time at equal error.
+
+use super::points::Point;
+
+/// Which of the two errors of a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// The median over the subjects.
+    Median,
+    /// The worst subject.
+    Worst,
+}
+
+impl Judged {
+    /// The state error of a point.
+    pub fn error(self, point: &Point) -> f64 {
+        match self {
+            Judged::Median => point.state_error_median,
+            Judged::Worst => point.state_error_worst,
+        }
+    }
+}
+
+/// What a method costs to be off by no more than `error`, in seconds per lane-period
+/// ([`Point::cost`]); none if it never is. Between two settings the curve is a straight line
+/// in logarithms; below its cheapest setting that is good enough it costs no less.
+pub fn cost_at(points: &[&Point], judged: Judged, error: f64) -> Option<f64> {
+    let mut sorted: Vec<&&Point> = points.iter().collect();
+    sorted.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
+    let good = sorted.iter().position(|point| judged.error(point) <= error)?;
+    let here = sorted[good];
+    let Some(before) = good.checked_sub(1).map(|i| sorted[i]) else { return Some(here.cost()) };
+    let (from, to) = (judged.error(before), judged.error(here));
+    if !from.is_finite() || to <= 0.0 {
+        return Some(here.cost());
+    }
+    let share = (from / error).ln() / (from / to).ln();
+    Some(before.cost() * (here.cost() / before.cost()).powf(share))
+}
+
+/// The smallest error of a method at any setting.
+pub fn best_error(points: &[&Point], judged: Judged) -> f64 {
+    points.iter().map(|point| judged.error(point)).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(seconds: f64, error: f64, cores: Option<u32>) -> Point {
+        Point {
+            method: String::new(),
+            device: String::new(),
+            precision: String::new(),
+            steps: None,
+            tolerance: None,
+            cores,
+            lanes: 1,
+            periods: 1,
+            rounds: 1,
+            seconds_per_lane_period: seconds,
+            fastest: seconds,
+            slowest: seconds,
+            state_error_median: error,
+            state_error_worst: 10.0 * error,
+            event_error_median: 0.0,
+            event_error_worst: 0.0,
+            lost: 0,
+        }
+    }
+
+    #[test]
+    fn costs_lie_on_the_line_between_settings() {
+        let (coarse, fine) = (point(1.0, 1e-4, Some(2)), point(2.0, 1e-6, Some(2)));
+        let curve = [&fine, &coarse];
+        let cost = |error| cost_at(&curve, Judged::Median, error);
+        assert!((cost(1e-5).unwrap() - 2.0 * 2f64.sqrt()).abs() < 1e-12, "half way, on two cores");
+        assert_eq!(cost(1e-3), Some(2.0), "never below the cheapest");
+        assert_eq!(cost(1e-7), None);
+        assert_eq!(cost_at(&curve, Judged::Worst, 1e-3), Some(2.0));
+        assert_eq!(best_error(&curve, Judged::Worst), 1e-5);
+        let lost = point(0.5, f64::INFINITY, Some(2));
+        assert_eq!(cost_at(&[&lost, &coarse], Judged::Median, 1e-3), Some(2.0), "no line from nowhere");
+    }
+}
