@@ -22,6 +22,8 @@ mod record_file;
 mod replay;
 mod report;
 mod validation_json;
+pub mod work_precision;
+mod work_precision_figure;
 
 pub use cells::Cells;
 pub use folder::{Folder, FolderError};

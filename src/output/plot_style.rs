@@ -7,6 +7,7 @@
 
 pub(super) mod axes;
 pub(super) mod legend;
+pub(super) mod log_axes;
 mod raster;
 
 use std::path::Path;

@@ -43,6 +43,74 @@ pub fn best_error(points: &[&Point], judged: Judged) -> f64 {
     points.iter().map(|point| judged.error(point)).fold(f64::INFINITY, f64::min)
 }
 
+/// The error at which fixed steps and lanes are compared.
+const EQUAL_ERROR: f64 = 1e-5;
+
+/// Who is compared with whom at [`EQUAL_ERROR`]: ours, theirs, and theirs in words.
+const PAIRS: [(&str, &str, &str); 5] = [
+    ("lane-f32", "rk4-wgsl-f32", "RK4 in WGSL, f32"),
+    ("lane-f64", "rk4-wgsl-f64", "RK4 in WGSL, f64"),
+    ("reference", "rk4-core", "RK4 in Rust on one core"),
+    ("reference", "dop853-core", "DOP853 on one core"),
+    ("reference", "rk4-numba", "RK4 in numba on one core"),
+];
+
+/// The ratios of a table of points, in sentences.
+pub fn sentences(points: &[Point]) -> Vec<String> {
+    let curve = |name: &str| points.iter().filter(|point| point.method == name).collect::<Vec<_>>();
+    let mut all = Vec::new();
+    for (ours, theirs, words) in PAIRS {
+        let (own, other) = (curve(ours), curve(theirs));
+        if own.is_empty() || other.is_empty() {
+            continue;
+        }
+        for (judged, of) in [(Judged::Worst, "worst"), (Judged::Median, "median")] {
+            all.push(match (cost_at(&own, judged, EQUAL_ERROR), cost_at(&other, judged, EQUAL_ERROR)) {
+                (Some(a), Some(b)) => format!(
+                    "{ours}: {:.1} times less time than {words} at a {of} error of {EQUAL_ERROR:e} ({:.3} against \
+                     {:.3} us)",
+                    b / a,
+                    1e6 * a,
+                    1e6 * b
+                ),
+                (Some(_), None) => {
+                    let best = best_error(&other, judged);
+                    format!("{words} comes to no {of} error below {best:.1e}; {ours} does")
+                }
+                (None, _) => {
+                    let best = best_error(&own, judged);
+                    format!("{ours} comes to no {of} error below {best:.1e}")
+                }
+            });
+        }
+    }
+    let (lane, rk4) = (curve("lane-f64"), curve("rk4-wgsl-f64"));
+    if !lane.is_empty() && !rk4.is_empty() {
+        let [a, b, c, d] =
+            [(&lane, Judged::Worst), (&rk4, Judged::Worst), (&lane, Judged::Median), (&rk4, Judged::Median)]
+                .map(|(curve, judged)| best_error(curve, judged));
+        all.push(format!(
+            "smallest error at any setting in f64, lane against RK4 in WGSL: worst {a:.1e} against {b:.1e}, median \
+             {c:.1e} against {d:.1e}"
+        ));
+    }
+    if let [reference] = curve("reference")[..] {
+        for heyoka in curve("heyoka") {
+            all.push(format!(
+                "reference: {:.1} times less time than heyoka at tolerance {:e}, whose worst error is {:.1e}, median \
+                 {:.1e} ({:.3} against {:.3} us on one core)",
+                heyoka.cost() / reference.cost(),
+                heyoka.tolerance.unwrap_or(f64::NAN),
+                heyoka.state_error_worst,
+                heyoka.state_error_median,
+                1e6 * reference.cost(),
+                1e6 * heyoka.cost()
+            ));
+        }
+    }
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
