@@ -69,15 +69,15 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
     let top = draw_head(canvas, shown.title, subtitle, &entries)? + 10.0;
     let (width, height) = canvas.size();
     let error = |point: &Point| (shown.error)(point).clamp(ERRORS.0, ERRORS.1);
-    let measured = points.iter().filter(|point| point.method != MEASURE);
+    let drawn = || present.iter().flat_map(|(style, points)| points.iter().map(move |point| (style, *point)));
     let frame = LogFrame::around(
         Rect { left: LEFT, top, right: width - RIGHT, bottom: height - BELOW },
         [
             "microseconds per lane and forcing period (processor: times cores; graphics card: as a whole)",
             shown.axis,
         ],
-        points.iter().map(microseconds),
-        measured.map(error),
+        drawn().map(|(_, point)| microseconds(point)),
+        drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
     );
     frame.draw_grid(canvas)?;
     for (style, points) in &present {

@@ -177,7 +177,7 @@ impl Flight {
     }
 
     /// The ending on a step of length `h` from `q0` at time `t` to `q1`, if one is seen: beyond
-    /// at the end, or at the turning point of the cubic Hermite polynomial in between. `first`:
+    /// at the end, or at the turning point in between, which a cubic Hermite polynomial tells. `first`:
     /// the step starts where the flight does. `after(tau)` integrates from `q0`.
     #[inline]
     pub fn look(
@@ -206,7 +206,10 @@ impl Flight {
                 return None;
             }
             let turn = h * turning_point(left, right, h)?;
-            // The polynomial is no proof: the equations decide.
+            // The polynomial is no proof: the equations decide, at their own turning point.
+            let q = after(turn);
+            let [acceleration, _] = self.field().accelerations(&q, self.cos(t + turn));
+            let turn = (turn - q[1] / acceleration).clamp(0.0, h);
             let is_beyond = self.distance(ending, &after(turn), t + turn).0 < 0.0;
             is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn })
         })
@@ -319,14 +322,18 @@ impl Flight {
     }
 }
 
-/// Where, as a share of the step, the cubic through values and rates at both ends turns, if it
-/// is negative there. It falls at the start and rises at the end.
+/// A cubic through the ends of a step of a radian is off by less than this share of the change
+/// of its slope.
+const CUBIC_ERROR: f64 = 0.01;
+
+/// Where, as a share of the step, the cubic through values and rates at both ends turns, if the
+/// motion may be beyond there. It falls at the start and rises at the end.
 fn turning_point(left: (f64, f64), right: (f64, f64), h: f64) -> Option<f64> {
     let (rise, s0, s1) = (right.0 - left.0, h * left.1, h * right.1);
     let (b, a) = (3.0 * rise - 2.0 * s0 - s1, s0 + s1 - 2.0 * rise);
     let u = -s0 / (b + (b * b - 3.0 * a * s0).max(0.0).sqrt());
     let least = left.0 + u * (s0 + u * (b + u * a));
-    (u > 0.0 && u < 1.0 && least < 0.0).then_some(u)
+    (u > 0.0 && u < 1.0 && least < CUBIC_ERROR * (s1 - s0)).then_some(u)
 }
 
 /// Where, as a share of the step, the cubic through a root at the start and a negative value at
@@ -347,8 +354,8 @@ mod tests {
         let left = (0.0525, -0.5);
         let right = (0.5525, 1.5);
         assert!((turning_point(left, right, 1.0).unwrap() - 0.25).abs() < 1e-14);
-        let higher = |(f, s): (f64, f64)| (f + 0.02, s);
-        assert_eq!(turning_point(higher(left), higher(right), 1.0), None, "it stays above");
+        let higher = |(f, s): (f64, f64)| (f + 0.04, s);
+        assert_eq!(turning_point(higher(left), higher(right), 1.0), None, "it stays well above");
         // u (0.25 - u) (1 + u)
         let share = second_root((0.0, 0.25), (-1.5, -3.25), 1.0);
         assert!((share - 0.25).abs() < 1e-14, "{share}");
