@@ -13,47 +13,55 @@ import heyoka as hy
 NAMES = ("m1", "m2", "r1", "r2", "k1", "k2", "r", "k", "F", "omega", "b", "e", "mesh_speed")
 MESH, SIDE = len(NAMES), len(NAMES) + 1
 
-# Callbacks are copied into the integrator, functions by reference: what they note goes here.
+# What callbacks work on: heyoka copies them into the integrator, but functions by reference.
+# Views of its memory and plain floats, since attributes and numpy scalars cost more than the law.
 events = []
+now = {}
 
 
-def contact_law(ta, wall):
-    m1, m2, r1, r2, k1, k2, r, k, force, omega, b, e, mesh_speed = ta.pars[:13]
-    z, w, x, v = ta.state
-    closing = wall * w
-    leaving = e * max(closing, 0.0)
-    v += wall * (1 + e) * max(closing, 0.0) * m1 / (m1 + m2)
+def contact_law(wall, t):
+    m1, m2, r1, r2, k1, k2, r, k, force, omega, b, e, mesh_speed = now["parameters"]
+    _, w, x, v = now["state"].tolist()
+    closing = max(wall * w, 0.0)
+    leaving = e * closing
+    v += wall * (1 + e) * closing * m1 / (m1 + m2)
     w = -wall * leaving
-    ta.state[:] = (wall * b, w, x, v)
+    now["state"][:] = (wall * b, w, x, v)
     if leaving > mesh_speed:
         return
-    x1, v1 = wall * b + x, w + v
-    a1 = (force * math.cos(omega * ta.time) - r1 * v1 - k1 * x1) / m1
+    a1 = (force * math.cos(omega * t) - r1 * (w + v) - k1 * (wall * b + x)) / m1
     a2 = (-r2 * v - k2 * x) / m2
     damping = r * w * (1 / m1 + 1 / m2)
     if wall * (a1 - a2) > 0.0 and wall * (a1 - a2 - damping) > 0.0:
-        ta.pars[MESH], ta.pars[SIDE] = 1.0, wall
+        mesh(wall)
 
 
-def at_wall(ta, wall, direction):
-    """A wall is crossed; `direction` is +1 into it."""
-    if ta.pars[MESH] == 0.0:
-        if direction > 0:
-            events.append(ta.time)
-            contact_law(ta, wall)
-    elif direction < 0 and ta.pars[SIDE] == wall:
-        ta.pars[MESH] = 0.0
-        ta.state[0] = wall * ta.pars[NAMES.index("b")]
+def mesh(wall):
+    """The teeth mesh on a side, +1 or -1, or not at all: 0."""
+    now["mesh"] = wall
+    now["pars"][MESH], now["pars"][SIDE] = abs(wall), wall
+
+
+def at_wall(ta, wall, into):
+    """A wall is crossed, into it or out of it."""
+    if now["mesh"] == 0.0:
+        if into:
+            t = ta.time
+            events.append(t)
+            contact_law(wall, t)
+    elif not into and now["mesh"] == wall:
+        mesh(0.0)
+        now["state"][0] = wall * now["parameters"][10]
         events.append(ta.time)
     return True
 
 
 def at_right(ta, sign):
-    return at_wall(ta, 1.0, sign)
+    return at_wall(ta, 1.0, sign > 0)
 
 
 def at_left(ta, sign):
-    return at_wall(ta, -1.0, -sign)
+    return at_wall(ta, -1.0, sign < 0)
 
 
 class Integrator:
@@ -77,10 +85,12 @@ class Integrator:
         """The last state in gap coordinates; event times are in `events`."""
         events.clear()
         ta = self.ta
+        now.update(parameters=parameters, state=ta.state, pars=ta.pars)
+        now["pars"][: len(NAMES)] = parameters
         beyond = abs(start[0]) > parameters[NAMES.index("b")]
-        ta.pars[:] = (*parameters, float(beyond), 1.0 if start[0] > 0 else -1.0)
+        mesh(math.copysign(1.0, start[0]) if beyond else 0.0)
         ta.time = 0.0
-        ta.state[:] = start
+        now["state"][:] = start
         ta.reset_cooldowns()
         outcome = ta.propagate_until(until)[0]
-        return ta.state.tolist() if outcome == hy.taylor_outcome.time_limit else [float("nan")] * 4
+        return ta.state.tolist() if outcome == hy.taylor_outcome.time_limit else [math.nan] * 4
