@@ -29,7 +29,8 @@ fn work_precision_measures_every_method() {
     }
     let out = folder.path().join("out/bench/work-precision");
     let points = rows(&out.join("work_precision.csv"));
-    let methods = ["lane-f32", "lane-f64", "rk4-wgsl-f32", "rk4-wgsl-f64", "rk4-core", "euler-core", "dop853-core"];
+    let methods =
+        ["lane-f32", "lane-f64", "rk4-wgsl-f32", "rk4-wgsl-f64", "rk4-core", "euler-core", "dop853-core"];
     for method in methods {
         let own: Vec<_> = points.iter().filter(|row| row["method"] == method).collect();
         assert_eq!(own.len(), 2, "{method}");
@@ -59,7 +60,8 @@ fn work_precision_measures_every_method() {
 
     // A table of points, such as this one, joins as peers.
     let peers = folder.path().join("peers.csv");
-    let foreign = fs::read_to_string(out.join("work_precision.csv")).unwrap().replace("rk4-core", "rk4-numba");
+    let foreign =
+        fs::read_to_string(out.join("work_precision.csv")).unwrap().replace("rk4-core", "rk4-numba");
     fs::write(&peers, foreign).unwrap();
     run(&["--methods", "reference", "--peers", "peers.csv", "--out", "joined", "--quiet"]).success();
     let joined = rows(&folder.path().join("joined/work_precision.csv"));

@@ -78,10 +78,18 @@ def look(p, mode, side, wall, order, z, w, x, v, t, h, z1, w1):
         else:
             share = 0.5
         return h, h * min(max(share, 0.01), 0.99)
-    if not (s0 < 0.0 and s1 > 0.0):
+    if s1 <= 0.0 or (s0 > 0.0 and order == 0):
         return math.nan, 0.0
-    u = -s0 / (quadratic + math.sqrt(max(quadratic**2 - 3 * cubic * s0, 0.0)))
-    if not (0.0 < u < 1.0) or f0 + u * (s0 + u * (quadratic + u * cubic)) >= 0.0:
+    # Where the cubic turns up; the same number, written without cancellation.
+    start = f0 if order == 0 else 0.0
+    root = math.sqrt(max(quadratic**2 - 3 * cubic * s0, 0.0))
+    if quadratic > 0.0:
+        u = -s0 / (quadratic + root)
+    elif cubic != 0.0:
+        u = (root - quadratic) / (3 * cubic)
+    else:
+        return math.nan, 0.0
+    if not (0.0 < u < 1.0) or start + u * (s0 + u * (quadratic + u * cubic)) >= 0.0:
         return math.nan, 0.0
     mesh = 0.0 if mode == FREE else 1.0
     low = part(p, mesh, side, z, w, x, v, t, u * h)

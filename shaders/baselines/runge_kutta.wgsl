@@ -56,13 +56,6 @@ fn after(q: vec4<Real>, part: Real) -> vec4<Real> {
     return runge_kutta(q, part, motion.phasor[0], cos_after(middle), cos_after(end));
 }
 
-// The state after a whole step: the same from constants.
-fn after_whole(q: vec4<Real>) -> vec4<Real> {
-    let c = cos_after(half_turn);
-    let s = motion.phasor[1] + (half_turn.x * motion.phasor[1] + half_turn.y * motion.phasor[0]);
-    return runge_kutta(q, 1.0, motion.phasor[0], c, c + (half_turn.x * c - half_turn.y * s));
-}
-
 // The distance that may end the flight, positive inside, and its rate. `c`: cos of the phase.
 fn distance_left(q: vec4<Real>, second: bool, c: Real) -> vec2<Real> {
     if tally.mode == MODE_FREE {
@@ -109,15 +102,17 @@ fn look(q0: vec4<Real>, q1: vec4<Real>, part: Real, second: bool, starts_there: 
         }
         return Ending(true, second, part, part * clamp(share, Real(0.01), Real(0.99)));
     }
-    if !(s0 < 0.0 && s1 > 0.0) {
+    if s1 <= 0.0 || (s0 > 0.0 && !starts_there) {
         return none;
     }
-    // Turning point of the cubic, which falls at the start and rises at the end.
-    let rise = right.x - left.x;
-    let b = 2.0 * (3.0 * rise - 2.0 * s0 - s1);
-    let a = 3.0 * (s0 + s1 - 2.0 * rise);
-    let u = -2.0 * s0 / (b + sqrt(max(b * b - 4.0 * a * s0, Real(0.0))));
-    let least = left.x + u * (s0 + u * ((3.0 * rise - 2.0 * s0 - s1) + u * (s0 + s1 - 2.0 * rise)));
+    // Where the cubic turns up; the same number, written without cancellation.
+    let start = select(left.x, Real(0.0), starts_there);
+    let rise = right.x - start;
+    let b = 3.0 * rise - 2.0 * s0 - s1;
+    let a = s0 + s1 - 2.0 * rise;
+    let root = sqrt(max(b * b - 3.0 * a * s0, Real(0.0)));
+    let u = select((root - b) / (3.0 * a), -s0 / (b + root), b > 0.0);
+    let least = start + u * (s0 + u * (b + u * a));
     if !(u > 0.0 && u < 1.0) || least >= 0.0 {
         return none;
     }
@@ -169,54 +164,129 @@ fn locate(q0: vec4<Real>, ending: Ending, order: u32) -> Real {
     return t;
 }
 
-// From step to step to the next mark; false if the lane or its share of this dispatch ends
-// before.
+// Steps between two looks at the table of phasors.
+const SYNC: u32 = 64u;
+
+// The scan has come to the mark.
+const SCAN_MARK: u32 = 2u;
+
+// Whole steps, as long as the Bernstein coefficients of their cubics lie between the walls.
+fn scan_steps() -> u32 {
+    if motion.theta != 0.0 || tally.order > 1u || tally.mode >= MODE_DIP {
+        return SCAN_CAREFUL;
+    }
+    // Meshing measures from its wall and has but one.
+    let d = domain_of(tally.mode);
+    let low = select(select(Real(0.0), -HUGE, d == 2u), walls[1], d == 0u);
+    let high = select(select(Real(0.0), HUGE, d == 1u), walls[0], d == 0u);
+    let mark = next_mark();
+    var q = vec4<Real>(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
+    var n = tally.step;
+    var leaves = tally.order > 0u;
+    var taken = 0u;
+    var verdict = SCAN_MARK;
+    var going = true;
+    while going {
+        motion.phasor = phasors[shape.phasors + n];
+        var c = motion.phasor[0];
+        var s = motion.phasor[1];
+        for (var i = 0u; i < SYNC; i++) {
+            if n >= mark {
+                going = false;
+                break;
+            }
+            if trips >= settings.trips {
+                verdict = SCAN_BUDGET;
+                going = false;
+                break;
+            }
+            trips += 1u;
+            let c1 = c + (half_turn.x * c - half_turn.y * s);
+            let s1 = s + (half_turn.x * s + half_turn.y * c);
+            let c2 = c1 + (half_turn.x * c1 - half_turn.y * s1);
+            let s2 = s1 + (half_turn.x * s1 + half_turn.y * c1);
+            let q1 = runge_kutta(q, 1.0, c, c1, c2);
+            let b1 = q.x + q.y * (1.0 / 3.0);
+            let b2 = q1.x - q1.y * (1.0 / 3.0);
+            // A start on the wall is a root that is divided out.
+            let b0 = select(q.x, b1, leaves);
+            let top = max(max(b0, b1), max(b2, q1.x));
+            let bottom = min(min(b0, b1), min(b2, q1.x));
+            if !(top < high && bottom > low) {
+                verdict = SCAN_CAREFUL;
+                going = false;
+                break;
+            }
+            q = q1;
+            c = c2;
+            s = s2;
+            n += 1u;
+            taken += 1u;
+            leaves = false;
+        }
+    }
+    motion.q = array<Real, 4>(q.x, q.y, q.z, q.w);
+    tally.step = n;
+    tally.passes_in_period += taken;
+    tally.order = select(0u, 1u, leaves);
+    return verdict;
+}
+
+// One step, or what events have left of it, up to the next event.
+fn careful_step() {
+    trips += 1u;
+    motion.phasor = phasors[shape.phasors + tally.step];
+    turn_phasor(motion.theta * here.substeps);
+    let q0 = vec4<Real>(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
+    let part = 1.0 - motion.theta;
+    let q1 = after(q0, part);
+    let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
+    let starts = tally.order > 0u;
+    var ending = look(q0, q1, part, false, starts && !on_second);
+    if !ending.event {
+        ending = look(q0, q1, part, true, starts && on_second);
+    }
+    tally.passes_in_period += 1u;
+    if !ending.event {
+        motion.q = array<Real, 4>(q1.x, q1.y, q1.z, q1.w);
+        motion.theta = 0.0;
+        tally.step += 1u;
+        tally.order = 0u;
+        return;
+    }
+    let at_start = starts && ending.second == on_second;
+    var tau: Real = 0.0;
+    if ending.within > 0.0 {
+        tau = locate(q0, ending, select(0u, tally.order, at_start));
+    }
+    let q = after(q0, tau);
+    motion.q = array<Real, 4>(q.x, q.y, q.z, q.w);
+    tally.order = 0u;
+    advance_phase(tau);
+    turn_phasor(tau * here.substeps);
+    check_finite();
+    act(ending.second, tau);
+    fetch_pull();
+}
+
+// From event to event to the next mark; false if the lane or its share of this dispatch ends
+// before. As in the lane, scanning and acting are separate: a driver that runs lanes in step
+// pays for events on every step otherwise.
 fn flight_to_mark() -> bool {
     fetch_pull();
     while running() && trips < settings.trips {
-        trips += 1u;
-        motion.phasor = phasors[shape.phasors + tally.step];
-        let q0 = vec4<Real>(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
-        let part = 1.0 - motion.theta;
-        var q1: vec4<Real>;
-        if motion.theta == 0.0 {
-            q1 = after_whole(q0);
-        } else {
-            turn_phasor(motion.theta * here.substeps);
-            q1 = after(q0, part);
+        let verdict = scan_steps();
+        if verdict == SCAN_BUDGET {
+            break;
         }
-        let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
-        let starts = tally.order > 0u;
-        var ending = look(q0, q1, part, false, starts && !on_second);
-        if !ending.event {
-            ending = look(q0, q1, part, true, starts && on_second);
+        if verdict == SCAN_CAREFUL {
+            careful_step();
         }
-        if !ending.event {
-            motion.q = array<Real, 4>(q1.x, q1.y, q1.z, q1.w);
-            motion.theta = 0.0;
-            tally.step += 1u;
-            tally.order = 0u;
-        } else {
-            let at_start = starts && ending.second == on_second;
-            var tau: Real = 0.0;
-            if ending.within > 0.0 {
-                tau = locate(q0, ending, select(0u, tally.order, at_start));
-            }
-            let q = after(q0, tau);
-            motion.q = array<Real, 4>(q.x, q.y, q.z, q.w);
-            tally.order = 0u;
-            advance_phase(tau);
-            turn_phasor(tau * here.substeps);
-            check_finite();
-            act(ending.second, tau);
-            fetch_pull();
-        }
-        tally.passes_in_period += 1u;
         if tally.step >= next_mark() {
             check_finite();
             return true;
         }
-        if tally.passes_in_period > 100u * settings.passes_per_period {
+        if tally.passes_in_period > settings.passes_per_period {
             tally.status = STATUS_TOO_STIFF;
         }
     }

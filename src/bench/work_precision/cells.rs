@@ -68,7 +68,7 @@ const SETTLED: [(Kind, f64, f64); 20] = [
     (Kind::Chaos, 0.7, 5.4),
     (Kind::Chaos, 0.65, 5.6),
     (Kind::Chaos, 0.8, 5.6),
-    (Kind::Chaos, 0.606, 5.6),
+    (Kind::Chaos, 0.62, 5.6),
 ];
 
 /// How far the contact-free steady motion at e = 0.5, omega = 5.6 would reach beyond the walls:

@@ -202,9 +202,10 @@ impl Flight {
                     if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
                 return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99) });
             }
-            if !(left.1 < 0.0 && right.1 > 0.0) {
+            if right.1 <= 0.0 || left.1 > 0.0 && !starts_there {
                 return None;
             }
+            let left = if starts_there { (0.0, left.1) } else { left };
             let turn = h * turning_point(left, right, h)?;
             // The polynomial is no proof: the equations decide, at their own turning point.
             let q = after(turn);
@@ -326,14 +327,16 @@ impl Flight {
 /// of its slope.
 const CUBIC_ERROR: f64 = 0.01;
 
-/// Where, as a share of the step, the cubic through values and rates at both ends turns, if the
-/// motion may be beyond there. It falls at the start and rises at the end.
+/// Where, as a share of the step, the cubic through values and rates at both ends turns up, if
+/// the motion may be beyond there. It rises at the end.
 fn turning_point(left: (f64, f64), right: (f64, f64), h: f64) -> Option<f64> {
     let (rise, s0, s1) = (right.0 - left.0, h * left.1, h * right.1);
     let (b, a) = (3.0 * rise - 2.0 * s0 - s1, s0 + s1 - 2.0 * rise);
-    let u = -s0 / (b + (b * b - 3.0 * a * s0).max(0.0).sqrt());
+    let root = (b * b - 3.0 * a * s0).max(0.0).sqrt();
+    // The same number, written without cancellation.
+    let u = if b > 0.0 { -s0 / (b + root) } else { (root - b) / (3.0 * a) };
     let least = left.0 + u * (s0 + u * (b + u * a));
-    (u > 0.0 && u < 1.0 && least < CUBIC_ERROR * (s1 - s0)).then_some(u)
+    (u > 0.0 && u < 1.0 && least < CUBIC_ERROR * (s1 - s0).max(0.0)).then_some(u)
 }
 
 /// Where, as a share of the step, the cubic through a root at the start and a negative value at
@@ -356,8 +359,11 @@ mod tests {
         assert!((turning_point(left, right, 1.0).unwrap() - 0.25).abs() < 1e-14);
         let higher = |(f, s): (f64, f64)| (f + 0.04, s);
         assert_eq!(turning_point(higher(left), higher(right), 1.0), None, "it stays well above");
+        // u (u - 0.25) (u - 0.5): off the wall, beyond and back, within one step.
+        let turn = turning_point((0.0, 0.125), (0.375, 1.625), 1.0).unwrap();
+        assert!((turn - (0.75 + 0.1875f64.sqrt()) / 3.0).abs() < 1e-14, "{turn}");
         // u (0.25 - u) (1 + u)
-        let share = second_root((0.0, 0.25), (-1.5, -3.25), 1.0);
+        let share = second_root((0.0, 0.25), (-1.5, -4.25), 1.0);
         assert!((share - 0.25).abs() < 1e-14, "{share}");
     }
 }

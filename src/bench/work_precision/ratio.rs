@@ -149,7 +149,7 @@ mod tests {
         assert_eq!(cost(1e-3), Some(2.0), "never below the cheapest");
         assert_eq!(cost(1e-7), None);
         assert_eq!(cost_at(&curve, Judged::Worst, 1e-3), Some(2.0));
-        assert_eq!(best_error(&curve, Judged::Worst), 1e-5);
+        assert!((best_error(&curve, Judged::Worst) - 1e-5).abs() < 1e-18);
         let lost = point(0.5, f64::INFINITY, Some(2));
         assert_eq!(cost_at(&[&lost, &coarse], Judged::Median, 1e-3), Some(2.0), "no line from nowhere");
     }
