@@ -164,17 +164,19 @@ fn errors_of_lanes_do_not_depend_on_their_steps() {
 #[test]
 fn runge_kutta_in_wgsl_and_in_rust_agree() {
     let subjects = first_variants();
-    let mut device = Device::open(Precision::F64, Form::RungeKutta, &subjects, 1).unwrap();
-    for steps in [256, 2048] {
-        let tables = device.load(steps).unwrap();
-        let (_, lanes) = device.run(&tables).unwrap();
-        for (subject, lane) in subjects.iter().zip(&lanes) {
-            let core = integrate(Scheme::RungeKutta, subject, steps);
-            let apart = lane.error(&core, subject.oscillator.period());
-            let bound = 1e-11 * subject.amplification.max(1.0);
-            let at = format!("{steps} steps, {:?}", subject.pair);
-            assert!(apart.state < bound, "{at}: states apart by {:.1e}", apart.state);
-            assert!(apart.event.unwrap_or(0.0) < bound, "{at}: events apart by {:?}", apart.event);
+    for form in [Form::RungeKutta, Form::RungeKuttaPhased] {
+        let mut device = Device::open(Precision::F64, form, &subjects, 1).unwrap();
+        for steps in [256, 2048] {
+            let tables = device.load(steps).unwrap();
+            let (_, lanes) = device.run(&tables).unwrap();
+            for (subject, lane) in subjects.iter().zip(&lanes) {
+                let core = integrate(Scheme::RungeKutta, subject, steps);
+                let apart = lane.error(&core, subject.oscillator.period());
+                let bound = 1e-11 * subject.amplification.max(1.0);
+                let at = format!("{form:?}, {steps} steps, {:?}", subject.pair);
+                assert!(apart.state < bound, "{at}: states apart by {:.1e}", apart.state);
+                assert!(apart.event.unwrap_or(0.0) < bound, "{at}: events apart by {:?}", apart.event);
+            }
         }
     }
 }

@@ -56,6 +56,13 @@ fn after(q: vec4<Real>, part: Real) -> vec4<Real> {
     return runge_kutta(q, part, motion.phasor[0], cos_after(middle), cos_after(end));
 }
 
+// The state after a whole step: the same from constants.
+fn after_whole(q: vec4<Real>) -> vec4<Real> {
+    let c = cos_after(half_turn);
+    let s = motion.phasor[1] + (half_turn.x * motion.phasor[1] + half_turn.y * motion.phasor[0]);
+    return runge_kutta(q, 1.0, motion.phasor[0], c, c + (half_turn.x * c - half_turn.y * s));
+}
+
 // The distance that may end the flight, positive inside, and its rate. `c`: cos of the phase.
 fn distance_left(q: vec4<Real>, second: bool, c: Real) -> vec2<Real> {
     if tally.mode == MODE_FREE {
@@ -236,10 +243,15 @@ fn scan_steps() -> u32 {
 fn careful_step() {
     trips += 1u;
     motion.phasor = phasors[shape.phasors + tally.step];
-    turn_phasor(motion.theta * here.substeps);
     let q0 = vec4<Real>(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
     let part = 1.0 - motion.theta;
-    let q1 = after(q0, part);
+    var q1: vec4<Real>;
+    if motion.theta == 0.0 {
+        q1 = after_whole(q0);
+    } else {
+        turn_phasor(motion.theta * here.substeps);
+        q1 = after(q0, part);
+    }
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
     let starts = tally.order > 0u;
     var ending = look(q0, q1, part, false, starts && !on_second);

@@ -10,7 +10,7 @@
 //! | method | steps, or tolerance | where | event times |
 //! | --- | --- | --- | --- |
 //! | lane, f32 and f64 ([`crate::gpu`]) | 16 to 1024 per period, never fewer than one per radian of the fastest free mode | device | reported by a variant of the shader |
-//! | classical Runge-Kutta, f32 and f64, in WGSL | 64 to 8192 per period | device | the same |
+//! | classical Runge-Kutta, f32 and f64, in WGSL: in one loop as papers write it, and in the lane's two phases | 64 to 8192 per period | device | the same |
 //! | classical Runge-Kutta ([`fixed_step`]) | 64 to 8192 per period | one core | yes |
 //! | semi-implicit Euler ([`fixed_step`]) | 64 to 8192 per period | one core | yes |
 //! | DOP853 of `ode_solvers` ([`adaptive`]) | tolerance 1e-4 to 1e-12 | one core | yes |

@@ -7,13 +7,16 @@ use plotters::style::RGBColor;
 
 use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::log_axes::LogFrame;
-use super::plot_style::{Canvas, DARK, Marker, Rect, Shape, save_figure};
+use super::plot_style::{Align, Canvas, DARK, FAINT, Marker, Rect, Shape, save_figure};
 use crate::bench::work_precision::points::Point;
 
 const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;
 const RIGHT: f64 = 50.0;
 const BELOW: f64 = 110.0;
+/// Settings at the ends of a curve: their type, and how far they stand off.
+const SMALLEST: f64 = 18.0;
+const LABEL: f64 = 13.0;
 /// Errors outside of this are drawn on its ends.
 const ERRORS: (f64, f64) = (1e-16, 10.0);
 
@@ -30,12 +33,14 @@ const fn style(method: &'static str, label: &'static str, [r, g, b]: [u8; 3], sh
 }
 
 /// Methods in the order of the legend: circles for this project's.
-const STYLES: [Style; 10] = [
+const STYLES: [Style; 12] = [
     style("lane-f32", "lane, f32", [0xd5, 0x5e, 0x00], Shape::Circle),
     style("lane-f64", "lane, f64", [0x00, 0x72, 0xb2], Shape::Circle),
     style("reference", "reference (the measure)", [0x26, 0x26, 0x26], Shape::Circle),
-    style("rk4-wgsl-f32", "RK4 in WGSL, f32", [0xe6, 0x9f, 0x00], Shape::Triangle),
-    style("rk4-wgsl-f64", "RK4 in WGSL, f64", [0x56, 0xb4, 0xe9], Shape::Triangle),
+    style("rk4-wgsl-f32", "RK4 in WGSL, one loop, f32", [0xe6, 0x9f, 0x00], Shape::Triangle),
+    style("rk4-wgsl-f64", "RK4 in WGSL, one loop, f64", [0x56, 0xb4, 0xe9], Shape::Triangle),
+    style("rk4-phased-f32", "the same in two phases, f32", [0x9a, 0x6a, 0x00], Shape::Triangle),
+    style("rk4-phased-f64", "the same in two phases, f64", [0x1b, 0x6f, 0x8f], Shape::Triangle),
     style("rk4-core", "RK4 in Rust", [0x60, 0x60, 0x60], Shape::Triangle),
     style("rk4-numba", "RK4 in numba", [0xcc, 0x79, 0xa7], Shape::Triangle),
     style("euler-core", "semi-implicit Euler in Rust", [0xaa, 0xaa, 0xaa], Shape::Square),
@@ -65,7 +70,14 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         .map(|style| (style, points.iter().filter(|point| point.method == style.method).collect()))
         .filter(|(_, points): &(_, Vec<&Point>)| !points.is_empty())
         .collect();
-    let entries: Vec<Entry> = present.iter().map(|(style, _)| entry(style)).collect();
+    let mut entries: Vec<Entry> = present.iter().map(|(style, _)| entry(style)).collect();
+    if let Some((style, _)) =
+        present.iter().find(|(_, points)| points.iter().any(|point| is_lost(shown, point)))
+    {
+        let marker = Marker { hollow: true, ..marker(style) };
+        entries.push(Entry::new(Key::Marker(marker), "hollow: a lane was lost"));
+    }
+    entries.push(Entry::new(Key::Mark { color: FAINT }, "numbers: steps per period, or tolerance"));
     let top = draw_head(canvas, shown.title, subtitle, &entries)? + 10.0;
     let (width, height) = canvas.size();
     let error = |point: &Point| (shown.error)(point).clamp(ERRORS.0, ERRORS.1);
@@ -88,12 +100,30 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         }
         let path: Vec<_> = points.iter().map(|point| frame.at(microseconds(point), error(point))).collect();
         canvas.stroke(&path, 2.0, style.color)?;
-        for (point, at) in points.iter().zip(path) {
-            let lost = (shown.error)(point) > ERRORS.1;
-            canvas.marker(at, Marker { hollow: lost, ..marker(style) })?;
+        for (point, at) in points.iter().zip(&path) {
+            canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) })?;
+        }
+        let ends = [(0, -LABEL, Align::Right), (points.len() - 1, LABEL, Align::Left)];
+        for (i, aside, align) in ends {
+            let at = (path[i].0 + aside, path[i].1);
+            canvas.text(&setting(points[i]), at, SMALLEST, align, style.color)?;
         }
     }
     frame.draw_axes(canvas)
+}
+
+/// The steps per period or the tolerance of a point.
+fn setting(point: &Point) -> String {
+    match (point.steps, point.tolerance) {
+        (Some(steps), _) => steps.to_string(),
+        (None, Some(tolerance)) => format!("{tolerance:e}").replace('-', "\u{2212}"),
+        (None, None) => String::new(),
+    }
+}
+
+/// A lane that was lost, or might as well have been.
+fn is_lost(shown: Shown, point: &Point) -> bool {
+    (shown.error)(point) > ERRORS.1
 }
 
 /// Its error is zero by definition: it is a line, not a curve.

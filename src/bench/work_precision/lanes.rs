@@ -16,8 +16,10 @@ use crate::record::{Record, valid};
 pub enum Form {
     /// By the exact propagator: the lane of the maps.
     Exact,
-    /// By classical Runge-Kutta steps.
+    /// By classical Runge-Kutta steps, events within the loop over steps.
     RungeKutta,
+    /// By classical Runge-Kutta steps in the lane's two phases.
+    RungeKuttaPhased,
 }
 
 /// A device that integrates subjects.
@@ -46,6 +48,7 @@ impl Device {
         gpu.rewrite_shaders(match form {
             Form::Exact => shaders::lane,
             Form::RungeKutta => shaders::runge_kutta,
+            Form::RungeKuttaPhased => shaders::runge_kutta_phased,
         });
         let (mut flows, mut laws): (Vec<Oscillator>, Vec<Law>) = (Vec::new(), Vec::new());
         let lanes: Vec<Lane> = subjects

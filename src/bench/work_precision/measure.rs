@@ -38,11 +38,13 @@ pub enum Setting {
 
 impl Method {
     /// All methods.
-    pub const ALL: [Method; 8] = [
+    pub const ALL: [Method; 10] = [
         Method::Lanes(Form::Exact, Precision::F32),
         Method::Lanes(Form::Exact, Precision::F64),
         Method::Lanes(Form::RungeKutta, Precision::F32),
         Method::Lanes(Form::RungeKutta, Precision::F64),
+        Method::Lanes(Form::RungeKuttaPhased, Precision::F32),
+        Method::Lanes(Form::RungeKuttaPhased, Precision::F64),
         Method::FixedStep(Scheme::RungeKutta),
         Method::FixedStep(Scheme::SemiImplicitEuler),
         Method::Dop853,
@@ -56,6 +58,8 @@ impl Method {
             Method::Lanes(Form::Exact, Precision::F64) => "lane-f64",
             Method::Lanes(Form::RungeKutta, Precision::F32) => "rk4-wgsl-f32",
             Method::Lanes(Form::RungeKutta, Precision::F64) => "rk4-wgsl-f64",
+            Method::Lanes(Form::RungeKuttaPhased, Precision::F32) => "rk4-phased-f32",
+            Method::Lanes(Form::RungeKuttaPhased, Precision::F64) => "rk4-phased-f64",
             Method::FixedStep(Scheme::RungeKutta) => "rk4-core",
             Method::FixedStep(Scheme::SemiImplicitEuler) => "euler-core",
             Method::Dop853 => "dop853-core",
@@ -72,7 +76,7 @@ impl Method {
         };
         let all: Vec<Setting> = match self {
             Method::Lanes(Form::Exact, _) => doubled(16, 1024).collect(),
-            Method::Lanes(Form::RungeKutta, _) | Method::FixedStep(_) => doubled(64, 8192).collect(),
+            Method::Lanes(..) | Method::FixedStep(_) => doubled(64, 8192).collect(),
             Method::Dop853 => [1e-4, 1e-6, 1e-8, 1e-10, 1e-12].map(Setting::Tolerance).to_vec(),
             Method::Reference => vec![Setting::None],
         };

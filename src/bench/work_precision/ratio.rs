@@ -47,9 +47,11 @@ pub fn best_error(points: &[&Point], judged: Judged) -> f64 {
 const EQUAL_ERROR: f64 = 1e-5;
 
 /// Who is compared with whom at [`EQUAL_ERROR`]: ours, theirs, and theirs in words.
-const PAIRS: [(&str, &str, &str); 5] = [
+const PAIRS: [(&str, &str, &str); 7] = [
     ("lane-f32", "rk4-wgsl-f32", "RK4 in WGSL, f32"),
     ("lane-f64", "rk4-wgsl-f64", "RK4 in WGSL, f64"),
+    ("lane-f32", "rk4-phased-f32", "RK4 in WGSL in the lane's two phases, f32"),
+    ("lane-f64", "rk4-phased-f64", "RK4 in WGSL in the lane's two phases, f64"),
     ("reference", "rk4-core", "RK4 in Rust on one core"),
     ("reference", "dop853-core", "DOP853 on one core"),
     (BESIDE_PEERS, "rk4-numba", "RK4 in numba on one core"),

@@ -5,8 +5,14 @@ pub(super) fn lane(source: String) -> String {
     with_event_times(&source)
 }
 
-/// The lane with classical Runge-Kutta in place of the exact propagator.
+/// The lane with classical Runge-Kutta in place of the exact propagator, in one loop as papers
+/// write it: step, look, act.
 pub(super) fn runge_kutta(source: String) -> String {
+    replace(&runge_kutta_phased(source), "let verdict = scan_steps();", "let verdict = SCAN_CAREFUL;")
+}
+
+/// The same with the lane's two phases: scan until something may happen, then act.
+pub(super) fn runge_kutta_phased(source: String) -> String {
     const BASELINE: &str = include_str!("../../../shaders/baselines/runge_kutta.wgsl");
     let start = source.find("// From event to event to the next mark").expect("the shader flies to marks");
     let (before, after) = source.split_at(start);
