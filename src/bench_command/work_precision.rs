@@ -2,14 +2,14 @@
 
 use anyhow::Context;
 use rattlemap::bench::work_precision::cells::subjects;
-use rattlemap::bench::work_precision::measure::{Curve, Method, Thoroughness, measure};
+use rattlemap::bench::work_precision::measure::{Curve, Method, ONE_CORE, Thoroughness, measure};
 use rattlemap::bench::work_precision::points::{self, Point};
 use rattlemap::bench::work_precision::ratio::sentences;
 use rattlemap::output::Folder;
 use rattlemap::output::work_precision::{FILES, Run, write};
 
 use crate::cli::WorkPrecision;
-use crate::error::Failure;
+use crate::error::{Failure, fail_if};
 use crate::progress::Progress;
 
 /// Cells of every kind.
@@ -41,7 +41,9 @@ pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
     let ours: Vec<Point> = curves.iter().map(|curve: &Curve| curve.point.clone()).collect();
     let all: Vec<Point> = ours.iter().chain(&peers).cloned().collect();
     let ratios = sentences(&all);
-    let adapter = ours.iter().find(|point| point.method.contains("lane") || point.method.contains("wgsl"));
+    let measured = |method: &&Method| ours.iter().any(|point| point.method == method.name());
+    let left_out: Vec<&str> = methods.iter().filter(|m| !measured(m)).map(|m| m.name()).collect();
+    let adapter = ours.iter().find(|point| point.device != ONE_CORE);
     let run = Run {
         processor: &processor(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
@@ -51,8 +53,12 @@ pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
         ratios: &ratios,
     };
     write(&folder, &run, &subjects, &curves, &peers)?;
-    progress.finish(&format!("{}\n{}: {}", summary(&all, &ratios), dir.display(), FILES.join(", ")));
-    Ok(())
+    let mut said = summary(&all, &ratios);
+    if !left_out.is_empty() {
+        said += &format!("\nleft out, no adapter has double precision: {}", left_out.join(", "));
+    }
+    progress.finish(&format!("{said}\n{}: {}", dir.display(), FILES.join(", ")));
+    fail_if(ours.is_empty(), "nothing was measured: no adapter has double precision")
 }
 
 /// Name of the processor, as it gives it.

@@ -191,20 +191,26 @@ fn subject(subject: &Subject) -> SubjectObject {
     }
 }
 
+/// One row per method, setting and cell: the largest errors over the cell's variants.
 fn write_cells(path: &Path, subjects: &[Subject], curves: &[Curve]) -> Result<()> {
     let mut writer = csv::Writer::from_path(path)?;
     for Curve { point, errors } in curves {
-        for (subject, error) in subjects.iter().zip(errors) {
+        let mut errors = errors.iter();
+        for variants in subjects.chunk_by(|a, b| a.cell == b.cell) {
+            let (first, own) = (&variants[0], errors.by_ref().take(variants.len()));
+            let largest = own.fold((0.0f64, None::<f64>), |(state, event), error| {
+                (state.max(error.state), event.into_iter().chain(error.event).reduce(f64::max))
+            });
             writer.serialize(CellRow {
                 method: &point.method,
                 steps: point.steps,
                 tolerance: point.tolerance,
-                kind: subject.kind.name(),
-                e: subject.pair.e,
-                omega: subject.pair.omega,
-                force: subject.pair.force,
-                state_error: error.state,
-                event_error: error.event,
+                kind: first.kind.name(),
+                e: first.pair.e,
+                omega: first.pair.omega,
+                force: first.pair.force,
+                state_error: largest.0,
+                event_error: largest.1,
             })?;
         }
     }

@@ -163,6 +163,9 @@ struct Runner {
     times: Vec<Vec<f64>>,
 }
 
+/// What methods without a device run on, as tables have it.
+pub const ONE_CORE: &str = "one core";
+
 /// Copies of each subject that fill a device.
 const HARDWARE_COPIES: usize = 1024;
 const SOFTWARE_COPIES: usize = 16;
@@ -246,7 +249,7 @@ impl Runner {
                 let cores = (!device.is_hardware()).then(cores);
                 (device.adapter(), cores, device.lane_count())
             }
-            None => ("one core".to_owned(), Some(1), subjects.len()),
+            None => (ONE_CORE.to_owned(), Some(1), subjects.len()),
         };
         let point = Point {
             method: self.method.name().to_owned(),
