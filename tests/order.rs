@@ -41,14 +41,19 @@ fn slopes(errors: &[f64], floor: f64) -> Vec<f64> {
     errors.windows(2).filter(|pair| pair[1] > floor).map(|pair| (pair[0] / pair[1]).log2()).collect()
 }
 
-/// Errors with doubling steps, and their slopes; the doublings are enough for three.
+/// How far the slope of the finest doubling above rounding may be off the order.
+const TOLERANCE: f64 = 0.15;
+
+/// Errors with doubling steps fall by the order in the end; three doublings at least must lie
+/// above rounding.
 #[track_caller]
-fn assert_order(name: &str, subject: &Subject, order: f64, tolerance: f64, errors: &[f64]) {
+fn assert_order(name: &str, subject: &Subject, order: f64, errors: &[f64]) {
     let slopes = slopes(errors, FLOOR * subject.amplification.max(1.0));
-    println!("{name}: errors {errors:?}, slopes {slopes:.2?}");
-    assert!(slopes.len() >= 3, "{name}: too few errors above rounding: {errors:?}");
-    let mean = slopes.iter().sum::<f64>() / slopes.len() as f64;
-    assert!((mean - order).abs() < tolerance, "{name}: order {mean:.2} instead of {order}: {errors:?}");
+    let at = format!("{name} at e = {}, omega = {}", subject.pair.e, subject.pair.omega);
+    println!("{at}: errors {errors:?}, slopes {slopes:.2?}");
+    assert!(slopes.len() >= 3, "{at}: too few errors above rounding: {errors:?}");
+    let last = slopes[slopes.len() - 1];
+    assert!((last - order).abs() < TOLERANCE, "{at}: order {last:.2} instead of {order}: {errors:?}");
 }
 
 fn doublings(from: u32, count: u32) -> impl Iterator<Item = u32> {
@@ -63,32 +68,28 @@ fn runge_kutta_is_of_order_4_on_smooth_motion() {
         let errors: Vec<_> = doublings(128, 5)
             .map(|n| state_error(subject, &integrate(Scheme::RungeKutta, subject, n)))
             .collect();
-        assert_order("smooth", subject, 4.0, 0.1, &errors);
+        assert_order("smooth", subject, 4.0, &errors);
     }
 }
 
-/// Steps are cut at events wherever they fall, so single slopes wander; the mean does not.
 #[test]
 fn runge_kutta_is_of_order_4_across_impacts() {
     for subject in first_variants().iter().filter(|s| of(Kind::Impacts)(s) || of(Kind::Chaos)(s)) {
-        let name = format!("impacts at e = {}, omega = {}", subject.pair.e, subject.pair.omega);
         let outcomes: Vec<_> = doublings(64, 5).map(|n| integrate(Scheme::RungeKutta, subject, n)).collect();
         let states: Vec<_> = outcomes.iter().map(|outcome| state_error(subject, outcome)).collect();
-        assert_order(&name, subject, 4.0, 0.25, &states);
+        assert_order("impacts", subject, 4.0, &states);
     }
 }
 
-/// Meshing turns at 39 rad per unit time: the order shows once steps are short against that,
-/// and the number of steps within one meshing interval is no whole number.
+/// Meshing turns at 39 rad per unit time: the order shows once steps are short against that.
 #[test]
 fn runge_kutta_is_of_order_4_across_meshing_and_chatter() {
     for subject in first_variants().iter().filter(|s| of(Kind::Meshing)(s) || of(Kind::Chatter)(s)) {
-        let name = format!("meshing at e = {}, omega = {}", subject.pair.e, subject.pair.omega);
         let outcomes: Vec<_> = doublings(512, 6).map(|n| integrate(Scheme::RungeKutta, subject, n)).collect();
         let states: Vec<_> = outcomes.iter().map(|outcome| state_error(subject, outcome)).collect();
-        assert_order(&name, subject, 4.0, 0.7, &states);
+        assert_order("meshing", subject, 4.0, &states);
         let events: Vec<_> = outcomes.iter().map(|outcome| event_error(subject, outcome)).collect();
-        assert!(events[5] < 1e-3 * events[0], "{name}: event times do not converge: {events:?}");
+        assert!(events[5] < 1e-3 * events[0], "{:?}: event times do not converge: {events:?}", subject.pair);
     }
 }
 
@@ -98,24 +99,23 @@ fn semi_implicit_euler_is_of_order_1() {
         let errors: Vec<_> = doublings(2048, 5)
             .map(|n| state_error(subject, &integrate(Scheme::SemiImplicitEuler, subject, n)))
             .collect();
-        assert_order("Euler, smooth", subject, 1.0, 0.1, &errors);
+        assert_order("Euler, smooth", subject, 1.0, &errors);
     }
     for subject in first_variants().iter().filter(|s| of(Kind::Impacts)(s)) {
-        let name = format!("Euler, impacts at e = {}, omega = {}", subject.pair.e, subject.pair.omega);
         let errors: Vec<_> = doublings(4096, 5)
             .map(|n| state_error(subject, &integrate(Scheme::SemiImplicitEuler, subject, n)))
             .collect();
-        assert_order(&name, subject, 1.0, 0.3, &errors);
+        assert_order("Euler, impacts", subject, 1.0, &errors);
     }
 }
 
 #[test]
 fn an_adaptive_library_gets_there_by_its_tolerance() {
-    for subject in &first_variants() {
+    for subject in &subjects(5) {
         let [coarse, fine] = [1e-6, 1e-12].map(|t| state_error(subject, &adaptive::integrate(subject, t)));
         let scale = subject.amplification.max(1.0);
         assert!(fine < 1e-10 * scale, "{:?}: {fine:e}", subject.pair);
-        assert!(coarse < 1e-2, "{:?}: {coarse:e}", subject.pair);
+        assert!(coarse < 1e-3, "{:?}: {coarse:e}", subject.pair);
     }
 }
 

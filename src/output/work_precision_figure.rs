@@ -14,7 +14,7 @@ const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;
 const RIGHT: f64 = 50.0;
 const BELOW: f64 = 110.0;
-/// Settings at the ends of a curve: their type, and how far they stand off.
+/// The setting at the end of a curve: its type, and how far it stands off.
 const SMALLEST: f64 = 18.0;
 const LABEL: f64 = 13.0;
 /// Errors outside of this are drawn on its ends.
@@ -77,7 +77,10 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         let marker = Marker { hollow: true, ..marker(style) };
         entries.push(Entry::new(Key::Marker(marker), "hollow: a lane was lost"));
     }
-    entries.push(Entry::new(Key::Mark { color: FAINT }, "numbers: steps per period, or tolerance"));
+    entries.push(Entry::new(
+        Key::Mark { color: FAINT },
+        "number: finest setting (steps per period, or tolerance)",
+    ));
     let top = draw_head(canvas, shown.title, subtitle, &entries)? + 10.0;
     let (width, height) = canvas.size();
     let error = |point: &Point| (shown.error)(point).clamp(ERRORS.0, ERRORS.1);
@@ -103,10 +106,8 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         for (point, at) in points.iter().zip(&path) {
             canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) })?;
         }
-        let ends = [(0, -LABEL, Align::Right), (points.len() - 1, LABEL, Align::Left)];
-        for (i, aside, align) in ends {
-            let at = (path[i].0 + aside, path[i].1);
-            canvas.text(&setting(points[i]), at, SMALLEST, align, style.color)?;
+        if let (Some(point), Some(at)) = (points.last(), path.last()) {
+            canvas.text(&setting(point), (at.0 + LABEL, at.1), SMALLEST, Align::Left, style.color)?;
         }
     }
     frame.draw_axes(canvas)

@@ -22,17 +22,10 @@ const ENDINGS_PER_PERIOD: u32 = 10_000;
 /// Durations in which the crate's first trial step underflows; one Euler step is exact there.
 const SHORTEST: f64 = 1e-12;
 
-/// Longest step, in radians of the faster of forcing and supports: no flight beyond a wall and
-/// back hides within one.
-const LONGEST: f64 = 1.0;
-
 /// Integrates a subject at a relative and absolute tolerance.
 pub fn integrate(subject: &Subject, tolerance: f64) -> Outcome {
     let oscillator = &subject.oscillator;
-    let support = |i: usize| oscillator.free.stiffness[i][i] / oscillator.masses[i];
-    let rate = support(0).max(support(1)).sqrt().max(oscillator.omega);
-    let solver =
-        Solver { omega: oscillator.omega, period: oscillator.period(), longest: LONGEST / rate, tolerance };
+    let solver = Solver { omega: oscillator.omega, period: oscillator.period(), tolerance };
     let mut flight = Flight::new(&subject.oscillator, subject.law, subject.start);
     for _ in 0..PERIODS {
         if solver.period(&mut flight).is_none() {
@@ -45,7 +38,6 @@ pub fn integrate(subject: &Subject, tolerance: f64) -> Outcome {
 struct Solver {
     omega: f64,
     period: f64,
-    longest: f64,
     tolerance: f64,
 }
 
@@ -135,9 +127,9 @@ impl Solver {
                 y[3] + duration * b,
             ]);
         }
+        let longest = watch.as_ref().map_or(duration, |watch| duration.min(watch.flight.longest_step()));
         let motion = Motion { field, omega: self.omega, watch };
         let start = Vector5::new(y[0], y[1], y[2], y[3], t);
-        let longest = duration.min(self.longest);
         let mut solver = Dop853::from_param(
             motion,
             0.0,

@@ -125,6 +125,13 @@ impl Flight {
         }
     }
 
+    /// The longest step that leaves nothing unseen: a radian of the supports; of the mesh while
+    /// the gap dips, since a dip and the meshing after it may be over sooner.
+    pub fn longest_step(&self) -> f64 {
+        let field = if let Mode::Dip(side) = self.mode { self.meshing_field(side) } else { &self.fields[0] };
+        (-field.rows[0][0]).max(-field.rows[1][2]).max(self.oscillator.omega.powi(2)).sqrt().recip()
+    }
+
     /// The next step does not start on a wall any more.
     #[inline]
     pub fn depart(&mut self) {
@@ -202,7 +209,7 @@ impl Flight {
                     if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
                 return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99) });
             }
-            if right.1 <= 0.0 || left.1 > 0.0 && !starts_there {
+            if right.1 <= 0.0 {
                 return None;
             }
             let left = if starts_there { (0.0, left.1) } else { left };
@@ -323,20 +330,25 @@ impl Flight {
     }
 }
 
-/// A cubic through the ends of a step of a radian is off by less than this share of the change
-/// of its slope.
+/// A cubic through the ends of a step of a radian is off by less than this share of its
+/// slopes.
 const CUBIC_ERROR: f64 = 0.01;
 
 /// Where, as a share of the step, the cubic through values and rates at both ends turns up, if
 /// the motion may be beyond there. It rises at the end.
 fn turning_point(left: (f64, f64), right: (f64, f64), h: f64) -> Option<f64> {
     let (rise, s0, s1) = (right.0 - left.0, h * left.1, h * right.1);
+    let room = CUBIC_ERROR * (s0.abs() + s1.abs());
+    // The inner Bernstein coefficients: where both are positive, so is the cubic.
+    if left.0 + s0 / 3.0 > room && right.0 - s1 / 3.0 > room {
+        return None;
+    }
     let (b, a) = (3.0 * rise - 2.0 * s0 - s1, s0 + s1 - 2.0 * rise);
     let root = (b * b - 3.0 * a * s0).max(0.0).sqrt();
     // The same number, written without cancellation.
     let u = if b > 0.0 { -s0 / (b + root) } else { (root - b) / (3.0 * a) };
     let least = left.0 + u * (s0 + u * (b + u * a));
-    (u > 0.0 && u < 1.0 && least < CUBIC_ERROR * (s1 - s0).max(0.0)).then_some(u)
+    (u > 0.0 && u < 1.0 && least < room).then_some(u)
 }
 
 /// Where, as a share of the step, the cubic through a root at the start and a negative value at
