@@ -61,11 +61,32 @@ fn judge_cycle() {
     }
     motion.cycle_growth = spectral_growth();
     let is_last = tally.period >= settings.longest;
-    if motion.cycle_growth < 0.0 && (is_last || is_on_cycle()) {
-        tally.cycle = tally.candidate;
-    } else if !is_last {
-        search_on();
+    if motion.cycle_growth >= 0.0 {
+        if !is_last {
+            give_up();
+            search_on();
+        }
+        return;
     }
+    if settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
+        tally.stage = STAGE_READING;
+        return;
+    }
+    if is_last || (is_on_cycle() && is_own()) {
+        tally.cycle = tally.candidate;
+        return;
+    }
+    give_up();
+    look_again();
+}
+
+// The cycle attracts, but is too far off: its recurrences count on.
+fn look_again() {
+    tally.stage = STAGE_RUNNING;
+    tally.has_read = 0u;
+    tally.tangent_count = 1u;
+    set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
+    begin_window(strobe_state(), tally.window);
 }
 
 // The exponent starts anew, but for what it has collected; recurrence from scratch.
@@ -88,7 +109,7 @@ fn away() -> f32 {
     // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
     let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
     // Rounding may hold a lane still before it is there.
-    let apart = max(exp2(-f32(octaves_apart()) / OCTAVE), NOISE);
+    let apart = max(exp2(-f32(tally.apart) / OCTAVE), NOISE);
     return apart / max(1.0 - mu, 1e-6);
 }
 
@@ -105,10 +126,5 @@ fn is_surely_unsymmetric() -> bool {
 
 // Near, or as near as rounding lets it.
 fn is_on_cycle() -> bool {
-    return is_near_cycle() || (tally.settled != 0u && octaves_apart() >= AT_REST);
-}
-
-// How far the last cycle took the lane, in quarter octaves below 1.
-fn octaves_apart() -> u32 {
-    return last_distance_at(max(tally.candidate, 1u));
+    return is_near_cycle() || (tally.settled != 0u && tally.apart >= AT_REST);
 }

@@ -113,6 +113,8 @@ struct MotionNow {
     growth_squares: Real,
     // Strobe state that later ones are compared with; where the cycle is read, its start.
     anchor: array<Real, 4>,
+    // Where Newton's method set out from.
+    home: array<Real, 4>,
     // Largest position and rate at strobes: the unit of distances.
     position_scale: Real,
     rate_scale: Real,
@@ -182,8 +184,14 @@ struct TallyNow {
     recent: u32,
     // Events on the strobe phase.
     on_strobe: u32,
-    // Distance of the cycle from its mirror image, in quarter octaves below 1.
+    // In quarter octaves below 1: distance of the cycle from its mirror image; how far the
+    // cycle that was read last took the lane, and the one before a Newton step.
     mirror: u32,
+    apart: u32,
+    apart_before: u32,
+    // Newton steps towards the cycle, and the events on it before the first.
+    refinements: u32,
+    branch: u32,
 }
 
 struct Tally {

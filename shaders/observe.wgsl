@@ -7,12 +7,23 @@ const NEAR: u32 = 24u;
 // A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
 // comes within 2^-12 of a cycle by chance.
 const SETTLED: f32 = 56.0;
+// 2^-7 where Newton's method shows what the limit is.
+const REFINABLE: f32 = 28.0;
+// Slower approaches than this, per period, are not waited for, only for a recurrence as close as
+// if they were as fast.
+const SLOWEST: f32 = 0.008;
+// Recurrences this close, 2^-12 of the motion, need not shrink, only not grow.
+const SLOW: u32 = 48u;
 // A distance must have shrunk by this much (a factor of 0.7) since the last window.
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
 // Lags of the first window; the following ones are twice as long each.
-const FIRST_WINDOW: u32 = 8u;
+const FIRST_WINDOW: u32 = 6u;
+// Windows need not be longer than so many cycles that contract.
+const LAGS_PER_CYCLE: u32 = 4u;
+// A refined cycle closes where a strobe comes this near to its start, in quarter octaves.
+const CLOSED: u32 = 48u;
 
 // Phase 0: a forcing period is complete.
 fn begin_period() {
@@ -24,7 +35,15 @@ fn begin_period() {
     tally.events_in_period = 0u;
     if tally.stage == STAGE_READING {
         tally.to_read -= 1u;
-        if tally.to_read == 0u {
+        let read = tally.candidate - tally.to_read;
+        let apart = octaves(distance_between(strobe_state(), motion.anchor));
+        // On the cycle itself the smallest divisor that closes is the period.
+        let closes = tally.refinements > 0u && tally.candidate % read == 0u && apart >= CLOSED
+            && apart + 8u >= tally.apart_before;
+        if tally.to_read == 0u || closes {
+            tally.candidate = read;
+            tally.to_read = 0u;
+            tally.apart = apart;
             tally.stage = STAGE_READ;
         }
         return;
@@ -61,7 +80,7 @@ const DEPARTURE: Real = 40.0;
 
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
-    if tally.block_periods > 0u || tally.streak > 0u || tally.period < settings.chaos_from {
+    if tally.block_periods > 0u || tally.streak >= STREAK || tally.period < settings.chaos_from {
         return false;
     }
     let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
@@ -164,9 +183,8 @@ fn recurs() -> bool {
         return false;
     }
     let lag = tally.period - tally.anchor_period;
-    let p = max(abs(q[0] - motion.anchor[0]), abs(q[2] - motion.anchor[2])) / max(motion.position_scale, Real(1e-30));
-    let r = max(abs(q[1] - motion.anchor[1]), abs(q[3] - motion.anchor[3])) / max(motion.rate_scale, Real(1e-30));
-    tallies[lane].distances[(lag - 1u) / 4u] |= octaves(max(p, r)) << (8u * ((lag - 1u) % 4u));
+    let apart = octaves(distance_between(q, motion.anchor));
+    tallies[lane].distances[(lag - 1u) / 4u] |= apart << (8u * ((lag - 1u) % 4u));
     if lag < tally.window {
         return false;
     }
@@ -176,8 +194,11 @@ fn recurs() -> bool {
     tallies[lane].last_distances = tallies[lane].distances;
     // The next anchor lies at the same place of the cycle: only there do distances compare. The
     // points of a cycle may be so close that a shorter lag seems to recur.
-    let lags = min(2u * tally.window, settings.max_period);
     let cycle = max(closest_lag(), 1u);
+    // A short lag that contracts is seen as well in short windows.
+    let enough = max(LAGS_PER_CYCLE * cycle, FIRST_WINDOW);
+    let wider = clamp(tally.period / 4u, FIRST_WINDOW, settings.max_period);
+    let lags = select(wider, min(enough, wider), found > 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
@@ -194,6 +215,13 @@ fn closest_lag() -> u32 {
         }
     }
     return best;
+}
+
+// The distance of two strobes, relative to the motion.
+fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
+    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(motion.position_scale, Real(1e-30));
+    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / max(motion.rate_scale, Real(1e-30));
+    return max(p, r);
 }
 
 fn begin_window(q: array<Real, 4>, lags: u32) {
@@ -226,7 +254,8 @@ fn contracting_lag() -> u32 {
     for (var lag = 1u; lag <= min(tally.window, tally.known_lags); lag++) {
         trips += 1u;
         let now = distance_at(lag);
-        let contracts = now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
+        let before = last_distance_at(lag);
+        let contracts = now >= RESOLVED || now >= before + SHRUNK || (now >= SLOW && now >= before);
         if now < NEAR || !contracts {
             continue;
         }
@@ -252,6 +281,9 @@ fn has_settled(lag: u32) -> bool {
     }
     // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), 1e-6, 1.0);
+    if EXPONENT && settings.early_stop == 1u {
+        return f32(now) >= REFINABLE - OCTAVE * log2(max(away, SLOWEST));
+    }
     return f32(now) >= SETTLED - OCTAVE * log2(away);
 }
 
@@ -260,13 +292,14 @@ const QUARTER_OCTAVE: f32 = 0.1733;
 
 // Keeps the books on the candidate; true once it is settled.
 fn judge_lag(found: u32) -> bool {
-    if found == 0u || found != tally.candidate {
-        tally.candidate = found;
-        tally.streak = select(1u, 0u, found == 0u);
-        tally.settled = 0u;
+    tally.settled = 0u;
+    if found == 0u {
+        tally.candidate = 0u;
+        tally.streak = 0u;
         return false;
     }
-    tally.streak += 1u;
+    tally.streak = select(1u, tally.streak + 1u, found == tally.candidate);
+    tally.candidate = found;
     // Weak chaos contracts by chance, the oftener it is looked at: ask for more of it.
     let windows = STREAK + tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
     let settled = tally.streak >= windows && has_settled(found);
@@ -277,10 +310,8 @@ fn judge_lag(found: u32) -> bool {
 // Half a period after the middle of a cycle of odd period: how far is the state from the mirror
 // image of the cycle's start?
 fn compare_mirror() {
-    let q = strobe_state();
-    let p = max(abs(q[0] + motion.anchor[0]), abs(q[2] + motion.anchor[2])) / max(motion.position_scale, Real(1e-30));
-    let r = max(abs(q[1] + motion.anchor[1]), abs(q[3] + motion.anchor[3])) / max(motion.rate_scale, Real(1e-30));
-    tally.mirror = octaves(max(p, r));
+    let a = motion.anchor;
+    tally.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
 }
 
 // A cycle this close to its mirror image, 2^-12 of the motion, is symmetric.

@@ -14,5 +14,7 @@ const RESOLVED: u32 = 60u;
 const AT_REST: u32 = 64u;
 // What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
 const NOISE: f32 = 4e-6;
+// Newton's method has done enough this close to the cycle, relative to the motion.
+const REFINED: f32 = 1e-5;
 // Events this close to phase 0, in turns, lie on it.
 const ON_STROBE: Real = 1e-6;

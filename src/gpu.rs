@@ -139,7 +139,7 @@ pub struct LaneSettings {
     /// Longest period looked for, at most 64; 0 looks for none.
     pub max_period: u32,
     /// Whether lanes end once they are decided: a cycle confirmed and read, contact-free for
-    /// good, or chaotic by six standard errors after half the budget.
+    /// good, or chaotic by six standard errors from `chaos_from` on.
     pub early_stop: bool,
     /// Periods beyond the budget for lanes that are undecided by then; with early stops alone.
     pub undecided_periods: u32,
@@ -147,6 +147,8 @@ pub struct LaneSettings {
     pub exponent: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
     pub exponent_from: u32,
+    /// The first period at which chaos may be called, with early stops.
+    pub chaos_from: u32,
     /// Free steps per period at least; none for as many as the motion needs.
     pub steps_per_period: Option<u32>,
     /// Lanes per batch at most; none for what the adapter's limits allow.
@@ -172,6 +174,7 @@ impl Default for LaneSettings {
             undecided_periods: 0,
             exponent: true,
             exponent_from: 100,
+            chaos_from: 198,
             steps_per_period: None,
             batch: None,
             trips: 4000,

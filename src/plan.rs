@@ -46,6 +46,8 @@ pub struct Batch {
 pub struct Needs {
     /// An exponent for motion that is not periodic: for its own sake or for the class.
     pub exponent: bool,
+    /// The exponent for its own sake.
+    pub lyapunov: bool,
     /// Impacts per forcing period.
     pub impacts: bool,
     /// Fraction of the time spent meshing.
@@ -96,6 +98,7 @@ impl Plan {
                 early_stop: integration.early_stop,
                 undecided_periods: integration.undecided_periods,
                 exponent: needs.exponent,
+                shows_exponent: needs.lyapunov,
             },
             steps: integration.steps_per_period,
             refine: scene.refine(),
@@ -227,6 +230,7 @@ fn needs(quantities: &[Quantity]) -> Needs {
     Needs {
         // Without it chaos cannot be told from a cycle that was not found.
         exponent: asked(Quantity::Lyapunov) || asked(Quantity::Class),
+        lyapunov: asked(Quantity::Lyapunov),
         impacts: asked(Quantity::Impacts),
         mesh: asked(Quantity::Mesh),
         symmetric: asked(Quantity::Symmetric),

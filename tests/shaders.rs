@@ -91,6 +91,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     growth_sum,
                     growth_squares,
                     anchor,
+                    home,
                     position_scale,
                     rate_scale,
                     cycle_growth,
@@ -181,6 +182,10 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     recent,
                     on_strobe,
                     mirror,
+                    apart,
+                    apart_before,
+                    refinements,
+                    branch,
                     distances,
                     last_distances,
                     word

@@ -141,13 +141,14 @@ fn lane_settings(plan: &Plan) -> LaneSettings {
     let budget = plan.budget();
     let default = LaneSettings::default();
     LaneSettings {
-        periods: budget.settings.transient_periods.saturating_add(budget.settings.observed_periods),
+        periods: budget.periods(),
         transient_periods: budget.settings.transient_periods,
         max_period: budget.settings.max_period,
         early_stop: budget.early_stop,
         undecided_periods: budget.undecided_periods,
         exponent: budget.exponent,
-        exponent_from: default.exponent_from.min(budget.settings.transient_periods),
+        exponent_from: budget.exponent_from(),
+        chaos_from: budget.chaos_from(),
         steps_per_period: match plan.steps_per_period() {
             Steps::Auto => None,
             Steps::PerPeriod(steps) => Some(steps),
@@ -190,12 +191,20 @@ mod tests {
             ..Record::default()
         };
         let whole = record;
-        let all = Needs { exponent: true, impacts: true, mesh: true, symmetric: true, word: true };
+        let all =
+            Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
         keep(&mut record, &all);
         assert_eq!(record, whole);
         keep(
             &mut record,
-            &Needs { exponent: false, impacts: false, mesh: false, symmetric: false, word: false },
+            &Needs {
+                exponent: false,
+                lyapunov: false,
+                impacts: false,
+                mesh: false,
+                symmetric: false,
+                word: false,
+            },
         );
         assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });
     }

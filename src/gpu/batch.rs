@@ -19,7 +19,7 @@ const LARGEST_BATCH: usize = 1 << 20;
 const LONGEST_PERIOD: u32 = 64;
 
 /// Blocks whose means give the exponent's standard error.
-const EXPONENT_BLOCKS: u32 = 16;
+const EXPONENT_BLOCKS: u32 = 32;
 
 pub(super) async fn run(
     gpu: &Gpu,
@@ -218,12 +218,11 @@ fn uniform(lanes: usize, groups: [u32; 2], settings: &LaneSettings) -> Settings 
     } else {
         settings.transient_periods
     };
-    let observed_periods = periods.saturating_sub(settings.transient_periods);
     Settings {
         lanes: lanes as u32,
         periods,
         longest: periods.saturating_add(more),
-        chaos_from: (periods / 2).max(observed_periods),
+        chaos_from: settings.chaos_from,
         trips: settings.trips,
         passes_per_period: settings.passes_per_period,
         events_per_period: settings.events_per_period,

@@ -142,6 +142,8 @@ pub struct Motion {
     pub growth_squares: f64,
     /// Strobe state that later ones are compared with.
     pub anchor: [f64; 4],
+    /// Where Newton's method set out from.
+    pub home: [f64; 4],
     /// Largest position at strobes.
     pub position_scale: f64,
     /// Largest rate at strobes.
@@ -226,6 +228,14 @@ pub struct Tally {
     pub on_strobe: u32,
     /// Distance of the cycle from its mirror image, in quarter octaves below 1.
     pub mirror: u32,
+    /// How far the cycle that was read last took the lane, likewise.
+    pub apart: u32,
+    /// The same before a Newton step.
+    pub apart_before: u32,
+    /// Newton steps towards the cycle.
+    pub refinements: u32,
+    /// The events on it before the first, hashed.
+    pub branch: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.

@@ -62,6 +62,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/tangent.wgsl"),
     include_str!("../../shaders/observe.wgsl"),
     include_str!("../../shaders/cycle.wgsl"),
+    include_str!("../../shaders/refine.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
     include_str!("../../shaders/begin.wgsl"),
     include_str!("../../shaders/record.wgsl"),

@@ -14,21 +14,30 @@ use crate::reference::{Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, refine};
 use crate::word::Word;
 
-/// The exponent accumulates from this period on, or from the end of a shorter transient.
-const EXPONENT_FROM: u32 = 100;
+/// An exponent that is shown accumulates from this period on, or from the end of a shorter
+/// transient.
+const SHOWN_EXPONENT_FROM: u32 = 100;
+
+/// One that only tells chaos from the rest may contain more of the transient.
+const EXPONENT_FROM: u32 = 50;
 
 /// Periods after which an early stop is first considered; then every quarter as many more.
 const FIRST_LOOK: u32 = 16;
 
 /// A cell stops early only this close to its cycle, relative to the motion: inside the region
 /// where the multipliers tell what happens next. A leaving speed near `mesh_speed` makes that
-/// region small: at 1e-3 one cell in 10,000 was taken for a period that it then left.
-const SETTLED: f64 = 1e-6;
+/// region small: of 20,000 cells over restitution and frequency one was taken for a period that
+/// it then left, at 1e-6 none; the periods of the others were halved.
+const SETTLED: f64 = 2e-3;
 
-/// With early stops chaos is called after half the budget already, if the exponent exceeds
-/// zero by this many standard errors. On 16,384 cells of restitution against frequency 18
-/// transients were taken for chaos then, 13 at the end of the budget.
+/// With early stops chaos is called before the budget is spent if the exponent exceeds zero by
+/// this many standard errors ...
 const EARLY_CHAOS_ERRORS: f64 = 6.0;
+
+/// ... after this fraction of the budget, in eighths: of 20,000 cells 38 transients are taken
+/// for chaos so, 33 if it is half, 17 if all of it is spent. Without an exponent to show, 46.
+const EARLY_CHAOS_FROM: u32 = 3;
+const HASTY_CHAOS_FROM: u32 = 2;
 
 /// Cycles, at least, over which an approach must have been seen.
 const APPROACH_CYCLES: usize = 4;
@@ -45,6 +54,27 @@ pub struct Budget {
     pub undecided_periods: u32,
     /// Whether motion that is not periodic gets an exponent. It costs a tangent vector.
     pub exponent: bool,
+    /// Whether that exponent is shown; otherwise it need only be sure that it is positive.
+    pub shows_exponent: bool,
+}
+
+impl Budget {
+    /// Forcing periods of a cell that is decided by then.
+    pub fn periods(&self) -> u32 {
+        self.settings.transient_periods.saturating_add(self.settings.observed_periods)
+    }
+
+    /// The period from which the exponent accumulates.
+    pub fn exponent_from(&self) -> u32 {
+        let from = if self.shows_exponent { SHOWN_EXPONENT_FROM } else { EXPONENT_FROM };
+        from.min(self.settings.transient_periods)
+    }
+
+    /// The first period at which chaos may be called, with early stops.
+    pub fn chaos_from(&self) -> u32 {
+        let eighths = if self.shows_exponent { EARLY_CHAOS_FROM } else { HASTY_CHAOS_FROM };
+        (self.periods() / 8 * eighths).max(self.settings.observed_periods)
+    }
 }
 
 /// What one cell showed.
@@ -115,11 +145,10 @@ struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     fn run(&mut self, start: State) -> Result<Measured, Stop> {
-        let settings = &self.budget.settings;
-        let budget = settings.transient_periods.saturating_add(settings.observed_periods);
+        let budget = self.budget.periods();
         let more = if self.budget.early_stop { self.budget.undecided_periods } else { 0 };
         let last = budget.saturating_add(more);
-        let exponent_from = self.exponent_from() as u32;
+        let exponent_from = self.budget.exponent_from();
         let turning_from =
             if self.budget.exponent { exponent_from.saturating_sub(TANGENT_PERIODS) } else { last };
         let mut look = if self.budget.early_stop { FIRST_LOOK.min(budget) } else { last };
@@ -141,11 +170,6 @@ impl<'a> Watch<'a> {
         unreachable!("the last period is looked at")
     }
 
-    /// The period from which the exponent accumulates.
-    fn exponent_from(&self) -> usize {
-        EXPONENT_FROM.min(self.budget.settings.transient_periods) as usize
-    }
-
     /// One forcing period, and a look at what has passed where one is due.
     fn period<const N: usize>(
         &mut self,
@@ -164,21 +188,22 @@ impl<'a> Watch<'a> {
         if now < *look {
             return Ok(None);
         }
-        let budget = self.budget.settings.transient_periods + self.budget.settings.observed_periods;
+        let (budget, chaos_from) = (self.budget.periods(), self.budget.chaos_from());
         let next = now + now.div_ceil(4);
-        *look = [budget / 2, budget, last]
+        *look = [chaos_from, budget, last]
             .into_iter()
             .find(|&stage| now < stage)
             .map_or(last, |stage| next.min(stage));
-        if let Some(orbit) = self.settled(&trajectory.carrying([]), now == budget || now == last)? {
+        let is_last = now == budget || now == last;
+        if let Some(orbit) = self.settled(&trajectory.carrying([]), is_last)?
+            && (is_last || self.is_own(&orbit))
+        {
             return Ok(Some(self.periodic(orbit)));
         }
         Ok(match now {
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
             _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measured::is_decided),
-            _ if now >= (budget / 2).max(self.budget.settings.observed_periods) => {
-                Some(self.aperiodic(EARLY_CHAOS_ERRORS)).filter(Measured::is_decided)
-            }
+            _ if now >= chaos_from => Some(self.aperiodic(EARLY_CHAOS_ERRORS)).filter(Measured::is_decided),
             _ => None,
         })
     }
@@ -249,8 +274,7 @@ impl<'a> Watch<'a> {
         let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_beside(found));
         let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
         let present = distance(0);
-        let left = f64::from(self.budget.settings.transient_periods + self.budget.settings.observed_periods)
-            - (self.strobes.len() - 1) as f64;
+        let left = f64::from(self.budget.periods()) - (self.strobes.len() - 1) as f64;
         // Where it would stand at the end of the budget: the same status for early stops.
         let radius = cycle.spectral_radius();
         let at_last = present * radius.powf(left / f64::from(cycle.period));
@@ -272,6 +296,15 @@ impl<'a> Watch<'a> {
         } else {
             Ok(None)
         }
+    }
+
+    /// Whether the last periods had the cycle's impacts: beyond a fold of the strobe map there may
+    /// be another cycle, as close as the motion's own.
+    fn is_own(&self, orbit: &Orbit) -> bool {
+        let (now, cycle) = (self.counts.len() - 1, orbit.cycle_periods as usize);
+        let [impacts, _] = self.counts[now];
+        now >= cycle
+            && impacts - self.counts[now - cycle][0] == (orbit.impacts_per_period * cycle as f64).round()
     }
 
     /// The last strobe that the cycle's state belongs to: the others, unless the period is 1,
@@ -312,7 +345,7 @@ impl<'a> Watch<'a> {
         let lyapunov = self.budget.exponent.then(|| self.exponent.estimate(period));
         let surely = lyapunov.map(|(mean, error)| mean - errors * error);
         // Banded chaos lingers at a cycle for ever, but no departure lasts through such growth.
-        let averaged = &self.strobes[self.exponent_from()..];
+        let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let lingered = lingering(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_departure = |rate: f64| rate * lingered as f64 * period < DEPARTURE;
         let slow = surely.is_some_and(|rate| rate <= 0.0)

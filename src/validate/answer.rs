@@ -127,7 +127,8 @@ pub(super) struct Answer {
 
 impl From<&Measured> for Answer {
     fn from(measured: &Measured) -> Answer {
-        let everything = Needs { exponent: true, impacts: true, mesh: true, symmetric: true, word: true };
+        let everything =
+            Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
         Answer {
             class: classify(&measured_record(measured, &everything)),
             status: measured.status,

@@ -1,0 +1,111 @@
+// Newton's method on the strobe map: from a motion that approaches a cycle to the cycle.
+
+// Newton steps for one candidate.
+const REFINEMENTS: u32 = 5u;
+// The cycle must lie this close to the motion, relative to it: what contracts from farther off
+// may still have a fold of the strobe map before it.
+const REACH: f32 = 1e-2;
+
+// The monodromy matrix has been read along one candidate cycle from the anchor to the present
+// strobe. Moves the lane to where the linearised strobe map has its fixed point, to read on from
+// there; false where that brings it no closer or is no part of the motion.
+fn refine() -> bool {
+    if tally.refinements == 0u {
+        motion.home = strobe_state();
+        tally.branch = branch();
+    }
+    let stalls = tally.refinements > 0u && tally.apart < tally.apart_before + SHRUNK;
+    let is_over = tally.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
+    if stalls || is_over || tally.mode >= MODE_DIP || tally.order > 0u {
+        return false;
+    }
+    let to = fixed_point();
+    var q = to;
+    if tally.mode != MODE_FREE {
+        q[0] -= walls[side_of(tally.mode)];
+    }
+    if !(is_within(q[0]) && distance_between(to, motion.home) < Real(REACH)) {
+        return false;
+    }
+    motion.q = q;
+    motion.bound = 0.0;
+    tally.refinements += 1u;
+    tally.apart_before = tally.apart;
+    begin_reading();
+    return true;
+}
+
+// The events of the cycle that has been read: along one branch of the strobe map they are the
+// same.
+fn branch() -> u32 {
+    var sum = tally.hash_low + tally.events;
+    for (var n = 0u; n < 7u; n++) {
+        sum = mix_bits(sum + tallies[lane].word[n]);
+    }
+    return sum;
+}
+
+// Whether the cycle lies on the branch on which the motion approaches it. Beyond a fold it may
+// be another motion's.
+fn is_own() -> bool {
+    return tally.refinements == 0u || branch() == tally.branch;
+}
+
+// Whether the gap may be there in the present domain, at a phase that is no event's.
+fn is_within(gap: Real) -> bool {
+    if tally.mode == MODE_FREE {
+        return gap < walls[0] && gap > walls[1];
+    }
+    return sign_of(side_of(tally.mode)) * gap > 0.0;
+}
+
+// Back to where the lane came from.
+fn give_up() {
+    if tally.refinements == 0u {
+        return;
+    }
+    motion.q = motion.home;
+    if tally.mode != MODE_FREE {
+        motion.q[0] -= walls[side_of(tally.mode)];
+    }
+    motion.bound = 0.0;
+    tally.refinements = 0u;
+}
+
+// `a + (1 - M)^-1 (P(a) - a)` for the anchor `a`, by elimination with row pivots.
+fn fixed_point() -> array<Real, 4> {
+    let present = strobe_state();
+    // Row by row, the right side last.
+    var m: array<Real, 20>;
+    for (var i = 0u; i < 4u; i++) {
+        for (var j = 0u; j < 4u; j++) {
+            m[5u * i + j] = select(Real(0.0), Real(1.0), i == j) - motions[lane].tangents[4u * j + i];
+        }
+        m[5u * i + 4u] = present[i] - motion.anchor[i];
+    }
+    for (var k = 0u; k < 4u; k++) {
+        var pivot = k;
+        for (var i = k + 1u; i < 4u; i++) {
+            pivot = select(pivot, i, abs(m[5u * i + k]) > abs(m[5u * pivot + k]));
+        }
+        for (var j = k; j < 5u; j++) {
+            let swapped = m[5u * k + j];
+            m[5u * k + j] = m[5u * pivot + j];
+            m[5u * pivot + j] = swapped;
+        }
+        let inverse = 1.0 / m[6u * k];
+        for (var i = 0u; i < 4u; i++) {
+            if i != k {
+                let factor = m[5u * i + k] * inverse;
+                for (var j = k; j < 5u; j++) {
+                    m[5u * i + j] -= factor * m[5u * k + j];
+                }
+            }
+        }
+    }
+    var to = motion.anchor;
+    for (var i = 0u; i < 4u; i++) {
+        to[i] += m[5u * i + 4u] / m[6u * i];
+    }
+    return to;
+}
