@@ -72,9 +72,8 @@ pub fn sentences(points: &[Point]) -> Vec<String> {
         for (judged, of) in [(Judged::Worst, "worst"), (Judged::Median, "median")] {
             all.push(match (cost_at(&own, judged, EQUAL_ERROR), cost_at(&other, judged, EQUAL_ERROR)) {
                 (Some(a), Some(b)) => format!(
-                    "{ours}: {:.1} times less time than {words} at a {of} error of {EQUAL_ERROR:e} ({:.3} against \
-                     {:.3} us)",
-                    b / a,
+                    "{ours}: {} {words} at a {of} error of {EQUAL_ERROR:e} ({:.3} against {:.3} us)",
+                    compared(a, b),
                     1e6 * a,
                     1e6 * b
                 ),
@@ -114,6 +113,14 @@ pub fn sentences(points: &[Point]) -> Vec<String> {
         }
     }
     all
+}
+
+fn compared(ours: f64, theirs: f64) -> String {
+    if ours <= theirs {
+        format!("{:.1} times less time than", theirs / ours)
+    } else {
+        format!("{:.1} times as much time as", ours / theirs)
+    }
 }
 
 #[cfg(test)]
