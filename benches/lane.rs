@@ -7,11 +7,10 @@ use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision, Variant}
 use rattlemap::model::{GearPair, Law, Oscillator};
 use rattlemap::record::Record;
 
-#[path = "lane/instructions.rs"]
-mod instructions;
 #[path = "lane/rewrite.rs"]
 mod rewrite;
 
+use rattlemap::bench::engines::{LOOPS, counting, instructions};
 use rewrite::{CHECKS, Rewrite};
 
 /// Sizes of one run.
@@ -96,7 +95,7 @@ fn median(mut times: Vec<f64>) -> f64 {
 
 /// Mean over the cells of what a counting variant reports in place of impacts.
 fn count(plane: &Plane, size: &Size, precision: Precision, function: &str) -> f64 {
-    let mut gpu = open(precision, rewrite::counting(function));
+    let mut gpu = open(precision, counting(function));
     let (_, records) = plane.run(&mut gpu, size, false);
     records.iter().map(|record| record.impacts_per_period).sum::<f64>() / records.len() as f64
 }
@@ -108,7 +107,7 @@ fn main() {
     println!("{0} x {0} cells, {1} periods from rest, median of {2}", size.side, size.periods, size.runs);
     for precision in Precision::ALL {
         println!("\n{precision:?}, work per lane-period:");
-        let work = rewrite::LOOPS.map(|(function, what)| (what, count(&plane, &size, precision, function)));
+        let work = LOOPS.map(|(function, what)| (what, count(&plane, &size, precision, function)));
         for (what, count) in work {
             println!("  {count:8.2} {what}");
         }
@@ -130,7 +129,11 @@ fn main() {
         }
         for exponent in [false, true] {
             println!("{precision:?}, exponent {exponent}: arithmetic instructions of the text");
-            instructions::print(&Variant { exponent, ..Variant::of(precision) }.source(), precision);
+            let counts = instructions(&Variant { exponent, ..Variant::of(precision) }.source());
+            println!("  {:8} a scan step", counts.scan);
+            println!("  {:8} a careful pass, all branches once", counts.careful);
+            println!("  {:8} a root trip", counts.root);
+            println!("  {:8} the whole text with every call copied in", counts.all);
         }
     }
 }

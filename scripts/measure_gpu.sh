@@ -6,15 +6,17 @@
 # BINARY is a release build of rattlemap; nothing else of the repository is needed but
 # scenes/, so that both can be carried to a machine without Rust. Checks first that the lanes
 # are right in both precisions, cell by cell against the reference; then times maps of
-# SIDE x SIDE cells (1024 unless given), each three times. Writes to OUT:
+# SIDE x SIDE cells (1024 unless given), each three times; then the same map on every engine, from
+# 10^3 lanes to as many as fit (`rattlemap bench engines`, five minutes at most). Writes to OUT:
 #
 #     devices.txt             adapters, limits, drivers
 #     validation_*.json       correctness, 128 x 128, per precision
 #     speed.csv               one row per timed run
+#     engines/                throughput against lanes on every engine: tables and figures
 #     summary.md              medians, and what they were measured on
 set -euo pipefail
 
-[[ $# -ge 2 ]] || { sed -n '2,15p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+[[ $# -ge 2 ]] || { sed -n '2,17p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
@@ -60,6 +62,10 @@ for precision in "${precisions[@]}"; do
     timed period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
 done
 
+# What it finds is a finding, too.
+"$binary" bench engines --budget "${ENGINES_SECONDS:-300}" --out "$out/engines" --force 2>&1 | tee "$out/engines.txt" ||
+    echo "bench engines: unexplained cells, or nothing measured" >>"$out/failed"
+
 {
     echo "# rattlemap on a GPU"
     echo
@@ -68,13 +74,15 @@ done
     echo "| what | precision | integration, s | lane-periods/s | ns per lane-step | outputs, s |"
     echo "| --- | --- | --- | --- | --- | --- |"
     tail -n +2 "$out/speed.csv" | sort -t, -k1,2 -k5,5n | awk -F, '
-        { n = ($3, ++count[$1 "," $2]); key = $1 "," $2; s[key, count[key]] = $5; p[key, count[key]] = $7
+        { key = $1 "," $2; count[key]++; s[key, count[key]] = $5; p[key, count[key]] = $7
           k[key, count[key]] = $8; o[key, count[key]] = $9; seen[key] = 1 }
         END { for (key in seen) { split(key, name, ",")
               printf "| %s | %s | %s (%s, %s) | %s | %s | %s |\n", name[1], name[2], s[key, 2], s[key, 1], s[key, 3],
                      p[key, 2], k[key, 2], o[key, 2] } }' | sort
     echo
     sed 's/^/    /' "$out/devices.txt"
+    echo
+    sed -n '/^largest map/,$p' "$out/engines.txt" | sed 's/^/    /'
 } >"$out/summary.md"
 cat "$out/summary.md"
 [[ ! -e "$out/failed" ]] || { cat "$out/failed" >&2; exit 1; }

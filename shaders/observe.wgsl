@@ -19,7 +19,7 @@ const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
 // Lags of the first window; the following ones are twice as long each.
-const FIRST_WINDOW: u32 = 6u;
+const FIRST_WINDOW: u32 = 4u;
 // Windows need not be longer than so many cycles that contract.
 const LAGS_PER_CYCLE: u32 = 4u;
 // A refined cycle closes where a strobe comes this near to its start, in quarter octaves.

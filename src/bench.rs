@@ -1,3 +1,4 @@
-//! Instruments: what the project measures about itself.
+//! Instruments: measurements that anybody can repeat. `rattlemap bench` runs them.
 
+pub mod engines;
 pub mod work_precision;

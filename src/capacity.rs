@@ -17,7 +17,8 @@ pub(crate) fn check(scene: &Scene, out: &Path) -> Result<(), Failure> {
     let memory = size.memory.saturating_add(size.memory_per_thread.saturating_mul(threads - 1));
     let kept = out.join(RECORDS).metadata().map_or(0, |data| data.len());
     let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
-    let map = format!("a map of {} = {} cells", counts.join(" x "), size.cells);
+    let starts = if size.runs > size.cells { format!(", {} runs,", size.runs) } else { String::new() };
+    let map = format!("a map of {} = {} cells{starts}", counts.join(" x "), size.cells);
     let refuse = |what: &str, needed: u64, available: u64| {
         Err(Failure::Usage(anyhow!(
             "{map} needs about {} of {what}, and {} are free; lower axis.0.count or axis.1.count{}",
@@ -28,7 +29,7 @@ pub(crate) fn check(scene: &Scene, out: &Path) -> Result<(), Failure> {
     };
     if !size.is_countable() {
         return Err(Failure::Usage(anyhow!(
-            "{map} is too large: at most {} cells can be numbered; lower axis.0.count or axis.1.count",
+            "{map} is too large: at most {} runs can be numbered; lower axis.0.count or axis.1.count",
             u32::MAX
         )));
     }

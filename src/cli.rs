@@ -92,9 +92,25 @@ fn method(text: &str) -> Result<Method, String> {
 
 /// The same scene on every engine: same answers, and where the time goes
 #[derive(Debug, Args)]
+#[command(after_help = "Lanes of the map scenes/e_omega.toml, from 10^3 to 10^7 as far as time and memory \
+    allow: on the CPU with 1 to all threads, and on every adapter in every precision. What is better: more periods \
+    per second. The answers are compared with each other and a sample of them with the reference; the exit code is 1 \
+    if a difference has no explanation.")]
 pub(crate) struct Engines {
     #[command(flatten)]
     pub(crate) run: BenchOptions,
+
+    /// Seconds that all of it may take
+    #[arg(long, value_name = "SECONDS", default_value_t = 480, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) budget: u32,
+
+    /// Peak of the hardware adapter in f32, in 10^12 operations per second, if it is not known
+    #[arg(long, value_name = "TERA")]
+    pub(crate) peak_f32: Option<f64>,
+
+    /// The same in f64
+    #[arg(long, value_name = "TERA")]
+    pub(crate) peak_f64: Option<f64>,
 }
 
 /// Long runs, grazing, chatter, stiff meshing, coarse grids and random parameters on every engine

@@ -1,11 +1,12 @@
 //! Who computes: one seam between what is asked and what measures it.
 //!
 //! An [`Engine`] takes batches of a plan's cells and returns one record per cell, in the
-//! batch's order. A record depends on its cell and the plan alone: not on the batch, its
+//! batch's order. A record depends on its cell, its start and the plan alone: not on the batch, its
 //! size, the neighbours, or the number of threads.
 
 mod cpu;
 mod fake;
+mod flows;
 mod gpu;
 
 use thiserror::Error;
@@ -13,6 +14,7 @@ use thiserror::Error;
 pub use cpu::Cpu;
 pub(crate) use cpu::record as measured_record;
 pub use fake::Fake;
+pub(crate) use flows::Flows;
 pub use gpu::Gpu;
 
 use crate::plan::Batch;

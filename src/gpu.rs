@@ -17,6 +17,7 @@ mod reading;
 mod self_test;
 mod shader;
 mod signal;
+mod stage;
 mod tables;
 mod transfer;
 mod unroll;
@@ -26,6 +27,7 @@ use std::collections::HashMap;
 pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
 pub use device::{AdapterChoice, AdapterReport, adapters, describe, is_hardware};
 pub use shader::{Precision, Variant, WORKGROUP};
+pub use stage::Stage;
 pub use tables::Tables;
 
 use crate::model::{Law, Oscillator, State};
@@ -194,6 +196,7 @@ pub struct Gpu {
     pipelines: HashMap<Variant, device::Pipelines>,
     trouble: device::Trouble,
     rewrite: fn(String) -> String,
+    watcher: Option<stage::Watcher>,
 }
 
 impl Gpu {
@@ -224,6 +227,17 @@ impl Gpu {
     pub fn rewrite_shaders(&mut self, rewrite: fn(String) -> String) {
         self.rewrite = rewrite;
         self.pipelines.clear();
+    }
+
+    /// Tells `watcher` from here on how far every batch has come: for measurements.
+    pub fn watch(&mut self, watcher: impl Fn(Stage) + Send + Sync + 'static) {
+        self.watcher = Some(Box::new(watcher));
+    }
+
+    fn tell(&self, stage: Stage) {
+        if let Some(watcher) = &self.watcher {
+            watcher(stage);
+        }
     }
 
     /// Integrates every lane and returns its record, in the same order.

@@ -8,13 +8,14 @@
 //! bifurcation diagram
 //! ([`bifurcation`]). A map's cells are numbered ([`plan`]) and put in order ([`schedule`]),
 //! go through an engine ([`engine`], [`sweep`]) and come back as records ([`record`],
-//! [`classify`]); a sample of them is replayed ([`mod@validate`]). All of it is then written
-//! down ([`output`]).
+//! [`classify`], [`coexistence`]); a sample of them is replayed ([`mod@validate`]). All of it is then written
+//! down ([`output`]); [`mod@bench`] measures it.
 
 pub mod bench;
 pub mod bifurcation;
 pub mod certificate;
 pub mod classify;
+pub mod coexistence;
 pub mod engine;
 pub mod flow;
 pub mod gpu;

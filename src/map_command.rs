@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, anyhow};
+use rattlemap::coexistence;
 use rattlemap::engine::Engine;
 use rattlemap::gpu::Precision;
 use rattlemap::orbit::Class;
@@ -41,12 +42,14 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let mut file = open_records(ask, &folder, &scene, &mut work, &engine)?;
     let resumed_cells = file.places();
     let clock = Instant::now();
-    let progress = Progress::new(work.schedule.sequence().len(), resumed_cells, "cells", ask.run.quiet);
+    let unit = unit(&plan);
+    let progress = Progress::new(work.schedule.expected(), resumed_cells, unit, ask.run.quiet);
     integrate(ask, &mut work, &mut engine, &mut file, &progress)?;
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
     let elapsed = clock.elapsed();
-    let cells = Cells::new(&scene, &plan, &records);
+    let attractors = coexistence::attractors(&plan, &records);
+    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref());
     let (device, lane_steps) = (engine.device(), engine.lane_steps());
     let (engine, precision) = (engine.name(), engine.precision());
     let run = output::map::Run {
@@ -97,7 +100,7 @@ fn engine_of(ask: &Map, folder: &Folder) -> EngineOptions {
     }
 }
 
-/// The record file, and what it holds already, by cell id.
+/// The record file, and what it holds already, by run.
 fn open_records(
     ask: &Map,
     folder: &Folder,
@@ -123,13 +126,13 @@ fn open_records(
 struct Work<'p> {
     plan: &'p Plan,
     schedule: Schedule,
-    /// By cell id.
+    /// By run.
     records: Vec<Record>,
 }
 
 impl<'p> Work<'p> {
     fn new(plan: &'p Plan) -> Work<'p> {
-        Work { plan, schedule: Schedule::new(plan), records: vec![Record::default(); plan.cell_count()] }
+        Work { plan, schedule: Schedule::new(plan), records: vec![Record::default(); plan.run_count()] }
     }
 }
 
@@ -152,9 +155,9 @@ fn integrate(
             Ok(if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
         }));
     let go_on = || {
-        let (done, total) = (file.places(), plan.cell_count());
+        let (done, total, unit) = (file.places(), plan.run_count(), unit(plan));
         let most = if plan.refine().is_some() { "at most " } else { "" };
-        format!("{done} of {most}{total} cells are kept; go on with: {}", ask.resume_command())
+        format!("{done} of {most}{total} {unit} are kept; go on with: {}", ask.resume_command())
     };
     match swept {
         Ok(true) => Ok(()),
@@ -181,10 +184,15 @@ fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
     Ok(stop)
 }
 
+/// What is counted while a map is made.
+pub(crate) fn unit(plan: &Plan) -> &'static str {
+    if plan.start_count() > 1 { "runs" } else { "cells" }
+}
+
 /// What was done, how fast, and what came out.
 fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64>, seconds: f64) -> String {
-    let [columns, rows] = cells.counts();
-    let count = columns * rows;
+    let (count, [columns, rows]) = (cells.runs(), cells.counts());
+    let unit = if count > columns * rows { "runs" } else { "cells" };
     let integrated = run.refined.as_ref().map_or(count, |refined| refined.integrated);
     let integrating = run.elapsed.as_secs_f64().max(1e-9);
     let here = (integrated - run.resumed_cells) as f64;
@@ -199,7 +207,7 @@ fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64
     });
     let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
     format!(
-        "{integrated} cells{resumed} on {} ({}) in {integrating:.3} s: {:.0} cells/s, {:.0} lane-periods/s\
+        "{integrated} {unit}{resumed} on {} ({}) in {integrating:.3} s: {:.0} {unit}/s, {:.0} lane-periods/s\
          {per_step}; outputs {:.3} s\n{refined}\
          {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
         run.engine,

@@ -6,6 +6,8 @@ pub mod bifurcation_figure;
 mod cells;
 mod cells_csv;
 mod cells_npy;
+pub mod engines;
+mod engines_figure;
 pub mod folder;
 mod layers;
 mod manifest;

@@ -4,36 +4,45 @@
 //! needs a flow, which depends on everything but the contact law, and a law; cells that
 //! differ in restitution or meshing speed alone share their flow. Engines get cells in
 //! Morton order: whatever the batch, its cells are neighbours and behave alike.
+//!
+//! A cell with several starts is as many runs. Run `k` of the cell `id` has the number
+//! `k * cell_count + id`, so that the first runs are the map itself.
 
 mod morton;
 mod size;
+mod start;
 
 pub(crate) use morton::key as morton_key;
 
 use std::ops::Range;
 
 pub use size::Size;
+pub(crate) use start::followed;
 
 use crate::model::{GearPair, Law, Oscillator, State};
 use crate::orbit::{Budget, Class};
-use crate::scene::{Axis, Quantity, REST, Refine, Scene, Start, Steps};
+use crate::record::Record;
+use crate::scene::{Axis, Quantity, Refine, Scene, Start, Steps};
+use start::Starts;
 
 /// The parameters that a contact law is made of; all others belong to the flow.
 const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
 
-/// What a cell is made of: indices of its flow and its law in the plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a run of a cell is made of: indices of its flow and its law in the plan, and its start.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// `j * count0 + i`.
+    /// `j * count0 + i`; for further starts of that cell, as many times the number of cells more.
     pub id: u32,
     /// Which flow it moves on, below [`Plan::flow_count`].
     pub flow: u32,
     /// Which contact law it obeys, below [`Plan::law_count`].
     pub law: u32,
+    /// The state in which it starts at phase 0.
+    pub start: State,
 }
 
 /// Cells that an engine computes in one go.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Batch {
     /// Places in the plan's order that it covers.
     pub places: Range<usize>,
@@ -64,7 +73,7 @@ pub struct Plan {
     base: GearPair,
     axes: [Axis; 2],
     is_law: [bool; 2],
-    start: State,
+    starts: Starts,
     budget: Budget,
     steps: Steps,
     refine: Option<Refine>,
@@ -76,23 +85,18 @@ impl Plan {
     /// Plans a map. The scene must have been read for a map, and its [`Size`] accepted.
     ///
     /// # Panics
-    /// If the scene has not two axes, more cells than a `u32` numbers, or a start policy
-    /// that maps do not have: reading a scene for a map rules all of that out.
+    /// If the scene has not two axes, or more runs than a `u32` numbers: reading a scene for a
+    /// map and asking its size rule that out.
     pub fn new(scene: &Scene) -> Plan {
         let &[first, second] = scene.axes() else { panic!("a map has two axes") };
         assert!(Size::of(scene).is_countable(), "cells are numbered by u32");
-        let start = match scene.start() {
-            Start::Rest => REST,
-            Start::State(state) => state,
-            Start::Up | Start::Down => panic!("a map's cells start from one state"),
-        };
         let needs = needs(&scene.outputs().quantities);
         let integration = scene.integration();
         Plan {
             base: scene.base(),
             axes: [first, second],
             is_law: [first, second].map(|axis| LAW_PARAMETERS.contains(&axis.parameter().name)),
-            start,
+            starts: Starts::new(scene.start(), scene.draw()),
             budget: Budget {
                 settings: scene.orbit_settings(),
                 early_stop: integration.early_stop,
@@ -134,9 +138,49 @@ impl Plan {
         &self.order
     }
 
-    /// The state in which every cell starts at phase 0.
-    pub fn start(&self) -> State {
-        self.start
+    /// Starts per cell.
+    pub fn start_count(&self) -> usize {
+        self.starts.count()
+    }
+
+    /// How many runs there are: one per cell and start.
+    pub fn run_count(&self) -> usize {
+        self.cell_count() * self.start_count()
+    }
+
+    /// How cells start: the first run of each.
+    pub fn policy(&self) -> Start {
+        self.starts.policy()
+    }
+
+    /// The run that the run `id` starts from the last state of, if cells follow their
+    /// neighbours; none at the end where following begins.
+    pub fn before(&self, id: u32) -> Option<u32> {
+        let (j, columns) = (self.indices(id)[1], self.axes[0].count() as u32);
+        match self.policy() {
+            Start::Up if j > 0 => Some(id - columns),
+            Start::Down if j + 1 < self.axes[1].count() => Some(id + columns),
+            _ => None,
+        }
+    }
+
+    /// The state in which the run `id` starts at phase 0. `records`, by run, are looked at only
+    /// where cells follow their neighbours: there the neighbour's last strobe state, or rest
+    /// where the neighbour failed or has no record yet.
+    pub fn start(&self, id: u32, records: &[Record]) -> State {
+        match self.before(id) {
+            Some(before) => followed(records.get(before as usize)),
+            None => self.own_start(id),
+        }
+    }
+
+    /// The start of a run that follows no neighbour.
+    fn own_start(&self, id: u32) -> State {
+        let nth = id as usize / self.cell_count();
+        match nth {
+            0 => self.starts.first(),
+            _ => self.starts.drawn(nth, &self.oscillator(self.flow_of(id))),
+        }
     }
 
     /// How long each cell is integrated.
@@ -159,22 +203,31 @@ impl Plan {
         &self.needs
     }
 
-    /// Indices on the two axes of a cell.
+    /// Indices on the two axes of a run's cell.
     pub fn indices(&self, id: u32) -> [usize; 2] {
-        let count = self.axes[0].count();
-        [id as usize % count, id as usize / count]
+        let (cell, count) = (id as usize % self.cell_count(), self.axes[0].count());
+        [cell % count, cell / count]
     }
 
-    /// What the cell `id` is made of.
+    /// What the run `id` is made of. One that follows its neighbour starts at rest here: only
+    /// the neighbour's record says where it does ([`Plan::start`]).
     pub fn cell(&self, id: u32) -> Cell {
-        let ids = self.indices(id);
-        let index = |is_law: bool| match [self.is_law[0] == is_law, self.is_law[1] == is_law] {
-            [true, true] => id,
-            [true, false] => ids[0] as u32,
-            [false, true] => ids[1] as u32,
+        Cell { id, flow: self.flow_of(id), law: self.part(id, true), start: self.own_start(id) }
+    }
+
+    fn flow_of(&self, id: u32) -> u32 {
+        self.part(id, false)
+    }
+
+    /// The index among laws, or among flows, of a run's cell.
+    fn part(&self, id: u32, is_law: bool) -> u32 {
+        let [i, j] = self.indices(id);
+        match [self.is_law[0] == is_law, self.is_law[1] == is_law] {
+            [true, true] => id % self.cell_count() as u32,
+            [true, false] => i as u32,
+            [false, true] => j as u32,
             [false, false] => 0,
-        };
-        Cell { id, flow: index(false), law: index(true) }
+        }
     }
 
     /// How many distinct flows there are.
@@ -219,9 +272,9 @@ impl Plan {
         pair
     }
 
-    /// The gear pair of the cell `id`.
+    /// The gear pair of the run `id`.
     pub fn gear_pair(&self, id: u32) -> GearPair {
-        self.pair([true; 2], id)
+        self.pair([true; 2], id % self.cell_count() as u32)
     }
 }
 

@@ -21,6 +21,11 @@ impl Random {
         ((u128::from(self.next()) * bound as u128) >> 64) as usize
     }
 
+    /// A number from 0 (included) to 1 (excluded), one of 2^53.
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 * 2f64.powi(-53)
+    }
+
     /// Moves `count` entries to the front, every choice and order of them equally likely.
     pub(crate) fn draw<T>(&mut self, list: &mut [T], count: usize) {
         for i in 0..count.min(list.len()) {

@@ -12,6 +12,7 @@ mod identity;
 mod overrides;
 mod section;
 mod settings;
+mod start;
 #[cfg(test)]
 mod tests;
 
@@ -19,7 +20,8 @@ use std::path::Path;
 
 pub use axis::{Axis, MAX_COUNT};
 pub use error::{Place, Problem, SceneError};
-pub use settings::{Continuous, Format, Integration, Outputs, Quantity, REST, Refine, Start, Steps};
+pub use settings::{Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
+pub use start::{Draw, REST, Start};
 
 use crate::model::GearPair;
 use crate::orbit;
@@ -57,6 +59,7 @@ pub struct Scene {
     axes: Vec<Axis>,
     integration: Integration,
     start: Start,
+    draw: Option<Draw>,
     refine: Option<Refine>,
     outputs: Outputs,
 }
@@ -90,14 +93,13 @@ impl Scene {
             title,
             base: axis::read_parameters(&root, &axes)?,
             integration: settings::read_integration(&root)?,
-            start: settings::read_start(&root)?,
+            start: start::read(&root)?,
+            draw: start::read_draw(&root, purpose)?,
             refine: settings::read_refine(&root, purpose)?,
             outputs: settings::read_outputs(&root, purpose)?,
             axes,
         };
-        if purpose == Purpose::Map {
-            settings::refuse_unbuilt(&root, scene.start)?;
-        }
+        start::check(&root, scene.start, scene.draw)?;
         Ok(scene)
     }
 
@@ -134,6 +136,11 @@ impl Scene {
     /// Where cells start.
     pub fn start(&self) -> Start {
         self.start
+    }
+
+    /// How many more starts each cell has; none where there is one alone.
+    pub fn draw(&self) -> Option<Draw> {
+        self.draw
     }
 
     /// Bounds of an adaptive map; none where every cell is integrated.

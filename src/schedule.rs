@@ -8,6 +8,10 @@
 //! blocks are halved and the audit is repeated; if not, only the blocks with wrong cells are
 //! refined on.
 //!
+//! Where cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells is
+//! a round, and starts from the last states of the row before. Several starts per cell are
+//! further runs over all cells, one start after the other: what runs side by side starts alike.
+//!
 //! The order of the cells follows from the records of the cells before. So a run that was
 //! interrupted goes on by replaying its records.
 
@@ -15,13 +19,15 @@ mod adaptive;
 mod audit;
 mod blocks;
 mod fill;
+mod follow;
 mod label;
 
 pub use audit::Audit;
 
 use adaptive::Adaptive;
+use follow::Follow;
 
-use crate::plan::{Batch, Plan};
+use crate::plan::{Batch, Cell, Plan};
 use crate::record::Record;
 
 /// The order of work on a map.
@@ -30,7 +36,17 @@ pub struct Schedule {
     /// Where the last round begins.
     round: usize,
     rounds: usize,
-    adaptive: Option<Box<Adaptive>>,
+    rule: Rule,
+}
+
+/// What decides about the next round.
+enum Rule {
+    /// There is one round.
+    Whole,
+    /// Rows that follow each other.
+    Follow(Follow),
+    /// Blocks that differ.
+    Adaptive(Box<Adaptive>),
 }
 
 /// What became of an adaptive map.
@@ -50,14 +66,18 @@ pub struct Refined {
 impl Schedule {
     /// The schedule of a plan.
     pub fn new(plan: &Plan) -> Schedule {
-        match plan.refine() {
-            None => Schedule { sequence: plan.order().to_vec(), round: 0, rounds: 1, adaptive: None },
+        let (sequence, rule) = match plan.refine() {
             Some(refine) => {
                 let adaptive = Adaptive::new(plan, refine);
-                let sequence = adaptive.first();
-                Schedule { sequence, round: 0, rounds: 1, adaptive: Some(Box::new(adaptive)) }
+                (adaptive.first(), Rule::Adaptive(Box::new(adaptive)))
             }
-        }
+            None if plan.policy().follows() => {
+                let follow = Follow::new(plan);
+                (follow.row(), Rule::Follow(follow))
+            }
+            None => (every_run(plan), Rule::Whole),
+        };
+        Schedule { sequence, round: 0, rounds: 1, rule }
     }
 
     /// Ids of the cells to integrate, as far as they are known by now.
@@ -68,24 +88,45 @@ impl Schedule {
     /// Adds the next round, once every cell of the sequence has its record (by id). False if
     /// the map is finished.
     pub fn extend(&mut self, records: &[Record]) -> bool {
-        let Some(adaptive) = &mut self.adaptive else { return false };
-        let next = adaptive.next(&self.sequence[self.round..], records);
+        let next = match &mut self.rule {
+            Rule::Whole => return false,
+            Rule::Follow(follow) => follow.next(records),
+            Rule::Adaptive(adaptive) => adaptive.next(&self.sequence[self.round..], records),
+        };
         self.round = self.sequence.len();
         self.sequence.extend(&next);
         self.rounds += usize::from(!next.is_empty());
         !next.is_empty()
     }
 
+    /// Runs that there will be, as far as is known by now.
+    pub fn expected(&self) -> usize {
+        match &self.rule {
+            Rule::Follow(follow) => follow.cell_count(),
+            Rule::Whole | Rule::Adaptive(_) => self.sequence.len(),
+        }
+    }
+
     /// The batch of up to `count` cells of the sequence from place `from` on.
+    ///
+    /// # Panics
+    /// Where cells follow their neighbours, if `from` lies before the last round.
     pub fn batch(&self, plan: &Plan, from: usize, count: usize) -> Batch {
         let places = from..from.saturating_add(count).min(self.sequence.len());
-        let cells = self.sequence[places.clone()].iter().map(|&id| plan.cell(id)).collect();
+        let cell = |place: usize| {
+            let cell = plan.cell(self.sequence[place]);
+            match &self.rule {
+                Rule::Follow(follow) => Cell { start: follow.start(place - self.round), ..cell },
+                Rule::Whole | Rule::Adaptive(_) => cell,
+            }
+        };
+        let cells = places.clone().map(cell).collect();
         Batch { places, cells }
     }
 
     /// Fills what was not integrated and says how it went; none where every cell was.
     pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
-        let adaptive = self.adaptive.as_ref()?;
+        let Rule::Adaptive(adaptive) = &self.rule else { return None };
         let filled = adaptive.fill(records);
         Some(Refined {
             integrated: self.sequence.len(),
@@ -94,6 +135,13 @@ impl Schedule {
             audits: adaptive.audits().to_vec(),
         })
     }
+}
+
+/// All cells in the plan's order, for every start.
+fn every_run(plan: &Plan) -> Vec<u32> {
+    let cells = plan.cell_count() as u32;
+    let of = |nth: u32| plan.order().iter().map(move |id| nth * cells + id);
+    (0..plan.start_count() as u32).flat_map(of).collect()
 }
 
 #[cfg(test)]

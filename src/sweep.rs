@@ -28,7 +28,7 @@ pub enum SweepError {
 }
 
 /// Runs the cells of a schedule from place `from` on, puts their records into `records` (by
-/// id) and hands every batch to `keep`, with the number of places that are scheduled by now;
+/// run) and hands every batch to `keep`, with the number of places that are foreseen by now;
 /// `keep` says whether to go on. True if the map is finished.
 ///
 /// Batches grow and shrink so that each takes about a second; records do not depend on it.
@@ -56,7 +56,7 @@ pub async fn run(
         place = batch.places.end;
         pace.adapt(batch.cells.len(), clock.elapsed());
         store(&batch, &computed, records);
-        let stops = keep(&batch, &computed, schedule.sequence().len()).map_err(SweepError::Keep)?.is_break();
+        let stops = keep(&batch, &computed, schedule.expected()).map_err(SweepError::Keep)?.is_break();
         if stops && (place < schedule.sequence().len() || schedule.extend(records)) {
             return Ok(false);
         }

@@ -37,9 +37,9 @@ pub const DEFAULT_SAMPLES: usize = 400;
 /// A finished map, and what made it.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
-    /// Its cells.
+    /// Its cells and their starts.
     pub plan: &'a Plan,
-    /// One record per cell, by id.
+    /// One record per run.
     pub records: &'a [Record],
     /// The precision that the records were computed in.
     pub precision: Precision,
@@ -61,7 +61,7 @@ pub struct Agreement {
 /// A cell whose record is not what the reference says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mismatch {
-    /// The cell, `j * count0 + i`.
+    /// The run, as in [`Plan::cell`].
     pub id: u32,
     /// What differs.
     pub differences: Vec<Difference>,

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
+use rattlemap::coexistence;
 use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
 use rattlemap::output::map::{MANIFEST, Made, write_validation};
 use rattlemap::output::{Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
@@ -17,6 +18,7 @@ use serde::Deserialize;
 
 use crate::cli::Validate;
 use crate::error::Failure;
+use crate::map_command::unit;
 use crate::progress::Progress;
 
 /// What a manifest has to say.
@@ -51,7 +53,8 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let progress = Progress::new(sample.picks.len(), 0, "cells replayed", ask.quiet);
     let validation =
         validate::replay(&subject, &sample, source, &|done| progress.report(done, sample.picks.len()));
-    let cells = Cells::new(&scene, &plan, &records);
+    let attractors = coexistence::attractors(&plan, &records);
+    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let files = write_validation(&folder, &cells, &made, &validation)?;
     progress.finish(&format!("{}\n{}: {}", summary(&validation), dir.display(), files.join(", ")));
@@ -100,7 +103,7 @@ fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
     }
 }
 
-/// One record per cell, by id.
+/// One record per run.
 fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> anyhow::Result<Vec<Record>> {
     let path = dir.join(RECORDS);
     if !path.is_file() {
@@ -112,7 +115,7 @@ fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> 
     }
     let identity = Identity::new(&manifest.engine, &manifest.precision, &manifest.device, scene.identity());
     let mut schedule = Schedule::new(plan);
-    let mut records = vec![Record::default(); plan.cell_count()];
+    let mut records = vec![Record::default(); plan.run_count()];
     let take =
         |place: usize, batch: &[Record]| sweep::replay(plan, &mut schedule, &mut records, place, batch);
     let again = "make the map again with `rattlemap map SCENE --force`";
@@ -126,8 +129,8 @@ fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> 
         other => other.into(),
     })?;
     if done < schedule.sequence().len() || schedule.extend(&records) {
-        let cells = schedule.sequence().len();
-        return Err(anyhow!("{} holds {done} of {cells} cells; {again}", path.display()));
+        let cells = schedule.expected();
+        return Err(anyhow!("{} holds {done} of {cells} {}; {again}", path.display(), unit(plan)));
     }
     schedule.finish(&mut records);
     Ok(records)
@@ -156,7 +159,8 @@ fn states(
         Steps::Auto => None,
         Steps::PerPeriod(steps) => Some(steps),
     };
-    let lanes = pollster::block_on(validate::states::lane_states(&mut gpu, subject.plan, &ids, steps))
+    let Subject { plan, records, .. } = *subject;
+    let lanes = pollster::block_on(validate::states::lane_states(&mut gpu, plan, records, &ids, steps))
         .context("cannot run the sample's lanes again")?;
     Ok(StateSource::Lanes(lanes))
 }

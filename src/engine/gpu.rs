@@ -73,7 +73,7 @@ impl<'p> Gpu<'p> {
     pub(super) async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
         let cells = batch.cells.len();
         let (own, lanes) = match &self.tables {
-            Some(_) => (None, batch.cells.iter().map(|cell| self.lane(cell.flow, cell.law)).collect()),
+            Some(_) => (None, batch.cells.iter().map(|cell| lane(cell, cell.flow, cell.law)).collect()),
             None => {
                 let (flows, laws, lanes) = self.renumbered(&batch.cells);
                 (Some(self.load(&flows, &laws).map_err(|error| self.error(error, cells))?), lanes)
@@ -97,15 +97,11 @@ impl<'p> Gpu<'p> {
         self.device.load(&flows, &laws, self.settings.steps_per_period)
     }
 
-    fn lane(&self, flow: u32, law: u32) -> Lane {
-        Lane { flow, law, start: self.plan.start() }
-    }
-
     /// The flows and laws of a batch alone, and its lanes with indices among them.
     fn renumbered(&self, cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
         let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
         let lanes =
-            cells.iter().map(|cell| self.lane(flows.place(cell.flow), laws.place(cell.law))).collect();
+            cells.iter().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
         (flows.list, laws.list, lanes)
     }
 
@@ -119,6 +115,10 @@ impl<'p> Gpu<'p> {
             other => EngineError::Refused { device, reason: other.to_string() },
         }
     }
+}
+
+fn lane(cell: &Cell, flow: u32, law: u32) -> Lane {
+    Lane { flow, law, start: cell.start }
 }
 
 /// Things in the order in which they were first met.

@@ -3,6 +3,7 @@
 use super::device::{BEGIN, CONCLUDE, EntryPoint, Pipelines, SWEEP};
 use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
 use super::reading::record;
+use super::stage::{Clock, Stage};
 use super::tables::Tables;
 use super::transfer::{buffer, from_reals, landing, read, reals, upload};
 use super::{Gpu, GpuError, Lane, LaneSettings};
@@ -11,6 +12,10 @@ use crate::record::Record;
 
 /// Dispatches between two looks at how many lanes are still running.
 const DISPATCHES_PER_LOOK: u32 = 4;
+
+/// Bytes of a look: lanes left, room, two timestamps.
+const LOOK: u64 = 24;
+const TIMES: u64 = 8;
 
 /// Batches hold no more lanes than this: below 1 GB on the device.
 const LARGEST_BATCH: usize = 1 << 20;
@@ -74,7 +79,8 @@ fn exponent_block(settings: &LaneSettings) -> u32 {
 /// One batch on the device.
 struct Batch {
     live: wgpu::Buffer,
-    /// Copies of `live` that the host reads, one while the other is written.
+    /// Copies of `live` that the host reads, one while the other is written, and the device's
+    /// time if it is asked for.
     looks: [wgpu::Buffer; 2],
     /// Readings and findings, and where the host reads them.
     results: [(wgpu::Buffer, wgpu::Buffer); 2],
@@ -134,7 +140,7 @@ impl Batch {
             })
         };
         Batch {
-            looks: [landing(gpu, "look", 4), landing(gpu, "look", 4)],
+            looks: [landing(gpu, "look", LOOK), landing(gpu, "look", LOOK)],
             begin: bind(&pipelines.begin, BEGIN),
             sweep: bind(&pipelines.sweep, SWEEP),
             conclude: bind(&pipelines.conclude, CONCLUDE),
@@ -156,11 +162,13 @@ impl Batch {
         lanes: &[Lane],
     ) -> Result<Vec<Record>, GpuError> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        self.dispatch(&mut encoder, &pipelines.begin, &self.begin);
+        self.dispatch(&mut encoder, &pipelines.begin, &self.begin, None);
         gpu.queue.submit([encoder.finish()]);
-        self.sweep_all(gpu, pipelines).await?;
+        gpu.tell(Stage::Uploaded);
+        let device_seconds = self.sweep_all(gpu, pipelines).await?;
+        gpu.tell(Stage::Integrated { device_seconds });
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        self.dispatch(&mut encoder, &pipelines.conclude, &self.conclude);
+        self.dispatch(&mut encoder, &pipelines.conclude, &self.conclude, None);
         for (buffer, landing) in &self.results {
             encoder.copy_buffer_to_buffer(buffer, 0, landing, 0, buffer.size());
         }
@@ -172,28 +180,44 @@ impl Batch {
         let record = |(lane, (reading, finding)): (&Lane, (&Reading, &Finding))| {
             record(tables.constants[lane.flow as usize].as_ref(), reading, finding)
         };
-        Ok(lanes.iter().zip(readings.iter().zip(&findings)).map(record).collect())
+        let records = lanes.iter().zip(readings.iter().zip(&findings)).map(record).collect();
+        gpu.tell(Stage::Read);
+        Ok(records)
     }
 
     /// Dispatches until no lane is running. The next dispatches are under way while the host
     /// looks at the last ones; a lane that has ended costs them next to nothing.
-    async fn sweep_all(&self, gpu: &Gpu, pipelines: &Pipelines) -> Result<(), GpuError> {
+    /// Returns the device's own time where somebody measures.
+    async fn sweep_all(&self, gpu: &Gpu, pipelines: &Pipelines) -> Result<Option<f64>, GpuError> {
+        let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue));
+        let mut seconds = 0.0;
         let mut before = None;
-        for look in self.looks.iter().cycle() {
+        for (slot, look) in (0..2).zip(&self.looks).cycle() {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            for _ in 0..DISPATCHES_PER_LOOK {
+            for nth in 0..DISPATCHES_PER_LOOK {
                 encoder.clear_buffer(&self.live, 0, None);
-                self.dispatch(&mut encoder, &pipelines.sweep, &self.sweep);
+                let is_last = nth + 1 == DISPATCHES_PER_LOOK;
+                let writes = clock.as_ref().and_then(|clock| clock.writes(slot, nth == 0, is_last));
+                self.dispatch(&mut encoder, &pipelines.sweep, &self.sweep, writes);
+            }
+            if let Some(clock) = &clock {
+                clock.copy(&mut encoder, slot, look, TIMES);
             }
             encoder.copy_buffer_to_buffer(&self.live, 0, look, 0, 4);
             let submission = gpu.queue.submit([encoder.finish()]);
-            if let Some((look, submission)) = before.replace((look, submission))
-                && read(gpu, look, submission, |bytes| bytes[..4] == [0; 4]).await?
-            {
-                break;
+            if let Some((look, submission)) = before.replace((look, submission)) {
+                let take = |bytes: &[u8]| {
+                    let took = clock.as_ref().map_or(0.0, |clock| clock.seconds(&bytes[TIMES as usize..]));
+                    (bytes[..4] == [0; 4], took)
+                };
+                let (is_done, took) = read(gpu, look, submission, take).await?;
+                seconds += took;
+                if is_done {
+                    break;
+                }
             }
         }
-        Ok(())
+        Ok(clock.map(|_| seconds))
     }
 
     fn dispatch(
@@ -201,8 +225,10 @@ impl Batch {
         encoder: &mut wgpu::CommandEncoder,
         pipeline: &wgpu::ComputePipeline,
         bindings: &wgpu::BindGroup,
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>,
     ) {
-        let mut pass = encoder.begin_compute_pass(&Default::default());
+        let mut pass =
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, bindings, &[]);
         pass.dispatch_workgroups(self.groups[0], self.groups[1], 1);

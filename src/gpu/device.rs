@@ -153,7 +153,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
     };
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("rattlemap"),
-        required_features: features(precision),
+        required_features: features(precision) | (adapter.features() & wgpu::Features::TIMESTAMP_QUERY),
         required_limits: adapter.limits(),
         ..Default::default()
     };
@@ -164,7 +164,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
-    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: |source| source })
+    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: |source| source, watcher: None })
 }
 
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {

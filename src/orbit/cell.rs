@@ -21,18 +21,20 @@ const SHOWN_EXPONENT_FROM: u32 = 100;
 /// One that only tells chaos from the rest may contain more of the transient.
 const EXPONENT_FROM: u32 = 50;
 
-/// Periods after which an early stop is first considered; then every quarter as many more.
+/// Periods after which an early stop is first considered; then every sixth as many more.
 const FIRST_LOOK: u32 = 16;
+const LOOKS: u32 = 6;
 
 /// A cell stops early only this close to its cycle, relative to the motion: inside the region
 /// where the multipliers tell what happens next. A leaving speed near `mesh_speed` makes that
-/// region small: of 20,000 cells over restitution and frequency one was taken for a period that
-/// it then left, at 1e-6 none; the periods of the others were halved.
-const SETTLED: f64 = 2e-3;
+/// region small: at 2e-3 one cell of 4,000 over restitution and frequency was taken for a period
+/// that it then left, at 1e-6 cells take half as many periods again.
+const SETTLED: f64 = 5e-4;
 
 /// With early stops chaos is called before the budget is spent if the exponent exceeds zero by
 /// this many standard errors ...
 const EARLY_CHAOS_ERRORS: f64 = 6.0;
+const HASTY_CHAOS_ERRORS: f64 = 5.0;
 
 /// ... after this fraction of the budget, in eighths: of 20,000 cells 38 transients are taken
 /// for chaos so, 33 if it is half, 17 if all of it is spent. Without an exponent to show, 46.
@@ -74,6 +76,11 @@ impl Budget {
     pub fn chaos_from(&self) -> u32 {
         let eighths = if self.shows_exponent { EARLY_CHAOS_FROM } else { HASTY_CHAOS_FROM };
         (self.periods() / 8 * eighths).max(self.settings.observed_periods)
+    }
+
+    /// Standard errors by which the exponent must exceed zero then.
+    pub fn chaos_errors(&self) -> f64 {
+        if self.shows_exponent { EARLY_CHAOS_ERRORS } else { HASTY_CHAOS_ERRORS }
     }
 }
 
@@ -189,7 +196,7 @@ impl<'a> Watch<'a> {
             return Ok(None);
         }
         let (budget, chaos_from) = (self.budget.periods(), self.budget.chaos_from());
-        let next = now + now.div_ceil(4);
+        let next = now + now.div_ceil(LOOKS);
         *look = [chaos_from, budget, last]
             .into_iter()
             .find(|&stage| now < stage)
@@ -203,7 +210,9 @@ impl<'a> Watch<'a> {
         Ok(match now {
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
             _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measured::is_decided),
-            _ if now >= chaos_from => Some(self.aperiodic(EARLY_CHAOS_ERRORS)).filter(Measured::is_decided),
+            _ if now >= chaos_from => {
+                Some(self.aperiodic(self.budget.chaos_errors())).filter(Measured::is_decided)
+            }
             _ => None,
         })
     }

@@ -1,6 +1,7 @@
 //! A finished map as rows: the one view that tables, figures and reports are made from.
 
 use crate::classify::{classify, status};
+use crate::model::State;
 use crate::orbit::{Class, Status};
 use crate::plan::Plan;
 use crate::record::{Record, Spelling, valid};
@@ -33,24 +34,37 @@ pub(super) struct Row {
     pub(super) status: Status,
     pub(super) periods_run: u32,
     pub(super) source: Source,
+    /// Attractors that several starts found.
+    pub(super) attractors: Option<u8>,
 }
 
-/// A scene, its plan, and one record per cell by id.
+/// A scene, its plan, and one record per run; what is shown of a cell is its first run.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells<'a> {
     scene: &'a Scene,
     plan: &'a Plan,
     records: &'a [Record],
+    attractors: Option<&'a [u8]>,
 }
 
 impl<'a> Cells<'a> {
     /// A finished map.
     ///
     /// # Panics
-    /// If there are not as many records as cells.
+    /// If there are not as many records as runs.
     pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a [Record]) -> Cells<'a> {
-        assert_eq!(plan.cell_count(), records.len(), "one record per cell");
-        Cells { scene, plan, records }
+        assert_eq!(plan.run_count(), records.len(), "one record per run");
+        Cells { scene, plan, records, attractors: None }
+    }
+
+    /// The same with the number of attractors found per cell, by id.
+    ///
+    /// # Panics
+    /// If there are not as many numbers as cells.
+    #[must_use]
+    pub fn counting(self, attractors: Option<&'a [u8]>) -> Cells<'a> {
+        assert!(attractors.is_none_or(|list| list.len() == self.plan.cell_count()), "one number per cell");
+        Cells { attractors, ..self }
     }
 
     /// Cells along the two axes.
@@ -60,17 +74,41 @@ impl<'a> Cells<'a> {
 
     /// The class of every cell, by id.
     pub fn classes(&self) -> impl Iterator<Item = Class> + '_ {
-        self.records.iter().map(classify)
+        self.first_runs().iter().map(classify)
     }
 
     /// The status of every cell, by id.
     pub fn statuses(&self) -> impl Iterator<Item = Status> + '_ {
-        self.records.iter().map(status)
+        self.first_runs().iter().map(status)
     }
 
-    /// Forcing periods integrated, over all cells.
+    /// Forcing periods integrated, over all runs.
     pub fn periods(&self) -> u64 {
         self.records.iter().map(|record| u64::from(record.periods_run)).sum()
+    }
+
+    /// Runs, one per cell and start.
+    pub fn runs(&self) -> usize {
+        self.records.len()
+    }
+
+    fn first_runs(&self) -> &'a [Record] {
+        &self.records[..self.plan.cell_count()]
+    }
+
+    /// Attractors found per cell, by id, if they were counted.
+    pub(super) fn attractors(&self) -> Option<&'a [u8]> {
+        self.attractors
+    }
+
+    /// The state in which the run `id` starts.
+    pub(super) fn start(&self, id: usize) -> State {
+        self.plan.start(id as u32, self.records)
+    }
+
+    /// Whether a run's start is not the scene's own: it follows a neighbour or was drawn.
+    pub(super) fn has_own_start(&self, id: usize) -> bool {
+        self.plan.policy().follows() || id >= self.plan.cell_count()
     }
 
     pub(super) fn scene(&self) -> &'a Scene {
@@ -90,7 +128,7 @@ impl<'a> Cells<'a> {
         if self.asks(Quantity::Word) { self.records[id].spelling() } else { None }
     }
 
-    /// The row of the cell `id`, less its word.
+    /// The row of the run `id`, less its word.
     pub(super) fn row(&self, id: usize) -> Row {
         let record = &self.records[id];
         let indices = self.plan.indices(id as u32);
@@ -122,6 +160,7 @@ impl<'a> Cells<'a> {
             status: status(record),
             periods_run: record.periods_run,
             source: if is_filled { Source::Filled } else { Source::Integrated },
+            attractors: self.attractors.and_then(|list| list.get(id).copied()),
         }
     }
 }

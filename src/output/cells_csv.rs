@@ -15,6 +15,9 @@ const BLOCK: usize = 1 << 16;
 /// Cells per task.
 const PART: usize = 1 << 12;
 
+/// The last field of maps that count attractors.
+pub(super) const ATTRACTORS: &str = "attractors";
+
 /// Fields after the indices and the axes.
 pub(super) const FIELDS: [&str; 11] = [
     "class",
@@ -38,7 +41,8 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
     let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
     let mut header = csv::Writer::from_writer(Vec::new());
-    header.write_record(["i", "j"].into_iter().chain(axes).chain(FIELDS))?;
+    let counted = cells.attractors().map(|_| ATTRACTORS);
+    header.write_record(["i", "j"].into_iter().chain(axes).chain(FIELDS).chain(counted))?;
     file.write_all(&header.into_inner()?)?;
     let [columns, rows] = cells.counts();
     let count = columns * rows;
@@ -56,7 +60,9 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
 fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> anyhow::Result<Vec<u8>> {
     let mut table = csv::Writer::from_writer(Vec::with_capacity(160 * ids.len()));
     for id in ids {
-        table.write_record(fields(&cells.row(id), cells.word(id)))?;
+        let row = cells.row(id);
+        let counted = row.attractors.map(|count| count.to_string());
+        table.write_record(fields(&row, cells.word(id)).into_iter().chain(counted))?;
     }
     Ok(table.into_inner()?)
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use npyz::{DType, Field, TypeStr, TypeWrite, WriterBuilder};
 
 use super::cells::{Cells, Row};
-use super::cells_csv::FIELDS;
+use super::cells_csv::{ATTRACTORS, FIELDS};
 use super::names;
 use crate::record::Spelling;
 
@@ -18,18 +18,21 @@ pub(super) const ABSENT: i8 = -1;
 const TYPES: [&str; 15] = [
     "<u4", "<u4", "<f8", "<f8", "|i1", "<u2", "<f8", "<f8", "<f8", "<f8", "|i1", "|S64", "|i1", "<u4", "|i1",
 ];
+const ATTRACTORS_TYPE: &str = "|u1";
 const WORD_BYTES: usize = 64;
 
 /// Writes the array to `path`: one dimension, the fields of `cells.csv` by name. Classes,
 /// statuses and sources are their codes; an absent period is 0, an absent float NaN, an
-/// absent class or symmetry -1, an absent word empty.
+/// absent class or symmetry -1, an absent word empty. Where attractors are counted, a last
+/// field has their number.
 ///
 /// # Errors
 /// If the file cannot be written.
 pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
     let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
     let names = ["i", "j"].into_iter().chain(axes).chain(FIELDS);
-    let fields = names.zip(TYPES).map(|(name, kind)| {
+    let counted = cells.attractors().map(|_| (ATTRACTORS, ATTRACTORS_TYPE));
+    let fields = names.zip(TYPES).chain(counted).map(|(name, kind)| {
         let kind: TypeStr = kind.parse()?;
         Ok(Field { name: name.to_owned(), dtype: DType::Plain(kind) })
     });
@@ -80,6 +83,7 @@ impl TypeWrite for PackedWriter {
         bytes.push(row.status.code() as u8);
         bytes.extend(row.periods_run.to_le_bytes());
         bytes.push(row.source as u8);
+        bytes.extend(row.attractors);
         to.write_all(&bytes)
     }
 }

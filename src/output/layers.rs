@@ -3,6 +3,7 @@
 //! A layer gives every cell an index into a palette of at most 256 colours, and says what
 //! the colours mean: by name, on a bar, or both.
 
+mod attractors;
 mod classes;
 mod colors;
 mod scale;
@@ -64,6 +65,7 @@ pub(super) fn of(cells: &Cells<'_>, words: Option<&Words>) -> Vec<Layer> {
     }
     layers.extend(SCALES.iter().filter(|scale| cells.asks(scale.quantity)).map(|scale| scale.layer(cells)));
     layers.extend(words.map(words::layer));
+    layers.extend(cells.attractors().map(attractors::layer));
     layers
 }
 

@@ -19,6 +19,7 @@ struct Manifest<'a> {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
+    commit: &'static str,
     engine: &'static str,
     title: &'a str,
     scene: &'a str,
@@ -50,6 +51,10 @@ impl From<&Axis> for AxisObject {
 pub(super) struct StartObject {
     policy: &'static str,
     state: Option<State>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    count: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u32>,
 }
 
 #[derive(Serialize)]
@@ -77,13 +82,14 @@ pub(super) fn bifurcation(
         format: FORMAT,
         command: "bifurcation",
         crate_version: env!("CARGO_PKG_VERSION"),
+        commit: env!("RATTLEMAP_COMMIT"),
         engine: "reference f64",
         title: scene.title(),
         scene: scene.text(),
         set: sets,
         axis: axis.into(),
         parameters: Parameters { pair: &scene.base(), except: &[axis.parameter().name] },
-        start: start(scene.start()),
+        start: start(scene),
         integration: IntegrationObject {
             transient_periods: settings.transient_periods,
             observed_periods: settings.observed_periods,
@@ -95,14 +101,15 @@ pub(super) fn bifurcation(
     })
 }
 
-pub(super) fn start(start: Start) -> StartObject {
-    let (policy, state) = match start {
+pub(super) fn start(scene: &Scene) -> StartObject {
+    let (policy, state) = match scene.start() {
         Start::Rest => ("rest", None),
         Start::State(state) => ("state", Some(state)),
         Start::Up => ("up", None),
         Start::Down => ("down", None),
     };
-    StartObject { policy, state }
+    let (count, seed) = scene.draw().map(|draw| (draw.count, draw.seed)).unzip();
+    StartObject { policy, state, count, seed }
 }
 
 fn count(columns: &[Column]) -> BTreeMap<&'static str, usize> {

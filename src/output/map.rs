@@ -21,8 +21,19 @@ const VALIDATION: &str = "validation.json";
 pub const MANIFEST: &str = "manifest.json";
 
 /// Every file that a map may have beside its records.
-const ALL: [&str; 10] =
-    [MANIFEST, CSV, NPY, "map.png", "lyapunov.png", "impacts.png", "mesh.png", "word.png", HTML, VALIDATION];
+const ALL: [&str; 11] = [
+    MANIFEST,
+    CSV,
+    NPY,
+    "map.png",
+    "lyapunov.png",
+    "impacts.png",
+    "mesh.png",
+    "word.png",
+    "attractors.png",
+    HTML,
+    VALIDATION,
+];
 
 /// Removes what an earlier run left, but for its records: files must not stand beside a
 /// manifest that does not know them.

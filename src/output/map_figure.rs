@@ -67,10 +67,16 @@ fn draw(canvas: &Canvas<'_>, cells: &Cells<'_>, layer: &Layer, [width, height]: 
 
 /// Where cells start and how long they run: what a map means depends on it.
 pub(super) fn subtitle(scene: &Scene) -> String {
+    let last = scene.axes().last().map_or("", |axis| axis.parameter().name);
     let start = match scene.start() {
         Start::Rest => "from rest".to_owned(),
         Start::State([x1, v1, x2, v2]) => format!("from ({x1}, {v1}, {x2}, {v2})"),
-        Start::Up | Start::Down => "following the attractor".to_owned(),
+        Start::Up => format!("from the attractor at the next lower {last}"),
+        Start::Down => format!("from the attractor at the next higher {last}"),
+    };
+    let more_starts = match scene.draw() {
+        Some(draw) => format!(", attractors counted with {} random states more", draw.count - 1),
+        None => String::new(),
     };
     let integration = scene.integration();
     let (transient, observed) = (integration.transient_periods, integration.observed_periods);
@@ -84,7 +90,7 @@ pub(super) fn subtitle(scene: &Scene) -> String {
         Some(_) => "; refined at borders, the rest filled and audited",
         None => "",
     };
-    format!("every cell {start}, {upper}{transient} + {observed} forcing periods{more}{filled}")
+    format!("every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{filled}")
 }
 
 /// An axis on which cells lie at their values: it reaches half a cell further.

@@ -66,6 +66,9 @@ struct Manifest<'a> {
     cells: usize,
     classes: BTreeMap<&'static str, usize>,
     statuses: BTreeMap<&'static str, usize>,
+    /// Cells by the number of attractors that their starts found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    attractors: Option<BTreeMap<u8, usize>>,
     periods: u64,
     codes: Codes,
     elapsed_seconds: f64,
@@ -147,12 +150,13 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, files: &[String]) -> serde_j
         set: run.sets,
         axes: scene.axes().iter().map(AxisObject::from).collect(),
         parameters: Parameters { pair: &scene.base(), except: &swept },
-        start: start(scene.start()),
+        start: start(scene),
         integration: integration(scene),
         quantities: scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect(),
         cells: cells.counts().iter().product(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
+        attractors: cells.attractors().map(tally),
         periods: cells.periods(),
         codes: codes(),
         elapsed_seconds: run.elapsed.as_secs_f64(),
@@ -182,6 +186,12 @@ fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
     for status in cells.statuses() {
         *counts.entry(names::status(status)).or_default() += 1;
     }
+    counts
+}
+
+fn tally(list: &[u8]) -> BTreeMap<u8, usize> {
+    let mut counts = BTreeMap::new();
+    list.iter().for_each(|&count| *counts.entry(count).or_default() += 1);
     counts
 }
 

@@ -1,6 +1,7 @@
 //! The command that replays one cell of a map.
 
-use crate::model::GearPair;
+use super::Cells;
+use crate::model::{GearPair, State};
 use crate::orbit::Settings;
 use crate::scene::{Scene, Start};
 
@@ -18,8 +19,8 @@ pub(super) fn arguments(scene: &Scene) -> String {
             _ => {}
         }
     }
-    if let Start::State([x1, v1, x2, v2]) = scene.start() {
-        words.push(format!(" --start {x1:?},{v1:?},{x2:?},{v2:?}"));
+    if let Start::State(state) = scene.start() {
+        words.push(start(state));
     }
     let (settings, default) = (scene.orbit_settings(), Settings::default());
     if settings.transient_periods != default.transient_periods {
@@ -31,11 +32,18 @@ pub(super) fn arguments(scene: &Scene) -> String {
     words.concat()
 }
 
-/// The whole command for the cell with these indices on the axes.
-pub(super) fn command(scene: &Scene, indices: [usize; 2]) -> String {
+fn start([x1, v1, x2, v2]: State) -> String {
+    format!(" --start {x1:?},{v1:?},{x2:?},{v2:?}")
+}
+
+/// The whole command for the run `id`.
+pub(super) fn command(cells: &Cells<'_>, id: usize) -> String {
+    let scene = cells.scene();
     let set = |(axis, i): (&crate::scene::Axis, usize)| {
         format!(" --set {}={:?}", axis.parameter().name, axis.value(i))
     };
-    let sets: String = scene.axes().iter().zip(indices).map(set).collect();
-    format!("rattlemap orbit{sets}{}", arguments(scene))
+    let sets: String = scene.axes().iter().zip(cells.row(id).indices).map(set).collect();
+    // A later argument wins over the scene's own.
+    let own = if cells.has_own_start(id) { start(cells.start(id)) } else { String::new() };
+    format!("rattlemap orbit{sets}{}{own}", arguments(scene))
 }

@@ -35,6 +35,9 @@ struct Data<'a> {
     axes: Vec<AxisData>,
     /// What follows the two `--set` of the axes in the command that replays a cell.
     replay: String,
+    /// Where cells start that follow their neighbours: four numbers per cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    starts: Option<Packed>,
     layers: Vec<LayerData>,
     values: serde_json::Map<String, serde_json::Value>,
     classes: [&'static str; 4],
@@ -104,6 +107,7 @@ pub(super) fn write(
         subtitle: subtitle(scene),
         axes: scene.axes().iter().map(AxisData::from).collect(),
         replay: replay::arguments(scene),
+        starts: starts(cells),
         layers: layers.par_iter().map(LayerData::from).collect(),
         values: values(cells, words)?,
         classes: names::CLASSES,
@@ -127,6 +131,13 @@ pub(super) fn write(
     }
     page.push_str(rest);
     Ok(fs::write(path, page)?)
+}
+
+/// Starts that a cell's record does not tell, in full: the command that replays it needs them.
+fn starts(cells: &Cells<'_>) -> Option<Packed> {
+    let [columns, rows] = cells.counts();
+    let all: Vec<[f64; 4]> = (0..columns * rows).map(|id| cells.start(id)).collect();
+    cells.scene().start().follows().then(|| packed("f64", &all))
 }
 
 /// What the page reads out for a cell, one array per quantity that the scene asks for.
@@ -161,6 +172,9 @@ fn values(
     }
     if cells.asks(Quantity::Symmetric) {
         list.push(("symmetric", bytes(|row| row.symmetric.map_or(u8::MAX, u8::from))));
+    }
+    if let Some(counts) = cells.attractors() {
+        list.push(("attractors", packed("u8", counts)));
     }
     if let Some(words) = words {
         list.push(("word", packed("u32", &words.numbers)));

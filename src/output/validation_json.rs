@@ -150,7 +150,7 @@ fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
         values: axes.zip(row.values).collect(),
         differences: differences.collect(),
         explanation: mismatch.explanation.map(Explanation::name),
-        replay: replay::command(cells.scene(), row.indices),
+        replay: replay::command(cells, mismatch.id as usize),
     }
 }
 

@@ -14,12 +14,16 @@ const PER_PERIOD: u64 = 40;
 const CSV: u64 = 190;
 const NPY: u64 = 132;
 const HTML: u64 = 24;
+/// Starts of cells that follow their neighbours, in the report.
+const HTML_START: u64 = 44;
 
 /// The size of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     /// Number of cells.
     pub cells: u64,
+    /// Number of runs: cells times starts per cell.
+    pub runs: u64,
     /// Bytes of memory that a run on the CPU with one thread needs, about.
     pub memory: u64,
     /// Bytes of memory for every further thread.
@@ -32,10 +36,12 @@ impl Size {
     /// The size of a scene's map.
     pub fn of(scene: &Scene) -> Size {
         let cells = scene.axes().iter().map(|axis| axis.count() as u64).product::<u64>();
+        let runs = cells.saturating_mul(scene.draw().map_or(1, |draw| u64::from(draw.count)));
         let record = size_of::<Record>() as u64;
         let per_file = |format: &Format| match format {
             Format::Csv => CSV,
             Format::Npy => NPY,
+            Format::Html if scene.start().follows() => HTML + HTML_START,
             Format::Html => HTML,
             Format::Png => 1,
         };
@@ -44,14 +50,16 @@ impl Size {
         let one_cell = periods * PER_PERIOD;
         Size {
             cells,
-            memory: cells * (record + MEMORY_BESIDE) + one_cell,
+            runs,
+            memory: runs.saturating_mul(record + MEMORY_BESIDE) + one_cell,
             memory_per_thread: one_cell,
-            disk: cells * (record + scene.outputs().files.iter().map(per_file).sum::<u64>()),
+            disk: runs.saturating_mul(record)
+                + cells * scene.outputs().files.iter().map(per_file).sum::<u64>(),
         }
     }
 
-    /// Whether a `u32` can number the cells.
+    /// Whether a `u32` can number the runs.
     pub fn is_countable(&self) -> bool {
-        self.cells <= u64::from(u32::MAX)
+        self.runs <= u64::from(u32::MAX)
     }
 }

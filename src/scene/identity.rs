@@ -39,6 +39,10 @@ impl Scene {
             Start::Down => "down".to_owned(),
         };
         tell("start".into(), start);
+        if let Some(draw) = self.draw() {
+            tell("start.count".into(), draw.count.to_string());
+            tell("start.seed".into(), draw.seed.to_string());
+        }
         if let Some(refine) = self.refine() {
             tell("refine.minimum_grid".into(), refine.minimum_grid.to_string());
             tell("refine.rounds".into(), refine.rounds.map_or("all".to_owned(), |n| n.to_string()));

@@ -1,11 +1,9 @@
-//! `[integration]`, `[start]`, `[refine]` and `[outputs]`.
+//! `[integration]`, `[refine]` and `[outputs]`.
 
 use super::Purpose;
 use super::document::Value;
 use super::error::SceneError;
-use super::section::{Field, Section};
-use crate::bifurcation;
-use crate::model::State;
+use super::section::Section;
 use crate::orbit;
 
 /// The most forcing periods that one field may ask for.
@@ -47,45 +45,6 @@ impl From<&Integration> for orbit::Settings {
             transient_periods: integration.transient_periods,
             observed_periods: integration.observed_periods,
             max_period: integration.max_period,
-        }
-    }
-}
-
-/// The state in which cells start at phase 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
-    /// At rest.
-    Rest,
-    /// The same given state in every cell.
-    State(State),
-    /// The attractor of the cell before, along the last axis from `min` to `max`.
-    Up,
-    /// The attractor of the cell after, along the last axis from `max` to `min`.
-    Down,
-}
-
-impl Start {
-    /// How cells start, to end a title with: which attractor is shown depends on it.
-    pub fn in_words(&self) -> &'static str {
-        match self {
-            Start::Rest => "from rest",
-            Start::State(_) => "from one given state",
-            Start::Up => "attractor followed upwards",
-            Start::Down => "attractor followed downwards",
-        }
-    }
-}
-
-/// The state at rest.
-pub const REST: State = [0.0; 4];
-
-impl From<Start> for bifurcation::Policy {
-    fn from(start: Start) -> Self {
-        match start {
-            Start::Rest => bifurcation::Policy::From(REST),
-            Start::State(state) => bifurcation::Policy::From(state),
-            Start::Up => bifurcation::Policy::Up,
-            Start::Down => bifurcation::Policy::Down,
         }
     }
 }
@@ -221,48 +180,6 @@ fn read_max_period(section: &Section<'_>, observed_periods: u32) -> Result<u32, 
     Ok(max_period)
 }
 
-/// `start.policy` as written, before its state is known.
-#[derive(Clone, Copy, PartialEq)]
-enum Policy {
-    Rest,
-    State,
-    Up,
-    Down,
-}
-
-const POLICIES: [(&str, Policy); 4] =
-    [("rest", Policy::Rest), ("state", Policy::State), ("up", Policy::Up), ("down", Policy::Down)];
-
-pub(super) fn read_start(root: &Section<'_>) -> Result<Start, SceneError> {
-    let section = root.section("start", &["policy", "state"])?;
-    let policy = section.get("policy").map_or(Ok(Policy::Rest), |field| field.choice(&POLICIES))?;
-    match (policy, section.get("state")) {
-        (Policy::State, Some(field)) => read_state(&field).map(Start::State),
-        (Policy::State, None) => {
-            Err(section.missing("state", "policy = \"state\" needs state = [x1, v1, x2, v2]"))
-        }
-        (_, Some(field)) => Err(field.conflict(
-            "it is read with start.policy = \"state\" alone; set that or drop the state".to_owned(),
-        )),
-        (Policy::Rest, None) => Ok(Start::Rest),
-        (Policy::Up, None) => Ok(Start::Up),
-        (Policy::Down, None) => Ok(Start::Down),
-    }
-}
-
-fn read_state(field: &Field<'_>) -> Result<State, SceneError> {
-    let expected = "four finite numbers, [x1, v1, x2, v2]";
-    let mut numbers = Vec::new();
-    for item in field.list(expected)? {
-        let number = item.number()?;
-        if !number.is_finite() {
-            return Err(item.out_of_range("a finite number"));
-        }
-        numbers.push(number);
-    }
-    numbers.try_into().map_err(|_| field.out_of_range(expected))
-}
-
 pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option<Refine>, SceneError> {
     let known = ["minimum_grid", "rounds", "max_error", "audit", "continuous"];
     let section = root.section("refine", &known)?;
@@ -292,18 +209,6 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
         None => Continuous::Interpolated,
     };
     Ok(Some(Refine { minimum_grid, rounds, max_error, audit, continuous }))
-}
-
-/// Refuses what maps cannot do yet, though scenes can say it: better than ignoring it.
-pub(super) fn refuse_unbuilt(root: &Section<'_>, start: Start) -> Result<(), SceneError> {
-    let section = root.section("start", &["policy", "state"])?;
-    match (start, section.get("policy")) {
-        (Start::Up | Start::Down, Some(field)) => Err(field.conflict(
-            "`map` starts every cell from one state so far; use \"rest\", or \"state\" with a state"
-                .to_owned(),
-        )),
-        _ => Ok(()),
-    }
 }
 
 pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {

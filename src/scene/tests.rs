@@ -106,8 +106,12 @@ fn a_map_refuses_what_it_would_ignore() {
     let text = format!("{GOOD}{SECOND_AXIS}");
     let refused = |text: &str| Scene::parse(text, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
     for policy in ["up", "down"] {
-        let message = refused(&text.replace("\"rest\"", &format!("\"{policy}\"")));
-        assert_says(&message, &["s.toml:21:10", &format!("`start.policy = \"{policy}\"`"), "\"rest\""]);
+        let text = text.replace("\"rest\"", &format!("\"{policy}\""));
+        assert!(Scene::parse(&text, "s.toml", &[], Purpose::Map).is_ok());
+        let message = refused(&format!("{text}\n[refine]\n"));
+        assert_says(&message, &["s.toml:21:10", &format!("`start.policy = \"{policy}\"`"), "drop [refine]"]);
+        let message = refused(&text.replace("[start]", "[start]\ncount = 3"));
+        assert_says(&message, &["s.toml:21:9", "`start.count = 3`", "have one start each"]);
     }
 }
 
@@ -145,7 +149,11 @@ fn unknown_fields_get_a_suggestion() {
         ("F = ", "f = ", "did you mean `F`? valid names: m1, m2,"),
         ("count =", "cuont =", "s.toml:11:1: unknown field `axis.0.cuont = 4`; did you mean `count`?"),
         ("max_period", "max_periods", "s.toml:18:1: unknown field `integration.max_periods = 4`"),
-        ("policy", "count", "unknown field `start.count = \"rest\"`; valid names: policy, state"),
+        (
+            "policy",
+            "begin",
+            "unknown field `start.begin = \"rest\"`; valid names: policy, state, count, seed",
+        ),
         ("files", "file", "s.toml:25:1: unknown field `outputs.file = [\"csv\"]`; did you mean `files`?"),
     ];
     for (old, new, expected) in cases {

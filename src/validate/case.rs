@@ -45,7 +45,8 @@ impl<'a> Case<'a> {
         let plan = subject.plan;
         let cell = plan.cell(id);
         let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
-        let (law, start, budget) = (plan.law(cell.law), plan.start(), *plan.budget());
+        let (law, start) = (plan.law(cell.law), plan.start(id, subject.records));
+        let budget = *plan.budget();
         let measured = measure(&flow, law, start, &budget);
         Case {
             pair: plan.gear_pair(id),

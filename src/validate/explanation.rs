@@ -50,7 +50,8 @@ pub enum Explanation {
     EngineCap,
     /// The reference does not decide within the budget, but gives the record's answer when it
     /// may take longer; or the record says `undecided`, and the motion settles too late or
-    /// grows too little for it to say more.
+    /// grows too little for it to say more, or rounding, which the cycle amplifies, keeps a lane
+    /// from seeing it settle.
     UndecidedInBudget,
     /// The reference, started on the record's own strobe state, has the record's class,
     /// period, word, exponent and averages: another attractor of the same cell.
@@ -324,7 +325,12 @@ fn late(case: &Case<'_>) -> Option<Explanation> {
             // The lane's last state is off the cycle, and the reference goes on from there to it.
             let is_off = || case.unrest(&stands, period) > UNSETTLED;
             let settles = || case.at_leisure(from).class == case.truth.class;
-            (late || is_off() && settles()).then_some(Explanation::UndecidedInBudget)
+            // Or it is as close as rounding, which the cycle amplifies, lets it come.
+            let trembles = || {
+                let is_kept_off = case.is_lane && case.unrest(&stands, period) > AT_REST;
+                is_kept_off && is_shaken(case, &stands, period) == Some(true)
+            };
+            (late || (is_off() || trembles()) && settles()).then_some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Chaotic) => {
             let [theirs, error] = case.truth.exponent?;
@@ -376,13 +382,21 @@ fn flip(case: &Case<'_>) -> Option<Explanation> {
     let stands = case.after(from, 0).ok()?;
     let image = StrobeMap::Periods(period).apply(&stands, from).ok()?;
     let [re, im] = *multipliers(&image.derivative())?.first()?;
-    let gain = image.derivative().singular_values().max() / (1.0 + re);
     let flips = im == 0.0 && re > -1.0 && re < NEAR_FLIP;
+    let settles = case.at_leisure(from).class == case.truth.class;
+    (flips && is_shaken(case, &stands, period)? && settles).then_some(Explanation::Border)
+}
+
+/// Whether rounding, amplified by a cycle that attracts, is as large as the motion's distance
+/// from where it was a cycle ago: the sum of what is left of the roundings of all cycles before.
+fn is_shaken(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> Option<bool> {
+    let image = StrobeMap::Periods(period).apply(stands, stands.state()).ok()?;
+    let [re, im] = *multipliers(&image.derivative())?.first()?;
+    let radius = re.hypot(im);
+    let gain = image.derivative().singular_values().max() / (1.0 - radius);
     // Every event rounds.
     let events = 1.0 + case.truth.impacts_per_period.unwrap_or(0.0) * f64::from(period);
-    let alternates = case.unrest(&stands, period) <= rounding(case.precision) * events * gain;
-    let settles = case.at_leisure(from).class == case.truth.class;
-    (flips && alternates && settles).then_some(Explanation::Border)
+    Some(radius < 1.0 && case.unrest(stands, period) <= rounding(case.precision) * events * gain)
 }
 
 /// The reference meets the graze: what the record says of itself is no evidence.

@@ -20,7 +20,7 @@ pub enum Stratum {
 /// A cell of the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pick {
-    /// The cell, `j * count0 + i`.
+    /// The run, as in [`Plan::cell`].
     pub id: u32,
     /// What it was drawn for; it may belong to other strata, too.
     pub stratum: Stratum,
@@ -101,12 +101,12 @@ impl Draw {
     }
 }
 
-/// Cells with a neighbour to the side, above or below of another class or period.
+/// Runs with a neighbour to the side, above or below of another class or period.
 fn border(plan: &Plan, records: &[Record]) -> Vec<u32> {
     let classes: Vec<Class> = records.iter().map(classify).collect();
     let [columns, rows] = plan.axes().map(|axis| axis.count());
     let differs = |id: usize| {
-        let (i, j) = (id % columns, id / columns);
+        let [i, j] = plan.indices(id as u32);
         let neighbours = [
             (i > 0).then(|| id - 1),
             (i + 1 < columns).then(|| id + 1),

@@ -141,13 +141,15 @@ impl Quantiles {
     }
 }
 
-/// Runs lanes from the plan's start over [`HORIZON`] periods: one record per id.
+/// Runs lanes from where the runs `ids` started over [`HORIZON`] periods: one record per id.
+/// `records` are the map's, by run, as for [`Plan::start`].
 ///
 /// # Errors
 /// A [`GpuError`].
 pub async fn lane_states(
     gpu: &mut Gpu,
     plan: &Plan,
+    records: &[Record],
     ids: &[u32],
     steps_per_period: Option<u32>,
 ) -> Result<Vec<Record>, GpuError> {
@@ -161,16 +163,17 @@ pub async fn lane_states(
         steps_per_period,
         ..LaneSettings::default()
     };
-    run_lanes(gpu, plan, ids, &settings).await
+    run_lanes(gpu, plan, records, ids, &settings).await
 }
 
-/// Runs lanes of a plan's cells: one record per id.
+/// Runs lanes of a plan's runs: one record per id. `records` are as for [`Plan::start`].
 ///
 /// # Errors
 /// A [`GpuError`].
 pub async fn run_lanes(
     gpu: &mut Gpu,
     plan: &Plan,
+    records: &[Record],
     ids: &[u32],
     settings: &LaneSettings,
 ) -> Result<Vec<Record>, GpuError> {
@@ -185,7 +188,11 @@ pub async fn run_lanes(
     let place = |list: &[u32], index: u32| list.partition_point(|&other| other < index) as u32;
     let lanes: Vec<Lane> = cells
         .iter()
-        .map(|cell| Lane { flow: place(&flows, cell.flow), law: place(&laws, cell.law), start: plan.start() })
+        .map(|cell| Lane {
+            flow: place(&flows, cell.flow),
+            law: place(&laws, cell.law),
+            start: plan.start(cell.id, records),
+        })
         .collect();
     let flows: Vec<_> = flows.iter().map(|&flow| plan.oscillator(flow)).collect();
     let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();

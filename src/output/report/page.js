@@ -7,6 +7,8 @@ const pen = canvas.getContext("2d");
 const MARGIN = { left: 78, right: 14, top: 10, bottom: 58 };
 
 let values = {};
+// Four numbers per cell where cells follow their neighbours.
+let starts = null;
 let layer = 0;
 // What is shown, in cells: the lower left corner and the extent.
 let view = { left: 0, bottom: 0, width: columns, height: rows };
@@ -17,7 +19,7 @@ async function unpack({ data, type }) {
   const packed = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const buffer = await new Response(stream).arrayBuffer();
-  const types = { u8: Uint8Array, i8: Int8Array, u32: Uint32Array, f32: Float32Array };
+  const types = { u8: Uint8Array, i8: Int8Array, u32: Uint32Array, f32: Float32Array, f64: Float64Array };
   return new types[type](buffer);
 }
 
@@ -183,6 +185,7 @@ function facts({ i, j }) {
     ["meshing", number("mesh_fraction")],
     ["symmetric", symmetric],
     ["word", at("word") === undefined || at("word") === 0xffffffff ? undefined : map.words[at("word")] || "no events"],
+    ...(values.attractors ? [["attractors found", at("attractors")]] : []),
     ["status", map.statuses[at("status")]],
     ["periods run", at("periods_run")],
     ["cell", `${i}, ${j}`],
@@ -206,7 +209,9 @@ function choose(cell) {
   if (cell) {
     const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
     const [first, second] = map.axes.map((axis) => axis.parameter);
-    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${map.replay}`.split(" --");
+    const place = 4 * (cell.j * columns + cell.i);
+    const start = starts ? ` --start ${[...starts.subarray(place, place + 4)].join(",")}` : "";
+    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${map.replay}${start}`.split(" --");
     // Lines break between arguments, never inside one.
     byId("command").replaceChildren(...words.flatMap((word, k) =>
       k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
@@ -477,6 +482,7 @@ async function start() {
   const names = Object.keys(map.values);
   const unpacked = await Promise.all(names.map((name) => unpack(map.values[name])));
   values = Object.fromEntries(names.map((name, k) => [name, unpacked[k]]));
+  if (map.starts) starts = await unpack(map.starts);
   await Promise.all(map.layers.map(async (shown) => { shown.indices = await unpack(shown); }));
   byId("wait").remove();
   // A link may name a cell and a layer.

@@ -1,27 +1,44 @@
 //! Arithmetic in the shader's text, counted in naga's intermediate form.
 
-use naga::{Block, Expression, Function, Handle, Literal, Module, Statement};
-use rattlemap::gpu::Precision;
+use wgpu::naga::{self, Block, Expression, Function, Handle, Literal, Module, Statement};
 
-/// Parts of the lane: function, and whether only its loop is meant.
-const PARTS: [(&str, bool, &str); 4] = [
-    ("scan", true, "a scan step"),
-    ("careful", false, "a careful pass, all branches once"),
-    ("root", true, "a root trip"),
-    ("sweep", false, "the whole text with every call copied in"),
-];
+/// Arithmetic instructions that the text of a lane holds: operators, built-in functions,
+/// selections and conversions, of reals and whole numbers alike, each once wherever it is
+/// written; what a variant rules out is not counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instructions {
+    /// One scan step.
+    pub scan: usize,
+    /// A careful pass, all branches once.
+    pub careful: usize,
+    /// One trip of the root search.
+    pub root: usize,
+    /// The whole text with every call copied in.
+    pub all: usize,
+}
 
-pub(crate) fn print(source: &str, precision: Precision) {
-    let module = naga::front::wgsl::parse_str(source)
-        .unwrap_or_else(|error| panic!("{precision:?}: {}", error.emit_to_string(source)));
-    for (name, only_loop, what) in PARTS {
+/// Counts the instructions of a shader.
+///
+/// # Panics
+/// If the source is no lane of this crate.
+pub fn instructions(source: &str) -> Instructions {
+    let module = match naga::front::wgsl::parse_str(source) {
+        Ok(module) => module,
+        Err(error) => panic!("{}", error.emit_to_string(source)),
+    };
+    let whole = |name: &str| {
         let function = function(&module, name);
-        let count = if only_loop {
-            loops(&function.body).map(|body| block(&module, function, body)).sum()
-        } else {
-            block(&module, function, &function.body)
-        };
-        println!("  {count:8} {what}");
+        block(&module, function, &function.body)
+    };
+    let in_loops = |name: &str| {
+        let function = function(&module, name);
+        loops(&function.body).map(|body| block(&module, function, body)).sum()
+    };
+    Instructions {
+        scan: in_loops("scan"),
+        careful: whole("careful"),
+        root: in_loops("root"),
+        all: whole("sweep"),
     }
 }
 

@@ -1,0 +1,29 @@
+//! Forms of the lane that count their loops' trips, made from the shader's text.
+
+/// Every loop pays for its trips; counting them function by function counts the work.
+pub const LOOPS: [(&str, &str); 4] =
+    [("scan", "scan steps"), ("careful", "careful passes"), ("first_event", "looks"), ("root", "root trips")];
+
+/// Reports the loop trips of a function in place of impacts.
+pub fn counting(function: &str) -> fn(String) -> String {
+    match function {
+        "scan" => |source| count_trips(&source, "scan"),
+        "careful" => |source| count_trips(&source, "careful"),
+        "first_event" => |source| count_trips(&source, "first_event"),
+        _ => |source| count_trips(&source, "root"),
+    }
+}
+
+fn count_trips(source: &str, function: &str) -> String {
+    let silent = replace(source, "tally.impacts += 1u;", "");
+    let start = silent.find(&format!("fn {function}(")).expect("the shader has the function");
+    let (before, after) = silent.split_at(start);
+    let (body, rest) = after.split_at(after.find("\n}\n").expect("a function ends"));
+    let paid = if body.contains("trips += price;") { "trips += price;" } else { "trips += 1u;" };
+    format!("{before}{}{rest}", replace(body, paid, &format!("{paid} tally.impacts += 1u;")))
+}
+
+fn replace(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "the shader has no {from}");
+    text.replace(from, to)
+}

@@ -1,0 +1,145 @@
+//! `[start]`: the states in which cells begin.
+
+use super::Purpose;
+use super::error::SceneError;
+use super::section::{Field, Section};
+use crate::bifurcation;
+use crate::model::State;
+
+/// The most states that one cell may start from: attractors are counted in a byte.
+const MAX_STARTS: u32 = 255;
+
+/// The state at rest.
+pub const REST: State = [0.0; 4];
+
+/// The state in which cells start at phase 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// At rest.
+    Rest,
+    /// The same given state in every cell.
+    State(State),
+    /// The last state of the cell before, along the last axis from `min` to `max`; the first
+    /// one starts at rest.
+    Up,
+    /// The last state of the cell after, along the last axis from `max` to `min`; the last one
+    /// starts at rest.
+    Down,
+}
+
+impl Start {
+    /// How cells start, to end a title with: which attractor is shown depends on it.
+    pub fn in_words(&self) -> &'static str {
+        match self {
+            Start::Rest => "from rest",
+            Start::State(_) => "from one given state",
+            Start::Up => "attractor followed upwards",
+            Start::Down => "attractor followed downwards",
+        }
+    }
+
+    /// Whether cells start from their neighbours.
+    pub fn follows(&self) -> bool {
+        matches!(self, Start::Up | Start::Down)
+    }
+}
+
+impl From<Start> for bifurcation::Policy {
+    fn from(start: Start) -> Self {
+        match start {
+            Start::Rest => bifurcation::Policy::From(REST),
+            Start::State(state) => bifurcation::Policy::From(state),
+            Start::Up => bifurcation::Policy::Up,
+            Start::Down => bifurcation::Policy::Down,
+        }
+    }
+}
+
+/// Several starts per cell: the policy's own, then states drawn at random.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Draw {
+    /// Starts per cell, the policy's own included; at least 2.
+    pub count: u32,
+    /// What decides the draw.
+    pub seed: u32,
+}
+
+/// `start.policy` as written, before its state is known.
+#[derive(Clone, Copy, PartialEq)]
+enum Policy {
+    Rest,
+    State,
+    Up,
+    Down,
+}
+
+const FIELDS: [&str; 4] = ["policy", "state", "count", "seed"];
+const POLICIES: [(&str, Policy); 4] =
+    [("rest", Policy::Rest), ("state", Policy::State), ("up", Policy::Up), ("down", Policy::Down)];
+
+pub(super) fn read(root: &Section<'_>) -> Result<Start, SceneError> {
+    let section = root.section("start", &FIELDS)?;
+    let policy = section.get("policy").map_or(Ok(Policy::Rest), |field| field.choice(&POLICIES))?;
+    match (policy, section.get("state")) {
+        (Policy::State, Some(field)) => read_state(&field).map(Start::State),
+        (Policy::State, None) => {
+            Err(section.missing("state", "policy = \"state\" needs state = [x1, v1, x2, v2]"))
+        }
+        (_, Some(field)) => Err(field.conflict(
+            "it is read with start.policy = \"state\" alone; set that or drop the state".to_owned(),
+        )),
+        (Policy::Rest, None) => Ok(Start::Rest),
+        (Policy::Up, None) => Ok(Start::Up),
+        (Policy::Down, None) => Ok(Start::Down),
+    }
+}
+
+fn read_state(field: &Field<'_>) -> Result<State, SceneError> {
+    let expected = "four finite numbers, [x1, v1, x2, v2]";
+    let mut numbers = Vec::new();
+    for item in field.list(expected)? {
+        let number = item.number()?;
+        if !number.is_finite() {
+            return Err(item.out_of_range("a finite number"));
+        }
+        numbers.push(number);
+    }
+    numbers.try_into().map_err(|_| field.out_of_range(expected))
+}
+
+/// `count` and `seed`; none for one start per cell.
+pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<Draw>, SceneError> {
+    let section = root.section("start", &FIELDS)?;
+    let seed = section.get("seed").map(|field| field.whole(0..=u32::MAX)).transpose()?;
+    let count = match section.get("count") {
+        Some(field) => field.whole(1..=MAX_STARTS)?,
+        None => 1,
+    };
+    match (section.get("count").filter(|_| count > 1), section.get("seed")) {
+        (Some(field), _) if purpose == Purpose::Bifurcation => {
+            Err(field
+                .conflict("`bifurcation` follows one motion per column; drop it, or draw a `map`".into()))
+        }
+        (None, Some(field)) => Err(field.conflict("it draws nothing without start.count above 1".into())),
+        (None, None) => Ok(None),
+        (Some(_), _) => Ok(Some(Draw { count, seed: seed.unwrap_or(1) })),
+    }
+}
+
+/// Refuses starts that do not fit each other, or a map that is refined.
+pub(super) fn check(root: &Section<'_>, start: Start, draw: Option<Draw>) -> Result<(), SceneError> {
+    let section = root.section("start", &FIELDS)?;
+    let is_refined = root.get("refine").is_some();
+    match (section.get("policy"), section.get("count")) {
+        (_, Some(count)) if draw.is_some() && start.follows() => Err(count.conflict(
+            "cells that follow their neighbours have one start each; use policy \"rest\" or \"state\"".into(),
+        )),
+        (Some(policy), _) if is_refined && start.follows() => Err(policy.conflict(
+            "filled cells have no motion for their neighbours to start from; drop [refine]".into(),
+        )),
+        (_, Some(count)) if is_refined && draw.is_some() => Err(count.conflict(
+            "where the map is filled, attractors are not looked for; drop [refine] or the count".into(),
+        )),
+        _ => Ok(()),
+    }
+}
