@@ -2,3 +2,4 @@
 
 pub mod engines;
 pub mod stability;
+pub mod work_precision;

@@ -9,7 +9,7 @@ use crate::error::Failure;
 
 pub(crate) fn run(ask: &Bench) -> Result<(), Failure> {
     match ask {
-        Bench::WorkPrecision(ask) => work_precision::run(&ask.run),
+        Bench::WorkPrecision(ask) => work_precision::run(ask),
         Bench::Engines(ask) => engines::run(ask),
         Bench::Stability(ask) => stability::run(&ask.run),
     }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use rattlemap::bench::work_precision::measure::Method;
 use rattlemap::gpu::Precision;
 use rattlemap::model::State;
 use rattlemap::orbit::Settings;
@@ -55,10 +56,38 @@ pub(crate) enum Bench {
 }
 
 /// Error of strobe states and event times against run time per period, for every method
+///
+/// Lanes in f32 and f64, classical Runge-Kutta in WGSL and on one core, semi-implicit Euler,
+/// DOP853 and the reference integrate the same cells; methods take turns. Writes
+/// work_precision.csv, a figure each for the worst and the median cell and for event times,
+/// cells.json for programs outside (benches/peers) and manifest.json, and prints the ratios of
+/// run time at equal error. Takes minutes, and wants a quiet machine.
 #[derive(Debug, Args)]
 pub(crate) struct WorkPrecision {
     #[command(flatten)]
     pub(crate) run: BenchOptions,
+
+    /// Methods to measure, comma-separated, such as lane-f64,rk4-core; all unless given
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = method)]
+    pub(crate) methods: Vec<Method>,
+
+    /// Times that everything is measured
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) rounds: u32,
+
+    /// Copies of each cell's lanes on a device; as many as fill it unless given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) copies: Option<u32>,
+
+    /// Results of other programs on the same cells, made by benches/peers/run.sh, to draw and compare
+    #[arg(long, value_name = "CSV")]
+    pub(crate) peers: Option<PathBuf>,
+}
+
+fn method(text: &str) -> Result<Method, String> {
+    let names = Method::ALL.map(Method::name);
+    let named = Method::ALL.into_iter().find(|method| method.name() == text);
+    named.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
 }
 
 /// The same scene on every engine: same answers, and where the time goes

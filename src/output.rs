@@ -26,6 +26,8 @@ mod report;
 pub mod stability;
 mod stability_figures;
 mod validation_json;
+pub mod work_precision;
+mod work_precision_figure;
 
 pub use cells::Cells;
 pub use folder::{Folder, FolderError};

@@ -1,0 +1,171 @@
+"""Peers on the cells of `rattlemap bench work-precision`, in turns with its one-core engine.
+
+usage: measure.py BINARY FOLDER [--rounds N] [--quick]
+
+Asks BINARY for the cells, times every method once per round, one after the other on one core,
+and writes FOLDER/peers.csv: rows for the command's `--peers`.
+"""
+
+import argparse
+import csv
+import math
+import statistics
+import subprocess
+import time
+from pathlib import Path
+
+import heyoka
+import numba
+
+import cells as cell_files
+import heyoka_events
+import rk4_numba
+
+NUMBA_STEPS = (128, 256, 512, 1024, 2048)
+HEYOKA_TOLERANCES = (1e-9, 1e-12)
+# Least time of a measurement, in seconds: the cells are run again until it has passed.
+LEAST = 0.2
+
+COLUMNS = (
+    "method device precision steps tolerance cores lanes periods rounds seconds_per_lane_period fastest slowest "
+    "state_error_median state_error_worst event_error_median event_error_worst lost"
+).split()
+
+
+class Numba:
+    method, tolerance = "rk4-numba", None
+    device = f"one core, numba {numba.__version__}"
+
+    def __init__(self, steps, cells):
+        self.steps = steps
+        names = heyoka_events.NAMES
+        self.work = [
+            (tuple(float(cell.parameters[name]) for name in names), tuple(cell_files.to_gap(cell.start)), cell.periods)
+            for cell in cells
+        ]
+
+    def run(self):
+        return [rk4_numba.integrate(p, start, periods, self.steps) for p, start, periods in self.work]
+
+
+class Heyoka:
+    method, steps = "heyoka", None
+    device = f"one core, heyoka {heyoka.__version__}"
+
+    def __init__(self, tolerance, cells):
+        self.tolerance = tolerance
+        self.integrator = heyoka_events.Integrator(tolerance)
+        self.work = [
+            (
+                [float(cell.parameters[name]) for name in heyoka_events.NAMES],
+                cell_files.to_gap(cell.start),
+                cell.periods * cell.period,
+                cell.period,
+            )
+            for cell in cells
+        ]
+
+    def run(self):
+        results = []
+        for parameters, start, until, period in self.work:
+            q = self.integrator.integrate(parameters, start, until)
+            results.append((q, [t % period for t in heyoka_events.events[:-3:-1]]))
+        return results
+
+
+class Reference:
+    """Our one-core engine, which times itself without its start."""
+
+    def __init__(self, binary, folder):
+        self.folder = Path(folder) / "reference"
+        self.command = [binary, "bench", "work-precision", "--methods", "reference", "--rounds", "1"]
+        self.command += ["--out", str(self.folder), "--force", "--quiet"]
+
+    def seconds(self):
+        subprocess.run(self.command, check=True)
+        with open(self.folder / "work_precision.csv", encoding="utf-8") as file:
+            (self.row,) = csv.DictReader(file)
+        return float(self.row["seconds_per_lane_period"])
+
+
+def seconds_per_lane_period(method, lane_periods, least):
+    runs, start = 0, time.perf_counter()
+    while True:
+        method.run()
+        runs += 1
+        elapsed = time.perf_counter() - start
+        if elapsed >= least:
+            return elapsed / (runs * lane_periods)
+
+
+def row(method, times, cells):
+    results = method.run()
+    state = [cell_files.state_error(cell, q) for cell, (q, _) in zip(cells, results)]
+    event = [cell_files.event_error(cell, latest) for cell, (_, latest) in zip(cells, results)]
+    event = [error for error in event if error is not None]
+    return {
+        "method": method.method,
+        "device": method.device,
+        "precision": "f64",
+        "steps": method.steps,
+        "tolerance": method.tolerance,
+        "cores": 1,
+        "lanes": len(cells),
+        "periods": cells[0].periods,
+        "rounds": len(times),
+        "seconds_per_lane_period": statistics.median(times),
+        "fastest": min(times),
+        "slowest": max(times),
+        "state_error_median": statistics.median_low(state),
+        "state_error_worst": max(state),
+        "event_error_median": statistics.median_low(event),
+        "event_error_worst": max(event),
+        "lost": sum(map(math.isinf, state)),
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("binary")
+    parser.add_argument("folder")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--quick", action="store_true", help="one round of one setting each: does it work?")
+    ask = parser.parse_args()
+
+    Path(ask.folder).mkdir(parents=True, exist_ok=True)
+    reference = Reference(ask.binary, ask.folder)
+    reference.seconds()
+    cells = cell_files.read(reference.folder / "cells.json")
+    steps, tolerances = (NUMBA_STEPS, HEYOKA_TOLERANCES) if not ask.quick else (NUMBA_STEPS[:1], HEYOKA_TOLERANCES[:1])
+    methods = [Numba(n, cells) for n in steps] + [Heyoka(tolerance, cells) for tolerance in tolerances]
+    lane_periods = sum(cell.periods for cell in cells)
+    for method in methods:
+        method.run()  # compiles
+
+    times = {method: [] for method in methods}
+    own = []
+    for _ in range(1 if ask.quick else ask.rounds):
+        own.append(reference.seconds())
+        for method in methods:
+            times[method].append(seconds_per_lane_period(method, lane_periods, 0.0 if ask.quick else LEAST))
+
+    # Our engine as it was beside them: ratios are taken against this.
+    beside = dict(reference.row, method="reference-beside-peers", rounds=len(own))
+    beside |= {"seconds_per_lane_period": statistics.median(own), "fastest": min(own), "slowest": max(own)}
+    rows = [row(method, times[method], cells) for method in methods]
+    path = Path(ask.folder) / "peers.csv"
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows([beside, *rows])
+    for r in [beside, *rows]:
+        setting = r["steps"] or r["tolerance"] or "-"
+        print(
+            f"{r['method']:<24} {setting!s:>8} {1e6 * float(r['seconds_per_lane_period']):10.3f} us per lane-period, "
+            f"worst {float(r['state_error_worst']):.1e}, median {float(r['state_error_median']):.1e}, lost {r['lost']}"
+        )
+    print(path)
+
+
+if __name__ == "__main__":
+    main()

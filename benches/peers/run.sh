@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Peers beside the one-core engine on the same cells: a virtual environment with numba and
+# heyoka, then alternating rounds. Writes out/bench/peers/peers.csv, for
+# `rattlemap bench work-precision --peers`. Arguments go to measure.py: --rounds N, --quick.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+environment="out/peers-venv"
+binary="target/release/rattlemap"
+
+command -v python3 >/dev/null || { echo "error: python3 is missing" >&2; exit 1; }
+cargo build --release
+if ! cmp -s benches/peers/requirements.txt "$environment/installed.txt"; then
+    python3 -m venv "$environment"
+    "$environment/bin/pip" install --quiet --requirement benches/peers/requirements.txt
+    cp benches/peers/requirements.txt "$environment/installed.txt"
+fi
+# One core for everybody.
+export NUMBA_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=1
+export NUMBA_CACHE_DIR="$PWD/out/peers-venv/cache"
+exec "$environment/bin/python" benches/peers/measure.py "$binary" out/bench/peers "$@"
