@@ -100,6 +100,21 @@ fn count(plane: &Plane, size: &Size, precision: Precision, function: &str) -> f6
     records.iter().map(|record| record.impacts_per_period).sum::<f64>() / records.len() as f64
 }
 
+/// What scenes ask for, and what is compiled for it.
+fn variants(precision: Precision) -> [(&'static str, Variant); 7] {
+    let everything = Variant::of(precision);
+    let class = Variant { word: false, mesh: false, symmetry: false, ..everything };
+    [
+        ("everything", everything),
+        ("everything, before the exponent", Variant { growth: false, ..everything }),
+        ("class, exponent, word", Variant { word: true, ..class }),
+        ("class, exponent", class),
+        ("class, before the exponent", Variant { growth: false, ..class }),
+        ("averages and words, no class", Variant { exponent: false, growth: false, ..everything }),
+        ("impacts alone", Variant { exponent: false, growth: false, ..class }),
+    ]
+}
+
 fn main() {
     let size = size();
     let plane = Plane::new(size.side);
@@ -127,13 +142,12 @@ fn main() {
             let results: Vec<_> = gpus.iter_mut().map(|gpu| plane.run(gpu, &size, exponent).1).collect();
             assert!(results.iter().all(|other| *other == results[0]), "the forms differ in their results");
         }
-        for exponent in [false, true] {
-            println!("{precision:?}, exponent {exponent}: arithmetic instructions of the text");
-            let counts = instructions(&Variant { exponent, ..Variant::of(precision) }.source());
-            println!("  {:8} a scan step", counts.scan);
-            println!("  {:8} a careful pass, all branches once", counts.careful);
-            println!("  {:8} a root trip", counts.root);
-            println!("  {:8} the whole text with every call copied in", counts.all);
+        println!("{precision:?}: arithmetic instructions of the text, by variant");
+        println!("  {:<44} {:>6} {:>8} {:>6} {:>7}", "", "scan", "careful", "root", "all");
+        for (name, variant) in variants(precision) {
+            let counts = instructions(&variant.source());
+            let [scan, careful, root, all] = [counts.scan, counts.careful, counts.root, counts.all];
+            println!("  {name:<44} {scan:6} {careful:8} {root:6} {all:7}");
         }
     }
 }

@@ -1,8 +1,8 @@
 // The queue of lanes that are still running, compacted between dispatches: ended lanes cost
 // nothing, and those that are left keep their order, for neighbours behave alike.
 //
-// Three passes: blocks of the queue are counted, the counts summed up, and what is left of every
-// block moved to its place in the queue's other half.
+// Four passes: blocks of the queue are counted, the counts summed up, what is left of every block
+// moved to its place in the queue's other half, and that half made the queue.
 
 const BLOCK: u32 = 256u;
 

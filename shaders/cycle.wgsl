@@ -31,6 +31,10 @@ fn spectral_growth() -> Real {
         for (var k = 0u; k < 16u; k++) {
             size = max(size, abs(m[k]));
         }
+        if !(size < 1e30) {
+            // Beyond what can be told, and no number any more.
+            return 100.0;
+        }
         if !(size > 1e-30) {
             // Superstable, as far as can be told.
             return -100.0;
@@ -55,43 +59,56 @@ fn spectral_growth() -> Real {
 // periods left: chaos lingers at unstable cycles, and where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
+    let is_last = tally.period >= settings.longest;
     if !EXPONENT {
+        // As near its start as at the end: a multiple of the period has been read.
+        if tally.divisor > 0u && tally.divisor_apart + 8u >= tally.apart && reads_divisor() {
+            return;
+        }
         tally.cycle = tally.candidate;
         return;
     }
     motion.cycle_growth = spectral_growth();
-    let is_last = tally.period >= settings.longest;
-    if motion.cycle_growth >= 0.0 {
-        if !is_last {
-            give_up();
-            search_on();
-        }
-        return;
-    }
-    if settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
+    note_branch();
+    let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    if attracts && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
         tally.stage = STAGE_READING;
         return;
     }
-    if is_multiple() {
-        // Beyond the last period it stays undecided.
-        if !is_last {
-            tally.candidate = tally.divisor;
-            begin_reading();
-        }
-        return;
-    }
-    if is_last || (is_on_cycle() && is_own()) {
+    let is_cycle = attracts && is_own() && (is_last || is_on_cycle());
+    if is_cycle && !is_multiple() {
         tally.cycle = tally.candidate;
         return;
     }
+    if is_cycle && reads_divisor() {
+        return;
+    }
     give_up();
-    look_again();
+    if is_last {
+        return;
+    }
+    if attracts {
+        look_again();
+    } else {
+        search_on();
+    }
+}
+
+// Reads the divisor of the period, if there is time left.
+fn reads_divisor() -> bool {
+    if tally.period + tally.divisor > settings.longest {
+        return false;
+    }
+    tally.candidate = tally.divisor;
+    begin_reading();
+    return true;
 }
 
 // The cycle attracts, but is too far off: its recurrences count on.
 fn look_again() {
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
+    begin_counting();
     forget_growth();
     begin_window(strobe_state(), tally.window);
 }
@@ -101,6 +118,7 @@ fn search_on() {
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
     tally.tries += 1u;
+    begin_counting();
     forget_growth();
     tally.window = 0u;
     tally.candidate = 0u;

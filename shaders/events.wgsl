@@ -245,7 +245,7 @@ fn careful() -> bool {
     motion.q = state_at(found.tau, substeps);
     motion.bound += here.growth;
     tally.order = 0u;
-    if d > 0u {
+    if MESH && d > 0u {
         count_meshing(found.tau * share);
     }
     advance_phase(found.tau * share);

@@ -129,8 +129,10 @@ fn scan() -> u32 {
         step_columns(taken);
     }
     // Whole numbers, so that it does not matter where a dispatch ends.
-    tally.mesh_right += select(0u, taken, d == 1u);
-    tally.mesh_left += select(0u, taken, d == 2u);
+    if MESH {
+        tally.mesh_right += select(0u, taken, d == 1u);
+        tally.mesh_left += select(0u, taken, d == 2u);
+    }
     return verdict;
 }
 

@@ -194,6 +194,10 @@ struct TallyNow {
     // Newton steps towards the cycle, and the events on it before the first.
     refinements: u32,
     branch: u32,
+    // The period for which that was, and what governed the motion where Newton set out.
+    branch_period: u32,
+    home_mode: u32,
+    home_origin: u32,
     // The divisor of its period after which it came nearest to its start, and how near.
     divisor: u32,
     divisor_apart: u32,

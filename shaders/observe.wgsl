@@ -18,7 +18,8 @@ const SLOW: u32 = 48u;
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Lags of the first window; the following ones are twice as long each.
+// Lags of the first window, and of any: the following ones are a quarter of the time that has
+// passed, or a few cycles.
 const FIRST_WINDOW: u32 = 4u;
 // Windows need not be longer than so many cycles that contract.
 const LAGS_PER_CYCLE: u32 = 4u;
@@ -64,7 +65,10 @@ fn begin_period() {
     }
 }
 
-// Standard errors by which the exponent must exceed zero: at half the budget, and after it.
+// Periods over which averages are taken, at least, before chaos is called early.
+const LEAST_COUNTED: u32 = 32u;
+
+// Standard errors by which the exponent must exceed zero: before the budget is spent, and after.
 const EARLY_CHAOS_ERRORS: Real = 6.0;
 const CHAOS_ERRORS: Real = 3.0;
 // And those that cast doubt on a cycle that has not settled.
@@ -80,6 +84,10 @@ const FEWEST_BLOCKS: u32 = 6u;
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
     if tally.block_periods > 0u || tally.blocks < FEWEST_BLOCKS || tally.streak >= STREAK || tally.period < settings.chaos_from {
+        return false;
+    }
+    // Averages that a cycle read in vain has interrupted begin anew.
+    if tally.period < tally.counted_from + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
     let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
@@ -156,7 +164,9 @@ fn begin_counting() {
     tally.hash_low = 0u;
     tally.hash_high = 0u;
     tally.recent = 0u;
-    tallies[lane].word = array<u32, 7>();
+    if WORD {
+        tallies[lane].word = array<u32, 7>();
+    }
     tally.counted_from = tally.period;
 }
 
@@ -348,7 +358,7 @@ fn note_symbol(side: u32) {
         return;
     }
     let n = tally.word_length;
-    if n < 70u {
+    if WORD && n < 70u {
         tallies[lane].word[n / 10u] |= symbol << (3u * (n % 10u));
     }
     tally.word_length = n + 1u;

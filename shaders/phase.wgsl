@@ -46,6 +46,6 @@ fn to_mark(mark: u32) -> Real {
 // may be its own mirror image and stands halfway.
 fn next_mark() -> u32 {
     let steps = shape.steps;
-    let halfway = tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
+    let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
     return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
 }

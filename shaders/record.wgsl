@@ -16,10 +16,13 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
         finding.valid = VALID_STROBE;
     }
     if tally.status == STATUS_OK {
-        finding.valid |= VALID_IMPACTS | VALID_MESH;
+        finding.valid |= VALID_IMPACTS;
         finding.impacts = tally.impacts;
         finding.counted = max(tally.period - tally.counted_from, 1u);
-        reading.mesh_fraction = mesh_fraction(finding.counted);
+        if MESH {
+            finding.valid |= VALID_MESH;
+            reading.mesh_fraction = mesh_fraction(finding.counted);
+        }
         if settings.max_period > 0u {
             finding.valid |= VALID_PERIOD;
             finding.period = tally.cycle;
@@ -66,13 +69,16 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     // Contact-free motion has not been read. On a slow approach a lost symmetry cannot be told
     // from one not reached yet, unless it is lost by far.
     let is_quiet = tally.has_read == 0u;
-    if shapes[cell.flow_index].mirror == 1u && (is_quiet || is_near_cycle() || is_surely_unsymmetric()) {
+    if SYMMETRY && shapes[cell.flow_index].mirror == 1u && (is_quiet || is_near_cycle() || is_surely_unsymmetric()) {
         (*finding).valid |= VALID_SYMMETRIC;
         (*finding).symmetric = select(0u, 1u, is_quiet || tally.mirror >= MIRROR);
     }
     if EXPONENT {
         (*finding).valid |= VALID_LYAPUNOV;
         (*reading).growth = LN_2 * motion.cycle_growth / Real(tally.cycle);
+    }
+    if !WORD {
+        return;
     }
     (*finding).valid |= VALID_WORD;
     (*finding).word_length = tally.word_length;

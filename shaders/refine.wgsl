@@ -12,7 +12,8 @@ const REACH: f32 = 1e-2;
 fn refine() -> bool {
     if tally.refinements == 0u {
         motion.home = strobe_state();
-        tally.branch = branch();
+        tally.home_mode = tally.mode;
+        tally.home_origin = tally.origin;
     }
     let stalls = tally.refinements > 0u && tally.apart < tally.apart_before + SHRUNK;
     let is_over = tally.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
@@ -38,17 +39,22 @@ fn refine() -> bool {
 // The events of the cycle that has been read: along one branch of the strobe map they are the
 // same.
 fn branch() -> u32 {
-    var sum = tally.hash_low + tally.events;
-    for (var n = 0u; n < 7u; n++) {
-        sum = mix_bits(sum + tallies[lane].word[n]);
+    return mix_bits(mix_bits(tally.hash_low + tally.events) + tally.recent);
+}
+
+// Notes the events of the first reading with the present period.
+fn note_branch() {
+    if tally.refinements == 0u || tally.branch_period != tally.candidate {
+        tally.branch = branch();
+        tally.branch_period = tally.candidate;
+        tally.apart_before = 0u;
     }
-    return sum;
 }
 
 // Whether the cycle lies on the branch on which the motion approaches it. Beyond a fold it may
 // be another motion's.
 fn is_own() -> bool {
-    return tally.refinements == 0u || branch() == tally.branch;
+    return branch() == tally.branch;
 }
 
 // Whether the gap may be there in the present domain, at a phase that is no event's.
@@ -65,6 +71,10 @@ fn give_up() {
         return;
     }
     motion.q = motion.home;
+    tally.mode = tally.home_mode;
+    tally.origin = tally.home_origin;
+    // Newton's method does not set out from a wall.
+    tally.order = 0u;
     if tally.mode != MODE_FREE {
         motion.q[0] -= walls[side_of(tally.mode)];
     }

@@ -133,7 +133,7 @@ pub struct Lane {
 /// How lanes are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneSettings {
-    /// Forcing periods to integrate at most; the last of them read the cycle of a periodic
+    /// Forcing periods to integrate at most, `undecided_periods` aside; the last of them read the cycle of a periodic
     /// cell.
     pub periods: u32,
     /// Periods before averages are taken, or `exponent_from` if that is less and lanes stop
@@ -148,6 +148,12 @@ pub struct LaneSettings {
     pub undecided_periods: u32,
     /// Whether exponents are asked for.
     pub exponent: bool,
+    /// Whether words, time spent meshing and symmetry are asked for.
+    pub word: bool,
+    /// See `word`.
+    pub mesh: bool,
+    /// See `word`.
+    pub symmetry: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
     pub exponent_from: u32,
     /// The first period at which chaos may be called, with early stops.
@@ -176,6 +182,9 @@ impl Default for LaneSettings {
             early_stop: true,
             undecided_periods: 0,
             exponent: true,
+            word: true,
+            mesh: true,
+            symmetry: true,
             exponent_from: 100,
             chaos_from: 198,
             steps_per_period: None,
@@ -290,11 +299,12 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
-        let LaneSettings { workgroup, exponent, .. } = *settings;
+        let LaneSettings { workgroup, exponent, word, mesh, symmetry, .. } = *settings;
         let keep = !is_hardware(&self.info);
         // Until they need it, lanes go on without the tangent vector.
         let growths: &[bool] = if exponent { &[false, true] } else { &[false] };
-        let variant = |growth| Variant { precision: self.precision, workgroup, exponent, growth, keep };
+        let precision = self.precision;
+        let variant = |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, keep };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
         for &variant in &variants {
             if !self.pipelines.contains_key(&variant) {

@@ -49,7 +49,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let refined = schedule.finish(&mut records);
     let elapsed = clock.elapsed();
     let attractors = coexistence::attractors(&plan, &records);
-    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref());
+    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
     let (device, lane_steps) = (engine.device(), engine.lane_steps());
     let (engine, precision) = (engine.name(), engine.precision());
     let run = output::map::Run {
@@ -59,7 +59,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         device: &device,
         elapsed,
         resumed_cells,
-        refined,
+        refined: refined.clone(),
     };
     let files = output::map::write(&folder, &cells, &run)?;
     progress.finish(&format!(

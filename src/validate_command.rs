@@ -11,7 +11,7 @@ use rattlemap::output::{Cells, Folder, Identity, RECORDS, RecordFile, RecordFile
 use rattlemap::plan::Plan;
 use rattlemap::record::Record;
 use rattlemap::scene::{Purpose, Scene, Steps};
-use rattlemap::schedule::Schedule;
+use rattlemap::schedule::{Refined, Schedule};
 use rattlemap::sweep;
 use rattlemap::validate::{self, Explanation, Sample, StateCheck, StateSource, Subject, Validation};
 use serde::Deserialize;
@@ -40,7 +40,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let name = dir.join(MANIFEST).display().to_string();
     let scene = Scene::parse(&manifest.scene, &name, &manifest.set, Purpose::Map)?;
     let plan = Plan::new(&scene);
-    let records = read_records(dir, &manifest, &scene, &plan).map_err(Failure::Usage)?;
+    let (records, refined) = read_records(dir, &manifest, &scene, &plan).map_err(Failure::Usage)?;
     let folder = Folder::open(dir, true)?;
     let subject = Subject {
         plan: &plan,
@@ -54,7 +54,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let validation =
         validate::replay(&subject, &sample, source, &|done| progress.report(done, sample.picks.len()));
     let attractors = coexistence::attractors(&plan, &records);
-    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref());
+    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let files = write_validation(&folder, &cells, &made, &validation)?;
     progress.finish(&format!("{}\n{}: {}", summary(&validation), dir.display(), files.join(", ")));
@@ -103,8 +103,13 @@ fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
     }
 }
 
-/// One record per run.
-fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> anyhow::Result<Vec<Record>> {
+/// One record per run, and what became of an adaptive map.
+fn read_records(
+    dir: &Path,
+    manifest: &Manifest,
+    scene: &Scene,
+    plan: &Plan,
+) -> anyhow::Result<(Vec<Record>, Option<Refined>)> {
     let path = dir.join(RECORDS);
     if !path.is_file() {
         return Err(anyhow!(
@@ -132,8 +137,8 @@ fn read_records(dir: &Path, manifest: &Manifest, scene: &Scene, plan: &Plan) -> 
         let cells = schedule.expected();
         return Err(anyhow!("{} holds {done} of {cells} {}; {again}", path.display(), unit(plan)));
     }
-    schedule.finish(&mut records);
-    Ok(records)
+    let refined = schedule.finish(&mut records);
+    Ok((records, refined))
 }
 
 /// Runs the sample's lanes again over a few periods, on the best adapter there is.

@@ -53,7 +53,14 @@ fn records_do_not_depend_on_how_the_work_is_cut() {
                 let laws: Vec<_> = cells.iter().map(|(pair, _)| pair.law()).collect();
                 let lane = |(i, &(_, start)): (u32, &(GearPair, State))| Lane { flow: i, law: i, start };
                 let mut lanes: Vec<_> = (0..).zip(&cells).map(lane).collect();
-                let budget = LaneSettings { periods: 60, transient_periods: 20, ..LaneSettings::default() };
+                // Long enough for chaos to be called, and for cycles to be read in vain.
+                let budget = LaneSettings {
+                    periods: 60,
+                    transient_periods: 20,
+                    undecided_periods: 200,
+                    chaos_from: 40,
+                    ..LaneSettings::default()
+                };
                 let settings = LaneSettings { exponent_from: 10, early_stop, exponent, ..budget };
                 let gpu = &mut *gpu.borrow_mut();
                 let mut whole = records(gpu, (&flows, &laws), &lanes, &settings);

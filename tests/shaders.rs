@@ -56,14 +56,20 @@ macro_rules! same_layout {
 #[test]
 fn every_variant_is_valid_and_lies_as_the_host_says() {
     for precision in Precision::ALL {
-        for (workgroup, exponent, growth, keep) in [
-            (32, false, false, true),
-            (64, true, true, false),
-            (64, true, false, false),
-            (64, false, false, false),
-            (256, true, true, true),
+        let everything = Variant::of(precision);
+        let class = Variant { word: false, mesh: false, symmetry: false, ..everything };
+        for variant in [
+            Variant { keep: true, ..everything },
+            Variant { growth: false, ..everything },
+            Variant { exponent: false, growth: false, ..everything },
+            Variant { workgroup: 256, keep: true, ..class },
+            Variant { growth: false, ..class },
+            Variant { workgroup: 32, exponent: false, growth: false, ..class },
+            Variant { symmetry: true, ..class },
+            Variant { mesh: true, keep: true, ..class },
+            Variant { word: true, growth: false, ..class },
         ] {
-            let (module, _) = &module(Variant { precision, workgroup, exponent, growth, keep });
+            let (module, _) = &module(variant);
             let real = precision.bytes();
             same_layout!(
                 module,
@@ -191,6 +197,9 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     apart_before,
                     refinements,
                     branch,
+                    branch_period,
+                    home_mode,
+                    home_origin,
                     divisor,
                     divisor_apart,
                     distances,
@@ -208,7 +217,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
 fn every_variant_translates_for_every_kind_of_device() {
     for exponent in [false, true] {
         for precision in Precision::ALL {
-            let variant = Variant { exponent, ..Variant::of(precision) };
+            let variant = Variant { exponent, growth: exponent, ..Variant::of(precision) };
             let (module, info) = module(variant);
             let words = spv::write_vec(&module, &info, &spv::Options::default(), None)
                 .unwrap_or_else(|error| panic!("SPIR-V, {variant:?}: {error}"));

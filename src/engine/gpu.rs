@@ -147,6 +147,9 @@ fn lane_settings(plan: &Plan) -> LaneSettings {
         early_stop: budget.early_stop,
         undecided_periods: budget.undecided_periods,
         exponent: budget.exponent,
+        word: plan.needs().word,
+        mesh: plan.needs().mesh,
+        symmetry: plan.needs().symmetric,
         exponent_from: budget.exponent_from(),
         chaos_from: budget.chaos_from(),
         steps_per_period: match plan.steps_per_period() {

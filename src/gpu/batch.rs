@@ -26,6 +26,10 @@ const QUEUE_HEAD: usize = 3;
 /// Blocks whose means give the exponent's standard error.
 const EXPONENT_BLOCKS: u32 = 32;
 
+/// Periods of a block at least: neighbouring periods are alike, and a standard error made of them
+/// is too small.
+const SHORTEST_BLOCK: u32 = 4;
+
 pub(super) async fn run(
     gpu: &Gpu,
     variants: &[&Pipelines],
@@ -73,7 +77,7 @@ pub(super) fn largest_batch(limits: &wgpu::Limits) -> usize {
 
 /// Periods per block of the exponent.
 fn exponent_block(settings: &LaneSettings) -> u32 {
-    (settings.periods.saturating_sub(settings.exponent_from) / EXPONENT_BLOCKS).max(1)
+    (settings.periods.saturating_sub(settings.exponent_from) / EXPONENT_BLOCKS).max(SHORTEST_BLOCK)
 }
 
 /// One batch on the device: its buffers.

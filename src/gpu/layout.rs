@@ -238,6 +238,12 @@ pub struct Tally {
     pub refinements: u32,
     /// The events on it before the first, hashed.
     pub branch: u32,
+    /// The period for which that was.
+    pub branch_period: u32,
+    /// What governed the motion where Newton's method set out.
+    pub home_mode: u32,
+    /// Wall of the last event there.
+    pub home_origin: u32,
     /// Divisor of its period after which it came nearest to its start.
     pub divisor: u32,
     /// How near, in quarter octaves below 1.

@@ -52,19 +52,13 @@ impl Rounds<'_> {
     pub(super) async fn run(&self, variants: &[&Pipelines]) -> Result<Option<f64>, GpuError> {
         let clock = self.gpu.watcher.as_ref().and_then(|_| Clock::new(&self.gpu.device, &self.gpu.queue));
         let mut seconds = 0.0;
-        let mut trips = FEWEST_TRIPS.min(self.most_trips);
         for pipelines in variants {
-            seconds += self.run_variant(pipelines, clock.as_ref(), &mut trips).await?;
+            seconds += self.run_variant(pipelines, clock.as_ref()).await?;
         }
         Ok(clock.map(|_| seconds))
     }
 
-    async fn run_variant(
-        &self,
-        pipelines: &Pipelines,
-        clock: Option<&Clock>,
-        trips: &mut u32,
-    ) -> Result<f64, GpuError> {
+    async fn run_variant(&self, pipelines: &Pipelines, clock: Option<&Clock>) -> Result<f64, GpuError> {
         let gpu = self.gpu;
         // All lanes are looked at anew: those that waited for this variant are left.
         let everyone: Vec<u32> = [self.lanes, 0, self.lanes].into_iter().chain(0..self.lanes).collect();
@@ -77,10 +71,12 @@ impl Rounds<'_> {
             .map(|(entry_point, pipeline)| (pipeline, bind(gpu, pipeline, entry_point, self.buffers)))
             .collect();
         let (mut left, mut seconds) = (self.lanes, 0.0);
-        let mut before: Option<(&wgpu::Buffer, wgpu::SubmissionIndex)> = None;
+        let most = self.most_trips.max(1);
+        let mut trips = FEWEST_TRIPS.min(most);
+        let mut before: Option<(&wgpu::Buffer, wgpu::SubmissionIndex, u32)> = None;
         let mut last_end = Instant::now();
         for (slot, look) in (0..2).zip(&looks).cycle() {
-            gpu.queue.write_buffer(self.settings, TRIPS, bytemuck::bytes_of(trips));
+            gpu.queue.write_buffer(self.settings, TRIPS, bytemuck::bytes_of(&trips));
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             for (nth, (pipeline, bindings)) in (0..).zip(&compact) {
                 let writes = clock.and_then(|clock| clock.writes(slot, nth == 0, false));
@@ -98,7 +94,9 @@ impl Rounds<'_> {
                 clock.copy(&mut encoder, slot, look, TIMES);
             }
             let submission = gpu.queue.submit([encoder.finish()]);
-            let Some((look, submission)) = before.replace((look, submission)) else { continue };
+            let Some((look, submission, its_trips)) = before.replace((look, submission, trips)) else {
+                continue;
+            };
             let take = |bytes: &[u8]| {
                 let took = clock.map_or(0.0, |clock| clock.seconds(&bytes[TIMES as usize..]));
                 (bytemuck::pod_read_unaligned::<u32>(&bytes[..4]), took)
@@ -109,8 +107,7 @@ impl Rounds<'_> {
             if left == 0 {
                 break;
             }
-            *trips = next_trips(*trips, last_end.elapsed())
-                .clamp(FEWEST_TRIPS.min(self.most_trips), self.most_trips);
+            trips = next_trips(its_trips, last_end.elapsed()).clamp(FEWEST_TRIPS.min(most), most);
             last_end = Instant::now();
         }
         Ok(seconds)
@@ -123,8 +120,8 @@ impl Rounds<'_> {
     }
 }
 
-/// Trips for a round of the wanted length, from what the last ones took. What is done does not
-/// depend on it.
+/// Trips for a round of the wanted length, from those of an earlier one and the time that it took.
+/// What is done does not depend on it.
 fn next_trips(trips: u32, took: Duration) -> u32 {
     let factor = ROUND.as_secs_f64() / took.as_secs_f64().max(1e-6);
     (f64::from(trips) * factor.clamp(0.25, 2.0)) as u32
@@ -172,12 +169,14 @@ mod tests {
 
     #[test]
     fn rounds_tend_to_their_length() {
-        let mut trips = 1000;
+        // 0.3 ms per trip; what a round took is known when the next one is already under way.
+        let (mut under_way, mut trips) = (1000, 1000);
         for _ in 0..20 {
-            // 0.3 ms per trip.
-            trips = next_trips(trips, Duration::from_micros(300) * trips);
+            let next = next_trips(under_way, Duration::from_micros(300) * under_way);
+            (under_way, trips) = (trips, next);
         }
         assert!((300..=340).contains(&trips), "{trips}");
+        assert!((300..=340).contains(&under_way), "{under_way}");
         assert_eq!(next_trips(1000, Duration::ZERO), 2000);
         assert_eq!(next_trips(1000, Duration::from_secs(100)), 250);
     }

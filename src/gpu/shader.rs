@@ -44,6 +44,12 @@ pub struct Variant {
     pub exponent: bool,
     /// Whether a tangent vector is carried for the exponent of motion at no cycle.
     pub growth: bool,
+    /// Whether cycles get their word spelled out.
+    pub word: bool,
+    /// Whether the time spent meshing is counted.
+    pub mesh: bool,
+    /// Whether cycles are compared with their mirror image.
+    pub symmetry: bool,
     /// Whether lanes keep copies of all their constants: for software drivers.
     pub keep: bool,
 }
@@ -74,7 +80,16 @@ const BODY: &str = concat!(
 impl Variant {
     /// The variant of a precision with the usual workgroup.
     pub fn of(precision: Precision) -> Variant {
-        Variant { precision, workgroup: WORKGROUP, exponent: true, growth: true, keep: false }
+        Variant {
+            precision,
+            workgroup: WORKGROUP,
+            exponent: true,
+            growth: true,
+            word: true,
+            mesh: true,
+            symmetry: true,
+            keep: false,
+        }
     }
 
     /// Its WGSL source.
@@ -83,7 +98,7 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let Variant { workgroup, exponent, growth, keep, .. } = self;
+        let Variant { workgroup, exponent, growth, word, mesh, symmetry, keep, .. } = self;
         let terms = terms(real);
         let body = unroll(BODY, terms);
         let bits: String =
@@ -91,6 +106,7 @@ impl Variant {
         format!(
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
              const GROWTH: bool = {growth};\n\
+             const WORD: bool = {word};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
              const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
         )
     }

@@ -41,6 +41,9 @@ const HASTY_CHAOS_ERRORS: f64 = 5.0;
 const EARLY_CHAOS_FROM: u32 = 3;
 const HASTY_CHAOS_FROM: u32 = 2;
 
+/// Periods, at least, over which an exponent is averaged before chaos is called early.
+const LEAST_AVERAGED: u32 = 32;
+
 /// Chaos has to outgrow this power of time.
 const NEUTRAL_ORDER: f64 = 2.0;
 
@@ -78,7 +81,8 @@ impl Budget {
     /// The first period at which chaos may be called, with early stops.
     pub fn chaos_from(&self) -> u32 {
         let eighths = if self.shows_exponent { EARLY_CHAOS_FROM } else { HASTY_CHAOS_FROM };
-        (self.periods() / 8 * eighths).max(self.settings.observed_periods)
+        let from = (self.periods() / 8 * eighths).max(self.settings.observed_periods);
+        from.max(self.exponent_from() + LEAST_AVERAGED)
     }
 
     /// Standard errors by which the exponent must exceed zero then.
@@ -128,6 +132,7 @@ pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measured
         strobes: vec![start],
         exponent: Exponent::default(),
         cycle: None,
+        approaches: false,
         counts: vec![[0.0; 2]],
     };
     watch.run(start).unwrap_or_else(|stop| watch.stopped(stop))
@@ -149,6 +154,8 @@ struct Watch<'a> {
     strobes: Vec<State>,
     exponent: Exponent,
     cycle: Option<Found<'a>>,
+    /// Whether the last look found it, or saw the motion nearer to it than then.
+    approaches: bool,
     /// Impacts and meshing time so far at every strobe.
     counts: Vec<[f64; 2]>,
 }
@@ -213,7 +220,7 @@ impl<'a> Watch<'a> {
         Ok(match now {
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
             _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measured::is_decided),
-            _ if now >= chaos_from => {
+            _ if now >= chaos_from && !self.approaches => {
                 Some(self.aperiodic(self.budget.chaos_errors())).filter(Measured::is_decided)
             }
             _ => None,
@@ -257,8 +264,9 @@ impl<'a> Watch<'a> {
             return Ok(Some(orbit));
         }
         // One that is being approached needs no second look.
-        if !is_last && self.cycle.as_ref().is_some_and(|found| self.present(found, &metric) < found.distance)
-        {
+        self.approaches =
+            self.cycle.as_ref().is_some_and(|found| self.present(found, &metric) < found.distance);
+        if !is_last && self.approaches {
             return Ok(None);
         }
         for candidate in candidates(window, &metric, max_period) {
@@ -268,6 +276,8 @@ impl<'a> Watch<'a> {
                 let Some(cycle) = self.analysis.smallest(seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
                 if cycle.spectral_radius() < 1.0 && distance < NEAR {
+                    // The next look will tell whether it is being approached.
+                    self.approaches = true;
                     let at = self.strobes.len() - 1;
                     self.cycle = Some(Found { cycle, seed: seed.clone(), at, distance });
                     if let Some(orbit) = self.approached(&metric, near)? {
@@ -360,7 +370,8 @@ impl<'a> Watch<'a> {
         let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let lingered = lingering(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_departure = |rate: f64| rate * lingered as f64 * period < DEPARTURE;
-        let is_neutral = |rate: f64| rate * (averaged.len() - 1) as f64 * period <= self.neutral_growth();
+        let is_neutral =
+            |rate: f64| rate * averaged.len().saturating_sub(1) as f64 * period <= self.neutral_growth();
         let slow = surely.is_some_and(is_neutral)
             || 2.0 * lingered as f64 >= span && surely.is_none_or(is_departure);
         Measured {

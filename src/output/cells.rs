@@ -6,6 +6,7 @@ use crate::orbit::{Class, Status};
 use crate::plan::Plan;
 use crate::record::{Record, Spelling, valid};
 use crate::scene::{Continuous, Quantity, Scene};
+use crate::schedule::Refined;
 
 /// Where a cell's values come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +46,7 @@ pub struct Cells<'a> {
     plan: &'a Plan,
     records: &'a [Record],
     attractors: Option<&'a [u8]>,
+    refined: Option<&'a Refined>,
 }
 
 impl<'a> Cells<'a> {
@@ -54,7 +56,16 @@ impl<'a> Cells<'a> {
     /// If there are not as many records as runs.
     pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a [Record]) -> Cells<'a> {
         assert_eq!(plan.run_count(), records.len(), "one record per run");
-        Cells { scene, plan, records, attractors: None }
+        Cells { scene, plan, records, attractors: None, refined: None }
+    }
+
+    /// The same with what became of an adaptive map.
+    pub fn refined(self, refined: Option<&'a Refined>) -> Cells<'a> {
+        Cells { refined, ..self }
+    }
+
+    pub(super) fn refinement(&self) -> Option<&'a Refined> {
+        self.refined
     }
 
     /// The same with the number of attractors found per cell, by id.

@@ -89,7 +89,7 @@ struct IntegrationObject {
 
 /// An adaptive map: how much was integrated, and how good the rest is.
 #[derive(Serialize)]
-struct RefinementObject {
+pub(super) struct RefinementObject {
     integrated: usize,
     filled: usize,
     rounds: usize,

@@ -19,6 +19,7 @@ use serde::Serialize;
 use super::cells::{Cells, Row};
 use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
+use super::map_manifest::RefinementObject;
 use super::validation_json::ValidationObject;
 use super::{names, replay};
 use crate::orbit::Status;
@@ -43,6 +44,8 @@ struct Data<'a> {
     classes: [&'static str; 4],
     statuses: Vec<&'static str>,
     words: Vec<String>,
+    /// What became of an adaptive map.
+    refinement: Option<RefinementObject>,
     validation: Option<&'a ValidationObject>,
 }
 
@@ -113,6 +116,7 @@ pub(super) fn write(
         classes: names::CLASSES,
         statuses: Status::ALL.iter().map(|&status| names::status(status)).collect(),
         words: words.map_or(Vec::new(), |words| words.list.iter().map(|(text, _)| text.clone()).collect()),
+        refinement: cells.refinement().map(RefinementObject::from),
         validation,
     };
     // `<` could end the script that holds the data.

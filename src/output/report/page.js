@@ -358,6 +358,29 @@ byId("copy").addEventListener("click", async () => {
   setTimeout(() => { byId("copy").textContent = "Copy"; }, 1500);
 });
 
+// ---- adaptive maps
+
+const percent = (rate) => `${Number((100 * rate).toPrecision(2))} %`;
+
+// How much was integrated, and what integrating a sample of the rest has shown.
+function tellRefinement({ integrated, filled, rounds, audits }) {
+  byId("refined").hidden = false;
+  const last = audits.at(-1);
+  const share = (100 * integrated / (integrated + filled)).toFixed(1);
+  byId("audit").textContent = `${share} % of the cells were integrated, in ${count(rounds, "round")}; the others are `
+    + "filled with what lies around them. " + (last
+    ? `Of ${count(last.sampled, "filled cell")}, drawn at random and integrated, ${last.wrong} turned out wrong: `
+      + `${percent(last.rate)} (95 %: ${percent(last.interval[0])} to ${percent(last.interval[1])}).`
+    : "No audit was asked for.");
+  if (audits.length > 1) {
+    byId("audits").append(...audits.map((audit, k) => {
+      const row = element("tr");
+      row.append(element("td", `audit ${k + 1}`), element("td", `${audit.wrong} of ${audit.sampled} wrong`, "number"));
+      return row;
+    }));
+  }
+}
+
 // ---- validation
 
 const count = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
@@ -478,6 +501,7 @@ async function start() {
     button.addEventListener("click", () => showLayer(k));
     return button;
   }));
+  if (map.refinement) tellRefinement(map.refinement);
   if (map.validation) tellValidation(map.validation);
   const names = Object.keys(map.values);
   const unpacked = await Promise.all(names.map((name) => unpack(map.values[name])));
