@@ -14,8 +14,9 @@ const RESOLVED: u32 = 60u;
 const AT_REST: u32 = 64u;
 // What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
 const NOISE: f32 = 4e-6;
-// A multiplier that is nearer to 1 than this, in octaves per period, is 1 as far as one can tell.
-const NEUTRAL: Real = 1e-4;
+// A multiplier that is nearer to 1 than this, in octaves per period, is 1 as far as one can tell: a
+// double one, as a free body has, scatters by the square root of rounding.
+const NEUTRAL: Real = 1e-3;
 // Newton's method has done enough this close to the cycle, relative to the motion.
 const REFINED: f32 = 1e-5;
 // Events this close to phase 0, in turns, lie on it.

@@ -14,8 +14,9 @@ const RESOLVED: u32 = 160u;
 const AT_REST: u32 = RESOLVED;
 // What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
 const NOISE: f32 = 1e-14;
-// A multiplier that is nearer to 1 than this, in octaves per period, is 1 as far as one can tell.
-const NEUTRAL: Real = 1e-12;
+// A multiplier that is nearer to 1 than this, in octaves per period, is 1 as far as one can tell: a
+// double one, as a free body has, scatters by the square root of rounding.
+const NEUTRAL: Real = 1e-7;
 // Newton's method has done enough this close to the cycle, relative to the motion.
 const REFINED: f32 = 1e-10;
 // Events this close to phase 0, in turns, lie on it.

@@ -207,10 +207,8 @@ impl<'a> Watch<'a> {
         }
         let (budget, chaos_from) = (self.budget.periods(), self.budget.chaos_from());
         let next = now + now.div_ceil(LOOKS);
-        *look = [chaos_from, budget, last]
-            .into_iter()
-            .find(|&stage| now < stage)
-            .map_or(last, |stage| next.min(stage));
+        let stages = [chaos_from, budget, last].into_iter().filter(|&stage| now < stage && stage <= last);
+        *look = next.min(stages.min().unwrap_or(last));
         let is_last = now == budget || now == last;
         if let Some(orbit) = self.settled(&trajectory.carrying([]), is_last)?
             && (is_last || self.is_own(&orbit))

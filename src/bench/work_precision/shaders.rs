@@ -34,8 +34,8 @@ fn with_event_times(source: &str) -> String {
     );
     replace(
         &noted,
-        "        finding.valid |= VALID_IMPACTS | VALID_MESH;\n",
-        "        finding.valid |= VALID_IMPACTS | VALID_MESH | VALID_LYAPUNOV;\n        \
+        "        finding.valid |= VALID_IMPACTS;\n",
+        "        finding.valid |= VALID_IMPACTS | VALID_LYAPUNOV;\n        \
          reading.growth = motion.growth_sum;\n        reading.growth_error = motion.growth_squares;\n",
     )
 }
