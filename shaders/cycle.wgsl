@@ -1,10 +1,5 @@
 // The cycle that was read: does it attract, and has the lane come near it?
 
-// Squarings of the monodromy matrix. With `n = 2^SQUARINGS` the modulus of its largest
-// multiplier is `|M^n|^(1/n)` up to a factor of `kappa^(1/n)`, kappa the condition of its
-// eigenvectors.
-const SQUARINGS: u32 = 40u;
-
 // A lane has settled once it is this close to its cycle, relative to the motion.
 const ON_CYCLE: f32 = 1e-4;
 
@@ -21,7 +16,9 @@ fn octaves_of(x: Real) -> Real {
 }
 
 // The binary logarithm of the spectral radius of the monodromy matrix, whose columns the
-// tangent vectors are: they started as the unit vectors.
+// tangent vectors are: they started as the unit vectors. With `n = 2^SQUARINGS` the modulus of
+// the largest multiplier is `|M^n|^(1/n)` up to a factor of `kappa^(1/n)`, kappa the condition
+// of its eigenvectors.
 fn spectral_growth() -> Real {
     var m = motions[lane].tangents;
     var growth: Real = 0.0;

@@ -21,3 +21,5 @@ const NEUTRAL: Real = 1e-7;
 const REFINED: f32 = 1e-10;
 // Events this close to phase 0, in turns, lie on it.
 const ON_STROBE: Real = 1e-9;
+// Squarings of the monodromy matrix: the spectral radius to the last digits.
+const SQUARINGS: u32 = 40u;
