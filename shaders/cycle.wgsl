@@ -2,6 +2,8 @@
 
 // A lane has settled once it is this close to its cycle, relative to the motion.
 const ON_CYCLE: f32 = 1e-4;
+// And at the end of its budget, if it came no closer, this close.
+const ABOUT: f32 = 0.01;
 
 // The binary logarithm of a number near 1e-30 to 1e30, to the precision of its type: f64 has no
 // logarithm of its own. `ln m = 2 artanh((m - 1) / (m + 1))`, m within a factor of sqrt 2 of 1.
@@ -68,11 +70,14 @@ fn judge_cycle() {
     motion.cycle_growth = spectral_growth();
     note_branch();
     let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
-    if attracts && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
+    // Beside a graze the map has no derivative that tells where the cycle is.
+    let is_smooth = tally.grazes == 0u || tally.refinements > 0u;
+    if attracts && is_smooth && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
         tally.stage = STAGE_READING;
         return;
     }
-    let is_cycle = attracts && is_own() && (is_last || is_on_cycle());
+    let is_here = is_on_cycle() || (is_last && (tally.settled != 0u || away() < ABOUT));
+    let is_cycle = attracts && is_own() && is_here;
     if is_cycle && !is_multiple() {
         tally.cycle = tally.candidate;
         return;

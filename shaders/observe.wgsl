@@ -212,6 +212,7 @@ fn recurs() -> bool {
         return false;
     }
     let found = contracting_lag();
+    let is_fast = found > 0u && shrinks(found);
     let settled = judge_lag(found);
     tally.known_lags = tally.window;
     tallies[lane].last_distances = tallies[lane].distances;
@@ -221,16 +222,20 @@ fn recurs() -> bool {
     // A short lag that contracts is seen as well in short windows.
     let enough = max(LAGS_PER_CYCLE * cycle, FIRST_WINDOW);
     let wider = clamp(tally.period / 4u, FIRST_WINDOW, settings.max_period);
-    let lags = select(wider, min(enough, wider), found > 0u);
+    let lags = select(wider, min(enough, wider), is_fast);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
 
 // The lag that recurs best; a longer one must be better by a factor of four.
 fn closest_lag() -> u32 {
+    return closest_of(tally.known_lags);
+}
+
+fn closest_of(lags: u32) -> u32 {
     var best = 0u;
     var distance = NEAR;
-    for (var lag = 1u; lag <= tally.known_lags; lag++) {
+    for (var lag = 1u; lag <= lags; lag++) {
         trips += 1u;
         if distance_at(lag) >= distance {
             best = lag;
@@ -274,11 +279,13 @@ fn last_distance_at(lag: u32) -> u32 {
 // The smallest lag that recurs at all its multiples and contracts, or has reached rounding.
 // Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
+    // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
+    let best = closest_of(tally.window);
     for (var lag = 1u; lag <= min(tally.window, tally.known_lags); lag++) {
         trips += 1u;
         let now = distance_at(lag);
         let before = last_distance_at(lag);
-        let contracts = now >= RESOLVED || now >= before + SHRUNK || (now >= SLOW && now >= before);
+        let contracts = shrinks(lag) || (now >= SLOW && now >= before && lag == best);
         if now < NEAR || !contracts {
             continue;
         }
@@ -292,6 +299,12 @@ fn contracting_lag() -> u32 {
         }
     }
     return 0u;
+}
+
+// Whether the distance at a lag has shrunk since the last window, or is rounding.
+fn shrinks(lag: u32) -> bool {
+    let now = distance_at(lag);
+    return now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
 }
 
 // Whether the limit is near enough: strobes `d` apart that shrink by `mu` per period are

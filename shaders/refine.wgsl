@@ -54,7 +54,7 @@ fn note_branch() {
 // Whether the cycle lies on the branch on which the motion approaches it. Beyond a fold it may
 // be another motion's.
 fn is_own() -> bool {
-    return branch() == tally.branch;
+    return branch() == tally.branch && (tally.grazes == 0u || tally.refinements == 0u);
 }
 
 // Whether the gap may be there in the present domain, at a phase that is no event's.
