@@ -4,6 +4,10 @@
 const ON_CYCLE: f32 = 1e-4;
 // And at the end of its budget, if it came no closer, this close.
 const ABOUT: f32 = 0.01;
+// A lane that rests on a cycle which repels is moved by so many times the scatter of rounding.
+const KICK: f32 = 32.0;
+// Newton's method is not asked again after it led nowhere so often.
+const VAIN: u32 = 2u;
 
 // The binary logarithm of a number near 1e-30 to 1e30, to the precision of its type: f64 has no
 // logarithm of its own. `ln m = 2 artanh((m - 1) / (m + 1))`, m within a factor of sqrt 2 of 1.
@@ -72,18 +76,23 @@ fn judge_cycle() {
     let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
     // Beside a graze the map has no derivative that tells where the cycle is.
     let is_smooth = tally.grazes == 0u || tally.refinements > 0u;
-    if attracts && is_smooth && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
+    // And where rounding is amplified it throws the lane off: such cycles are waited for.
+    let helps = is_smooth && tally.vain < VAIN;
+    if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
         tally.stage = STAGE_READING;
         return;
     }
     let is_here = is_on_cycle() || (is_last && (tally.settled != 0u || away() < ABOUT));
     let is_cycle = attracts && is_own() && is_here;
-    if is_cycle && !is_multiple() {
+    if is_cycle && (!is_multiple() || is_refuted()) {
         tally.cycle = tally.candidate;
         return;
     }
     if is_cycle && reads_divisor() {
         return;
+    }
+    if attracts && is_own() && tally.refinements > 0u {
+        tally.vain += 1u;
     }
     give_up();
     if is_last {
@@ -102,6 +111,7 @@ fn reads_divisor() -> bool {
         return false;
     }
     tally.candidate = tally.divisor;
+    tally.settled = 0u;
     begin_reading();
     return true;
 }
@@ -117,9 +127,19 @@ fn look_again() {
 
 // The exponent starts anew, but for what it has collected; recurrence from scratch.
 fn search_on() {
+    // Rounding may hold a lane on a cycle that repels for ever.
+    if tally.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
+        motion.q[1] += Real(KICK * NOISE) * motion.rate_scale;
+        motion.bound = 0.0;
+        // What grew there was no chaos.
+        tally.blocks = 0u;
+        motion.growth_sum = 0.0;
+        motion.growth_squares = 0.0;
+    }
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
     tally.tries += 1u;
+    tally.refuted = tally.candidate;
     begin_counting();
     forget_growth();
     tally.window = 0u;
@@ -135,13 +155,41 @@ fn is_multiple() -> bool {
     return tally.divisor > 0u && exp2(-f32(tally.divisor_apart) / OCTAVE) < 4.0 * away();
 }
 
+// Whether the cycle of the divisor is known not to attract, and surely is another one.
+fn is_refuted() -> bool {
+    return tally.refuted == tally.divisor && exp2(-f32(tally.divisor_apart) / OCTAVE) > 4.0 * NOISE;
+}
+
+// What rounding moves the state by over a cycle at most, relative to the motion: every event rounds, and
+// the cycle amplifies it.
+fn noise() -> f32 {
+    if !EXPONENT {
+        return NOISE;
+    }
+    let scales = array<Real, 4>(motion.position_scale, motion.rate_scale, motion.position_scale, motion.rate_scale);
+    var gain: Real = 1.0;
+    for (var k = 0u; k < 16u; k++) {
+        let unit = scales[k / 4u] / max(scales[k % 4u], Real(1e-30));
+        gain = max(gain, abs(motions[lane].tangents[k]) * unit);
+    }
+    return f32(ULP * gain) * f32(16u + 2u * tally.events);
+}
+
 // How far the lane is from its cycle at most, relative to the motion.
 fn away() -> f32 {
-    // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
-    let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
     // Rounding may hold a lane still before it is there.
-    let apart = max(exp2(-f32(tally.apart) / OCTAVE), NOISE);
-    return apart / max(1.0 - mu, 1e-6);
+    return limit_of(max(exp2(-f32(tally.apart) / OCTAVE), NOISE));
+}
+
+// And if rounding is taken at its worst.
+fn blur() -> f32 {
+    return max(away(), limit_of(noise()));
+}
+
+// Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
+fn limit_of(d: f32) -> f32 {
+    let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
+    return d / max(1.0 - mu, 1e-6);
 }
 
 // Whether the lane has come so near to its cycle that its symmetry shows.
@@ -152,10 +200,11 @@ fn is_near_cycle() -> bool {
 // Whether the cycle is farther from its mirror image than the lane can be from the cycle: twice
 // that far for the state and as much for the image it is compared with.
 fn is_surely_unsymmetric() -> bool {
-    return exp2(-f32(tally.mirror) / OCTAVE) > 4.0 * max(away(), ON_CYCLE);
+    return exp2(-f32(tally.mirror) / OCTAVE) > 4.0 * max(blur(), ON_CYCLE);
 }
 
 // Near, or as near as rounding lets it.
 fn is_on_cycle() -> bool {
-    return is_near_cycle() || tally.apart >= AT_REST;
+    let is_blurred = tally.vain >= VAIN && tally.settled != 0u && exp2(-f32(tally.apart) / OCTAVE) < min(noise(), ON_CYCLE);
+    return is_near_cycle() || tally.apart >= AT_REST || is_blurred;
 }

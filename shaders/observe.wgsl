@@ -120,12 +120,19 @@ fn departs(errors: Real) -> bool {
     // A lane that has just been sent on lingered. A single lag comes near by chance, its
     // multiples with it do not.
     var lingers = tally.known_lags == 0u;
-    for (var lag = 1u; 2u * lag <= tally.known_lags && !lingers; lag++) {
-        lingers = true;
-        for (var multiple = lag; multiple <= tally.known_lags && lingers; multiple += lag) {
+    var rests = false;
+    for (var lag = 1u; 2u * lag <= tally.known_lags && !rests; lag++) {
+        var nearest = 255u;
+        for (var multiple = lag; multiple <= tally.known_lags && nearest >= NEAR; multiple += lag) {
             trips += 1u;
-            lingers = last_distance_at(multiple) >= NEAR;
+            nearest = min(nearest, last_distance_at(multiple));
         }
+        lingers = lingers || nearest >= NEAR;
+        rests = nearest >= SLOW;
+    }
+    // What rests at a cycle is held there by rounding: its growth is no chaos.
+    if rests {
+        return true;
     }
     let growth = mean_growth();
     let periods = Real(tally.blocks * settings.exponent_block);
@@ -202,7 +209,7 @@ fn recurs() -> bool {
     motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
     motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
     if tally.window == 0u {
-        begin_window(q, FIRST_WINDOW);
+        begin_window(q, widest());
         return false;
     }
     let lag = tally.period - tally.anchor_period;
@@ -221,10 +228,13 @@ fn recurs() -> bool {
     let cycle = max(closest_lag(), 1u);
     // A short lag that contracts is seen as well in short windows.
     let enough = max(LAGS_PER_CYCLE * cycle, FIRST_WINDOW);
-    let wider = clamp(tally.period / 4u, FIRST_WINDOW, settings.max_period);
-    let lags = select(wider, min(enough, wider), is_fast);
+    let lags = select(widest(), min(enough, widest()), is_fast && tally.tries == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
+}
+
+fn widest() -> u32 {
+    return clamp(tally.period / 4u, FIRST_WINDOW, settings.max_period);
 }
 
 // The lag that recurs best; a longer one must be better by a factor of four.
@@ -325,7 +335,7 @@ fn is_refinable(lag: u32) -> bool {
     let now = f32(distance_at(lag));
     let shrunk = now - f32(last_distance_at(lag));
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), SLOWEST, 1.0);
-    return EXPONENT && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
+    return EXPONENT && tally.vain < VAIN && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
 }
 
 // Natural logarithm of a quarter octave.

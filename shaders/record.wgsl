@@ -66,12 +66,14 @@ fn mesh_fraction(periods: u32) -> Real {
 }
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
-    // Contact-free motion has not been read. On a slow approach a lost symmetry cannot be told
-    // from one not reached yet, unless it is lost by far.
-    let is_quiet = tally.has_read == 0u;
-    if SYMMETRY && shapes[cell.flow_index].mirror == 1u && (is_quiet || is_near_cycle() || is_surely_unsymmetric()) {
-        (*finding).valid |= VALID_SYMMETRIC;
-        (*finding).symmetric = select(0u, 1u, is_quiet || tally.mirror >= MIRROR);
+    // Contact-free motion has not been read. On a slow approach, or where rounding is amplified, a lost
+    // symmetry cannot be told from one not reached, unless it is lost by far.
+    if SYMMETRY && shapes[cell.flow_index].mirror == 1u {
+        let is_symmetric = tally.has_read == 0u || (is_near_cycle() && tally.mirror >= MIRROR);
+        if is_symmetric || is_surely_unsymmetric() {
+            (*finding).valid |= VALID_SYMMETRIC;
+            (*finding).symmetric = select(0u, 1u, is_symmetric);
+        }
     }
     if EXPONENT {
         (*finding).valid |= VALID_LYAPUNOV;

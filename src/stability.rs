@@ -21,7 +21,7 @@ use crate::model::State;
 use crate::reference::{Stop, Trajectory};
 
 /// The unit vectors: tangents that become the columns of a derivative.
-const UNIT: [State; 4] =
+pub(crate) const UNIT: [State; 4] =
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
 /// Which map an orbit is a fixed point of.

@@ -14,6 +14,7 @@ mod answer;
 mod case;
 mod explanation;
 mod limits;
+mod same_cycle;
 mod sample;
 pub mod states;
 

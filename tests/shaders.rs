@@ -202,6 +202,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     home_origin,
                     divisor,
                     divisor_apart,
+                    vain,
+                    refuted,
                     distances,
                     last_distances,
                     word

@@ -248,6 +248,10 @@ pub struct Tally {
     pub divisor: u32,
     /// How near, in quarter octaves below 1.
     pub divisor_apart: u32,
+    /// Times that Newton's method led nowhere.
+    pub vain: u32,
+    /// Period of the last cycle that was read and does not attract.
+    pub refuted: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.

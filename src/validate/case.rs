@@ -6,6 +6,7 @@ use crate::flow::Flow;
 use crate::gpu::Precision;
 use crate::model::{GearPair, Law, State};
 use crate::orbit::{Budget, Class, Measured, analyse_flow, measure};
+use crate::random::Random;
 use crate::record::Record;
 use crate::reference::{Happening, Stop, Trajectory};
 use crate::stability::{StrobeMap, multipliers};
@@ -74,9 +75,8 @@ impl<'a> Case<'a> {
         Answer::from(&analyse_flow(&self.flow, self.law, start, &self.budget.settings, 1))
     }
 
-    /// The pair with one parameter moved to either side within rounding.
-    pub(super) fn nudged_pairs(&self) -> impl Iterator<Item = GearPair> + '_ {
-        let amount = rounding(self.precision);
+    /// The pair with one parameter moved to either side by this much, relatively.
+    pub(super) fn nudged_pairs(&self, amount: f64) -> impl Iterator<Item = GearPair> + '_ {
         // Leaving speeds carry the rounding of the whole motion's velocity.
         let speed = self.units(&self.record.strobe)[1] / self.law.mesh_speed.max(f64::MIN_POSITIVE);
         GearPair::PARAMETERS.iter().flat_map(move |parameter| {
@@ -92,7 +92,7 @@ impl<'a> Case<'a> {
 
     /// Answers within the budget for starts and parameters that are the same within rounding.
     pub(super) fn nudged(&self) -> impl Iterator<Item = Answer> + '_ {
-        let parameters = self.nudged_pairs().filter_map(|pair| {
+        let parameters = self.nudged_pairs(rounding(self.precision)).filter_map(|pair| {
             let flow = Box::new(Flow::new(&pair.oscillator().ok()?));
             Some(Answer::from(&measure(&flow, pair.law(), self.start, &self.budget)))
         });
@@ -101,6 +101,19 @@ impl<'a> Case<'a> {
             Answer::from(&measure(&self.flow, self.law, start, &self.budget))
         });
         starts.chain(parameters)
+    }
+
+    /// Answers within the budget for random starts that are the same within rounding.
+    pub(super) fn scattered(&self, count: usize) -> impl Iterator<Item = Answer> + '_ {
+        let mut random = Random::new(u64::from(self.record.periods_run));
+        let moved: State = std::array::from_fn(|i| self.nudged_start(i)[i]);
+        (0..count).map(move |_| {
+            let start = std::array::from_fn(|i| {
+                let reach = moved[i] - self.start[i];
+                self.start[i] + reach * (2.0 * random.unit() - 1.0)
+            });
+            Answer::from(&measure(&self.flow, self.law, start, &self.budget))
+        })
     }
 
     /// The start moved within rounding along one coordinate, to either side.

@@ -6,10 +6,11 @@
 
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
-use super::limits::{hidden_symmetry, undecided_chaos};
+use super::limits::undecided_chaos;
+use super::same_cycle::{may_repel, same_cycle, within_reach};
 use crate::classify::{classify, status};
-use crate::gpu::{Constants, LaneSettings};
-use crate::model::State;
+use crate::gpu::{Constants, LaneSettings, Precision};
+use crate::model::{GearPair, State};
 use crate::orbit::{CHAOS_ERRORS, Class, Status, analyse};
 use crate::record::valid;
 use crate::reference::Trajectory;
@@ -20,13 +21,19 @@ use crate::stability::{StrobeMap, multipliers};
 const NEAR_BIFURCATION: f64 = 0.01;
 
 /// A motion this far from where it was a cycle ago, relative to its size, is not on the cycle.
-const ELSEWHERE: f64 = 1e-2;
+pub(super) const ELSEWHERE: f64 = 1e-2;
 
 /// A motion this far from where it was a cycle ago has not settled.
 const UNSETTLED: f64 = 1e-4;
 
-/// A motion this close to where it was a cycle ago rests on it as nearly as lanes in f32 can.
-const AT_REST: f64 = 1e-5;
+/// A motion this close to where it was a cycle ago rests on it as nearly as lanes can that amplify no
+/// rounding (`NOISE` in the shaders for f32, `RESOLVED` for f64).
+fn at_rest(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 4e-6,
+        Precision::F64 => 1e-12,
+    }
+}
 
 /// A motion this close to where it was some periods ago may be lingering at a cycle.
 const LINGERING: f64 = 0.03;
@@ -37,8 +44,9 @@ const CONFIRMATION_WINDOWS: u32 = 3;
 /// Multipliers below this belong to a cycle that is about to double its period.
 const NEAR_FLIP: f64 = -0.8;
 
-/// Periods in which a confirmed cycle is reached well enough to see its symmetry.
-const SETTLING_PERIODS: u32 = 400;
+/// Starts within rounding that are tried before a transient counts as different: of a map's many
+/// transients some are rare.
+const SCATTERED_STARTS: usize = 1000;
 
 /// Share of a state error that rounding at the start must make on the reference itself.
 const SENSITIVE: f64 = 0.1;
@@ -133,20 +141,22 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 13] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 15] = [
         engine_cap,
         longer,
         other_attractor,
         within_rounding,
         resolution,
         unsettled,
-        nearly_symmetric,
-        hidden_symmetry,
+        same_cycle,
         undecided_chaos,
         late,
         bifurcation,
         flip,
         grazing,
+        held,
+        within_scatter,
+        scattered,
     ];
     CHECKS.iter().find_map(|check| check(case))
 }
@@ -206,17 +216,60 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
     };
     let same = case.is_the_records(&answer)
         || read().is_some_and(|answer| case.is_the_records(&answer))
-        || rounding_hides_it(case, from, &answer);
+        || within_reach(case, from, &answer).is_some()
+        || unresolved(case, from, &answer) == Some(true);
     same.then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
     })
 }
 
+/// Whether the cycle has a multiple of the record's period, and lanes cannot tell it from the record's.
+fn unresolved(case: &Case<'_>, from: State, answer: &Answer) -> Option<bool> {
+    let (Class::Periodic { period }, Class::Periodic { period: theirs }) =
+        (classify(case.record), answer.class)
+    else {
+        return None;
+    };
+    let stands = case.after(from, 0).ok()?;
+    let divides = period < theirs && theirs.is_multiple_of(period);
+    if !divides || case.unrest(&stands, period) > LANE_RESOLUTION {
+        return None;
+    }
+    let read = case.read_as_is(&stands, period)?;
+    Some(case.is_the_records(&read) || within_reach(case, from, &read).is_some())
+}
+
 fn within_rounding(case: &Case<'_>) -> Option<Explanation> {
     let chaotic = classify(case.record) == Class::Chaotic && case.truth.class == Class::Chaotic;
     let because = if chaotic { Explanation::Chaos } else { Explanation::Border };
     case.nudged().any(|answer| case.is_the_records(&answer)).then_some(because)
+}
+
+/// The reference has the record's cycle if a parameter moves by as little as rounding makes the lane's
+/// strobes scatter.
+fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    let from = strobe(case)?;
+    let scatter = case.unrest(&case.after(from, 0).ok()?, period);
+    if !case.is_lane || scatter > UNSETTLED {
+        return None;
+    }
+    let is_the_same = |pair: GearPair| {
+        let answer = Answer::from(&analyse(&pair, from, &case.budget.settings));
+        case.is_the_records(&answer)
+    };
+    case.nudged_pairs(scatter).any(is_the_same).then_some(Explanation::Border)
+}
+
+/// Chaos on the way to a cycle: how long it lasts is decided by rounding, and among many starts
+/// that are the same within rounding one takes as long as the record's did, or as short.
+fn scattered(case: &Case<'_>) -> Option<Explanation> {
+    let one_is_chaotic = [classify(case.record), case.truth.class].contains(&Class::Chaotic);
+    if !one_is_chaotic || matches!(case.truth.class, Class::Undecided | Class::Failed) {
+        return None;
+    }
+    case.scattered(SCATTERED_STARTS).any(|answer| case.is_the_records(&answer)).then_some(Explanation::Chaos)
 }
 
 /// The same class and period, read off a motion that is still on its way.
@@ -235,63 +288,7 @@ fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     ];
     let same = |answer: Answer| case.is_the_records(&answer);
     let read = |place: &Trajectory<'_>| case.read_as_is(place, period).is_some_and(same);
-    let as_is = places.iter().flatten().any(read);
-    (as_is || unrest_hides_it(case, period)?).then_some(Explanation::Unsettled)
-}
-
-/// Whether the exponent is within what the reference reads about the record's strobe state, as
-/// far from it as one cycle takes the motion; all other fields must be as they are.
-fn unrest_hides_it(case: &Case<'_>, period: u32) -> Option<bool> {
-    let from = strobe(case)?;
-    let stands = case.after(from, 0).ok()?;
-    let unrest = case.unrest(&stands, period);
-    let units = case.units(&from);
-    let read = |k: usize| {
-        let mut state = from;
-        state[k % 4] += units[k % 2] * if k < 4 { unrest } else { -unrest };
-        case.read_as_is(&stands.at(state, []), period)?.exponent.map(|[exponent, _]| exponent)
-    };
-    let exponents: Vec<f64> = (0..8).filter_map(read).collect();
-    let low = exponents.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = exponents.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let read = Answer { exponent: Some([case.record.lyapunov, 0.0]), ..case.truth.clone() };
-    let hidden = unrest < ELSEWHERE && (low..=high).contains(&case.record.lyapunov);
-    Some(hidden && case.is_the_records(&read))
-}
-
-/// Whether an answer is the record's but for the exponent, and rounding of the parameters moves
-/// the exponent of the same cycle to either side of the record's.
-fn rounding_hides_it(case: &Case<'_>, from: State, answer: &Answer) -> bool {
-    let read = Answer { exponent: Some([case.record.lyapunov, 0.0]), ..answer.clone() };
-    if !matches!(answer.class, Class::Periodic { .. }) || !case.is_the_records(&read) {
-        return false;
-    }
-    let same = |other: Answer| (other.class == answer.class && other.word == answer.word).then_some(other);
-    let exponents: Vec<f64> = case
-        .nudged_pairs()
-        .filter_map(|pair| same(Answer::from(&analyse(&pair, from, &case.budget.settings))))
-        .filter_map(|other| other.exponent.map(|[exponent, _]| exponent))
-        .collect();
-    let below = exponents.iter().any(|&exponent| exponent <= case.record.lyapunov);
-    below && exponents.iter().any(|&exponent| exponent >= case.record.lyapunov)
-}
-
-/// The reference's cycle differs from its mirror image by less than lanes look for.
-fn nearly_symmetric(case: &Case<'_>) -> Option<Explanation> {
-    let Class::Periodic { period } = case.truth.class else { return None };
-    let claimed = Answer { symmetric: Some(case.record.symmetric != 0), ..case.truth.clone() };
-    let says_symmetric = case.is_lane && case.record.symmetric != 0;
-    if period.is_multiple_of(2) || !says_symmetric || !case.is_the_records(&claimed) {
-        return None;
-    }
-    let settled = case.after(case.start, case.measured.periods_run + SETTLING_PERIODS).ok()?;
-    let mut opposite = settled.clone();
-    for _ in 0..period / 2 {
-        opposite.advance_period(&mut ()).ok()?;
-    }
-    opposite.advance_to(0.5 * case.flow.period, &mut ()).ok()?;
-    let apart = case.apart(&settled.state(), &opposite.state().map(|x| -x));
-    (apart < LANE_RESOLUTION).then_some(Explanation::NearlySymmetric)
+    places.iter().flatten().any(read).then_some(Explanation::Unsettled)
 }
 
 /// Lanes do not tell the cycle from one of a shorter period.
@@ -306,8 +303,22 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     let hides = divides && case.unrest(&stands, period) < LANE_RESOLUTION;
     // Or rounding keeps the lane off its cycle in a pattern of its own.
     let multiplies = period > theirs && period.is_multiple_of(theirs);
-    let scatters = multiplies && (AT_REST..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
+    let is_kept_off = (at_rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
+    let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)?;
     (hides || scatters).then_some(Explanation::BelowResolution)
+}
+
+/// The lane rests on a cycle that repels, and rounding of its tangents hides that.
+fn held(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    let from = strobe(case)?;
+    let stands = case.after(from, 0).ok()?;
+    if !case.is_lane || case.unrest(&stands, period) > UNSETTLED {
+        return None;
+    }
+    let answer = case.read_as_is(&stands, period)?;
+    let is_hidden = || within_reach(case, from, &answer) == Some(Explanation::BelowResolution);
+    (is_least(case)? && is_hidden()).then_some(Explanation::BelowResolution)
 }
 
 /// The record has no period and the reference has one, or the other way round in chaos: the
@@ -337,10 +348,13 @@ fn late(case: &Case<'_>) -> Option<Explanation> {
             let settles = || case.at_leisure(from).class == case.truth.class;
             // Or it is as close as rounding, which the cycle amplifies, lets it come.
             let trembles = || {
-                let is_kept_off = case.is_lane && case.unrest(&stands, period) > AT_REST;
+                let is_kept_off = case.is_lane && case.unrest(&stands, period) > at_rest(case.precision);
                 is_kept_off && is_shaken(case, &stands, period) == Some(true)
             };
-            (late || (is_off() || trembles()) && settles()).then_some(Explanation::UndecidedInBudget)
+            // Or rounding hides from it that the cycle attracts.
+            let doubts = || case.is_lane && may_repel(case, &stands, &case.truth) == Some(true);
+            (late || (is_off() || trembles() || doubts()) && settles())
+                .then_some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Chaotic) => {
             let [theirs, error] = case.truth.exponent?;
@@ -441,7 +455,7 @@ fn is_least(case: &Case<'_>) -> Option<bool> {
 }
 
 /// Where the record says that its motion was at last.
-fn strobe(case: &Case<'_>) -> Option<State> {
+pub(super) fn strobe(case: &Case<'_>) -> Option<State> {
     let known = case.record.valid & valid::STROBE != 0 && case.record.strobe.iter().all(|x| x.is_finite());
     known.then_some(case.record.strobe)
 }

@@ -1,0 +1,189 @@
+//! Both sides describe one cycle: may what differs in it be rounding, or the distance at which a
+//! lane read it?
+
+use nalgebra::Matrix4;
+
+use super::answer::{Answer, Difference, Field};
+use super::case::{Case, LANE_RESOLUTION, rounding};
+use super::explanation::{ELSEWHERE, Explanation, strobe};
+use super::states::{ROUNDINGS_PER_STEP, unit_roundoff};
+use crate::classify::classify;
+use crate::gpu::Constants;
+use crate::model::State;
+use crate::orbit::{Class, analyse};
+use crate::random::Random;
+use crate::reference::Trajectory;
+use crate::stability::{UNIT, multipliers};
+
+/// Periods in which a confirmed cycle is reached well enough to see its symmetry.
+const SETTLING_PERIODS: u32 = 400;
+
+/// States about a lane's from which a cycle is read, and monodromy matrices within rounding.
+const TRIALS: usize = 32;
+
+/// How often tangents are rounded in a forcing period.
+const ROUNDED_PER_PERIOD: u32 = 16;
+
+/// The record describes the reference's cycle, and each field that differs has its own reason.
+pub(super) fn same_cycle(case: &Case<'_>) -> Option<Explanation> {
+    within_reach(case, strobe(case)?, &case.truth)
+}
+
+/// The same for the cycle that `truth` describes, which the reference reaches from `from`.
+pub(super) fn within_reach(case: &Case<'_>, from: State, truth: &Answer) -> Option<Explanation> {
+    let Class::Periodic { period } = truth.class else { return None };
+    if truth.class != classify(case.record) {
+        return None;
+    }
+    let stands = case.after(from, 0).ok()?;
+    let mut claimed = truth.clone();
+    let mut because = None;
+    let differences = truth.compare(case.record, &case.bars).into_iter().filter_map(|(_, differs)| differs);
+    for Difference { field, .. } in differences {
+        let reason = match field {
+            Field::Symmetric => {
+                claimed.symmetric = Some(case.record.symmetric != 0);
+                symmetry(case, &stands, truth, period)
+            }
+            Field::Exponent => {
+                claimed.exponent = Some([case.record.lyapunov, 0.0]);
+                exponent(case, &stands, truth, period)
+            }
+            Field::Mesh => {
+                claimed.mesh_fraction = Some(case.record.mesh_fraction);
+                mesh_fraction(case, &stands, truth, period)
+            }
+            _ => None,
+        };
+        because = because.or(Some(reason?));
+    }
+    // Words and impacts have no such excuse.
+    case.is_the_records(&claimed).then_some(because).flatten()
+}
+
+fn symmetry(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u32) -> Option<Explanation> {
+    if !case.is_lane || period.is_multiple_of(2) {
+        return None;
+    }
+    if case.record.symmetric == 0 {
+        return steps_hide_it(case, period)?.then_some(Explanation::BelowResolution);
+    }
+    // The cycle differs from its mirror image by less than lanes look for.
+    debug_assert_eq!(truth.symmetric, Some(false));
+    let settled = case.after(stands.state(), SETTLING_PERIODS - SETTLING_PERIODS % period).ok()?;
+    let mut opposite = settled.clone();
+    // Lanes measure by the largest strobes.
+    let mut largest = settled.state().map(f64::abs);
+    for _ in 0..period / 2 {
+        opposite.advance_period(&mut ()).ok()?;
+        largest = std::array::from_fn(|i| largest[i].max(opposite.state()[i].abs()));
+    }
+    opposite.advance_to(0.5 * case.flow.period, &mut ()).ok()?;
+    let (there, here) = (opposite.state(), settled.state());
+    let offset: State = std::array::from_fn(|i| here[i] + there[i] + largest[i]);
+    let apart = case.apart(&largest, &offset);
+    (apart < LANE_RESOLUTION).then_some(Explanation::NearlySymmetric)
+}
+
+/// Whether rounding over the steps of a lane may make a cycle as unsymmetric as lanes look for.
+fn steps_hide_it(case: &Case<'_>, period: u32) -> Option<bool> {
+    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+    let steps = f64::from(constants.steps) * finest * f64::from(period);
+    Some(ROUNDINGS_PER_STEP * unit_roundoff(case.precision) * steps > LANE_RESOLUTION)
+}
+
+fn exponent(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u32) -> Option<Explanation> {
+    let ours = case.record.lyapunov;
+    let contains = |values: &[f64]| {
+        values.iter().any(|&value| value <= ours) && values.iter().any(|&value| value >= ours)
+    };
+    let read = |answer: Answer| answer.exponent.map(|[exponent, _]| exponent);
+    let about: Vec<f64> = readings(case, stands, truth, period).into_iter().filter_map(read).collect();
+    if contains(&about) {
+        return Some(Explanation::Unsettled);
+    }
+    let moved: Vec<f64> = case
+        .nudged_pairs(rounding(case.precision))
+        .map(|pair| Answer::from(&analyse(&pair, stands.state(), &case.budget.settings)))
+        .filter(|other| other.class == truth.class && other.word == truth.word)
+        .filter_map(read)
+        .collect();
+    if contains(&moved) {
+        return Some(Explanation::Border);
+    }
+    let rounded = rounded_exponents(case, stands, period)?;
+    (case.is_lane && contains(&rounded)).then_some(Explanation::BelowResolution)
+}
+
+fn mesh_fraction(
+    case: &Case<'_>,
+    stands: &Trajectory<'_>,
+    truth: &Answer,
+    period: u32,
+) -> Option<Explanation> {
+    let ours = case.record.mesh_fraction;
+    let about: Vec<f64> =
+        readings(case, stands, truth, period).into_iter().filter_map(|answer| answer.mesh_fraction).collect();
+    let hides =
+        about.iter().any(|&fraction| fraction <= ours) && about.iter().any(|&fraction| fraction >= ours);
+    hides.then_some(Explanation::Unsettled)
+}
+
+/// The cycle as it is read where the lane was, and as far about that as the cycle itself may be.
+fn readings(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u32) -> Vec<Answer> {
+    let from = stands.state();
+    let span = f64::from(period) * case.flow.period;
+    let multiplier = truth.exponent.map_or(0.0, |[exponent, _]| (exponent * span).exp());
+    // States `d` apart that shrink by a factor per cycle are `d / (1 - factor)` from their limit.
+    let reach = case.unrest(stands, period) / (1.0 - multiplier).max(f64::MIN_POSITIVE);
+    if reach > ELSEWHERE {
+        return Vec::new();
+    }
+    let units = case.units(&from);
+    let mut random = Random::new(u64::from(period));
+    let mut places = vec![from];
+    places.extend((0..TRIALS).map(|_| {
+        let mut state = from;
+        for (i, x) in state.iter_mut().enumerate() {
+            *x += units[i % 2] * reach * (2.0 * random.unit() - 1.0);
+        }
+        state
+    }));
+    places.into_iter().filter_map(|place| case.read_as_is(&stands.at(place, []), period)).collect()
+}
+
+/// Exponents of the cycle if its tangents are rounded again and again on the way.
+fn rounded_exponents(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> Option<Vec<f64>> {
+    let error = rounding(case.precision);
+    let [position, velocity] = case.units(&stands.state());
+    let mut random = Random::new(u64::from(period));
+    let span = f64::from(period) * case.flow.period;
+    let exponent = |_| {
+        let mut cycle = stands.carrying(UNIT);
+        for k in 1..=period * ROUNDED_PER_PERIOD {
+            match k % ROUNDED_PER_PERIOD {
+                0 => cycle.advance_period(&mut ()).ok()?,
+                part => {
+                    let until = f64::from(part) / f64::from(ROUNDED_PER_PERIOD) * case.flow.period;
+                    cycle.advance_to(until, &mut ()).ok()?;
+                }
+            }
+            cycle.set_tangents(cycle.tangents().map(|u| {
+                let size = (u[0].abs().max(u[2].abs()) / position).max(u[1].abs().max(u[3].abs()) / velocity);
+                let unit = [position, velocity, position, velocity];
+                std::array::from_fn(|i| u[i] + error * size * unit[i] * (2.0 * random.unit() - 1.0))
+            }));
+        }
+        let tangents = cycle.tangents();
+        let [re, im] = *multipliers(&Matrix4::from_fn(|i, j| tangents[j][i]))?.first()?;
+        Some((re.hypot(im).ln() + cycle.log_scale()) / span)
+    };
+    Some((0..TRIALS).filter_map(exponent).collect())
+}
+
+/// Whether rounding of the tangents leaves open if the cycle that the motion is near attracts.
+pub(super) fn may_repel(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Option<bool> {
+    let Class::Periodic { period } = truth.class else { return None };
+    Some(rounded_exponents(case, stands, period)?.into_iter().any(|exponent| exponent >= 0.0))
+}
