@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::cells::Cells;
-use super::manifest::FORMAT;
+use super::manifest::Head;
 use super::map_manifest::Made;
 use super::{names, replay};
 use crate::validate::states::HORIZON;
@@ -15,9 +15,8 @@ use crate::validate::{Explanation, Field, Mismatch, Quantiles, StateCheck, Strat
 
 #[derive(Serialize)]
 pub(super) struct ValidationObject {
-    format: u32,
-    command: &'static str,
-    crate_version: &'static str,
+    #[serde(flatten)]
+    head: Head,
     engine: String,
     precision: String,
     device: String,
@@ -115,9 +114,7 @@ impl ValidationObject {
             mismatches: validation.explained_by(explanation),
         });
         ValidationObject {
-            format: FORMAT,
-            command: "validate",
-            crate_version: env!("CARGO_PKG_VERSION"),
+            head: Head::of("validate"),
             engine: made.engine.to_owned(),
             precision: made.precision.to_owned(),
             device: made.device.to_owned(),
