@@ -26,7 +26,7 @@ mod unroll;
 use std::collections::HashMap;
 
 pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
-pub use device::{AdapterChoice, AdapterReport, adapters, describe, is_hardware};
+pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware};
 pub use shader::{Precision, Variant, WORKGROUP};
 pub use stage::Stage;
 pub use tables::Tables;

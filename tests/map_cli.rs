@@ -446,6 +446,7 @@ fn devices_says_what_there_is_and_what_auto_takes() {
     run.stdout(says(&[
         "cpu: event-driven reference",
         "gpu: ",
+        "interface   ",
         "precision   f32",
         "batch       up to",
         "auto takes ",
