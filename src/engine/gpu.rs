@@ -32,16 +32,16 @@ impl<'p> Gpu<'p> {
     ///
     /// # Errors
     /// [`EngineError`] if the device takes no constants.
-    pub fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+    pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let settings = lane_settings(plan);
         let is_shared = plan.flow_count() < plan.cell_count() && plan.flow_count() <= KEPT_FLOWS;
         let mut engine = Gpu { plan, device, settings, tables: None, steps: 0 };
         if is_shared {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
-            engine.tables = match engine.load(&flows, &laws) {
+            engine.tables = match engine.load(&flows, &laws).await {
                 // Batches that need fewer of them may fit.
-                Err(GpuError::TooManyFlows { .. }) => None,
+                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
                 other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
             };
         }
@@ -76,7 +76,7 @@ impl<'p> Gpu<'p> {
             Some(_) => (None, batch.cells.iter().map(|cell| lane(cell, cell.flow, cell.law)).collect()),
             None => {
                 let (flows, laws, lanes) = self.renumbered(&batch.cells);
-                (Some(self.load(&flows, &laws).map_err(|error| self.error(error, cells))?), lanes)
+                (Some(self.load(&flows, &laws).await.map_err(|error| self.error(error, cells))?), lanes)
             }
         };
         let Some(tables) = own.as_ref().or(self.tables.as_ref()) else {
@@ -91,10 +91,10 @@ impl<'p> Gpu<'p> {
         Ok(records)
     }
 
-    fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
+    async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
         let flows: Vec<_> = flows.iter().map(|&flow| self.plan.oscillator(flow)).collect();
         let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
-        self.device.load(&flows, &laws, self.settings.steps_per_period)
+        self.device.load(&flows, &laws, self.settings.steps_per_period).await
     }
 
     /// The flows and laws of a batch alone, and its lanes with indices among them.

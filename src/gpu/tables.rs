@@ -1,6 +1,7 @@
 //! What lanes share, on the device: flows and contact laws.
 
 use super::constants::Constants;
+use super::guard::guarded;
 use super::layout::{self, Flow, FlowShape};
 use super::transfer::{reals, upload};
 use super::{Gpu, GpuError};
@@ -23,7 +24,7 @@ impl Tables {
         self.constants[flow as usize].as_ref().map_or(0, |constants| constants.steps)
     }
 
-    pub(super) fn new(
+    pub(super) async fn new(
         gpu: &Gpu,
         flows: &[Oscillator],
         laws: &[Law],
@@ -61,13 +62,14 @@ impl Tables {
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows: flows.len(), needed, allowed });
         }
-        Ok(Tables {
+        let make = || Tables {
             flows: upload(gpu, "flows", &tables),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
             phasors: upload(gpu, "phasors", &phasors),
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
             constants,
             law_count: laws.len(),
-        })
+        };
+        guarded(gpu, "flows", flows.len(), make).await
     }
 }

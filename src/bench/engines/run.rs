@@ -232,7 +232,8 @@ impl<'a> Bench<'a> {
                 let Some(opened) = device.take() else {
                     return Err("no device is left after the failure before".to_owned());
                 };
-                let lanes = engine::Gpu::new(plan, *opened).map_err(|error| error.to_string())?;
+                let lanes =
+                    pollster::block_on(engine::Gpu::new(plan, *opened)).map_err(|error| error.to_string())?;
                 let mut engine = engine::Engine::Gpu(Box::new(lanes));
                 let swept = sweep(plan, &mut engine, &split, clock);
                 if let engine::Engine::Gpu(lanes) = engine {
