@@ -31,6 +31,7 @@ pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_ran
 pub use shader::{Precision, Variant, WORKGROUP};
 pub use stage::Stage;
 pub use tables::Tables;
+pub(crate) use tables::bytes as table_bytes;
 
 use crate::model::{Law, Oscillator, State};
 use crate::record::Record;

@@ -18,6 +18,18 @@ pub struct Tables {
     pub(super) laws: wgpu::Buffer,
 }
 
+/// Copies of all constants while they are handed over: those of the lanes, the lists of flows and
+/// phasors, these in the lanes' precision, what the driver is given, and the device's own where it
+/// has no memory of its own.
+const COPIES: u64 = 5;
+
+/// Bytes of memory that the constants of one flow take at most.
+pub(crate) fn bytes(oscillator: &Oscillator, steps_per_period: Option<u32>) -> u64 {
+    let steps = Constants::steps(oscillator, steps_per_period);
+    let phasors = steps.map_or(0, |steps| (u64::from(steps) + 1) * size_of::<[f64; 2]>() as u64);
+    COPIES * (size_of::<Constants>() as u64 + size_of::<FlowShape>() as u64 + phasors)
+}
+
 impl Tables {
     /// Free steps per forcing period of a flow; 0 if lanes cannot carry it.
     pub fn steps_per_period(&self, flow: u32) -> u32 {

@@ -58,7 +58,8 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Resul
 }
 
 /// Writes `validation.json` and, where the map has a report, the report again with a section
-/// on it. Returns the files' names.
+/// on it. `again` is the device that ran the sample's lanes again, if one did. Returns the files'
+/// names.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -66,9 +67,10 @@ pub fn write_validation(
     folder: &Folder,
     cells: &Cells<'_>,
     made: &Made<'_>,
+    again: Option<&str>,
     validation: &Validation,
 ) -> anyhow::Result<Vec<&'static str>> {
-    let object = ValidationObject::new(cells, made, validation);
+    let object = ValidationObject::new(cells, made, again, validation);
     folder.write_json(VALIDATION, &object)?;
     if !folder.path().join(HTML).is_file() {
         return Ok(vec![VALIDATION]);
