@@ -309,12 +309,7 @@ fn needs(quantities: &[Quantity]) -> Needs {
 pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
     let mut counts = [0; 4];
     for class in classes {
-        counts[match class {
-            Class::Periodic { .. } => 0,
-            Class::Chaotic => 1,
-            Class::Undecided => 2,
-            Class::Failed => 3,
-        }] += 1;
+        counts[class.index()] += 1;
     }
     counts
 }
