@@ -237,7 +237,7 @@ mod tests {
         let last = refined.audits[refined.audits.len() - 1];
         assert!(last.rate() <= 0.01);
         assert!(wrong(&records, 241, islands) <= refined.filled / 100, "{refined:?}");
-        // One island too small to matter: what the audit hits of it is cut out.
+        // One island too small to matter: what the audit finds of it is cut out.
         let one = |i: usize, j: usize| if (40..48).contains(&i) && (40..48).contains(&j) { 5 } else { 1 };
         let plan = self::plan([241, 241], "minimum_grid = 48\naudit = 4000");
         let (records, refined) = run(&plan, one);

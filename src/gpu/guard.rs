@@ -21,10 +21,10 @@ pub(super) async fn guarded<T>(
     if out_of_memory.is_some() {
         return Err(GpuError::OutOfMemory { what, count });
     }
-    match refused {
-        Some(error) => Err(gpu.failure(GpuError::Refused { what, message: error.to_string() })),
-        None => Ok(made),
-    }
+    let Some(error) = refused else { return Ok(made) };
+    // A lost device refuses everything; that it is lost it tells when it is polled.
+    let _ = gpu.device.poll(wgpu::PollType::Poll);
+    Err(gpu.failure(GpuError::Refused { what, message: error.to_string() }))
 }
 
 #[cfg(test)]

@@ -135,7 +135,7 @@ fn dot(frame: &Frame, columns: &[Column], least: f64) -> Vec<(i32, i32)> {
 
 /// The number of dots drawn at full strength: only one pixel in a hundred has more.
 ///
-/// The few pixels that a periodic orbit hits every time would fade all others.
+/// The few pixels that a periodic orbit falls on every time would fade all others.
 fn darkest(counts: &[[u32; 2]]) -> f64 {
     let mut totals: Vec<u32> = counts.iter().map(|[a, b]| a + b).filter(|n| *n > 0).collect();
     if totals.is_empty() {

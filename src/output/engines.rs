@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::manifest::{Head, MANIFEST};
 use super::{Folder, engines_figure, names};
 use crate::bench::engines::check::Check;
-use crate::bench::engines::statistics::Spread;
 use crate::bench::engines::{Point, Run, SCENE, Series};
+use crate::bench::statistics::Spread;
 use crate::validate::Explanation;
 
 const TABLE: &str = "engines.csv";

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 
 use super::Engine;
-use super::statistics::Spread;
+use crate::bench::statistics::Spread;
 use crate::classify::classify;
 use crate::engine::{self, Cpu};
 use crate::gpu::{self, AdapterChoice, Precision, Stage};
