@@ -239,7 +239,7 @@ impl Plan {
         self.count(false)
     }
 
-    /// Most flows to have at hand at a time, a power of 2.
+    /// Most flows that engines have at hand at a time.
     pub fn most_flows(&self) -> usize {
         KEPT_FLOWS
     }
