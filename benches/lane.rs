@@ -11,6 +11,7 @@ use rattlemap::record::Record;
 mod rewrite;
 
 use rattlemap::bench::engines::{LOOPS, counting, instructions};
+use rattlemap::bench::statistics::Spread;
 use rewrite::{CHECKS, Rewrite};
 
 /// Sizes of one run.
@@ -85,12 +86,7 @@ fn seconds(plane: &Plane, size: &Size, gpus: &mut [Gpu], exponent: bool) -> Vec<
             times.push(plane.run(gpu, size, exponent).0);
         }
     }
-    times.into_iter().map(median).collect()
-}
-
-fn median(mut times: Vec<f64>) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
+    times.into_iter().map(|times| Spread::of(times).median).collect()
 }
 
 /// Mean over the cells of what a counting variant reports in place of impacts.

@@ -2,4 +2,5 @@
 
 pub mod engines;
 pub mod stability;
+pub mod statistics;
 pub mod work_precision;

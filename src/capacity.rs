@@ -7,15 +7,33 @@ use rattlemap::output::RECORDS;
 use rattlemap::plan::Size;
 use rattlemap::scene::Scene;
 
+use crate::cli::EngineChoice;
 use crate::error::Failure;
+
+/// What there is, in bytes; none where the system does not tell.
+struct Free {
+    memory: Option<u64>,
+    disk: Option<u64>,
+}
 
 /// Refuses a map that does not fit memory or disk, with figures. What the system does not
 /// tell is taken to be enough.
-pub(crate) fn check(scene: &Scene, out: &Path) -> Result<(), Failure> {
+pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(), Failure> {
+    let kept = out.join(RECORDS).metadata().map_or(0, |data| data.len());
+    let disk = free_disk(out).map(|free| free.saturating_add(kept));
+    judge(scene, engine, &Free { memory: free_memory(), disk })
+}
+
+fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
     let size = Size::of(scene);
     let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
-    let memory = size.memory.saturating_add(size.memory_per_thread.saturating_mul(threads - 1));
-    let kept = out.join(RECORDS).metadata().map_or(0, |data| data.len());
+    let (cpu, gpu) = (size.on_cpu(threads), size.on_gpu());
+    let memory = match engine {
+        EngineChoice::Cpu => cpu,
+        EngineChoice::Gpu => gpu,
+        // Either may be chosen.
+        EngineChoice::Auto => cpu.max(gpu),
+    };
     let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
     let starts = if size.runs > size.cells { format!(", {} runs,", size.runs) } else { String::new() };
     let map = format!("a map of {} = {} cells{starts}", counts.join(" x "), size.cells);
@@ -24,7 +42,11 @@ pub(crate) fn check(scene: &Scene, out: &Path) -> Result<(), Failure> {
             "{map} needs about {} of {what}, and {} are free; lower axis.0.count or axis.1.count{}",
             gigabytes(needed),
             gigabytes(available),
-            if what == "disk" { ", or name another disk with --out" } else { "" }
+            match what {
+                "disk" => ", or name another disk with --out",
+                _ if cpu < available => ", or ask for --engine cpu, which needs less",
+                _ => "",
+            }
         )))
     };
     if !size.is_countable() {
@@ -33,12 +55,9 @@ pub(crate) fn check(scene: &Scene, out: &Path) -> Result<(), Failure> {
             u32::MAX
         )));
     }
-    match free_memory() {
-        Some(free) if free < memory => return refuse("memory", memory, free),
-        _ => {}
-    }
-    match free_disk(out) {
-        Some(free) if free.saturating_add(kept) < size.disk => refuse("disk", size.disk, free),
+    match *free {
+        Free { memory: Some(free), .. } if free < memory => refuse("memory", memory, free),
+        Free { disk: Some(free), .. } if free < size.disk => refuse("disk", size.disk, free),
         _ => Ok(()),
     }
 }
@@ -61,4 +80,28 @@ fn free_disk(out: &Path) -> Option<u64> {
 
 fn gigabytes(bytes: u64) -> String {
     format!("{:.1} GB", bytes as f64 / 1e9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap::scene::Purpose;
+
+    /// Half a million steps of tables for little more than a thousand cells.
+    const SLOW: &str = "[[axis]]\nparameter = 'e'\nmin = 0.1\nmax = 0.9\ncount = 2\n\
+                        [[axis]]\nparameter = 'omega'\nmin = 0.002\nmax = 0.003\ncount = 16000\n";
+
+    #[test]
+    fn constants_of_lanes_count_where_lanes_may_run() {
+        let scene = Scene::parse(SLOW, "s", &[], Purpose::Map).unwrap();
+        let free = Free { memory: Some(2_000_000_000), disk: None };
+        assert!(judge(&scene, EngineChoice::Cpu, &free).is_ok());
+        for engine in [EngineChoice::Gpu, EngineChoice::Auto] {
+            let Err(failure) = judge(&scene, engine, &free) else { panic!("{engine:?} was let through") };
+            let text = failure.to_string();
+            assert!(text.contains("GB of memory, and 2.0 GB are free"), "{text}");
+            assert!(text.contains("or ask for --engine cpu"), "{text}");
+        }
+        assert!(judge(&scene, EngineChoice::Gpu, &Free { memory: None, disk: None }).is_ok());
+    }
 }

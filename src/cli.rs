@@ -184,7 +184,8 @@ pub(crate) struct SceneOptions {
     pub(crate) force: bool,
 
     /// Override the scene: a parameter by name (k=800), anything else by its path
-    /// (integration.max_period=32, axis.0.count=200). May be repeated
+    /// (integration.max_period=32, axis.0.count=200). An axis named here (axis.0.parameter=F)
+    /// replaces the scene's own value of that parameter. May be repeated
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 

@@ -38,6 +38,7 @@ fn print(adapter: &AdapterReport) {
     let kind = if gpu::is_hardware(info) { "hardware" } else { "software" };
     println!("gpu: {}", gpu::describe(info));
     println!("  kind        {kind} ({:?})", info.device_type);
+    println!("  interface   {:?}, {}", info.backend, gpu::interface_rank(info));
     println!("  precision   {}", names.join(", "));
     println!("  binding     {:.1} GiB", *largest_binding as f64 / f64::from(1 << 30));
     println!("  batch       up to {batch_lanes} lanes");

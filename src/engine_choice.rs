@@ -51,7 +51,8 @@ pub(crate) fn open<'p>(plan: &'p Plan, asked: &EngineOptions) -> Result<Chosen<'
 }
 
 fn open_gpu(plan: &Plan, precision: Precision) -> Result<Engine<'_>, Failure> {
-    let engine = Gpu::new(plan, open_device(precision)?).map_err(|error| Failure::Run(error.into()))?;
+    let engine = pollster::block_on(Gpu::new(plan, open_device(precision)?))
+        .map_err(|error| Failure::Run(error.into()))?;
     Ok(Engine::Gpu(Box::new(engine)))
 }
 
@@ -92,7 +93,7 @@ fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, Failure> {
     let device = open_device(precision)?;
     let failed = |error: EngineError| Failure::Run(error.into());
     let on_cpu = rate(&brief, &mut Engine::Cpu(Cpu::new(&brief))).map_err(failed)?;
-    let mut lanes = Engine::Gpu(Box::new(Gpu::new(&brief, device).map_err(failed)?));
+    let mut lanes = Engine::Gpu(Box::new(pollster::block_on(Gpu::new(&brief, device)).map_err(failed)?));
     // The first batch compiles the shader.
     pollster::block_on(lanes.run(&spread(&brief, 0, 1))).map_err(failed)?;
     let on_gpu = rate(&brief, &mut lanes).map_err(failed)?;
@@ -102,7 +103,7 @@ fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, Failure> {
     );
     let engine = match lanes {
         Engine::Gpu(lanes) if on_gpu > on_cpu => {
-            Engine::Gpu(Box::new(Gpu::new(plan, lanes.into_device()).map_err(failed)?))
+            Engine::Gpu(Box::new(pollster::block_on(Gpu::new(plan, lanes.into_device())).map_err(failed)?))
         }
         _ => Engine::Cpu(Cpu::new(plan)),
     };

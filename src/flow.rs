@@ -112,6 +112,13 @@ impl Flow {
         }
     }
 
+    /// Bytes of memory that it takes.
+    #[cfg(test)]
+    pub(crate) fn bytes(&self) -> usize {
+        let domains = [&self.free, &self.meshing[0], &self.meshing[1]];
+        size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>()
+    }
+
     /// Whether `(y, t) -> (-y, t + T/2)` takes solutions to solutions.
     pub fn mirror_symmetric(&self) -> bool {
         self.symmetric

@@ -12,6 +12,7 @@
 mod batch;
 mod constants;
 mod device;
+mod guard;
 pub mod layout;
 mod reading;
 mod rounds;
@@ -26,10 +27,11 @@ mod unroll;
 use std::collections::HashMap;
 
 pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
-pub use device::{AdapterChoice, AdapterReport, adapters, describe, is_hardware};
+pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware};
 pub use shader::{Precision, Variant, WORKGROUP};
 pub use stage::Stage;
 pub use tables::Tables;
+pub(crate) use tables::bytes as table_bytes;
 
 use crate::model::{Law, Oscillator, State};
 use crate::record::Record;
@@ -65,10 +67,12 @@ pub enum GpuError {
         message: String,
     },
     /// The device ran out of memory.
-    #[error("the device has no memory for a batch of {lanes} lanes; ask for smaller batches")]
+    #[error("the device has no memory for {count} {what}; ask for fewer at a time")]
     OutOfMemory {
-        /// Lanes of the batch.
-        lanes: usize,
+        /// Lanes or flows.
+        what: &'static str,
+        /// How many.
+        count: usize,
     },
     /// The device was lost on the way.
     #[error("the device was lost during a batch: {message}; finished batches are kept")]
@@ -264,7 +268,7 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
-        let tables = self.load(flows, laws, settings.steps_per_period)?;
+        let tables = self.load(flows, laws, settings.steps_per_period).await?;
         self.run_on(&tables, lanes, settings).await
     }
 
@@ -278,14 +282,15 @@ impl Gpu {
     /// many as the motion needs.
     ///
     /// # Errors
-    /// [`GpuError::TooManyFlows`] if they do not fit one buffer.
-    pub fn load(
+    /// [`GpuError::TooManyFlows`] if they do not fit one buffer, [`GpuError::OutOfMemory`] if
+    /// they do not fit the device.
+    pub async fn load(
         &self,
         flows: &[Oscillator],
         laws: &[Law],
         steps_per_period: Option<u32>,
     ) -> Result<Tables, GpuError> {
-        Tables::new(self, flows, laws, steps_per_period)
+        Tables::new(self, flows, laws, steps_per_period).await
     }
 
     /// [`Gpu::run`] on flows and laws that are loaded; the settings' `steps_per_period` is

@@ -31,7 +31,7 @@ const KILLED: i32 = 130;
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let scene = scene::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
-    capacity::check(&scene, &ask.run.out())?;
+    capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
     let folder = open_folder(ask)?;
     let plan = Plan::new(&scene);
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;

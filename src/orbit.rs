@@ -55,7 +55,27 @@ pub enum Class {
     Failed,
 }
 
-/// How a cell's integration ended. `Failed` cells have one of the last three.
+impl Class {
+    /// The names of all classes, in the order in which they are counted and numbered.
+    pub const NAMES: [&'static str; 4] = ["periodic", "chaotic", "undecided", "failed"];
+
+    /// Its place among [`Class::NAMES`], whatever its period.
+    pub fn index(self) -> usize {
+        match self {
+            Class::Periodic { .. } => 0,
+            Class::Chaotic => 1,
+            Class::Undecided => 2,
+            Class::Failed => 3,
+        }
+    }
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        Class::NAMES[self.index()]
+    }
+}
+
+/// How a cell's integration ended. `Failed` cells have one of the last four.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// Nothing to remark.

@@ -3,6 +3,7 @@
 pub mod bifurcation;
 mod bifurcation_csv;
 pub mod bifurcation_figure;
+mod bifurcation_manifest;
 mod cells;
 mod cells_csv;
 mod cells_npy;

@@ -28,6 +28,10 @@ use start::Starts;
 /// The parameters that a contact law is made of; all others belong to the flow.
 const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
 
+/// Most flows that engines keep for all batches, or hand to a device at a time: below 1 GB but
+/// for motion that needs thousands of steps per forcing period.
+const KEPT_FLOWS: usize = 16_384;
+
 /// What a run of a cell is made of: indices of its flow and its law in the plan, and its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
@@ -235,6 +239,16 @@ impl Plan {
         self.count(false)
     }
 
+    /// Most flows that engines have at hand at a time.
+    pub fn most_flows(&self) -> usize {
+        KEPT_FLOWS
+    }
+
+    /// Whether several runs share a flow, and all flows can be kept.
+    pub fn keeps_flows(&self) -> bool {
+        size::keeps_flows(self.flow_count() as u64, self.run_count() as u64)
+    }
+
     /// How many distinct laws there are.
     pub fn law_count(&self) -> usize {
         self.count(true)
@@ -295,12 +309,7 @@ fn needs(quantities: &[Quantity]) -> Needs {
 pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
     let mut counts = [0; 4];
     for class in classes {
-        counts[match class {
-            Class::Periodic { .. } => 0,
-            Class::Chaotic => 1,
-            Class::Undecided => 2,
-            Class::Failed => 3,
-        }] += 1;
+        counts[class.index()] += 1;
     }
     counts
 }

@@ -20,7 +20,7 @@ use std::path::Path;
 
 pub use axis::{Axis, MAX_COUNT};
 pub use error::{Place, Problem, SceneError};
-pub use settings::{Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
+pub use settings::{AUDIT, Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, REST, Start};
 
 use crate::model::GearPair;

@@ -209,6 +209,22 @@ mod tests {
         assert_eq!(wrong(&records, 101, |_, _| 4), 0);
     }
 
+    /// To integrate what was to be filled would be no refinement.
+    #[test]
+    fn the_audit_of_a_small_map_leaves_most_of_it_filled() {
+        let small = plan([40, 40], "minimum_grid = 8");
+        let (_, refined) = run(&small, |_, _| 4);
+        let [audit] = refined.audits[..] else { panic!("{refined:?}") };
+        assert_eq!((audit.filled, audit.sampled), (1600 - 36, 391), "{refined:?}");
+        assert_eq!(refined.filled, 1600 - 36 - 391);
+        // Who asks for so many cells gets them.
+        let (_, refined) = run(&plan([40, 40], "minimum_grid = 8\naudit = 2000"), |_, _| 4);
+        assert_eq!((refined.audits[0].sampled, refined.filled), (1564, 0), "{refined:?}");
+        // On a large map the cells that it takes to see 0.3 %.
+        let (_, refined) = run(&plan([200, 200], "minimum_grid = 8"), |_, _| 4);
+        assert_eq!(refined.audits[0].sampled, crate::scene::AUDIT as usize);
+    }
+
     /// Islands smaller than a block that the coarse grid misses altogether.
     #[test]
     fn the_audit_finds_planted_islands_and_mends_the_map() {
@@ -221,7 +237,7 @@ mod tests {
         let last = refined.audits[refined.audits.len() - 1];
         assert!(last.rate() <= 0.01);
         assert!(wrong(&records, 241, islands) <= refined.filled / 100, "{refined:?}");
-        // One island too small to matter: what the audit hits of it is cut out.
+        // One island too small to matter: what the audit finds of it is cut out.
         let one = |i: usize, j: usize| if (40..48).contains(&i) && (40..48).contains(&j) { 5 } else { 1 };
         let plan = self::plan([241, 241], "minimum_grid = 48\naudit = 4000");
         let (records, refined) = run(&plan, one);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use rattlemap::coexistence;
-use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
+use rattlemap::gpu::{self, AdapterChoice, Gpu, Precision};
 use rattlemap::output::map::{MANIFEST, Made, write_validation};
 use rattlemap::output::{Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
 use rattlemap::plan::Plan;
@@ -49,15 +49,15 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         is_lane: manifest.engine == "gpu",
     };
     let sample = validate::sample(&plan, &records, ask.samples as usize, ask.seed);
-    let source = states(&subject, &scene, &manifest, &sample)?;
+    let Again { source, device, note } = states(&subject, &scene, &manifest, &sample)?;
     let progress = Progress::new(sample.picks.len(), 0, "cells replayed", ask.quiet);
     let validation =
         validate::replay(&subject, &sample, source, &|done| progress.report(done, sample.picks.len()));
     let attractors = coexistence::attractors(&plan, &records);
     let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
-    let files = write_validation(&folder, &cells, &made, &validation)?;
-    progress.finish(&format!("{}\n{}: {}", summary(&validation), dir.display(), files.join(", ")));
+    let files = write_validation(&folder, &cells, &made, device.as_deref(), &validation)?;
+    progress.finish(&format!("{}{note}\n{}: {}", summary(&validation), dir.display(), files.join(", ")));
     verdict(dir, &plan, &validation)
 }
 
@@ -141,23 +141,43 @@ fn read_records(
     Ok((records, refined))
 }
 
-/// Runs the sample's lanes again over a few periods, on the best adapter there is.
+/// States of the sample, made again.
+struct Again {
+    source: StateSource,
+    /// What ran lanes again, if anything did.
+    device: Option<String>,
+    /// What is to be said about that; empty where it is the map's own device.
+    note: String,
+}
+
+impl Again {
+    fn without_lanes(source: StateSource) -> Again {
+        Again { source, device: None, note: String::new() }
+    }
+}
+
+/// Runs the sample's lanes again over a few periods, on the device that made the map or else on
+/// the best adapter there is.
 fn states(
     subject: &Subject<'_>,
     scene: &Scene,
     manifest: &Manifest,
     sample: &Sample,
-) -> Result<StateSource, Failure> {
+) -> Result<Again, Failure> {
     if !subject.is_lane {
-        return Ok(StateSource::Replay);
+        return Ok(Again::without_lanes(StateSource::Replay));
     }
-    // The device that made the map, if it is there.
-    let same = AdapterChoice { name: Some(manifest.device.clone()) };
-    let opened = pollster::block_on(Gpu::open(subject.precision, &same))
-        .or_else(|_| pollster::block_on(Gpu::open(subject.precision, &AdapterChoice::default())));
-    let mut gpu = match opened {
-        Ok(gpu) => gpu,
-        Err(error) => return Ok(StateSource::None(error.to_string())),
+    let open = |choice: &AdapterChoice| pollster::block_on(Gpu::open(subject.precision, choice));
+    let own = AdapterChoice { name: Some(manifest.device.clone()) };
+    let (mut gpu, note) = match open(&own) {
+        Ok(gpu) => (gpu, String::new()),
+        Err(why) => match open(&AdapterChoice::default()) {
+            Ok(gpu) => {
+                let device = gpu::describe(gpu.adapter());
+                (gpu, format!("\nlanes ran again on {device}, not on the map's own device: {why}"))
+            }
+            Err(error) => return Ok(Again::without_lanes(StateSource::None(error.to_string()))),
+        },
     };
     let ids: Vec<u32> = sample.picks.iter().map(|pick| pick.id).collect();
     let steps = match scene.integration().steps_per_period {
@@ -167,7 +187,7 @@ fn states(
     let Subject { plan, records, .. } = *subject;
     let lanes = pollster::block_on(validate::states::lane_states(&mut gpu, plan, records, &ids, steps))
         .context("cannot run the sample's lanes again")?;
-    Ok(StateSource::Lanes(lanes))
+    Ok(Again { source: StateSource::Lanes(lanes), device: Some(gpu::describe(gpu.adapter())), note })
 }
 
 fn summary(validation: &Validation) -> String {

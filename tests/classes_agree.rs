@@ -48,7 +48,7 @@ fn check_map(axes: [Axis<'_>; 2], sets: &[&str], precision: Precision) {
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
     let plan = Plan::new(&Scene::parse(&text, "plane", &sets, Purpose::Map).unwrap());
     let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
-    let mut engine = Engine::Gpu(Box::new(engine::Gpu::new(&plan, device).unwrap()));
+    let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(&plan, device)).unwrap()));
     let batch = Schedule::new(&plan).batch(&plan, 0, plan.cell_count());
     let mut records = vec![Record::default(); plan.cell_count()];
     for (cell, record) in batch.cells.iter().zip(pollster::block_on(engine.run(&batch)).unwrap()) {

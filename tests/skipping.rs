@@ -38,7 +38,7 @@ fn run(by: By, side: usize, ids: &[u32], sets: &[&str]) -> Vec<Record> {
         By::Reference => Engine::Cpu(Cpu::new(&plan)),
         By::Lanes(precision) => {
             let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
-            Engine::Gpu(Box::new(engine::Gpu::new(&plan, device).unwrap()))
+            Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(&plan, device)).unwrap()))
         }
     };
     pollster::block_on(engine.run(&batch)).unwrap()

@@ -66,7 +66,7 @@ fn on_cpu(plan: &Plan) -> Vec<Record> {
 
 fn on_lanes(plan: &Plan, precision: Precision) -> Vec<Record> {
     let device = pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::default())).unwrap();
-    swept(plan, &mut Engine::Gpu(Box::new(Gpu::new(plan, device).unwrap())))
+    swept(plan, &mut Engine::Gpu(Box::new(pollster::block_on(Gpu::new(plan, device)).unwrap())))
 }
 
 /// Period of a cell; 0 where there is none.

@@ -306,6 +306,44 @@ fn planted_records_fail_the_validation_by_name() {
     }
 }
 
+/// Another device than the map's may round differently: whoever reads the result is told.
+#[test]
+fn lanes_of_another_device_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("o");
+    fs::write(folder.path().join("s.toml"), scene_text(4, 3)).unwrap();
+    let map = ["map", "s.toml", "--out", "o", "--engine", "gpu", "--quiet"];
+    rattlemap(folder.path(), &map).success();
+    let validated = || said(&rattlemap(folder.path(), &["validate", "o"]).success());
+    let text = validated();
+    assert!(!text.contains("device"), "{text}");
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let made: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    let states = &json(&out)["states"];
+    assert_eq!((&states["same_device"], &states["device"]), (&true.into(), &made["device"]));
+    // The same map, as if it came from elsewhere.
+    let device = made["device"].as_str().unwrap();
+    let scene = scene(4, 3);
+    let identity = |device| Identity::new("gpu", "f32", device, scene.identity());
+    let mut records = Vec::new();
+    let take = |_, batch: &[Record]| {
+        records.extend_from_slice(batch);
+        true
+    };
+    RecordFile::read(&out.join(RECORDS), &identity(device), take).unwrap();
+    RecordFile::create(&out.join(RECORDS), &identity("Faraway card")).unwrap().append(&records).unwrap();
+    fs::write(out.join("manifest.json"), manifest.replace(device, "Faraway card")).unwrap();
+    let text = validated();
+    assert!(
+        text.contains(&format!("lanes ran again on {device}, not on the map's own device: no")),
+        "{text}"
+    );
+    assert!(text.contains("called Faraway card"), "{text}");
+    let found = json(&out);
+    assert_eq!((&found["device"], &found["states"]["same_device"]), (&"Faraway card".into(), &false.into()));
+    assert_eq!(found["states"]["device"], device);
+}
+
 #[test]
 fn what_is_no_finished_map_is_refused() {
     let (folder, out) = finished();

@@ -11,7 +11,6 @@ pub mod check;
 mod instructions;
 pub mod peak;
 mod run;
-pub mod statistics;
 mod trips;
 pub mod work;
 
@@ -21,11 +20,11 @@ pub use instructions::{Instructions, instructions};
 pub use run::{Bench, Run, Times};
 pub use trips::{LOOPS, counting};
 
+use super::statistics::Spread;
 use crate::gpu::Precision;
 use crate::orbit::Class;
 use crate::scene::{Purpose, Scene};
 use check::Check;
-use statistics::Spread;
 use work::Work;
 
 /// The scene's text.

@@ -15,7 +15,7 @@ use rattlemap::scene::Scene;
 use rattlemap::validate::DEFAULT_SAMPLES;
 
 use crate::capacity;
-use crate::cli::Engines;
+use crate::cli::{EngineChoice, Engines};
 use crate::error::Failure;
 
 /// Side of the map on which operations are counted.
@@ -102,8 +102,10 @@ fn measure(
         Engine::Cpu { threads } => Bench::cpu(*threads, scratch)?,
         Engine::Gpu { precision, device, .. } => Bench::gpu(*precision, device, scratch)?,
     };
-    let misfit =
-        |scene: &Scene| capacity::check(scene, scratch.path()).err().map(|failure| failure.to_string());
+    let choice = if engine.threads().is_some() { EngineChoice::Cpu } else { EngineChoice::Gpu };
+    let misfit = |scene: &Scene| {
+        capacity::check(scene, choice, scratch.path()).err().map(|failure| failure.to_string())
+    };
     let sides = if ask.run.quick { &QUICK_SIDES[..] } else { &SIDES };
     let runs = if ask.run.quick { LEAST_RUNS } else { RUNS };
     let extent = Extent { sides, runs, seconds, misfit: &misfit };

@@ -5,9 +5,6 @@ use std::sync::OnceLock;
 use crate::flow::Flow;
 use crate::plan::Plan;
 
-/// Most flows that are kept; each takes about 20 kB.
-const KEPT: usize = 16_384;
-
 /// The flows of a plan; any thread may ask.
 pub(crate) struct Flows<'p> {
     plan: &'p Plan,
@@ -17,8 +14,7 @@ pub(crate) struct Flows<'p> {
 
 impl<'p> Flows<'p> {
     pub(crate) fn new(plan: &'p Plan) -> Flows<'p> {
-        let shared = plan.flow_count() < plan.run_count() && plan.flow_count() <= KEPT;
-        let kept = if shared { plan.flow_count() } else { 0 };
+        let kept = if plan.keeps_flows() { plan.flow_count() } else { 0 };
         Flows { plan, kept: (0..kept).map(|_| OnceLock::new()).collect() }
     }
 

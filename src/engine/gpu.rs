@@ -8,10 +8,6 @@ use crate::plan::{Batch, Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use crate::scene::Steps;
 
-/// Most flows that stay on the device for all batches; each takes 2 kB in f32, 4 kB in f64,
-/// and a phasor per step.
-const KEPT_FLOWS: usize = 16_384;
-
 /// First batches: enough to keep a hardware device busy, or a software one for a second.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
 const LEAST_IN_SOFTWARE: usize = 256;
@@ -32,16 +28,15 @@ impl<'p> Gpu<'p> {
     ///
     /// # Errors
     /// [`EngineError`] if the device takes no constants.
-    pub fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+    pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let settings = lane_settings(plan);
-        let is_shared = plan.flow_count() < plan.cell_count() && plan.flow_count() <= KEPT_FLOWS;
         let mut engine = Gpu { plan, device, settings, tables: None, steps: 0 };
-        if is_shared {
+        if plan.keeps_flows() {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
-            engine.tables = match engine.load(&flows, &laws) {
+            engine.tables = match engine.load(&flows, &laws).await {
                 // Batches that need fewer of them may fit.
-                Err(GpuError::TooManyFlows { .. }) => None,
+                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
                 other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
             };
         }
@@ -71,38 +66,36 @@ impl<'p> Gpu<'p> {
     }
 
     pub(super) async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
-        let cells = batch.cells.len();
-        let (own, lanes) = match &self.tables {
-            Some(_) => (None, batch.cells.iter().map(|cell| lane(cell, cell.flow, cell.law)).collect()),
-            None => {
-                let (flows, laws, lanes) = self.renumbered(&batch.cells);
-                (Some(self.load(&flows, &laws).map_err(|error| self.error(error, cells))?), lanes)
-            }
-        };
-        let Some(tables) = own.as_ref().or(self.tables.as_ref()) else {
-            unreachable!("one of them is there")
-        };
-        let ran = self.device.run_on(tables, &lanes, &self.settings).await;
-        let mut records = ran.map_err(|error| self.error(error, cells))?;
-        for (record, lane) in records.iter_mut().zip(&lanes) {
+        let failed = |engine: &Gpu<'_>, error| engine.error(error, batch.cells.len());
+        if let Some(tables) = self.tables.take() {
+            let lanes: Vec<Lane> = batch.cells.iter().map(|cell| lane(cell, cell.flow, cell.law)).collect();
+            let ran = self.run_on(&tables, &lanes).await;
+            self.tables = Some(tables);
+            return ran.map_err(|error| failed(self, error));
+        }
+        let mut records = Vec::with_capacity(batch.cells.len());
+        for cells in batch.cells.chunks(self.plan.most_flows()) {
+            let (flows, laws, lanes) = renumbered(cells);
+            let tables = self.load(&flows, &laws).await.map_err(|error| failed(self, error))?;
+            records.extend(self.run_on(&tables, &lanes).await.map_err(|error| failed(self, error))?);
+        }
+        Ok(records)
+    }
+
+    /// The records of lanes, with what somebody asked for.
+    async fn run_on(&mut self, tables: &Tables, lanes: &[Lane]) -> Result<Vec<Record>, GpuError> {
+        let mut records = self.device.run_on(tables, lanes, &self.settings).await?;
+        for (record, lane) in records.iter_mut().zip(lanes) {
             self.steps += u64::from(record.periods_run) * u64::from(tables.steps_per_period(lane.flow));
             keep(record, self.plan.needs());
         }
         Ok(records)
     }
 
-    fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
+    async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
         let flows: Vec<_> = flows.iter().map(|&flow| self.plan.oscillator(flow)).collect();
         let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
-        self.device.load(&flows, &laws, self.settings.steps_per_period)
-    }
-
-    /// The flows and laws of a batch alone, and its lanes with indices among them.
-    fn renumbered(&self, cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
-        let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
-        let lanes =
-            cells.iter().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
-        (flows.list, laws.list, lanes)
+        self.device.load(&flows, &laws, self.settings.steps_per_period).await
     }
 
     fn error(&self, error: GpuError, cells: usize) -> EngineError {
@@ -115,6 +108,13 @@ impl<'p> Gpu<'p> {
             other => EngineError::Refused { device, reason: other.to_string() },
         }
     }
+}
+
+/// The flows and laws of these cells alone, and their lanes with indices among them.
+fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
+    let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
+    let lanes = cells.iter().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
+    (flows.list, laws.list, lanes)
 }
 
 fn lane(cell: &Cell, flow: u32, law: u32) -> Lane {

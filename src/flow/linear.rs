@@ -89,6 +89,12 @@ pub struct LinearFlow {
 }
 
 impl LinearFlow {
+    /// Bytes beside the struct itself.
+    #[cfg(test)]
+    pub(super) fn heap_bytes(&self) -> usize {
+        self.steps.capacity() * size_of::<Step>() + self.table.capacity() * size_of::<Columns>()
+    }
+
     pub(super) fn new(oscillator: &Oscillator, domain: &Domain) -> LinearFlow {
         let generator = generator(oscillator, domain);
         let rate = rate(oscillator, domain);

@@ -1,6 +1,7 @@
 //! Batches: buffers, dispatches and reading back.
 
 use super::device::{BEGIN, CONCLUDE, Pipelines};
+use super::guard::guarded;
 use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
 use super::reading::record;
 use super::rounds::{Rounds, bind, dispatch, row};
@@ -45,18 +46,8 @@ pub(super) async fn run(
     }
     let mut records = Vec::with_capacity(lanes.len());
     for batch in lanes.chunks(batch_lanes(gpu, settings)) {
-        let out_of_memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        // What is made of a buffer that is not there is refused, which says no more.
-        let refused = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let buffers = Batch::new(gpu, tables, batch, settings);
-        let (refused, out_of_memory) = (refused.pop(), out_of_memory.pop());
-        let (refused, out_of_memory) = (refused.await, out_of_memory.await);
-        if out_of_memory.is_some() {
-            return Err(GpuError::OutOfMemory { lanes: batch.len() });
-        }
-        if let Some(error) = refused {
-            return Err(gpu.failure(GpuError::Refused { what: "a batch", message: error.to_string() }));
-        }
+        let make = || Batch::new(gpu, tables, batch, settings);
+        let buffers = guarded(gpu, "lanes", batch.len(), make).await?;
         records.extend(buffers.run(gpu, variants, tables, batch, settings).await?);
     }
     Ok(records)

@@ -46,23 +46,26 @@ struct Equations {
 }
 
 impl Constants {
-    /// Derives the constants, with `steps` free steps per period or as many as the motion
-    /// needs. None if a lane would be refused for their number.
-    pub fn new(oscillator: &model::Oscillator, steps: Option<u32>) -> Option<Constants> {
-        let period = oscillator.period();
-        let needed = (period * rate(oscillator, &oscillator.free) / STEP_ANGLE).ceil().max(8.0);
+    /// Free steps per forcing period: `asked` or as many as the motion needs. None if a lane
+    /// would be refused for their number.
+    pub fn steps(oscillator: &model::Oscillator, asked: Option<u32>) -> Option<u32> {
+        let angle = oscillator.period() * rate(oscillator, &oscillator.free);
+        let needed = (angle / STEP_ANGLE).ceil().max(8.0);
         // Even, so that half a period is a step, too.
-        let steps = 2.0 * (0.5 * f64::from(steps.unwrap_or(0)).max(needed)).ceil();
-        if !(steps.is_finite() && steps <= f64::from(MOST_STEPS)) {
-            return None;
-        }
-        let h = period / steps;
+        let steps = 2.0 * (0.5 * f64::from(asked.unwrap_or(0)).max(needed)).ceil();
+        (steps <= f64::from(MOST_STEPS)).then_some(steps as u32)
+    }
+
+    /// Derives the constants for as many steps as [`Constants::steps`] says; none if it has none.
+    pub fn new(oscillator: &model::Oscillator, asked: Option<u32>) -> Option<Constants> {
+        let steps = Constants::steps(oscillator, asked)?;
+        let period = oscillator.period();
+        let h = period / f64::from(steps);
         let substeps = |domain: &model::Domain| {
             (h * rate(oscillator, domain) / STEP_ANGLE).max(1.0).log2().ceil().exp2()
         };
         let [right, left] = oscillator.meshing;
         let domain = |d: &model::Domain, wall: f64, substeps: f64| domain(oscillator, d, wall, h, substeps);
-        let steps = steps as u32;
         let mut constants = Constants {
             flow: Zeroable::zeroed(),
             steps,

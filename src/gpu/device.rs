@@ -142,14 +142,34 @@ fn features(precision: Precision) -> wgpu::Features {
     }
 }
 
-/// Hardware before software, dedicated before integrated.
-fn rank(info: &wgpu::AdapterInfo) -> u32 {
-    match info.device_type {
+/// Hardware before software, dedicated before integrated; of the interfaces to one adapter the
+/// one that offers most.
+fn rank(info: &wgpu::AdapterInfo) -> (u32, u32) {
+    let kind = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::VirtualGpu => 1,
         wgpu::DeviceType::IntegratedGpu => 2,
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
+    };
+    let interface = match info.backend {
+        wgpu::Backend::Vulkan => 0,
+        wgpu::Backend::Metal => 1,
+        wgpu::Backend::Dx12 => 2,
+        wgpu::Backend::Gl => 3,
+        wgpu::Backend::BrowserWebGpu | wgpu::Backend::Noop => 4,
+    };
+    (kind, interface)
+}
+
+/// Why an adapter comes before or after itself by another interface.
+pub fn interface_rank(info: &wgpu::AdapterInfo) -> &'static str {
+    match info.backend {
+        wgpu::Backend::Vulkan => "first choice: the only interface with f64",
+        wgpu::Backend::Metal => "second to Vulkan: no f64",
+        wgpu::Backend::Dx12 => "second to Vulkan: no f64 here",
+        wgpu::Backend::Gl => "last choice: no f64, smaller buffers, no clock of its own",
+        wgpu::Backend::BrowserWebGpu | wgpu::Backend::Noop => "last choice",
     }
 }
 
@@ -245,4 +265,26 @@ fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry_point: EntryPoint) -> 
         compilation_options: Default::default(),
         cache: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_adapter_by_two_interfaces_is_taken_by_the_better() {
+        let adapters = pollster::block_on(adapters());
+        let seen = &adapters.first().expect("tests need an adapter").info;
+        let with = |device_type, backend| wgpu::AdapterInfo { device_type, backend, ..seen.clone() };
+        let (dedicated, software) = (wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu);
+        let in_order = [
+            with(dedicated, wgpu::Backend::Vulkan),
+            with(dedicated, wgpu::Backend::Dx12),
+            with(dedicated, wgpu::Backend::Gl),
+            with(software, wgpu::Backend::Vulkan),
+            with(software, wgpu::Backend::Gl),
+        ];
+        let ranks = in_order.each_ref().map(rank);
+        assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:?}");
+    }
 }

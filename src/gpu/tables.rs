@@ -1,6 +1,7 @@
 //! What lanes share, on the device: flows and contact laws.
 
 use super::constants::Constants;
+use super::guard::guarded;
 use super::layout::{self, Flow, FlowShape};
 use super::transfer::{reals, upload};
 use super::{Gpu, GpuError};
@@ -17,13 +18,25 @@ pub struct Tables {
     pub(super) laws: wgpu::Buffer,
 }
 
+/// Copies of all constants while they are handed over: those of the lanes, the lists of flows and
+/// phasors, these in the lanes' precision, what the driver is given, and the device's own where it
+/// has no memory of its own.
+const COPIES: u64 = 5;
+
+/// Bytes of memory that the constants of one flow take at most.
+pub(crate) fn bytes(oscillator: &Oscillator, steps_per_period: Option<u32>) -> u64 {
+    let steps = Constants::steps(oscillator, steps_per_period);
+    let phasors = steps.map_or(0, |steps| (u64::from(steps) + 1) * size_of::<[f64; 2]>() as u64);
+    COPIES * (size_of::<Constants>() as u64 + size_of::<FlowShape>() as u64 + phasors)
+}
+
 impl Tables {
     /// Free steps per forcing period of a flow; 0 if lanes cannot carry it.
     pub fn steps_per_period(&self, flow: u32) -> u32 {
         self.constants[flow as usize].as_ref().map_or(0, |constants| constants.steps)
     }
 
-    pub(super) fn new(
+    pub(super) async fn new(
         gpu: &Gpu,
         flows: &[Oscillator],
         laws: &[Law],
@@ -61,13 +74,14 @@ impl Tables {
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows: flows.len(), needed, allowed });
         }
-        Ok(Tables {
+        let make = || Tables {
             flows: upload(gpu, "flows", &tables),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
             phasors: upload(gpu, "phasors", &phasors),
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
             constants,
             law_count: laws.len(),
-        })
+        };
+        guarded(gpu, "flows", flows.len(), make).await
     }
 }

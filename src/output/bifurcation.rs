@@ -1,15 +1,15 @@
 //! The folder of a bifurcation diagram: table, figure and manifest.
 
-use std::fs;
 use std::time::Duration;
 
-use super::{Folder, bifurcation_csv, bifurcation_figure, manifest};
+use super::bifurcation_manifest::Manifest;
+use super::manifest::MANIFEST;
+use super::{Folder, bifurcation_csv, bifurcation_figure};
 use crate::bifurcation::Column;
 use crate::scene::{Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
 const PNG: &str = "bifurcation.png";
-const MANIFEST: &str = "manifest.json";
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one
 /// is complete. Returns the files' names.
@@ -39,7 +39,6 @@ pub fn write(
         files.push(PNG);
     }
     files.push(MANIFEST);
-    let manifest = manifest::bifurcation(scene, sets, columns, elapsed, &files)?;
-    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    folder.write_json(MANIFEST, &Manifest::new(scene, sets, columns, elapsed, &files))?;
     Ok(files)
 }

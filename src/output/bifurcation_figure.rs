@@ -14,8 +14,6 @@ use crate::orbit::Class;
 
 const SIZE: (u32, u32) = (1600, 1400);
 const LEFT: f64 = 130.0;
-const RIGHT: f64 = 45.0;
-const BELOW: f64 = 100.0;
 const BETWEEN: f64 = 30.0;
 /// Height of the strip that holds the marks of columns without an attractor.
 const MARKS: f64 = 16.0;
@@ -43,7 +41,8 @@ pub fn write(path: &Path, title: &str, axis_label: &str, columns: &[Column]) -> 
 fn draw(canvas: &Canvas<'_>, title: &str, axis_label: &str, columns: &[Column]) -> Result<()> {
     let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
     let top = draw_head(canvas, title, "", &legend(!left_out.is_empty()))? + 14.0;
-    let bottom = canvas.size().1 - BELOW;
+    let whole = canvas.panel(LEFT, top);
+    let bottom = whole.bottom;
     let middle = (top + bottom) / 2.0;
     let panels = [
         (0, "x\u{2081} at |z| = b", top, middle - BETWEEN / 2.0),
@@ -52,7 +51,7 @@ fn draw(canvas: &Canvas<'_>, title: &str, axis_label: &str, columns: &[Column]) 
     for (component, label, top, bottom) in panels {
         let values = columns.iter().flat_map(|c| &c.points).map(|p| p.before[component]);
         let mut frame = Frame {
-            rect: Rect { left: LEFT, top, right: canvas.size().0 - RIGHT, bottom },
+            rect: Rect { top, bottom, ..whole },
             x: value_axis(axis_label, columns),
             y: Axis::around(label, values, 1e-6),
         };
@@ -136,7 +135,7 @@ fn dot(frame: &Frame, columns: &[Column], least: f64) -> Vec<(i32, i32)> {
 
 /// The number of dots drawn at full strength: only one pixel in a hundred has more.
 ///
-/// The few pixels that a periodic orbit hits every time would fade all others.
+/// The few pixels that a periodic orbit falls on every time would fade all others.
 fn darkest(counts: &[[u32; 2]]) -> f64 {
     let mut totals: Vec<u32> = counts.iter().map(|[a, b]| a + b).filter(|n| *n > 0).collect();
     if totals.is_empty() {

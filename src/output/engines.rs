@@ -1,24 +1,22 @@
 //! The folder of `bench engines`: tables, figures and manifest.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use anyhow::Result;
 use serde::Serialize;
 
-use super::manifest::FORMAT;
+use super::manifest::{Head, MANIFEST};
 use super::{Folder, engines_figure, names};
 use crate::bench::engines::check::Check;
-use crate::bench::engines::statistics::Spread;
 use crate::bench::engines::{Point, Run, SCENE, Series};
+use crate::bench::statistics::Spread;
 use crate::validate::Explanation;
 
 const TABLE: &str = "engines.csv";
 const RUNS: &str = "runs.csv";
 const FIGURE: &str = "engines.png";
 const STAGES: &str = "stages.png";
-const MANIFEST: &str = "manifest.json";
 
 /// What was asked for, and on what it ran.
 #[derive(Clone, Debug)]
@@ -46,8 +44,7 @@ pub fn write(folder: &Folder, series: &[Series], asked: &Asked) -> Result<Vec<&'
     folder.replace(FIGURE, |path| engines_figure::write_rates(path, series, &asked.processor))?;
     folder.replace(STAGES, |path| engines_figure::write_stages(path, series))?;
     let files = vec![TABLE, RUNS, FIGURE, STAGES, MANIFEST];
-    let manifest = serde_json::to_string_pretty(&manifest(series, asked, &files))?;
-    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    folder.write_json(MANIFEST, &manifest(series, asked, &files))?;
     Ok(files)
 }
 
@@ -155,10 +152,8 @@ fn write_runs(path: &Path, all: &[Series]) -> Result<()> {
 
 #[derive(Serialize)]
 struct Manifest<'a> {
-    format: u32,
-    command: &'static str,
-    crate_version: &'static str,
-    commit: &'static str,
+    #[serde(flatten)]
+    head: Head,
     scene: &'static str,
     budget_seconds: f64,
     quick: bool,
@@ -250,10 +245,7 @@ fn manifest<'a>(all: &'a [Series], asked: &'a Asked, files: &'a [&'static str]) 
         check: series.check.as_ref().map(CheckObject::from),
     };
     Manifest {
-        format: FORMAT,
-        command: "bench engines",
-        crate_version: env!("CARGO_PKG_VERSION"),
-        commit: env!("RATTLEMAP_COMMIT"),
+        head: Head::of("bench engines"),
         scene: SCENE,
         budget_seconds: asked.budget_seconds,
         quick: asked.quick,

@@ -7,20 +7,16 @@ use plotters::style::RGBColor;
 
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::{Align, Canvas, DARK, GRID, MEDIUM, Marker, Rect, SMALL, Shape, save_figure};
+use super::plot_style::{Align, Canvas, DARK, Marker, Rect, SMALL, Shape, save_figure};
 use crate::bench::engines::{Engine, Point, Run, Series, Times};
 use crate::gpu::Precision;
 
 const SIZE: (u32, u32) = (1700, 1150);
 const LEFT: f64 = 190.0;
-const RIGHT: f64 = 60.0;
-const BELOW: f64 = 110.0;
-const TICK: f64 = 7.0;
 const WIDTH: f64 = 3.0;
 const RADIUS: f64 = 7.0;
-/// Axes span this many decades at least, and name all their ticks below the other number.
+/// Axes span this many decades at least.
 const LEAST_DECADES: f64 = 0.8;
-const SHORT: f64 = 2.5;
 /// Half the width of the bars' ends.
 const END: f64 = 6.0;
 
@@ -66,11 +62,11 @@ pub(super) fn write_rates(path: &Path, all: &[Series], processor: &str) -> Resul
         );
         let top = draw_head(canvas, title, &subtitle, &entries)? + 10.0;
         let frame = frame(canvas, top, &all);
-        grid(canvas, &frame)?;
+        frame.draw_grid(canvas)?;
         for (&series, &color) in all.iter().zip(&colors) {
             curve(canvas, &frame, series, color)?;
         }
-        axes(canvas, &frame)
+        frame.draw_axes(canvas, true)
     })
 }
 
@@ -100,86 +96,23 @@ fn colors(all: &[&Series]) -> Vec<RGBColor> {
     all.iter().map(color).collect()
 }
 
-/// All points with some room; coordinates are decimal logarithms.
+/// All points with some room.
 fn frame(canvas: &Canvas<'_>, top: f64, all: &[&Series]) -> Frame {
-    let (width, height) = canvas.size();
-    let rect = Rect { left: LEFT, top, right: width - RIGHT, bottom: height - BELOW };
     let points = || all.iter().flat_map(|series| &series.points);
-    let lanes = points().map(|point| (point.lanes as f64).log10());
+    let lanes = points().map(|point| point.lanes as f64);
     let rates = points().flat_map(|point| {
         let spread = point.spread(Run::rate);
-        [spread.low, spread.high].map(f64::log10)
+        [spread.low, spread.high]
     });
     Frame {
-        rect,
-        x: Axis::around("lanes", lanes, LEAST_DECADES),
-        y: Axis::around("forcing periods per second, over all lanes", rates, LEAST_DECADES),
-    }
-}
-
-/// One, two and five times powers of ten on an axis of logarithms, and which of them are named:
-/// all of them on a short axis, else the powers alone.
-fn ticks(axis: &Axis) -> impl Iterator<Item = (f64, bool, String)> + use<> {
-    let Axis { low, high, .. } = *axis;
-    let names_all = high - low < SHORT;
-    (low.floor() as i32..=high.ceil() as i32)
-        .flat_map(|decade| [1, 2, 5].map(|part| (decade, part)))
-        .map(move |(decade, part)| {
-            let at = f64::from(decade) + f64::from(part).log10();
-            (at, part == 1 || names_all, named(part, decade))
-        })
-        .filter(move |(at, ..)| (low..=high).contains(at))
-}
-
-fn grid(canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
-    let Rect { left, top, right, bottom } = frame.rect;
-    let width = |is_named| if is_named { 1.5 } else { 0.7 };
-    for (at, is_named, _) in ticks(&frame.x) {
-        let x = frame.at(at, 0.0).0;
-        canvas.stroke(&[(x, top), (x, bottom)], width(is_named), GRID)?;
-    }
-    for (at, is_named, _) in ticks(&frame.y) {
-        let y = frame.at(0.0, at).1;
-        canvas.stroke(&[(left, y), (right, y)], width(is_named), GRID)?;
-    }
-    Ok(())
-}
-
-fn axes(canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
-    let Rect { left, top, right, bottom } = frame.rect;
-    canvas.stroke(
-        &[(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)],
-        1.5,
-        DARK,
-    )?;
-    for (at, _, name) in ticks(&frame.x).filter(|(_, is_named, _)| *is_named) {
-        let x = frame.at(at, 0.0).0;
-        canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
-        canvas.text(&name, (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
-    }
-    for (at, _, name) in ticks(&frame.y).filter(|(_, is_named, _)| *is_named) {
-        let y = frame.at(0.0, at).1;
-        canvas.stroke(&[(left - TICK, y), (left, y)], 1.5, DARK)?;
-        canvas.text(&name, (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
-    }
-    let middle = ((left + right) / 2.0, bottom + TICK + 56.0);
-    canvas.text(&frame.x.label, middle, MEDIUM, Align::Center, DARK)?;
-    canvas.text(&frame.y.label, (left - 145.0, (top + bottom) / 2.0), MEDIUM, Align::Upwards, DARK)
-}
-
-/// `part` times a power of ten as people say it.
-fn named(part: u32, decade: i32) -> String {
-    match decade {
-        0..=2 => (part * 10u32.pow(decade as u32)).to_string(),
-        3..=5 => format!("{} 000", part * 10u32.pow(decade as u32 - 3)),
-        6..=8 => format!("{} million", part * 10u32.pow(decade as u32 - 6)),
-        9..=11 => format!("{} billion", part * 10u32.pow(decade as u32 - 9)),
-        _ => format!("{part}e{decade}"),
+        rect: canvas.panel(LEFT, top),
+        x: Axis::around_logarithms("lanes", lanes, LEAST_DECADES),
+        y: Axis::around_logarithms("forcing periods per second, over all lanes", rates, LEAST_DECADES),
     }
 }
 
 fn curve(canvas: &Canvas<'_>, frame: &Frame, series: &Series, color: RGBColor) -> Result<()> {
-    let place = |point: &Point, rate: f64| frame.at((point.lanes as f64).log10(), rate.log10());
+    let place = |point: &Point, rate: f64| frame.at(point.lanes as f64, rate);
     let line: Vec<_> =
         series.points.iter().map(|point| place(point, point.spread(Run::rate).median)).collect();
     canvas.stroke(&line, WIDTH, color)?;
@@ -196,6 +129,7 @@ fn curve(canvas: &Canvas<'_>, frame: &Frame, series: &Series, color: RGBColor) -
     Ok(())
 }
 
+const LEFT_OF_STAGES: f64 = 80.0;
 const BAR: f64 = 44.0;
 const ROW: f64 = 96.0;
 
@@ -215,21 +149,12 @@ pub(super) fn write_stages(path: &Path, all: &[Series]) -> Result<()> {
         let title = "Where the time goes: the more of it is integration, the better";
         let subtitle = "the largest map of every engine; medians";
         let top = draw_head(canvas, title, subtitle, &entries)? + 10.0;
-        let rect = Rect { left: LEFT - 110.0, top, right: canvas.size().0 - RIGHT, bottom: height - BELOW };
         let x = Axis::exact("share of the time, %", 0.0, 100.0);
-        let frame = Frame { rect, x, y: Axis::exact("", 0.0, 1.0) };
+        let frame = Frame { rect: canvas.panel(LEFT_OF_STAGES, top), x, y: Axis::exact("", 0.0, 1.0) };
         for (nth, (series, point)) in rows.iter().enumerate() {
             stages(canvas, &frame, top + ROW * nth as f64, series, point)?;
         }
-        let Rect { left, right, bottom, .. } = rect;
-        canvas.stroke(&[(left, bottom), (right, bottom)], 1.5, DARK)?;
-        for percent in (0..=100).step_by(20) {
-            let x = frame.at(percent.into(), 0.0).0;
-            canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
-            canvas.text(&percent.to_string(), (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
-        }
-        let middle = ((left + right) / 2.0, bottom + TICK + 56.0);
-        canvas.text(&frame.x.label, middle, MEDIUM, Align::Center, DARK)
+        frame.draw_x_axis(canvas, true)
     })
 }
 
@@ -271,13 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_powers_of_ten_and_on_short_axes_their_parts() {
-        let names = |low: f64, high: f64| -> Vec<String> {
-            let named = ticks(&Axis::exact("", low, high)).filter(|(_, is_named, _)| *is_named);
-            named.map(|(_, _, name)| name).collect()
-        };
-        assert_eq!(names(2.9, 7.1), ["1 000", "10 000", "100 000", "1 million", "10 million"]);
-        assert_eq!(names(4.8, 6.5), ["100 000", "200 000", "500 000", "1 million", "2 million"]);
+    fn numbers_are_written_for_the_eye() {
         assert_eq!(grouped(9_998_244), "9 998 244");
         assert_eq!([2.516, 31.77, 0.00123].map(seconds), ["2.52", "31.8", "0.00123"]);
     }

@@ -6,6 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use serde::Serialize;
 use thiserror::Error;
 
 /// Why a folder cannot be used.
@@ -82,6 +83,14 @@ impl Folder {
             let _ = fs::remove_file(&partial);
         }
         written.with_context(|| format!("cannot write {}", target.display()))
+    }
+
+    /// Writes `object` as the file `name`, in lines to be read, whole or not at all.
+    ///
+    /// # Errors
+    /// As [`Folder::replace`].
+    pub(super) fn write_json(&self, name: &str, object: &impl Serialize) -> anyhow::Result<()> {
+        self.replace(name, |path| Ok(fs::write(path, serde_json::to_string_pretty(object)? + "\n")?))
     }
 
     /// Removes the files `names` of an earlier run, as far as they exist.

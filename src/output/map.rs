@@ -1,6 +1,5 @@
 //! The folder of a map: tables, figures, report and manifest.
 
-use std::fs;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -10,15 +9,13 @@ use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifes
 use crate::scene::Format;
 use crate::validate::Validation;
 
+pub use super::manifest::MANIFEST;
 pub use super::map_manifest::{Made, Run};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const HTML: &str = "report.html";
 const VALIDATION: &str = "validation.json";
-
-/// A map's manifest: the last file that a run writes.
-pub const MANIFEST: &str = "manifest.json";
 
 /// Every file that a map may have beside its records.
 const ALL: [&str; 11] = [
@@ -56,13 +53,13 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Resul
     let mut files = tables?;
     files.extend(pictures?);
     files.push(MANIFEST.to_owned());
-    let manifest = map_manifest::map(cells, run, &files)?;
-    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    folder.write_json(MANIFEST, &map_manifest::map(cells, run, &files))?;
     Ok(files)
 }
 
 /// Writes `validation.json` and, where the map has a report, the report again with a section
-/// on it. Returns the files' names.
+/// on it. `again` is the device that ran the sample's lanes again, if one did. Returns the files'
+/// names.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -70,11 +67,11 @@ pub fn write_validation(
     folder: &Folder,
     cells: &Cells<'_>,
     made: &Made<'_>,
+    again: Option<&str>,
     validation: &Validation,
 ) -> anyhow::Result<Vec<&'static str>> {
-    let object = ValidationObject::new(cells, made, validation);
-    let json = serde_json::to_string_pretty(&object)?;
-    folder.replace(VALIDATION, |path| Ok(fs::write(path, json + "\n")?))?;
+    let object = ValidationObject::new(cells, made, again, validation);
+    folder.write_json(VALIDATION, &object)?;
     if !folder.path().join(HTML).is_file() {
         return Ok(vec![VALIDATION]);
     }

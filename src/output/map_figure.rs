@@ -9,12 +9,11 @@ use super::cells::Cells;
 use super::layers::{Bar, Entry, Layer};
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::draw_head;
-use super::plot_style::{Align, Canvas, DARK, MEDIUM, Rect, SMALL, save_figure};
+use super::plot_style::{Align, BELOW, Canvas, DARK, Rect, SMALL, save_figure};
 use crate::scene::{self, Scene, Start};
 
 const LEFT: f64 = 140.0;
 const TOP: f64 = 130.0;
-const BELOW: f64 = 105.0;
 /// Room for the legend beside the map.
 const BESIDE: f64 = 460.0;
 /// Between map and legend.
@@ -117,10 +116,10 @@ fn draw_entries(
         let y = top + ROW * (row as f64 + 0.5);
         let patch = Rect { left, top: y - PATCH.1 / 2.0, right: left + PATCH.0, bottom: y + PATCH.1 / 2.0 };
         canvas.fill(patch, rgb(entry.color), 1.0)?;
-        outline(canvas, patch)?;
+        canvas.outline(patch, 1.0)?;
         let share = share(entry, total);
         let room = right - left - PATCH.0 - 14.0 - canvas.text_width(&share, SMALL)? - 16.0;
-        let text = fitted(canvas, &entry.text, room)?;
+        let text = canvas.fitted(&entry.text, SMALL, room)?;
         canvas.text(&text, (left + PATCH.0 + 14.0, y), SMALL, Align::Left, DARK)?;
         canvas.text(&share, (right, y), SMALL, Align::Right, DARK)?;
     }
@@ -136,28 +135,12 @@ fn share(entry: &Entry, total: usize) -> String {
     }
 }
 
-/// A text cut to a width.
-fn fitted(canvas: &Canvas<'_>, text: &str, room: f64) -> Result<String> {
-    let mut text = text.to_owned();
-    while text.chars().count() > 2 && canvas.text_width(&text, SMALL)? > room {
-        text.truncate(text.char_indices().nth_back(1).map_or(0, |(i, _)| i));
-        text.push('\u{2026}');
-    }
-    Ok(text)
-}
-
 fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64)) -> Result<()> {
-    canvas.text(bar.label, (left, top + 12.0), SMALL.min(MEDIUM), Align::Left, DARK)?;
+    canvas.text(bar.label, (left, top + 12.0), SMALL, Align::Left, DARK)?;
     let top = top + 44.0;
     let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
     canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row])?;
-    outline(canvas, rect)?;
+    canvas.outline(rect, 1.0)?;
     let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact("", bar.low, bar.high) };
     frame.draw_scale(canvas)
-}
-
-fn outline(canvas: &Canvas<'_>, rect: Rect) -> Result<()> {
-    let Rect { left, top, right, bottom } = rect;
-    let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
-    canvas.stroke(&corners, 1.0, DARK)
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::cells::{Cells, SOURCES};
 use super::cells_npy::ABSENT;
-use super::manifest::{AxisObject, FORMAT, StartObject, start};
+use super::manifest::{AxisObject, Head, StartObject, start};
 use super::names;
 use super::orbit_json::Parameters;
 use crate::orbit::Status;
@@ -45,13 +45,11 @@ pub struct Run<'a> {
     pub refined: Option<Refined>,
 }
 
+/// It names neither the machine's paths nor its users.
 #[derive(Serialize)]
-struct Manifest<'a> {
-    format: u32,
-    command: &'static str,
-    crate_version: &'static str,
-    /// Of the program; `unknown` where it was built outside of its repository.
-    commit: &'static str,
+pub(super) struct Manifest<'a> {
+    #[serde(flatten)]
+    head: Head,
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
@@ -59,7 +57,7 @@ struct Manifest<'a> {
     scene: &'a str,
     set: &'a [String],
     axes: Vec<AxisObject>,
-    parameters: Parameters<'a>,
+    parameters: Parameters,
     start: StartObject,
     integration: IntegrationObject,
     quantities: Vec<String>,
@@ -130,18 +128,11 @@ struct Codes {
     symmetric: BTreeMap<&'static str, i8>,
 }
 
-/// The manifest as JSON. It names neither the machine's paths nor its users.
-///
-/// # Errors
-/// None that a run can cause; serialisation is fallible by signature.
-pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, files: &[String]) -> serde_json::Result<String> {
+/// The manifest of a map that `run` has made.
+pub(super) fn map<'a>(cells: &Cells<'a>, run: &Run<'a>, files: &'a [String]) -> Manifest<'a> {
     let scene = cells.scene();
-    let swept: Vec<&str> = scene.axes().iter().map(|axis| axis.parameter().name).collect();
-    serde_json::to_string_pretty(&Manifest {
-        format: FORMAT,
-        command: "map",
-        crate_version: env!("CARGO_PKG_VERSION"),
-        commit: env!("RATTLEMAP_COMMIT"),
+    Manifest {
+        head: Head::of("map"),
         engine: run.engine,
         precision: run.precision,
         device: run.device,
@@ -149,7 +140,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, files: &[String]) -> serde_j
         scene: scene.text(),
         set: run.sets,
         axes: scene.axes().iter().map(AxisObject::from).collect(),
-        parameters: Parameters { pair: &scene.base(), except: &swept },
+        parameters: Parameters::of_scene(scene),
         start: start(scene),
         integration: integration(scene),
         quantities: scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect(),
@@ -163,7 +154,7 @@ pub(super) fn map(cells: &Cells<'_>, run: &Run<'_>, files: &[String]) -> serde_j
         resumed_cells: run.resumed_cells,
         refinement: run.refined.as_ref().map(RefinementObject::from),
         files,
-    })
+    }
 }
 
 fn integration(scene: &Scene) -> IntegrationObject {

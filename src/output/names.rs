@@ -5,25 +5,15 @@ use crate::model::Side;
 use crate::orbit::{Class, EventKind, Status};
 
 /// Every class name, in the order in which they are counted.
-pub(super) const CLASSES: [&str; 4] = ["periodic", "chaotic", "undecided", "failed"];
+pub(super) const CLASSES: [&str; 4] = Class::NAMES;
 
 pub(super) fn class(class: Class) -> &'static str {
-    match class {
-        Class::Periodic { .. } => CLASSES[0],
-        Class::Chaotic => CLASSES[1],
-        Class::Undecided => CLASSES[2],
-        Class::Failed => CLASSES[3],
-    }
+    class.name()
 }
 
 /// The number that stands for a class in tables: its place in [`CLASSES`].
 pub(super) fn class_code(class: Class) -> i8 {
-    match class {
-        Class::Periodic { .. } => 0,
-        Class::Chaotic => 1,
-        Class::Undecided => 2,
-        Class::Failed => 3,
-    }
+    class.index() as i8
 }
 
 /// Forcing periods per cycle, where the motion is periodic.

@@ -20,13 +20,11 @@ use crate::orbit::{EventKind, Orbit, Sample};
 /// The files that [`write`] makes.
 pub(super) const NAMES: [&str; 3] = ["phase_plane.png", "time_history.png", "gap.png"];
 const WIDTH: u32 = 1600;
-/// Panels' distance from the left and right edge of a figure.
 const LEFT: f64 = 130.0;
-const RIGHT: f64 = 45.0;
 /// Between the two phase planes: room for the labels of the right one.
 const BETWEEN: f64 = 150.0;
-/// Room below the lowest panel, for tick labels and the axis label.
-const BELOW: f64 = 100.0;
+/// Room for the walls' names beside the gap.
+const WALL_NAMES: f64 = 97.0;
 const LINE: f64 = 2.2;
 const MESHING_LINE: f64 = 4.0;
 /// Opacity of the bands that show when the teeth mesh.
@@ -70,11 +68,11 @@ impl Scene<'_> {
         legend.extend(self.meshing_entry());
         legend.extend(self.event_entries(true));
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
-        let bottom = canvas.size().1 - BELOW;
-        let width = (canvas.size().0 - RIGHT - LEFT - BETWEEN) / 2.0;
+        let whole = canvas.panel(LEFT, top);
+        let width = (whole.right - whole.left - BETWEEN) / 2.0;
         for (gear, left) in [(1, LEFT), (2, LEFT + width + BETWEEN)] {
             let (x, v) = (2 * gear - 2, 2 * gear - 1);
-            let rect = Rect { left, top, right: left + width, bottom };
+            let rect = Rect { left, right: left + width, ..whole };
             let frame = Frame {
                 rect,
                 x: self.state_axis(&format!("displacement of gear {gear}, x{}", subscript(gear)), &[x], 1.0),
@@ -103,15 +101,15 @@ impl Scene<'_> {
         }
         legend.extend(self.event_entries(true));
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
-        let bottom = canvas.size().1 - BELOW;
-        let middle = (top + bottom) / 2.0;
+        let whole = canvas.panel(LEFT, top);
+        let middle = (top + whole.bottom) / 2.0;
         let panels = [
             (0, "displacement, x", 1.0, top, middle - 15.0),
-            (1, "velocity, v", self.pair.omega, middle + 15.0, bottom),
+            (1, "velocity, v", self.pair.omega, middle + 15.0, whole.bottom),
         ];
         for (quantity, label, scale, top, bottom) in panels {
             let frame = Frame {
-                rect: Rect { left: LEFT, top, right: canvas.size().0 - RIGHT, bottom },
+                rect: Rect { top, bottom, ..whole },
                 x: self.time_axis(),
                 y: self.state_axis(label, &[quantity, quantity + 2], scale),
             };
@@ -129,19 +127,19 @@ impl Scene<'_> {
     }
 
     fn draw_gap(&self, canvas: &Canvas<'_>) -> Result<()> {
-        // Room for the walls' names.
-        let right = canvas.size().0 - 155.0;
         let mut legend = vec![Entry::new(Key::Line { color: DARK, width: LINE }, "gap in free motion")];
         legend.extend(self.meshing_entry());
         legend.extend(self.event_entries(false));
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
-        let bottom = canvas.size().1 - BELOW;
+        let panel = canvas.panel(LEFT, top);
+        let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
+        let bottom = panel.bottom;
         let split = if self.motion.meshes() { top + 0.64 * (bottom - top) } else { bottom };
         let b = self.pair.b;
         let walls = [1.25 * b, -1.25 * b];
         let gaps = self.motion.points().map(|(_, state)| state[0] - state[2]);
         let frame = Frame {
-            rect: Rect { left: LEFT, top, right, bottom: split },
+            rect: Rect { bottom: split, ..panel },
             x: self.time_axis(),
             y: Axis::around("gap, z = x\u{2081} \u{2212} x\u{2082}", gaps.chain(walls), b),
         };
@@ -151,7 +149,7 @@ impl Scene<'_> {
         self.draw_markers(canvas, &frame, false, at)?;
         frame.draw_axes(canvas, split == bottom)?;
         if split < bottom {
-            self.draw_penetration(canvas, Rect { left: LEFT, top: split + 30.0, right, bottom })?;
+            self.draw_penetration(canvas, Rect { top: split + 30.0, ..panel })?;
         }
         Ok(())
     }

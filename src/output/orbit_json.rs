@@ -5,16 +5,29 @@ use serde::{Serialize, Serializer};
 use super::names;
 use crate::model::{GearPair, State};
 use crate::orbit::{Event, Orbit};
+use crate::scene::Scene;
 
 /// Every parameter by name, in the order of Table 1.
-#[derive(Clone, Copy)]
-pub(super) struct Parameters<'a> {
-    pub(super) pair: &'a GearPair,
+pub(super) struct Parameters {
+    pair: GearPair,
     /// Parameters to leave out because they are swept.
-    pub(super) except: &'a [&'a str],
+    except: Vec<&'static str>,
 }
 
-impl Serialize for Parameters<'_> {
+impl Parameters {
+    /// All parameters of a gear pair.
+    pub(super) fn of(pair: &GearPair) -> Parameters {
+        Parameters { pair: *pair, except: Vec::new() }
+    }
+
+    /// Those of a scene that no axis sweeps.
+    pub(super) fn of_scene(scene: &Scene) -> Parameters {
+        let swept = scene.axes().iter().map(|axis| axis.parameter().name);
+        Parameters { pair: scene.base(), except: swept.collect() }
+    }
+}
+
+impl Serialize for Parameters {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let named = GearPair::PARAMETERS.iter().filter(|p| !self.except.contains(&p.name));
         serializer.collect_map(named.map(|p| (p.name, self.pair.get(p.name).ok())))
@@ -26,7 +39,7 @@ impl Serialize for Parameters<'_> {
 struct OrbitObject<'a> {
     e: f64,
     omega: f64,
-    parameters: Parameters<'a>,
+    parameters: Parameters,
     class: &'static str,
     period: Option<u32>,
     lyapunov: f64,
@@ -73,7 +86,7 @@ pub(super) fn to_json(pair: &GearPair, orbit: &Orbit) -> serde_json::Result<Stri
     serde_json::to_string_pretty(&OrbitObject {
         e: pair.e,
         omega: pair.omega,
-        parameters: Parameters { pair, except: &[] },
+        parameters: Parameters::of(pair),
         class: names::class(orbit.class),
         period: names::period(orbit.class),
         lyapunov: orbit.lyapunov,

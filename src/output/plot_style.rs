@@ -7,8 +7,8 @@
 
 pub(super) mod axes;
 pub(super) mod legend;
-pub(super) mod log_axes;
 mod raster;
+mod ticks;
 
 use std::path::Path;
 use std::sync::Once;
@@ -41,6 +41,11 @@ pub(super) const SMALL: f64 = 23.0;
 pub(super) const MEDIUM: f64 = 26.0;
 /// Size of titles.
 pub(super) const LARGE: f64 = 32.0;
+
+/// From a figure's edges to its panels: room for the last tick label on the right, for ticks and
+/// the axis' name below.
+const RIGHT: f64 = 58.0;
+pub(super) const BELOW: f64 = 105.0;
 
 /// Canvas pixels per pixel of the finished picture, along each direction.
 const FINE: u32 = 2;
@@ -173,6 +178,11 @@ impl Canvas<'_> {
         self.size
     }
 
+    /// What is left for panels of the picture below `top`, `left` pixels from its left edge.
+    pub(super) fn panel(&self, left: f64, top: f64) -> Rect {
+        Rect { left, top, right: self.size.0 - RIGHT, bottom: self.size.1 - BELOW }
+    }
+
     /// Fills a rectangle.
     pub(super) fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<()> {
         let corners = [fine((rect.left, rect.top)), fine((rect.right, rect.bottom))];
@@ -203,6 +213,16 @@ impl Canvas<'_> {
         let font = FontDesc::new(FontFamily::Name(FONT), size * scale, FontStyle::Normal);
         let (width, _) = self.area.estimate_text_size(text, &font.into())?;
         Ok(f64::from(width) / scale)
+    }
+
+    /// The beginning of a text that is not wider than `room`, with an ellipsis if that is not all.
+    pub(super) fn fitted(&self, text: &str, size: f64, room: f64) -> Result<String> {
+        let mut text = text.to_owned();
+        while text.chars().count() > 2 && self.text_width(&text, size)? > room {
+            text.truncate(text.char_indices().nth_back(1).map_or(0, |(i, _)| i));
+            text.push('\u{2026}');
+        }
+        Ok(text)
     }
 
     /// Draws an event marker, with a thin white rim that sets it off from the line.
@@ -252,6 +272,13 @@ impl Canvas<'_> {
             self.area.draw_pixel(at, &color.mix(share.into()))?;
         }
         Ok(())
+    }
+
+    /// Draws the border of a rectangle.
+    pub(super) fn outline(&self, rect: Rect, width: f64) -> Result<()> {
+        let Rect { left, top, right, bottom } = rect;
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
+        self.stroke(&corners, width, DARK)
     }
 
     /// Draws a dashed straight line.

@@ -1,18 +1,15 @@
 //! The folder of `rattlemap bench stability`: a table per part, figures, and the manifest.
 
-use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
 use serde::Serialize;
 
 use super::Folder;
-use super::manifest::FORMAT;
+use super::manifest::{Head, MANIFEST};
 use super::stability_figures as figures;
 use crate::bench::stability::{Report, Verdict, fuzz};
 use crate::model::GearPair;
-
-const MANIFEST: &str = "manifest.json";
 
 /// How a report was made.
 #[derive(Clone, Copy, Debug)]
@@ -29,10 +26,8 @@ pub struct Made<'a> {
 
 #[derive(Serialize)]
 struct Manifest<'a> {
-    format: u32,
-    command: &'static str,
-    crate_version: &'static str,
-    commit: &'static str,
+    #[serde(flatten)]
+    head: Head,
     size: &'a str,
     seed: u64,
     device: &'a str,
@@ -82,11 +77,8 @@ pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> anyhow::Resul
     file("stiffness.png", &|path| figures::stiffness(path, device, &report.stiffness))?;
     file("grid.png", &|path| figures::grid(path, device, &report.grid.swings))?;
     files.push(MANIFEST);
-    let manifest = serde_json::to_string_pretty(&Manifest {
-        format: FORMAT,
-        command: "bench stability",
-        crate_version: env!("CARGO_PKG_VERSION"),
-        commit: env!("RATTLEMAP_COMMIT"),
+    let manifest = Manifest {
+        head: Head::of("bench stability"),
         size: made.size,
         seed: made.seed,
         device: made.device,
@@ -94,8 +86,8 @@ pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> anyhow::Resul
         elapsed_seconds: made.elapsed.as_secs_f64(),
         verdicts: report.verdicts.iter().map(VerdictObject::from).collect(),
         files: &files,
-    })?;
-    folder.replace(MANIFEST, |path| Ok(fs::write(path, manifest + "\n")?))?;
+    };
+    folder.write_json(MANIFEST, &manifest)?;
     Ok(files)
 }
 

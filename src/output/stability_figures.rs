@@ -6,15 +6,13 @@ use std::path::Path;
 use anyhow::Result;
 use plotters::style::RGBColor;
 
+use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::log_axes::LogFrame;
-use super::plot_style::{Canvas, DARK, FAINT, Marker, Rect, Shape, save_figure};
+use super::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
 use crate::bench::stability::{EngineName, grazing, grid, long_runs, stiffness};
 
 const SIZE: (u32, u32) = (1500, 1150);
 const LEFT: f64 = 160.0;
-const RIGHT: f64 = 50.0;
-const BELOW: f64 = 110.0;
 /// Errors of nothing at all are drawn here, on the axis.
 const LEAST_ERROR: f64 = 1e-17;
 
@@ -73,14 +71,12 @@ fn save(path: &Path, figure: &Figure<'_>, groups: &[Group]) -> Result<()> {
 fn draw(canvas: &Canvas<'_>, figure: &Figure<'_>, groups: &[Group]) -> Result<()> {
     let entries: Vec<Entry> = groups.iter().map(|group| Entry::new(group.key(), &group.label)).collect();
     let top = draw_head(canvas, figure.title, figure.subtitle, &entries)? + 10.0;
-    let (width, height) = canvas.size();
     let points = || groups.iter().flat_map(|group| group.curves.iter().flatten());
-    let frame = LogFrame::around(
-        Rect { left: LEFT, top, right: width - RIGHT, bottom: height - BELOW },
-        figure.labels,
-        points().map(|point| point.0),
-        points().map(|point| point.1),
-    );
+    let frame = Frame {
+        rect: canvas.panel(LEFT, top),
+        x: Axis::decades(figure.labels[0], points().map(|point| point.0)),
+        y: Axis::decades(figure.labels[1], points().map(|point| point.1)),
+    };
     frame.draw_grid(canvas)?;
     for group in groups {
         for curve in &group.curves {
@@ -97,7 +93,7 @@ fn draw(canvas: &Canvas<'_>, figure: &Figure<'_>, groups: &[Group]) -> Result<()
             }
         }
     }
-    frame.draw_axes(canvas)
+    frame.draw_axes(canvas, true)
 }
 
 /// Error against forcing periods, a curve per cell and engine.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::cells::Cells;
-use super::manifest::FORMAT;
+use super::manifest::Head;
 use super::map_manifest::Made;
 use super::{names, replay};
 use crate::validate::states::HORIZON;
@@ -15,9 +15,8 @@ use crate::validate::{Explanation, Field, Mismatch, Quantiles, StateCheck, Strat
 
 #[derive(Serialize)]
 pub(super) struct ValidationObject {
-    format: u32,
-    command: &'static str,
-    crate_version: &'static str,
+    #[serde(flatten)]
+    head: Head,
     engine: String,
     precision: String,
     device: String,
@@ -50,6 +49,9 @@ struct AgreementObject {
 #[serde(tag = "check", rename_all = "snake_case")]
 enum StatesObject {
     Lanes {
+        /// What ran the lanes again, and whether that is what made the map.
+        device: String,
+        same_device: bool,
         horizon_periods: u32,
         cells: usize,
         above_budget: usize,
@@ -99,7 +101,13 @@ struct DifferenceObject {
 }
 
 impl ValidationObject {
-    pub(super) fn new(cells: &Cells<'_>, made: &Made<'_>, validation: &Validation) -> ValidationObject {
+    /// `again` is the device that ran the sample's lanes again, if one did.
+    pub(super) fn new(
+        cells: &Cells<'_>,
+        made: &Made<'_>,
+        again: Option<&str>,
+        validation: &Validation,
+    ) -> ValidationObject {
         let strata = validation.strata.iter().map(|stratum| StratumObject {
             name: stratum_name(stratum.stratum),
             cells: stratum.cells,
@@ -115,9 +123,7 @@ impl ValidationObject {
             mismatches: validation.explained_by(explanation),
         });
         ValidationObject {
-            format: FORMAT,
-            command: "validate",
-            crate_version: env!("CARGO_PKG_VERSION"),
+            head: Head::of("validate"),
             engine: made.engine.to_owned(),
             precision: made.precision.to_owned(),
             device: made.device.to_owned(),
@@ -126,7 +132,7 @@ impl ValidationObject {
             samples: validation.sampled(),
             strata: strata.collect(),
             agreement: agreement.collect(),
-            states: StatesObject::from(&validation.states),
+            states: StatesObject::new(&validation.states, made.device, again),
             mismatched: validation.mismatches.len(),
             explanations: explanations.collect(),
             unexplained: validation.unexplained(),
@@ -154,11 +160,13 @@ fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
     }
 }
 
-impl From<&StateCheck> for StatesObject {
-    fn from(check: &StateCheck) -> StatesObject {
+impl StatesObject {
+    fn new(check: &StateCheck, made_on: &str, again: Option<&str>) -> StatesObject {
         let object = |quantiles: &Option<Quantiles>| quantiles.as_ref().map(QuantilesObject::from);
         match check {
             StateCheck::Lanes { cells, above_budget, units, absolute } => StatesObject::Lanes {
+                device: again.unwrap_or(made_on).to_owned(),
+                same_device: again.is_none_or(|again| again == made_on),
                 horizon_periods: HORIZON,
                 cells: *cells,
                 above_budget: *above_budget,

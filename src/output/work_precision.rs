@@ -1,24 +1,23 @@
 //! Files of `bench work-precision`: tables, figures, the cells for other programs, a manifest.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::Result;
 use serde::Serialize;
 
 use super::Folder;
-use super::manifest::FORMAT;
+use super::manifest::{Head, MANIFEST};
+use super::orbit_json::Parameters;
 use super::work_precision_figure::{self, Shown};
 use crate::bench::work_precision::PERIODS;
 use crate::bench::work_precision::cells::Subject;
 use crate::bench::work_precision::measure::Curve;
 use crate::bench::work_precision::points::{self, Point};
-use crate::model::{GearPair, State};
+use crate::model::State;
 
 const TABLE: &str = "work_precision.csv";
 const CELLS_TABLE: &str = "work_precision_cells.csv";
 const CELLS: &str = "cells.json";
-const MANIFEST: &str = "manifest.json";
 
 /// Every file that a run may write.
 pub const FILES: [&str; 7] = [
@@ -78,10 +77,8 @@ pub struct Run<'a> {
 
 #[derive(Serialize)]
 struct Manifest<'a> {
-    format: u32,
-    command: &'static str,
-    crate_version: &'static str,
-    commit: &'static str,
+    #[serde(flatten)]
+    head: Head,
     #[serde(flatten)]
     run: &'a Run<'a>,
     periods: u32,
@@ -106,7 +103,7 @@ struct CellObject {
 #[derive(Serialize)]
 struct SubjectObject {
     kind: &'static str,
-    parameters: serde_json::Map<String, serde_json::Value>,
+    parameters: Parameters,
     periods: u32,
     start: State,
     state: State,
@@ -142,25 +139,20 @@ pub fn write(
         curves.iter().map(|curve| curve.point.clone()).chain(peers.iter().cloned()).collect();
     folder.replace(TABLE, |at| points::write(at, &all))?;
     folder.replace(CELLS_TABLE, |at| write_cells(at, subjects, curves))?;
-    folder.replace(CELLS, |at| {
-        let objects: Vec<_> = subjects.iter().map(subject).collect();
-        Ok(fs::write(at, serde_json::to_string_pretty(&objects)? + "\n")?)
-    })?;
+    let objects: Vec<_> = subjects.iter().map(subject).collect();
+    folder.write_json(CELLS, &objects)?;
     let subtitle = format!("{} cores: {}; lanes on {}", run.cores, run.processor, run.adapter);
     for (name, shown) in FIGURES {
         folder.replace(name, |at| work_precision_figure::write(at, &subtitle, shown, &all))?;
     }
     let manifest = Manifest {
-        format: FORMAT,
-        command: "bench work-precision",
-        crate_version: env!("CARGO_PKG_VERSION"),
-        commit: env!("RATTLEMAP_COMMIT"),
+        head: Head::of("bench work-precision"),
         run,
         periods: PERIODS,
         cells: subjects.chunk_by(|a, b| a.cell == b.cell).map(cell).collect(),
         files: FILES,
     };
-    folder.replace(MANIFEST, |at| Ok(fs::write(at, serde_json::to_string_pretty(&manifest)? + "\n")?))
+    folder.write_json(MANIFEST, &manifest)
 }
 
 fn cell(variants: &[Subject]) -> CellObject {
@@ -177,13 +169,9 @@ fn cell(variants: &[Subject]) -> CellObject {
 }
 
 fn subject(subject: &Subject) -> SubjectObject {
-    let value = |name| subject.pair.get(name).expect("the table has its own names");
-    let parameters = GearPair::PARAMETERS
-        .iter()
-        .map(|parameter| (parameter.name.to_owned(), value(parameter.name).into()));
     SubjectObject {
         kind: subject.kind.name(),
-        parameters: parameters.collect(),
+        parameters: Parameters::of(&subject.pair),
         periods: PERIODS,
         start: subject.start,
         state: subject.truth.state,

@@ -5,15 +5,13 @@ use std::path::Path;
 use anyhow::Result;
 use plotters::style::RGBColor;
 
+use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::log_axes::LogFrame;
-use super::plot_style::{Align, Canvas, DARK, FAINT, Marker, Rect, Shape, save_figure};
+use super::plot_style::{Align, Canvas, DARK, FAINT, Marker, Shape, save_figure};
 use crate::bench::work_precision::points::Point;
 
 const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;
-const RIGHT: f64 = 50.0;
-const BELOW: f64 = 110.0;
 /// The setting at the end of a curve: its type, and how far it stands off.
 const SMALLEST: f64 = 18.0;
 const LABEL: f64 = 13.0;
@@ -82,23 +80,24 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         "number: finest setting (steps per period, or tolerance)",
     ));
     let top = draw_head(canvas, shown.title, subtitle, &entries)? + 10.0;
-    let (width, height) = canvas.size();
     let error = |point: &Point| (shown.error)(point).clamp(ERRORS.0, ERRORS.1);
     let drawn = || present.iter().flat_map(|(style, points)| points.iter().map(move |point| (style, *point)));
-    let frame = LogFrame::around(
-        Rect { left: LEFT, top, right: width - RIGHT, bottom: height - BELOW },
-        [
+    let frame = Frame {
+        rect: canvas.panel(LEFT, top),
+        x: Axis::decades(
             "microseconds per lane and forcing period (processor: times cores; graphics card: as a whole)",
+            drawn().map(|(_, point)| microseconds(point)),
+        ),
+        y: Axis::decades(
             shown.axis,
-        ],
-        drawn().map(|(_, point)| microseconds(point)),
-        drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
-    );
+            drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
+        ),
+    };
     frame.draw_grid(canvas)?;
     for (style, points) in &present {
         if style.method == MEASURE {
             let x = frame.at(microseconds(points[0]), 1.0).0;
-            canvas.dashes((x, frame.rect().top), (x, frame.rect().bottom), 2.0, style.color)?;
+            canvas.dashes((x, frame.rect.top), (x, frame.rect.bottom), 2.0, style.color)?;
             continue;
         }
         let path: Vec<_> = points.iter().map(|point| frame.at(microseconds(point), error(point))).collect();
@@ -107,10 +106,13 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
             canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) })?;
         }
         if let (Some(point), Some(at)) = (points.last(), path.last()) {
-            canvas.text(&setting(point), (at.0 + LABEL, at.1), SMALLEST, Align::Left, style.color)?;
+            // On the side that the curve does not come from.
+            let is_from_right = path.iter().rev().nth(1).is_some_and(|before| before.0 > at.0);
+            let (side, align) = if is_from_right { (-1.0, Align::Right) } else { (1.0, Align::Left) };
+            canvas.text(&setting(point), (at.0 + side * LABEL, at.1), SMALLEST, align, style.color)?;
         }
     }
-    frame.draw_axes(canvas)
+    frame.draw_axes(canvas, true)
 }
 
 /// The steps per period or the tolerance of a point.

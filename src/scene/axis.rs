@@ -1,7 +1,7 @@
 //! Axes: which parameter is swept, from where to where, in how many values.
 
 use super::document::{Node, Value};
-use super::error::SceneError;
+use super::error::{Place, SceneError};
 use super::section::{Field, Section};
 use crate::model::{GearPair, Parameter};
 
@@ -117,6 +117,9 @@ fn read_one(table: &Field<'_>) -> Result<Axis, SceneError> {
 }
 
 /// Reads `[parameters]` beside the axes: the base from which every cell is made.
+///
+/// A parameter that is an axis must not be set as well, except that an axis named by a `--set`
+/// argument replaces the value in the scene's text: arguments win over the text.
 pub(super) fn read_parameters(root: &Section<'_>, axes: &[Axis]) -> Result<GearPair, SceneError> {
     let names: Vec<&str> = GearPair::PARAMETERS.iter().map(|p| p.name).collect();
     let section = root.section("parameters", &names)?;
@@ -125,13 +128,13 @@ pub(super) fn read_parameters(root: &Section<'_>, axes: &[Axis]) -> Result<GearP
         let name = parameter.name;
         let swept = axes.iter().position(|axis| axis.parameter.name == name);
         let value = match (section.get(name), swept) {
-            (Some(field), Some(i)) => {
+            (Some(field), Some(i)) if is_argument(&field) || !is_argument(&named(root, i)?) => {
                 return Err(field.conflict(format!(
                     "axis {i} sweeps `{name}`; set `axis.{i}.min` and `axis.{i}.max`, or drop one of the two"
                 )));
             }
             (Some(field), None) => given(&field, parameter)?,
-            (None, Some(i)) => axes[i].min,
+            (_, Some(i)) => axes[i].min,
             (None, None) => parameter.default.ok_or_else(|| {
                 let remedy = format!(
                     "{} has no default: set it under [parameters] or make it an axis",
@@ -145,6 +148,16 @@ pub(super) fn read_parameters(root: &Section<'_>, axes: &[Axis]) -> Result<GearP
         }
     }
     Ok(pair)
+}
+
+/// The name of axis `i`'s parameter.
+fn named<'a>(root: &Section<'a>, i: usize) -> Result<Field<'a>, SceneError> {
+    let tables = root.require("axis", EXAMPLE)?.list("a list of tables, [[axis]]")?;
+    Section::open(tables[i].node, &tables[i].path, &FIELDS)?.require("parameter", EXAMPLE)
+}
+
+fn is_argument(field: &Field<'_>) -> bool {
+    matches!(field.node.place, Place::Set { .. })
 }
 
 fn given(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError> {

@@ -47,7 +47,7 @@ impl Scene {
             tell("refine.minimum_grid".into(), refine.minimum_grid.to_string());
             tell("refine.rounds".into(), refine.rounds.map_or("all".to_owned(), |n| n.to_string()));
             tell("refine.max_error".into(), format!("{:?}", refine.max_error));
-            tell("refine.audit".into(), refine.audit.to_string());
+            tell("refine.audit".into(), refine.audit.map_or("default".to_owned(), |n| n.to_string()));
         }
         let mut quantities = self.outputs().quantities.clone();
         quantities.sort_unstable();

@@ -59,10 +59,25 @@ pub struct Refine {
     pub rounds: Option<u32>,
     /// Fraction of the filled cells that may be wrong, as the audit measures it.
     pub max_error: f64,
-    /// Filled cells that one audit integrates.
-    pub audit: u32,
+    /// Filled cells that one audit integrates; none for [`AUDIT`], or a quarter of the filled ones
+    /// if that is less.
+    pub audit: Option<u32>,
     /// What filled cells show of quantities that vary continuously.
     pub continuous: Continuous,
+}
+
+/// Filled cells that one audit integrates unless told otherwise: enough to see an error of 0.3 %.
+pub const AUDIT: u32 = 2000;
+
+impl Refine {
+    /// How many of `filled` cells an audit integrates. Unless told it leaves three quarters of a
+    /// small map alone: to integrate all of it would be no refinement.
+    pub fn audited(&self, filled: usize) -> usize {
+        match self.audit {
+            Some(cells) => filled.min(cells as usize),
+            None => filled.div_ceil(4).min(AUDIT as usize),
+        }
+    }
 }
 
 /// What filled cells show of exponent, impacts and mesh fraction.
@@ -201,7 +216,7 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
     };
     let minimum_grid = section.get("minimum_grid").map_or(Ok(8), |field| field.whole(1..=1024))?;
     let rounds = section.get("rounds").map(|field| field.whole(0..=32)).transpose()?;
-    let audit = section.get("audit").map_or(Ok(2000), |field| field.whole(1..=10_000_000))?;
+    let audit = section.get("audit").map(|field| field.whole(1..=10_000_000)).transpose()?;
     let continuous = match section.get("continuous") {
         Some(field) => {
             field.choice(&[("interpolated", Continuous::Interpolated), ("empty", Continuous::Empty)])?

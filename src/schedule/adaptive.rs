@@ -100,7 +100,7 @@ impl Adaptive {
             (0..).zip(&self.labels).filter(|(_, label)| !label.is_known()).map(|(id, _)| id).collect();
         let filled = candidates.len();
         let seed = 1 + self.audits.len() as u64;
-        self.audited = sample(candidates, self.refine.audit as usize, seed);
+        self.audited = sample(candidates, self.refine.audited(filled), seed);
         self.stage = if self.audited.is_empty() { Stage::Done } else { Stage::Auditing };
         if !self.audited.is_empty() {
             self.audits.push(Audit { filled, sampled: self.audited.len(), wrong: 0 });

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 
 use super::Engine;
-use super::statistics::Spread;
+use crate::bench::statistics::Spread;
 use crate::classify::classify;
 use crate::engine::{self, Cpu};
 use crate::gpu::{self, AdapterChoice, Precision, Stage};
@@ -232,7 +232,8 @@ impl<'a> Bench<'a> {
                 let Some(opened) = device.take() else {
                     return Err("no device is left after the failure before".to_owned());
                 };
-                let lanes = engine::Gpu::new(plan, *opened).map_err(|error| error.to_string())?;
+                let lanes =
+                    pollster::block_on(engine::Gpu::new(plan, *opened)).map_err(|error| error.to_string())?;
                 let mut engine = engine::Engine::Gpu(Box::new(lanes));
                 let swept = sweep(plan, &mut engine, &split, clock);
                 if let engine::Engine::Gpu(lanes) = engine {

@@ -6,9 +6,7 @@ use crate::flow::Flow;
 use crate::gpu::Precision;
 use crate::model::{GearPair, State};
 use crate::reference::{Stop, Trajectory};
-
-/// At rest in the middle of the gap.
-pub(super) const REST: State = [0.0; 4];
+pub(super) use crate::scene::REST;
 
 /// Who computed a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]

@@ -24,7 +24,7 @@ use crate::classify::{classify, status};
 use crate::engine::measured_record;
 use crate::gpu::{GpuError, LaneSettings};
 use crate::model::GearPair;
-use crate::orbit::{Budget, Class, Settings, Status, measure as measure_cell, status_of};
+use crate::orbit::{Budget, Settings, Status, measure as measure_cell, status_of};
 use crate::plan::Needs;
 use crate::random::Random;
 use crate::record::Record;
@@ -145,7 +145,7 @@ impl Rows {
     fn count(&mut self, kind: &'static str, engine: EngineName, records: &[Record]) {
         let mut counts = BTreeMap::new();
         for record in records {
-            let key = (record.status, class_name(classify(record)));
+            let key = (record.status, classify(record).name());
             counts.entry(key).or_insert((status(record).name(), 0usize)).1 += 1;
         }
         self.counts.extend(counts.into_iter().map(|((_, class), (status, cells))| Count {
@@ -198,15 +198,6 @@ fn is_finite(record: &Record) -> bool {
     let superstable = record.lyapunov == f64::NEG_INFINITY && record.period > 0;
     (record.lyapunov.is_finite() || superstable)
         && numbers.iter().chain(&record.strobe).all(|number| number.is_finite())
-}
-
-fn class_name(class: Class) -> &'static str {
-    match class {
-        Class::Periodic { .. } => "periodic",
-        Class::Chaotic => "chaotic",
-        Class::Undecided => "undecided",
-        Class::Failed => "failed",
-    }
 }
 
 /// No hang, nothing that is not finite, and no mismatch without an explanation.

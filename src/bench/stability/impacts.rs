@@ -4,8 +4,9 @@
 //! `(1 - e^2) m1 m2 / (m1 + m2) w^2 / 2`. Engines carry the rates `w = v1 - v2` and `v2`, so the
 //! velocity of gear 1 is known to a rounding of `|w| + |v2|`: less than of itself where a heavy gear 1
 //! hardly moves. Deviations are given in unit roundoffs of the engine relative to
-//! `m1 (|w| + |v2|) + m2 |v2|` and `m1 (|w| + |v2|)^2 + m2 v2^2`. The reference reports the states of every event; lanes are ended at their first contact by a form of the shader
-//! that shows the velocities before and after.
+//! `m1 (|w| + |v2|) + m2 |v2|` and `m1 (|w| + |v2|)^2 + m2 v2^2`. The reference reports the states of
+//! every event; lanes are ended at their first contact by a form of the shader that shows the
+//! velocities before and after.
 
 use rayon::prelude::*;
 use serde::Serialize;

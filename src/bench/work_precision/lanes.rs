@@ -85,7 +85,7 @@ impl Device {
     /// # Errors
     /// As [`Gpu::load`].
     pub fn load(&self, steps: u32) -> Result<Tables, GpuError> {
-        self.gpu.load(&self.flows, &self.laws, Some(steps))
+        pollster::block_on(self.gpu.load(&self.flows, &self.laws, Some(steps)))
     }
 
     /// Integrates every copy; the time from lanes to records, and what one copy of each

@@ -8,6 +8,7 @@ use super::lanes::{Device, Form};
 use super::outcome::{Error, Outcome, median_and_worst};
 use super::points::Point;
 use super::{PERIODS, adaptive, fixed_step};
+use crate::bench::statistics::Spread;
 use crate::flow::Flow;
 use crate::gpu::{GpuError, Precision, Tables};
 use crate::model::Law;
@@ -242,8 +243,7 @@ impl Runner {
             .collect();
         let [state_median, state_worst] = median_and_worst(errors.iter().map(|e| e.state).collect());
         let [event_median, event_worst] = median_and_worst(errors.iter().filter_map(|e| e.event).collect());
-        let mut times = self.times[i].clone();
-        times.sort_by(f64::total_cmp);
+        let Spread { median, low, high } = Spread::of(self.times[i].clone());
         let (device, cores, lanes) = match &self.device {
             Some((device, _)) => {
                 let cores = (!device.is_hardware()).then(cores);
@@ -260,10 +260,10 @@ impl Runner {
             cores,
             lanes,
             periods: PERIODS,
-            rounds: times.len(),
-            seconds_per_lane_period: times[times.len() / 2],
-            fastest: times[0],
-            slowest: times[times.len() - 1],
+            rounds: self.times[i].len(),
+            seconds_per_lane_period: median,
+            fastest: low,
+            slowest: high,
             state_error_median: state_median,
             state_error_worst: state_worst,
             event_error_median: event_median,

@@ -1,20 +1,34 @@
-//! Axes: ranges, ticks, and the frame that maps data to pixels.
+//! Axes: ranges, scales, and the frame that maps data to pixels.
 
 use anyhow::Result;
 
+use super::ticks::{Tick, ticks};
 use super::{Align, Canvas, DARK, GRID, MEDIUM, Point, Rect, SMALL};
 
 /// Share of its span by which an axis reaches beyond its data.
 const PADDING: f64 = 0.06;
 /// Tick marks' length.
 const TICK: f64 = 7.0;
+/// Pixels between ticks at least: labels beside each other need more room than stacked ones.
+const APART: (f64, f64) = (90.0, 60.0);
+const APART_ON_BAR: f64 = 45.0;
+
+/// How values lie on an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::output) enum Scale {
+    Linear,
+    /// By decimal logarithms.
+    Logarithmic,
+}
 
 /// One axis: what it shows and from where to where.
 #[derive(Clone, Debug)]
 pub(in crate::output) struct Axis {
     pub(in crate::output) label: String,
+    /// Ends in the scale: decimal logarithms on a logarithmic axis.
     pub(in crate::output) low: f64,
     pub(in crate::output) high: f64,
+    pub(in crate::output) scale: Scale,
 }
 
 impl Axis {
@@ -23,7 +37,7 @@ impl Axis {
         let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 0.0) };
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-6);
         let (low, high) = if high - low > least { (low, high) } else { (low - 0.5, low + 0.5) };
-        Axis { label: label.to_owned(), low, high }
+        Axis { label: label.to_owned(), low, high, scale: Scale::Linear }
     }
 
     /// An axis that holds all finite `values` with some room.
@@ -31,37 +45,46 @@ impl Axis {
     /// It spans at least `least_span`, lest motion that has died down fills a panel with
     /// its rounding errors.
     pub(in crate::output) fn around(label: &str, values: impl Iterator<Item = f64>, least_span: f64) -> Axis {
-        let (low, high) =
-            values.filter(|v| v.is_finite()).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
-        if low > high {
+        let Some((low, high)) = ends(values) else {
             return Axis::exact(label, -least_span / 2.0, least_span / 2.0);
-        }
+        };
         let room = PADDING * (high - low) + (least_span - (high - low)).max(0.0) / 2.0;
         Axis::exact(label, low - room, high + room)
     }
 
-    /// At most `most` round values on the axis, and how to write them.
-    fn ticks(&self, most: f64) -> Vec<(f64, String)> {
-        let rough = (self.high - self.low) / most.max(1.0);
-        let decade = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * decade).into_iter().find(|s| *s >= rough * (1.0 - 1e-9));
-        let step = step.unwrap_or(10.0 * decade);
-        let first = (self.low / step - 1e-9).ceil();
-        let count = (self.high / step + 1e-9).floor() - first;
-        let decimals = (-step.log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
-        let largest = self.low.abs().max(self.high.abs());
-        (0..=count.clamp(-1.0, 100.0) as i64)
-            .map(|i| (first + i as f64) * step)
-            .map(|value| (value, label(value, decimals, largest >= 1e6 || step < 1e-5)))
-            .collect()
+    /// A logarithmic axis that holds all positive `values` with some room and spans at least
+    /// `least_decades`.
+    pub(in crate::output) fn around_logarithms(
+        label: &str,
+        values: impl Iterator<Item = f64>,
+        least_decades: f64,
+    ) -> Axis {
+        let axis = Axis::around(label, values.filter(|v| *v > 0.0).map(f64::log10), least_decades);
+        Axis { scale: Scale::Logarithmic, ..axis }
+    }
+
+    /// A logarithmic axis that holds all positive `values`, of whole decades, one at least.
+    pub(in crate::output) fn decades(label: &str, values: impl Iterator<Item = f64>) -> Axis {
+        let logarithms = values.filter(|v| *v > 0.0).map(f64::log10);
+        let (low, high) = ends(logarithms).unwrap_or((-1.0, 1.0));
+        let axis = Axis::exact(label, low.floor(), high.ceil().max(low.floor() + 1.0));
+        Axis { scale: Scale::Logarithmic, ..axis }
+    }
+
+    /// Where a value lies in the scale; on a logarithmic axis what is beyond an end lies on it.
+    fn place(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => value,
+            Scale::Logarithmic => value.log10().clamp(self.low, self.high),
+        }
     }
 }
 
-/// A tick label, with the typographic minus.
-fn label(value: f64, decimals: usize, scientific: bool) -> String {
-    let text = if scientific { format!("{value:.3e}") } else { format!("{value:.decimals$}") };
-    let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
-    text.trim_start_matches(if zero { "-" } else { "" }).replace('-', "\u{2212}")
+/// The smallest and the largest finite value, if there is one.
+fn ends(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let finite = values.filter(|v| v.is_finite());
+    let (low, high) = finite.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+    (low <= high).then_some((low, high))
 }
 
 /// A panel: its place on the canvas and what its edges mean.
@@ -75,11 +98,17 @@ pub(in crate::output) struct Frame {
 impl Frame {
     /// The pixel at which a data point lies.
     pub(in crate::output) fn at(&self, x: f64, y: f64) -> Point {
-        let Rect { left, top, right, bottom } = self.rect;
-        (
-            left + (x - self.x.low) / (self.x.high - self.x.low) * (right - left),
-            bottom - (y - self.y.low) / (self.y.high - self.y.low) * (bottom - top),
-        )
+        (self.x_pixel(self.x.place(x)), self.y_pixel(self.y.place(y)))
+    }
+
+    fn x_pixel(&self, place: f64) -> f64 {
+        let Rect { left, right, .. } = self.rect;
+        left + (place - self.x.low) / (self.x.high - self.x.low) * (right - left)
+    }
+
+    fn y_pixel(&self, place: f64) -> f64 {
+        let Rect { top, bottom, .. } = self.rect;
+        bottom - (place - self.y.low) / (self.y.high - self.y.low) * (bottom - top)
     }
 
     /// The pixels between two values of x over the panel's whole height.
@@ -91,12 +120,12 @@ impl Frame {
     /// Draws the grid; comes before the data.
     pub(in crate::output) fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<()> {
         let Rect { left, top, right, bottom } = self.rect;
-        for (value, _) in self.x_ticks() {
-            let x = self.at(value, 0.0).0;
+        for tick in self.x_ticks() {
+            let x = self.x_pixel(tick.at);
             canvas.stroke(&[(x, top), (x, bottom)], 1.0, GRID)?;
         }
-        for (value, _) in self.y_ticks() {
-            let y = self.at(0.0, value).1;
+        for tick in self.y_ticks(APART.1) {
+            let y = self.y_pixel(tick.at);
             canvas.stroke(&[(left, y), (right, y)], 1.0, GRID)?;
         }
         Ok(())
@@ -105,28 +134,34 @@ impl Frame {
     /// Draws border, ticks and labels; comes after the data. `x_labels` is false for a
     /// panel that shares the x axis of the one below.
     pub(in crate::output) fn draw_axes(&self, canvas: &Canvas<'_>, x_labels: bool) -> Result<()> {
-        let Rect { left, top, right, bottom } = self.rect;
-        let border = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
-        canvas.stroke(&border, 1.5, DARK)?;
-        for (value, text) in self.x_ticks() {
-            let x = self.at(value, 0.0).0;
-            canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
-            if x_labels {
-                canvas.text(&text, (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
-            }
-        }
+        let Rect { left, top, bottom, .. } = self.rect;
+        canvas.outline(self.rect, 1.5)?;
+        self.draw_x_axis(canvas, x_labels)?;
         let mut widest = 0f64;
-        for (value, text) in self.y_ticks() {
-            let y = self.at(0.0, value).1;
+        for Tick { at, label } in self.y_ticks(APART.1) {
+            let y = self.y_pixel(at);
             canvas.stroke(&[(left - TICK, y), (left, y)], 1.5, DARK)?;
-            canvas.text(&text, (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
-            widest = widest.max(canvas.text_width(&text, SMALL)?);
+            canvas.text(&label, (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
+            widest = widest.max(canvas.text_width(&label, SMALL)?);
         }
         let y_label = (left - TICK - 6.0 - widest - 26.0, (top + bottom) / 2.0);
-        canvas.text(&self.y.label, y_label, MEDIUM, Align::Upwards, DARK)?;
-        if x_labels {
-            let x_label = ((left + right) / 2.0, bottom + TICK + 54.0);
-            canvas.text(&self.x.label, x_label, MEDIUM, Align::Center, DARK)?;
+        canvas.text(&self.y.label, y_label, MEDIUM, Align::Upwards, DARK)
+    }
+
+    /// Draws the lower edge with its ticks, and labels if they are wanted.
+    pub(in crate::output) fn draw_x_axis(&self, canvas: &Canvas<'_>, labels: bool) -> Result<()> {
+        let Rect { left, right, bottom, .. } = self.rect;
+        canvas.stroke(&[(left, bottom), (right, bottom)], 1.5, DARK)?;
+        for Tick { at, label } in self.x_ticks() {
+            let x = self.x_pixel(at);
+            canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
+            if labels {
+                canvas.text(&label, (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
+            }
+        }
+        if labels {
+            let middle = ((left + right) / 2.0, bottom + TICK + 54.0);
+            canvas.text(&self.x.label, middle, MEDIUM, Align::Center, DARK)?;
         }
         Ok(())
     }
@@ -134,20 +169,20 @@ impl Frame {
     /// Draws ticks and labels of the y axis on the right: the scale of a colour bar.
     pub(in crate::output) fn draw_scale(&self, canvas: &Canvas<'_>) -> Result<()> {
         let right = self.rect.right;
-        for (value, text) in self.y.ticks((self.rect.bottom - self.rect.top) / 45.0) {
-            let y = self.at(0.0, value).1;
+        for Tick { at, label } in self.y_ticks(APART_ON_BAR) {
+            let y = self.y_pixel(at);
             canvas.stroke(&[(right, y), (right + TICK, y)], 1.5, DARK)?;
-            canvas.text(&text, (right + TICK + 7.0, y), SMALL, Align::Left, DARK)?;
+            canvas.text(&label, (right + TICK + 7.0, y), SMALL, Align::Left, DARK)?;
         }
         Ok(())
     }
 
-    fn x_ticks(&self) -> Vec<(f64, String)> {
-        self.x.ticks((self.rect.right - self.rect.left) / 90.0)
+    fn x_ticks(&self) -> Vec<Tick> {
+        ticks(&self.x, self.rect.right - self.rect.left, APART.0)
     }
 
-    fn y_ticks(&self) -> Vec<(f64, String)> {
-        self.y.ticks((self.rect.bottom - self.rect.top) / 60.0)
+    fn y_ticks(&self, apart: f64) -> Vec<Tick> {
+        ticks(&self.y, self.rect.bottom - self.rect.top, apart)
     }
 }
 
@@ -155,25 +190,27 @@ impl Frame {
 mod tests {
     use super::*;
 
-    fn labels(low: f64, high: f64, most: f64) -> Vec<String> {
-        Axis::exact("", low, high).ticks(most).into_iter().map(|(_, text)| text).collect()
-    }
-
-    #[test]
-    fn ticks_are_round_and_written_with_a_true_minus() {
-        assert_eq!(labels(-1.02, 1.02, 5.0), ["\u{2212}1.0", "\u{2212}0.5", "0.0", "0.5", "1.0"]);
-        assert_eq!(labels(0.0, 0.031, 4.0), ["0.00", "0.01", "0.02", "0.03"]);
-        assert_eq!(labels(0.0, 1.0, 10.0).len(), 11);
-        assert_eq!(labels(0.0, 128.0, 10.0), ["0", "20", "40", "60", "80", "100", "120"]);
-    }
-
     #[test]
     fn empty_constant_and_extreme_data_give_a_usable_axis() {
         let cases: [&[f64]; 5] = [&[], &[0.0, 0.0], &[f64::NAN], &[1e300, -1e300], &[1e-12, 1.1e-12]];
         for values in cases {
             let axis = Axis::around("", values.iter().copied(), 0.01);
             assert!(axis.high > axis.low, "{values:?}");
-            assert!(axis.ticks(8.0).len() <= 101, "{values:?}");
+            let axis = Axis::around_logarithms("", values.iter().copied(), 0.8);
+            assert!(axis.high - axis.low > 0.79, "{values:?}");
         }
+    }
+
+    #[test]
+    fn logarithmic_axes_run_over_whole_decades() {
+        let axis = Axis::decades("", [3e-7, 0.2, 0.0, f64::INFINITY, f64::NAN].into_iter());
+        assert_eq!((axis.low, axis.high), (-7.0, 0.0));
+        let flat = Axis::decades("", [10.0].into_iter());
+        assert_eq!((flat.low, flat.high), (1.0, 2.0));
+        assert!(Axis::decades("", std::iter::empty()).low < 0.0);
+        let rect = Rect { left: 0.0, top: 0.0, right: 70.0, bottom: 10.0 };
+        let frame = Frame { rect, x: axis, y: flat };
+        assert_eq!(frame.at(1e-6, 1e9), (10.0, 0.0), "what is beyond an end lies on it");
+        assert_eq!(frame.at(0.0, 10.0), (0.0, 10.0));
     }
 }

@@ -82,11 +82,7 @@ pub(in crate::output) fn draw_head(
 fn draw_fitted(canvas: &Canvas<'_>, text: &str, y: f64, size: f64) -> Result<()> {
     let room = canvas.size().0 - 2.0 * MARGIN;
     let size = (size * room / canvas.text_width(text, size)?.max(1.0)).clamp(SMALLEST, size);
-    let mut text = text.to_owned();
-    while canvas.text_width(&text, size)? > room + 1.0 && text.chars().count() > 2 {
-        text.truncate(text.char_indices().nth_back(1).map_or(0, |(i, _)| i));
-        text.push('\u{2026}');
-    }
+    let text = canvas.fitted(text, size, room + 1.0)?;
     canvas.text(&text, (canvas.size().0 / 2.0, y), size, Align::Center, DARK)
 }
 

@@ -419,7 +419,8 @@ function stateText({ check, ...states }, samples) {
       + `${count(states.cells, "cell")} are the same to the last bit`
       + (states.absolute ? `, the largest difference is ${short(states.absolute.worst)}.` : ".");
   }
-  return `The lanes were run again over ${states.horizon_periods} forcing periods and their states compared with the `
+  const where = states.same_device ? "" : ` on ${states.device}, not on the map's own device,`;
+  return `The lanes were run again${where} over ${states.horizon_periods} forcing periods and their states compared with the `
     + "reference's. The budget is what rounding may amount to by an estimate made beforehand, from the precision, the "
     + `number of steps and the growth of small errors along the motion: ${states.above_budget} of `
     + `${count(states.cells, "cell")} are above it`

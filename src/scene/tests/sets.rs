@@ -67,3 +67,24 @@ fn single_cells_come_from_sets_alone() {
         &["--set start.policy=up: unknown field"],
     );
 }
+
+/// Arguments win over the text, so an axis that one names does over the text's value.
+#[test]
+fn an_axis_named_by_an_argument_replaces_the_value_of_the_text() {
+    let sets = ["e=0.5", "axis.0.parameter=F", "axis.0.min=40", "axis.0.max=60"];
+    let scene = parse(GOOD, &sets).unwrap();
+    assert_eq!((scene.axes()[0].parameter().name, scene.base().force, scene.base().e), ("F", 40.0, 0.5));
+    let both = [&sets[..], &["F=50"]].concat();
+    assert_says(
+        &parse(GOOD, &both).unwrap_err().to_string(),
+        &["--set F=50: `parameters.F = 50` does not fit: axis 0 sweeps `F`"],
+    );
+    // What was the axis has no value any more.
+    assert_says(&parse(GOOD, &sets[1..]).unwrap_err().to_string(), &["restitution", "no default"]);
+    // Text against text stays an error, whatever else of the axis an argument changes.
+    let text = GOOD.replace("\"e\"", "\"F\"");
+    assert_says(
+        &parse(&text, &["e=0.5", "axis.0.max=60"]).unwrap_err().to_string(),
+        &["s.toml:5:5: `parameters.F = 50.0` does not fit: axis 0 sweeps `F`"],
+    );
+}

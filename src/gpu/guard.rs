@@ -1,0 +1,63 @@
+//! Making buffers, with an error where the device cannot.
+
+use super::{Gpu, GpuError};
+
+/// Runs `make`, which makes and fills buffers for `count` things called `what`.
+///
+/// # Errors
+/// [`GpuError::OutOfMemory`] if the device has no room for them, else whatever it refused.
+pub(super) async fn guarded<T>(
+    gpu: &Gpu,
+    what: &'static str,
+    count: usize,
+    make: impl FnOnce() -> T,
+) -> Result<T, GpuError> {
+    let out_of_memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    // What is made of a buffer that is not there is refused, which says no more.
+    let refused = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let made = make();
+    let (refused, out_of_memory) = (refused.pop(), out_of_memory.pop());
+    let (refused, out_of_memory) = (refused.await, out_of_memory.await);
+    if out_of_memory.is_some() {
+        return Err(GpuError::OutOfMemory { what, count });
+    }
+    let Some(error) = refused else { return Ok(made) };
+    // A lost device refuses everything; that it is lost it tells when it is polled.
+    let _ = gpu.device.poll(wgpu::PollType::Poll);
+    Err(gpu.failure(GpuError::Refused { what, message: error.to_string() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{AdapterChoice, Precision};
+
+    /// A texture of terabytes, which no device has; buffers are limited to what most have.
+    fn huge(gpu: &Gpu) -> wgpu::Texture {
+        let limits = gpu.device.limits();
+        let side = limits.max_texture_dimension_2d;
+        gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("huge"),
+            size: wgpu::Extent3d {
+                width: side,
+                height: side,
+                depth_or_array_layers: limits.max_texture_array_layers,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        })
+    }
+
+    #[test]
+    fn memory_that_is_not_there_is_an_error_that_says_so() {
+        let gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
+        let error = pollster::block_on(guarded(&gpu, "flows", 7, || huge(&gpu))).unwrap_err();
+        assert!(matches!(error, GpuError::OutOfMemory { what: "flows", count: 7 }), "{error}");
+        assert!(error.to_string().contains("no memory for 7 flows"), "{error}");
+        assert_eq!(gpu.trouble.message(), None, "caught here, not by the watch");
+    }
+}

@@ -1,0 +1,70 @@
+//! `manifest.json` of a bifurcation diagram: everything needed to make its folder again.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::manifest::{AxisObject, Head, StartObject, start};
+use super::names;
+use super::orbit_json::Parameters;
+use crate::bifurcation::Column;
+use crate::plan::count_classes;
+use crate::scene::Scene;
+
+/// It names neither the machine nor where on it the run took place.
+#[derive(Serialize)]
+pub(super) struct Manifest<'a> {
+    #[serde(flatten)]
+    head: Head,
+    engine: &'static str,
+    title: &'a str,
+    scene: &'a str,
+    set: &'a [String],
+    axis: AxisObject,
+    parameters: Parameters,
+    start: StartObject,
+    integration: IntegrationObject,
+    classes: BTreeMap<&'static str, usize>,
+    elapsed_seconds: f64,
+    files: &'a [&'static str],
+}
+
+#[derive(Serialize)]
+struct IntegrationObject {
+    transient_periods: u32,
+    observed_periods: u32,
+    max_period: u32,
+}
+
+impl<'a> Manifest<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        sets: &'a [String],
+        columns: &[Column],
+        elapsed: Duration,
+        files: &'a [&'static str],
+    ) -> Manifest<'a> {
+        let axis = &scene.axes()[0];
+        let settings = scene.orbit_settings();
+        let classes = count_classes(columns.iter().map(|column| column.class));
+        Manifest {
+            head: Head::of("bifurcation"),
+            engine: "reference f64",
+            title: scene.title(),
+            scene: scene.text(),
+            set: sets,
+            axis: axis.into(),
+            parameters: Parameters::of_scene(scene),
+            start: start(scene),
+            integration: IntegrationObject {
+                transient_periods: settings.transient_periods,
+                observed_periods: settings.observed_periods,
+                max_period: settings.max_period,
+            },
+            classes: names::CLASSES.into_iter().zip(classes).collect(),
+            elapsed_seconds: elapsed.as_secs_f64(),
+            files,
+        }
+    }
+}
