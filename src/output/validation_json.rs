@@ -237,7 +237,8 @@ fn meaning(explanation: Explanation) -> &'static str {
             "the cycle differs from its mirror image by less than 2.5e-4 of its size, all that lanes look for"
         }
         Explanation::BelowResolution => {
-            "one period is a multiple of the other, and the cycles are nearer to each other than lanes resolve"
+            "lanes cannot resolve it: one period is a multiple of the other and the cycles are as near to each other, \
+             or rounding of the tangents moves the exponent that far"
         }
         Explanation::NearGrazing => "an event grazes more nearly than the precision resolves",
     }

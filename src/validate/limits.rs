@@ -1,9 +1,32 @@
 //! What a lane cannot tell within its precision, or within its budget.
 
-use super::case::Case;
-use super::explanation::Explanation;
+use super::answer::Answer;
+use super::case::{Case, rounding};
+use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
+use super::same_cycle::{may_repel, within_reach};
 use crate::classify::classify;
-use crate::orbit::{CHAOS_ERRORS, Class};
+use crate::gpu::Precision;
+use crate::model::GearPair;
+use crate::orbit::{CHAOS_ERRORS, Class, Status, analyse};
+use crate::record::valid;
+use crate::reference::Trajectory;
+use crate::stability::{StrobeMap, multipliers};
+
+/// A motion this far from where it was a cycle ago has not settled.
+const UNSETTLED: f64 = 1e-4;
+
+/// A motion this close to where it was some periods ago may be lingering at a cycle.
+const LINGERING: f64 = 0.03;
+
+/// Periods that lanes take to confirm a period: three windows of the longest they look for.
+const CONFIRMATION_WINDOWS: u32 = 3;
+
+/// Multipliers below this belong to a cycle that is about to double its period.
+const NEAR_FLIP: f64 = -0.8;
+
+/// Starts within rounding that are tried before a transient counts as different: of a map's many
+/// transients some are rare.
+const SCATTERED_STARTS: usize = 1000;
 
 /// The record says chaotic where the reference decides nothing within the same budget: it is the
 /// same average, which exceeds zero by enough errors on one side and not on the other; or the
@@ -20,4 +43,162 @@ pub(super) fn undecided_chaos(case: &Case<'_>) -> Option<Explanation> {
         return Some(Explanation::UndecidedInBudget);
     }
     case.nudged().any(|answer| answer.class == Class::Chaotic).then_some(Explanation::Chaos)
+}
+
+/// The same start, and as long as it takes.
+pub(super) fn longer(case: &Case<'_>) -> Option<Explanation> {
+    let because = match case.truth.class {
+        Class::Undecided => Explanation::UndecidedInBudget,
+        Class::Chaotic => Explanation::Chaos,
+        Class::Periodic { .. } | Class::Failed => return None,
+    };
+    let answer = case.at_leisure(case.start);
+    // Neither side claims anything, and neither can: both are right.
+    let silent = answer.class == Class::Undecided && is_spent(case);
+    (case.is_the_records(&answer) || silent).then_some(because)
+}
+
+/// The record has no period and the reference has one, or the other way round in chaos: the
+/// side that decided is right in the end, the other was still on its way.
+pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
+    let (ours, from) = (classify(case.record), strobe(case)?);
+    let stands = case.after(from, 0).ok()?;
+    match (ours, case.truth.class) {
+        (Class::Chaotic, Class::Periodic { period }) => {
+            let early = 2 * case.record.periods_run < whole_budget(case);
+            let wanders = || case.unrest(&stands, period) > ELSEWHERE;
+            let is_transient = || wanders_within_rounding(case, case.record.periods_run, period, ELSEWHERE);
+            let settles = || case.at_leisure(from).class == case.truth.class;
+            (!early && wanders() && is_transient() && settles()).then_some(Explanation::Chaos)
+        }
+        _ if !is_spent(case) => None,
+        // The reference, too, is still on its way.
+        (Class::Undecided, Class::Periodic { .. }) if case.truth.status == Status::Slow => {
+            Some(Explanation::UndecidedInBudget)
+        }
+        (Class::Undecided, Class::Periodic { period }) => {
+            let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;
+            let began = case.record.periods_run.saturating_sub(confirming);
+            let late = wanders_within_rounding(case, began, period, UNSETTLED);
+            // The lane's last state is off the cycle, and the reference goes on from there to it.
+            let is_off = || case.unrest(&stands, period) > UNSETTLED;
+            let settles = || case.at_leisure(from).class == case.truth.class;
+            // Or it is as close as rounding, which the cycle amplifies, lets it come.
+            let trembles = || {
+                let is_kept_off = case.is_lane && case.unrest(&stands, period) > at_rest(case.precision);
+                is_kept_off && is_shaken(case, &stands, period) == Some(true)
+            };
+            // Or rounding hides from it that the cycle attracts.
+            let doubts = || case.is_lane && may_repel(case, &stands, &case.truth) == Some(true);
+            (late || (is_off() || trembles() || doubts()) && settles())
+                .then_some(Explanation::UndecidedInBudget)
+        }
+        (Class::Undecided, Class::Chaotic) => {
+            let [theirs, error] = case.truth.exponent?;
+            let (ours, bar) = (case.record.lyapunov, 5.0 * error.hypot(case.record.lyapunov_error));
+            let known = case.record.valid & valid::LYAPUNOV != 0 && (ours - theirs).abs() <= bar;
+            let is_weak = ours <= CHAOS_ERRORS * case.record.lyapunov_error;
+            let lags = case.budget.settings.max_period / 2;
+            let lingers = || (1..=lags).any(|lag| case.unrest(&stands, lag) < LINGERING);
+            (known && (is_weak || lingers())).then_some(Explanation::UndecidedInBudget)
+        }
+        _ => None,
+    }
+}
+
+/// Periods that a cell may take whatever becomes of it.
+pub(super) fn whole_budget(case: &Case<'_>) -> u32 {
+    case.budget.settings.transient_periods + case.budget.settings.observed_periods
+}
+
+/// Whether a record is undecided and has had all its periods: before, there is no such thing.
+pub(super) fn is_spent(case: &Case<'_>) -> bool {
+    classify(case.record) == Class::Undecided && case.record.periods_run >= whole_budget(case)
+}
+
+/// Whether the reference itself, from the start or from one that is the same within rounding,
+/// is off its cycle of `period` by more than `bar` after some periods.
+pub(super) fn wanders_within_rounding(case: &Case<'_>, periods: u32, period: u32, bar: f64) -> bool {
+    let mut starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
+    let wanders = |start| case.after(start, periods).is_ok_and(|at| case.unrest(&at, period) > bar);
+    starts.any(wanders)
+}
+
+/// A flip is near, and rounding, amplified by the cycle, is as large as the alternation.
+pub(super) fn flip(case: &Case<'_>) -> Option<Explanation> {
+    let (Class::Periodic { period: ours }, Class::Periodic { period }) =
+        (classify(case.record), case.truth.class)
+    else {
+        return None;
+    };
+    if ours != 2 * period || !case.is_lane {
+        return None;
+    }
+    let from = strobe(case)?;
+    let stands = case.after(from, 0).ok()?;
+    let image = StrobeMap::Periods(period).apply(&stands, from).ok()?;
+    let [re, im] = *multipliers(&image.derivative())?.first()?;
+    let flips = im == 0.0 && re > -1.0 && re < NEAR_FLIP;
+    let settles = case.at_leisure(from).class == case.truth.class;
+    (flips && is_shaken(case, &stands, period)? && settles).then_some(Explanation::Border)
+}
+
+/// Whether rounding, amplified by a cycle that attracts, is as large as the motion's distance
+/// from where it was a cycle ago: the sum of what is left of the roundings of all cycles before.
+pub(super) fn is_shaken(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> Option<bool> {
+    let image = StrobeMap::Periods(period).apply(stands, stands.state()).ok()?;
+    let [re, im] = *multipliers(&image.derivative())?.first()?;
+    let radius = re.hypot(im);
+    let gain = image.derivative().singular_values().max() / (1.0 - radius);
+    // Every event rounds.
+    let events = 1.0 + case.truth.impacts_per_period.unwrap_or(0.0) * f64::from(period);
+    Some(radius < 1.0 && case.unrest(stands, period) <= rounding(case.precision) * events * gain)
+}
+
+/// The lane rests on a cycle that repels, and rounding of its tangents hides that.
+pub(super) fn held(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    let from = strobe(case)?;
+    let stands = case.after(from, 0).ok()?;
+    if !case.is_lane || case.unrest(&stands, period) > UNSETTLED {
+        return None;
+    }
+    let answer = case.read_as_is(&stands, period)?;
+    let is_hidden = || within_reach(case, from, &answer) == Some(Explanation::BelowResolution);
+    (is_least(case)? && is_hidden()).then_some(Explanation::BelowResolution)
+}
+
+/// Chaos on the way to a cycle: how long it lasts is decided by rounding, and among many starts
+/// that are the same within rounding one takes as long as the record's did, or as short.
+pub(super) fn scattered(case: &Case<'_>) -> Option<Explanation> {
+    let one_is_chaotic = [classify(case.record), case.truth.class].contains(&Class::Chaotic);
+    if !one_is_chaotic || matches!(case.truth.class, Class::Undecided | Class::Failed) {
+        return None;
+    }
+    case.scattered(SCATTERED_STARTS).any(|answer| case.is_the_records(&answer)).then_some(Explanation::Chaos)
+}
+
+/// The reference has the record's cycle if a parameter moves by as little as rounding makes the lane's
+/// strobes scatter.
+pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    let from = strobe(case)?;
+    let scatter = case.unrest(&case.after(from, 0).ok()?, period);
+    if !case.is_lane || scatter > UNSETTLED {
+        return None;
+    }
+    let is_the_same = |pair: GearPair| {
+        let answer = Answer::from(&analyse(&pair, from, &case.budget.settings));
+        case.is_the_records(&answer)
+    };
+    case.nudged_pairs(scatter).any(is_the_same).then_some(Explanation::Border)
+}
+
+/// A motion this close to where it was a cycle ago rests on it as nearly as lanes can that amplify no
+/// rounding (`NOISE` in the shaders for f32, `RESOLVED` for f64).
+pub(super) fn at_rest(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 4e-6,
+        Precision::F64 => 1e-12,
+    }
 }
