@@ -37,15 +37,18 @@
 //! That holds at resonance and without damping, costs one square root, and is tight where
 //! motion is slow: a stiff meshing spring that is not excited does not shorten the step.
 
+mod arc;
 mod columns;
+mod course;
 mod energy;
 mod generator;
 mod linear;
 
 use nalgebra::Matrix2;
 
-pub(crate) use columns::add;
+pub(crate) use arc::{Arc, REACH, TERMS};
 pub use linear::LinearFlow;
+pub(crate) use linear::Step;
 
 use crate::model::{Oscillator, Quiet, Side, State};
 
