@@ -42,6 +42,8 @@
 
 use wide::{CmpGt, CmpLt, f64x4};
 
+use crate::fused::fma;
+
 /// Bernstein coefficients `c_0 .. c_6` of the quintic through value, slope and curvature of a
 /// function at both ends of a step: `c_0`, and the departures of the others from it, which keep
 /// their own relative accuracy on steps far shorter than an ulp of the value.
@@ -230,7 +232,8 @@ fn bracket(c: &[f64; 7], order: usize, turn: usize, eps: f64) -> Option<Bracket>
     let fourth = [third[1] - third[0], third[2] - third[1]];
     let power =
         [b[0], 5.0 * first[0], 10.0 * second[0], 10.0 * third[0], 5.0 * fourth[0], fourth[1] - fourth[0]];
-    let guess = quintic_root(&power, order, polygon_root(c, turn))?;
+    // Where the control polygon crosses zero would be nearer, but later to know.
+    let guess = quintic_root(&power, order, (turn as f64 - 0.5) * (1.0 / 6.0))?;
     let bend = upper(upper(second[0], second[1]), upper(second[2], second[3]));
     let slope = upper(upper(first[0], first[1]), upper(upper(first[2], first[3]), first[4]));
     if bend < -BEND_ERROR * eps || slope < -SLOPE_ERROR * eps {
@@ -264,34 +267,34 @@ fn near(power: &[f64; 6], second: &[f64; 4], guess: f64, eps: f64) -> Option<Bra
 fn lowered(c: &[f64; 7]) -> [f64; 6] {
     [
         c[0],
-        1.2 * c[1] - 0.2 * c[0],
-        1.5 * c[2] - 0.6 * c[1] + 0.1 * c[0],
-        1.5 * c[4] - 0.6 * c[5] + 0.1 * c[6],
-        1.2 * c[5] - 0.2 * c[6],
+        fma(1.2, c[1], -0.2 * c[0]),
+        fma(1.5, c[2], fma(-0.6, c[1], 0.1 * c[0])),
+        fma(1.5, c[4], fma(-0.6, c[5], 0.1 * c[6])),
+        fma(1.2, c[5], -0.2 * c[6]),
         c[6],
     ]
 }
 
-/// Where the control polygon crosses zero.
-#[inline(always)]
-fn polygon_root(c: &[f64; 7], turn: usize) -> f64 {
-    let (above, below) = (c[turn - 1], c[turn].min(0.0));
-    ((turn - 1) as f64 + above / (above - below)) * (1.0 / 6.0)
-}
-
-/// Newton on the quintic with its root at the start divided out: two digits suffice.
+/// Halley's method on the quintic with its root at the start divided out: two digits suffice.
 #[inline(always)]
 fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
-    let deflated: [f64; 6] = std::array::from_fn(|i| power.get(i + order).copied().unwrap_or(0.0));
+    let deflated = match order {
+        0 => *power,
+        1 => [power[1], power[2], power[3], power[4], power[5], 0.0],
+        2 => [power[2], power[3], power[4], power[5], 0.0, 0.0],
+        _ => [power[3], power[4], power[5], 0.0, 0.0, 0.0],
+    };
+    let [_, _, c2, c3, c4, c5] = deflated;
     let mut u = start;
     for _ in 0..6 {
         let [p, slope] = quintic(&deflated, u);
-        let step = p / slope;
+        let bend = fma(u * u, fma(10.0 * c5, u, 6.0 * c4), fma(3.0 * c3, u, c2));
+        let step = p * slope / fma(slope, slope, -p * bend);
         u -= step;
         if !(u > 0.0 && u < 1.0 + 1e-6) {
             return None;
         }
-        if step.abs() < 5e-2 * u {
+        if step.abs() < 0.1 * u || step.abs() < 0.1 && u > 0.1 {
             return Some(u);
         }
     }
@@ -302,9 +305,9 @@ fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
 #[inline(always)]
 fn quintic(c: &[f64; 6], u: f64) -> [f64; 2] {
     let square = u * u;
-    let fourth = square * square;
-    let value = ((c[0] + c[1] * u) + square * (c[2] + c[3] * u)) + fourth * (c[4] + c[5] * u);
-    let slope = ((c[1] + 2.0 * c[2] * u) + square * (3.0 * c[3] + 4.0 * c[4] * u)) + fourth * (5.0 * c[5]);
+    let value = fma(square, fma(square, fma(c[5], u, c[4]), fma(c[3], u, c[2])), fma(c[1], u, c[0]));
+    let tail = fma(square, 5.0 * c[5], fma(4.0 * c[4], u, 3.0 * c[3]));
+    let slope = fma(square, tail, fma(2.0 * c[2], u, c[1]));
     [value, slope]
 }
 

@@ -396,7 +396,10 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             };
             match self.outlook(linear, step) {
                 Outlook::Clear { roomy } => {
-                    self.level[slot] = if roomy && level > 0 { level - 1 } else { level };
+                    self.level[slot] = level;
+                    if roomy && level > 0 {
+                        self.lengthen(slot);
+                    }
                     self.clear_step(linear, step, until);
                     return Ok(());
                 }
@@ -423,6 +426,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 }
             }
         }
+    }
+
+    /// Takes a longer step next time. Out of line, so that the next step need not wait for the
+    /// arithmetic of this one's certificate.
+    #[cold]
+    #[inline(never)]
+    fn lengthen(&mut self, slot: usize) {
+        self.level[slot] -= 1;
     }
 
     /// Takes a step that is clear, cut at `until`.
@@ -456,7 +467,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Moves everything by a time of at most the longest step.
     #[inline(always)]
     fn move_within(&mut self, linear: &LinearFlow, s: f64) {
-        let u = s / linear.unit;
+        let u = s * linear.per_unit;
         let arc = linear.grid.arc(&self.q, &self.phasor, u);
         self.arrive(linear, &arc, u);
         self.count_meshing(s);

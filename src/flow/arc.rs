@@ -10,6 +10,7 @@ use wide::f64x4;
 use super::columns::Columns;
 use super::linear::terms;
 use super::{Gap, Phasor};
+use crate::fused::fma;
 
 /// Parts of the Taylor step whose propagators are stored.
 const PARTS: usize = 16;
@@ -26,6 +27,14 @@ pub(crate) const TERMS: usize = 8;
 /// Distance from the grid up to which the series may be used, in Taylor steps: half a part and
 /// a little, for a root beyond the middle.
 pub(crate) const REACH: f64 = 0.035;
+
+/// Added to a small number it leaves the nearest whole one in the last bits.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+const MASK: u64 = 0xffff;
+
+/// Series of `1 - sin(x) / x` and of `1 - cos(x)`, signs left out.
+const SIN: [f64; 3] = [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0];
+const COS: [f64; 4] = [0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40320.0];
 
 /// Propagators of a grid of instants, less the identity, and the terms of the Taylor series.
 #[derive(Clone, Debug)]
@@ -68,21 +77,22 @@ impl Grid {
 
     /// The propagator, less the identity, of a multiple of the sixteenth: exact grid only.
     pub(super) fn propagator(&self, u: f64) -> Columns {
-        let [whole, part] = self.nearest(u);
+        let (_, whole, part) = self.nearest(u);
         self.parts[part].after(&self.wholes[whole])
     }
 
-    /// Whole steps and parts of the grid point nearest to `u`.
+    /// The grid point nearest to `u`, and its whole steps and parts.
     #[inline(always)]
-    fn nearest(&self, u: f64) -> [usize; 2] {
-        let i = (u * PARTS as f64 + 0.5) as usize;
-        [i / PARTS, i % PARTS]
+    fn nearest(&self, u: f64) -> (f64, usize, usize) {
+        let rounded = fma(u, PARTS as f64, ROUNDER);
+        let i = (rounded.to_bits() & MASK) as usize;
+        ((rounded - ROUNDER) * FINEST_PART, (i / PARTS).min(self.wholes.len() - 1), i % PARTS)
     }
 
     /// The motion from a state near the instant `u >= 0`, in Taylor steps.
     #[inline(always)]
     pub(crate) fn arc(&self, q: &Gap, phasor: &Phasor, u: f64) -> Arc {
-        let [whole, part] = self.nearest(u);
+        let (instant, whole, part) = self.nearest(u);
         let start = f64x4::from(*q);
         let (mut moved, mut p) = (f64x4::ZERO, *phasor);
         let mut here = *q;
@@ -98,10 +108,10 @@ impl Grid {
         let there = start + moved;
         let here = there.to_array();
         Arc {
-            start: whole as f64 + part as f64 * FINEST_PART,
+            start: instant,
             moved,
             q: there,
-            terms: std::array::from_fn(|n| self.terms[n].chain(&here, &p)),
+            terms: std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p)),
             phasor: p,
         }
     }
@@ -109,8 +119,8 @@ impl Grid {
     /// Tangent vectors after `u` Taylor steps.
     #[inline(always)]
     pub(crate) fn carry<const N: usize>(&self, u: f64, tangents: [Gap; N]) -> [Gap; N] {
-        let [whole, part] = self.nearest(u);
-        let v = u - (whole as f64 + part as f64 * FINEST_PART);
+        let (instant, whole, part) = self.nearest(u);
+        let v = u - instant;
         let (whole, part) = (&self.wholes[whole], &self.parts[part]);
         let here = tangents.map(|t| part.carry_tangent(&whole.carry_tangent(&t)));
         Columns::carry(&self.terms, v, here)
@@ -131,12 +141,14 @@ impl Arc {
     /// The state `v` Taylor steps after `start`.
     #[inline(always)]
     pub(crate) fn state(&self, v: f64) -> Gap {
-        let wide = f64x4::splat(v);
-        let mut sum = self.terms[TERMS - 1];
-        for term in self.terms[..TERMS - 1].iter().rev() {
-            sum = sum.mul_add(wide, *term);
-        }
-        sum.mul_add(wide, self.q).to_array()
+        let t = &self.terms;
+        let v = f64x4::splat(v);
+        let square = v * v;
+        // In a tree: whoever needs the state has nothing else to do meanwhile.
+        let pair = |i: usize| t[i + 1].mul_add(v, t[i]);
+        let low = pair(2).mul_add(square, pair(0));
+        let high = pair(6).mul_add(square, pair(4));
+        high.mul_add(square * square, low).mul_add(v, self.q).to_array()
     }
 
     /// The phasor after a turn by a small angle.
@@ -144,8 +156,8 @@ impl Arc {
     pub(crate) fn phasor(&self, angle: f64) -> Phasor {
         let [cos, sin] = self.phasor;
         let square = angle * angle;
-        let s = angle * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0)));
-        let less = -0.5 * square * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)));
-        [cos + (less * cos - s * sin), sin + (s * cos + less * sin)]
+        let s = angle * fma(-square, fma(-square, fma(-square, SIN[2], SIN[1]), SIN[0]), 1.0);
+        let less = square * fma(square, fma(-square, fma(-square, COS[3], COS[2]), COS[1]), -COS[0]);
+        [cos + fma(less, cos, -s * sin), sin + fma(s, cos, less * sin)]
     }
 }

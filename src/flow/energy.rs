@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::columns::Columns;
 use super::{Gap, Phasor, displacement_matrix};
+use crate::fused::fma;
 use crate::model::{Domain, Oscillator};
 
 /// Energies below this are not told from zero by squaring.
@@ -50,14 +51,14 @@ impl EnergyBound {
     #[inline]
     pub(crate) fn remainder(&self, q: &Gap, phasor: &Phasor, u: f64) -> f64 {
         let sum = self.columns.apply(q, phasor).to_array();
-        let energy = (sum[0] * sum[0] + sum[1] * sum[1]) + (sum[2] * sum[2] + sum[3] * sum[3]);
+        let energy = fma(sum[0], sum[0], sum[1] * sum[1]) + fma(sum[2], sum[2], sum[3] * sum[3]);
         // Squares of states this small underflow.
         let root = if energy < TINY {
             2.0 * sum.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
         } else {
             energy.sqrt()
         };
-        root + self.growth * u
+        fma(self.growth, u, root)
     }
 }
 

@@ -9,6 +9,7 @@ use super::course::Course;
 use super::energy::EnergyBound;
 use super::generator::{Generator, generator, rate};
 use super::{Gap, Phasor};
+use crate::fused::fma;
 use crate::model::{Domain, Oscillator};
 
 /// Terms of the Taylor table: what is left out is below `1.6^23 / 23! < 2e-18`.
@@ -62,6 +63,8 @@ pub struct LinearFlow {
     pub(crate) rate: f64,
     /// The Taylor step: the unit of time of the series below.
     pub(crate) unit: f64,
+    /// Its inverse.
+    pub(crate) per_unit: f64,
     /// Angle of the forcing over a Taylor step.
     pub(crate) turn: f64,
     /// Steps, coarsest first, each half as long as the one before; the finest are made on demand.
@@ -110,6 +113,7 @@ impl LinearFlow {
             generator,
             rate,
             unit,
+            per_unit: 1.0 / unit,
             turn: oscillator.omega * unit,
             steps: Vec::new(),
             levels: coarse + 1 + FINE_LEVELS,
@@ -196,10 +200,9 @@ impl LinearFlow {
 
 #[inline]
 fn dot(row: &[f64; 7], q: &Gap, phasor: &Phasor) -> f64 {
-    (row[0] * q[0] + row[1] * q[1])
-        + (row[2] * q[2] + row[3] * q[3])
-        + (row[4] * phasor[0] + row[5] * phasor[1])
-        + row[6]
+    let gap = fma(row[0], q[0], fma(row[1], q[1], row[6]));
+    let other = fma(row[2], q[2], row[3] * q[3]);
+    gap + fma(row[4], phasor[0], fma(row[5], phasor[1], other))
 }
 
 /// Terms `(G unit)^(n+1) / (n+1)!` of the propagator.

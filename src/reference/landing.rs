@@ -3,6 +3,7 @@
 use super::{Crossing, Observer, Stop, Trajectory};
 use crate::certificate::Bracket;
 use crate::flow::{Arc, Gap, LinearFlow, Phasor, REACH, TERMS};
+use crate::fused::fma;
 
 /// Evaluations of the exact flow allowed for one root; one or two are needed.
 const ROOT_CAP: u32 = 60;
@@ -28,7 +29,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let remaining = until - self.t;
         if bracket.guess * h * linear.unit > remaining {
             // Probably after `until`. It is if what lies there is still before the one root.
-            let u = remaining / linear.unit;
+            let u = remaining * linear.per_unit;
             let arc = linear.grid.arc(&self.q, &self.phasor, u);
             let v = u - arc.start;
             if self.before(crossing, linear, &arc.state(v), &arc.phasor(linear.turn * v)) {
@@ -126,33 +127,45 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 }
 
-/// The root of a series near `v`: one step of Halley's method, then Newton's until what it
-/// leaves is below rounding. `u` is the time of flight that the correction is measured by.
+/// The root of a series near `v`: reversion of the series there, then Newton's steps until what
+/// they leave is below rounding. `u` is the time of flight that it is measured by.
+///
+/// Few divisions and trees instead of chains: the next flight waits for this number.
 #[inline(always)]
 fn root_near(c: &[f64; TERMS + 1], v: f64, u: f64) -> Option<f64> {
-    let (mut value, mut slope, mut bend) = (c[TERMS], 0.0, 0.0);
-    for &c in c[..TERMS].iter().rev() {
-        bend = bend * v + slope;
-        slope = slope * v + value;
-        value = value * v + c;
-    }
-    let first = -value / slope;
-    let bend = bend / slope;
-    let mut v = v + first / (1.0 + bend * first);
+    let value = sum(c, v);
+    // What follows need not be exact: the last terms of the series are below 1e-8 of the slope.
+    let square = v * v;
+    let tail = fma(square, fma(6.0 * c[6], v, 5.0 * c[5]), fma(4.0 * c[4], v, 3.0 * c[3]));
+    let slope = fma(square, tail, fma(2.0 * c[2], v, c[1]));
+    let bend = fma(square, fma(10.0 * c[5], v, 6.0 * c[4]), fma(3.0 * c[3], v, c[2]));
+    let twist = fma(square, 10.0 * c[5], fma(4.0 * c[4], v, c[3]));
+    let inverse = 1.0 / slope;
+    let (first, bend, twist) = (-value * inverse, bend * inverse, twist * inverse);
+    let curl = bend * first;
+    let curve = fma(2.0 * curl, curl, -twist * first * first);
+    let delta = fma(first, curve - curl, first);
+    let flatter = fma(-delta, fma(delta, fma(-4.0 * bend, bend, 3.0 * twist), 2.0 * bend), 1.0);
+    let inverse = inverse * flatter;
+    // The share of a correction that the slope's own error leaves.
+    let steepness = bend.abs() * delta.abs();
+    let share = steepness * steepness * steepness + (twist * delta * delta * delta).abs() * 64.0 + 1e-6;
+    let mut v = v + delta;
     for _ in 0..POLISH_CAP {
-        let (mut value, mut slope) = (c[TERMS], 0.0);
-        for &c in c[..TERMS].iter().rev() {
-            slope = slope * v + value;
-            value = value * v + c;
-        }
-        let delta = -value / slope;
-        v += delta;
-        if delta * delta * bend.abs() <= LEFT * u {
-            return Some(v);
-        }
-        if !(v.abs() <= 1.0) {
+        let correction = sum(c, v) * inverse;
+        v -= correction;
+        if (correction * share).abs() <= LEFT * u {
             return Some(v);
         }
     }
     None
+}
+
+/// The sum of a series.
+#[inline(always)]
+fn sum(c: &[f64; TERMS + 1], v: f64) -> f64 {
+    let square = v * v;
+    let low = fma(square, fma(c[4], v, c[3]), fma(c[2], v, c[1]));
+    let high = fma(square, fma(c[8], v, c[7]), fma(c[6], v, c[5]));
+    fma(v, fma(square * square, high, low), c[0])
 }
