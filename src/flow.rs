@@ -18,10 +18,10 @@
 //!
 //! # How it is evaluated
 //!
-//! [`LinearFlow`] holds one Taylor table `(G h)^n / n!` for a step `h` with `|G| h <= 1.6`;
-//! at order 22 the remainder is below `2e-18`. Summing it gives the propagator of any part
-//! of the step, less the identity, so that a short flight keeps its relative accuracy.
-//! Propagators of `h, h/2, h/4, ...` are stored, and a few longer ones made by squaring.
+//! [`LinearFlow`] makes propagators from one Taylor table `(G h)^n / n!` for a step `h` with
+//! `|G| h <= 1.6`; at order 22 the remainder is below `2e-18`. They are kept less the identity,
+//! so that a short flight keeps its relative accuracy: those of `h, h/2, h/4, ...`, a few longer
+//! ones made by squaring, and a fine grid from which a short series leads to any instant between.
 //!
 //! # Bounds on derivatives
 //!

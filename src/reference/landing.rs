@@ -116,7 +116,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 linear.acceleration_rates(&arc.state(v), &arc.phasor(linear.turn * v));
             let delta = -pressing / (rate * linear.unit);
             v += delta;
-            if !(v.abs() <= REACH) {
+            if v.is_nan() || v.abs() > REACH {
                 return None;
             }
             if delta * delta * (bend * linear.unit).abs() <= LEFT * rate.abs() * u {
