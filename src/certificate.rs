@@ -31,28 +31,108 @@
 //! departs from `p'` by less than `1.08 eps` (the sharp constant for the quintic's first
 //! derivative is `sqrt(5)/30000 h^5 max|f^(6)|`).
 //!
+//! Mostly there is a shorter way: where all second differences of `p`'s coefficients show
+//! `f'' < 0`, or all first ones `f' < 0`, on the whole step, `f` has one root after the start if
+//! it ends below zero. The curvature of `f` departs from `p''` by at most `7.5 eps` (the sharp
+//! constant of the second derivative is `1/1920 h^4 max|f^(6)|`).
+//!
 //! A start on the wall itself is a root of order `m` at `u = 0`. Dividing `u^m` out turns
 //! `c_i` into a positive multiple of `c_i` for `i >= m` and drops the rest, so the same
 //! test serves: it merely starts at `i = m`.
 
-/// Value, slope and curvature of a function at both ends of a step, in units of the step:
-/// `(f, h f', h^2 f'')`.
+use wide::{CmpGt, CmpLt, f64x4};
+
+use crate::fused::fma;
+
+/// Bernstein coefficients `c_0 .. c_6` of the quintic through value, slope and curvature of a
+/// function at both ends of a step: `c_0`, and the departures of the others from it, which keep
+/// their own relative accuracy on steps far shorter than an ulp of the value.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Hermite {
-    left: [f64; 3],
-    right: [f64; 3],
-    /// Difference of the two values, to its own relative accuracy.
-    rise: f64,
+pub(crate) struct Bernstein {
+    start: f64,
+    /// `c_1 .. c_4`, less `c_0`.
+    low: f64x4,
+    /// `c_5`, and `c_6` three times.
+    high: f64x4,
 }
 
-impl Hermite {
-    /// From values, slopes and curvatures per unit time, and the difference of the values.
+impl Bernstein {
+    /// From `h f'`, `h^2 f''` at the left end, the rise of `f`, and `h f'`, `h^2 f''` at the right
+    /// end; of a function that starts at zero.
+    pub(crate) fn departures(s0: f64, a0: f64, rise: f64, s1: f64, a1: f64) -> Bernstein {
+        let (b2, b3) = (0.4 * s0 + 0.05 * a0, rise - 0.4 * s1 + 0.05 * a1);
+        let c1 = s0 * (1.0 / 6.0);
+        let c2 = s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0);
+        let c4 = rise - s1 * (1.0 / 3.0) + a1 * (1.0 / 30.0);
+        let c5 = rise - s1 * (1.0 / 6.0);
+        Bernstein {
+            start: 0.0,
+            low: f64x4::from([c1, c2, 0.5 * (b2 + b3), c4]),
+            high: f64x4::from([c5, rise, rise, rise]),
+        }
+    }
+
+    /// From value, slope and curvature per unit time at both ends of a step `h`.
+    pub(crate) fn new([f0, s0, a0]: [f64; 3], [f1, s1, a1]: [f64; 3], h: f64) -> Bernstein {
+        let departures = Bernstein::departures(h * s0, h * h * a0, f1 - f0, h * s1, h * h * a1);
+        Bernstein { start: f0, ..departures }
+    }
+
+    /// The departures, as they are stored.
+    pub(crate) fn wide(&self) -> [f64x4; 2] {
+        [self.low, self.high]
+    }
+
+    /// From the value at the start and the departures.
     #[inline(always)]
-    pub(crate) fn new(left: [f64; 3], right: [f64; 3], h: f64, rise: f64) -> Hermite {
-        let scale = |[f, s, a]: [f64; 3]| [f, h * s, h * h * a];
-        Hermite { left: scale(left), right: scale(right), rise }
+    pub(crate) fn from_wide(start: f64, [low, high]: [f64x4; 2]) -> Bernstein {
+        Bernstein { start, low, high }
+    }
+
+    /// Lowest and highest value that the function can take on the step, leaving out the first
+    /// `order` coefficients: the quick test, good for both walls at once.
+    ///
+    /// A start on a wall has a root of order `order` there; without its coefficients the range
+    /// is that of the deflated function as far as signs go.
+    #[inline(always)]
+    pub(crate) fn range(&self, order: usize, remainder: f64) -> [f64; 2] {
+        let blur = f64x4::from([0.0, 0.0, remainder, 0.0]);
+        let mut low = self.low;
+        if order > 1 {
+            let [_, c2, c3, c4] = low.to_array();
+            low = f64x4::from([c2, c2, c3, c4]);
+        }
+        let lowest = smallest((low - blur).fast_min(self.high));
+        let highest = -smallest((-(low + blur)).fast_min(-self.high));
+        let end = self.start + self.high.to_array()[1];
+        let rounding = ROUNDING * (self.start.abs() + end.abs());
+        let (least, most) =
+            if order > 0 { (lowest, highest) } else { (lower(lowest, 0.0), upper(highest, 0.0)) };
+        [self.start + (least - rounding), self.start + (most + rounding)]
     }
 }
+
+/// The smallest of four numbers.
+#[inline(always)]
+fn smallest(x: f64x4) -> f64 {
+    let [a, b, c, d] = x.to_array();
+    lower(lower(a, c), lower(b, d))
+}
+
+/// The smaller of two numbers in one instruction; `f64::min` takes four to mind NaN.
+#[inline(always)]
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers.
+#[inline(always)]
+fn upper(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Rounding of a Bernstein coefficient, relative to the ends it is made of.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// What a step holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,134 +156,102 @@ pub(crate) struct Bracket {
     pub(crate) hi: f64,
 }
 
-/// Lowest and highest value that a function can take on a step, leaving out the first
-/// `order` coefficients: the quick test, good for both walls at once.
-///
-/// A start on a wall has a root of order `order` there; without its coefficients the range
-/// is that of the deflated function as far as signs go.
-#[inline(always)]
-pub(crate) fn range(f: &Hermite, order: usize, remainder: f64) -> [f64; 2] {
-    let [f0, s0, a0] = f.left;
-    let [f1, s1, a1] = f.right;
-    let (b2, b3) = (f0 + 0.4 * s0 + 0.05 * a0, f1 - 0.4 * s1 + 0.05 * a1);
-    let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
-    let c0 = if order > 0 { c2 } else { f0 };
-    let c1 = if order > 1 { c2 } else { f0 + s0 * (1.0 / 6.0) };
-    let c3 = 0.5 * (b2 + b3);
-    let c4 = f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0));
-    let c5 = f1 - s1 * (1.0 / 6.0);
-    let lowest = lower(lower(lower(c0, f1), lower(c1, c2)), lower(lower(c4, c5), c3 - remainder));
-    let highest = upper(upper(upper(c0, f1), upper(c1, c2)), upper(upper(c4, c5), c3 + remainder));
-    let rounding = ROUNDING * (f0.abs() + f1.abs());
-    [lowest - rounding, highest + rounding]
-}
-
-/// The smaller of two numbers in one instruction; `f64::min` takes four to mind NaN.
-#[inline(always)]
-fn lower(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// The larger of two numbers.
-#[inline(always)]
-fn upper(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-/// Rounding of a Bernstein coefficient, relative to the ends it is made of.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
-
 /// Judges the distance `sign * (f - level)` on a step.
 ///
 /// `order` is the order of its root at the start, 0 where it starts inside; `remainder` is
 /// `eps` of the module's argument.
 #[inline(always)]
-pub(crate) fn judge(f: &Hermite, level: f64, sign: f64, order: usize, remainder: f64) -> Verdict {
-    let [_, s0, a0] = f.left.map(|value| sign * value);
-    let [_, s1, a1] = f.right.map(|value| sign * value);
+pub(crate) fn judge(f: &Bernstein, level: f64, sign: f64, order: usize, remainder: f64) -> Verdict {
+    let wide = f64x4::splat(sign);
     // From the wall, coefficients are departures and carry their own rounding only: a flight
     // far shorter than an ulp of the wall's position keeps its shape.
-    let (start, end, rounding) = if order > 0 {
-        let size = s0.abs() + a0.abs() + s1.abs() + a1.abs();
-        (0.0, sign * f.rise, ROUNDING * (f.rise.abs() + size))
+    let (start, size) = if order > 0 {
+        let [a, b] = [f.low, f.high].map(|c| (-c).fast_max(c));
+        (0.0, -SLOPES * smallest(-a.fast_max(b)))
     } else {
-        let size = f.left[0].abs() + f.right[0].abs() + level.abs();
-        (sign * (f.left[0] - level), sign * (f.right[0] - level), ROUNDING * size)
+        (sign * (f.start - level), f.start.abs() + (f.start + f.high.to_array()[1]).abs() + level.abs())
     };
-    let quintic = [
-        start,
-        start + 0.2 * s0,
-        start + 0.4 * s0 + 0.05 * a0,
-        end - 0.4 * s1 + 0.05 * a1,
-        end - 0.2 * s1,
-        end,
-    ];
-    let c = [
-        start,
-        start + s0 * (1.0 / 6.0),
-        start + s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0),
-        0.5 * (quintic[2] + quintic[3]),
-        end - s1 * (1.0 / 3.0) + a1 * (1.0 / 30.0),
-        end - s1 * (1.0 / 6.0),
-        end,
-    ];
+    let rounding = ROUNDING * size;
     let eps = remainder + rounding;
-
-    let right = lower(lower(c[4], c[5]), c[6]);
-    let left = match order {
-        0 => lower(lower(c[0], c[1]), c[2]),
-        1 => lower(c[1], c[2]),
-        2 => c[2],
-        _ => f64::INFINITY,
-    };
-    if left > 0.0 && right > rounding && c[3] > eps {
-        return Verdict::Clear { roomy: ROOMY * remainder < lower(lower(left, right), c[3]) };
+    let [low, high] = [f.low, f.high].map(|c| c.mul_add(wide, f64x4::splat(start)));
+    let slack = [f64x4::from([0.0, 0.0, eps, rounding]), f64x4::splat(rounding)];
+    let above = bits(low.cmp_gt(slack[0]), high.cmp_gt(slack[1]));
+    let first = order.min(3);
+    if above >> first.saturating_sub(1) == ALL >> first.saturating_sub(1) && (order > 0 || start > 0.0) {
+        let [_, c2, c3, c4] = low.to_array();
+        let mut room = smallest(low.fast_min(high));
+        if order > 1 {
+            room = lower(lower(if order > 2 { c3 } else { c2 }, c3), lower(c4, smallest(high)));
+        }
+        return Verdict::Clear { roomy: ROOMY * remainder < room };
     }
-    turn(&c, order.min(3), eps)
-        .and_then(|turn| bracket(&quintic, [s0, a0, s1, a1], &c, order, turn, eps))
-        .map_or(Verdict::Unclear, Verdict::Crossing)
+    if order == 0 && start <= 0.0 {
+        return Verdict::Unclear;
+    }
+    let below = bits(low.cmp_lt(f64x4::from([0.0, 0.0, -eps, 0.0])), high.cmp_lt(f64x4::ZERO));
+    let Some(turn) = turn(above, below, first) else { return Verdict::Unclear };
+    let ([c1, c2, c3, c4], [c5, c6, ..]) = (low.to_array(), high.to_array());
+    bracket(&[start, c1, c2, c3, c4, c5, c6], order, turn, eps).map_or(Verdict::Unclear, Verdict::Crossing)
+}
+
+/// What slopes and curvatures at the ends can be, relative to the largest coefficient.
+const SLOPES: f64 = 64.0;
+
+/// One bit for each of `c_1 .. c_6`.
+const ALL: u32 = 0b11_1111;
+
+#[inline(always)]
+fn bits(low: f64x4, high: f64x4) -> u32 {
+    (low.move_mask() as u32 | (high.move_mask() as u32) << 4) & ALL
 }
 
 /// A remainder this many times smaller than the room left suits a step twice as long.
 pub(crate) const ROOMY: f64 = 64.0;
 
 /// Index of the first coefficient that is not positive, if both bounding polynomials change
-/// sign exactly once.
+/// sign exactly once: from `above` to `below`, with but the middle one in between.
 #[inline(always)]
-fn turn(c: &[f64; 7], first: usize, eps: f64) -> Option<usize> {
-    let slack = |i: usize| if i == 3 { eps } else { 0.0 };
-    let turn = (first..7).find(|&i| c[i] <= slack(i))?;
-    if turn == first {
+fn turn(above: u32, below: u32, first: usize) -> Option<usize> {
+    let begin = first.max(1);
+    let turn = begin + (above >> (begin - 1)).trailing_ones() as usize;
+    if turn > 6 || turn == first {
         return None;
     }
-    let negative_from = if turn == 3 && c[3] >= -eps { 4 } else { turn };
-    (negative_from..7).all(|i| c[i] < -slack(i)).then_some(turn)
+    let is_middle = turn == 3 && below & 0b100 == 0;
+    let negative_from = turn + usize::from(is_middle);
+    (below >> (negative_from - 1) == ALL >> (negative_from - 1)).then_some(turn)
 }
 
-/// A bracket that holds exactly one root, if the slope there is large enough to show it.
-fn bracket(
-    b: &[f64; 6],
-    ends: [f64; 4],
-    c: &[f64; 7],
-    order: usize,
-    turn: usize,
-    eps: f64,
-) -> Option<Bracket> {
-    let [s0, a0, s1, a1] = ends;
-    let (d, d1, d2) = (b[5] - b[0] - s0 - 0.5 * a0, s1 - s0 - a0, a1 - a0);
-    let power = [
-        b[0],
-        s0,
-        0.5 * a0,
-        10.0 * d - 4.0 * d1 + 0.5 * d2,
-        -15.0 * d + 7.0 * d1 - d2,
-        6.0 * d - 3.0 * d1 + 0.5 * d2,
-    ];
-    let guess = quintic_root(&power, order, polygon_root(c, turn))?;
-    let [p, slope] = quintic(&power, guess);
+/// A bracket that holds exactly one root, if slope or curvature shows that there is but one.
+#[inline(always)]
+fn bracket(c: &[f64; 7], order: usize, turn: usize, eps: f64) -> Option<Bracket> {
+    let b = lowered(c);
+    let first: [f64; 5] = std::array::from_fn(|i| b[i + 1] - b[i]);
+    let second: [f64; 4] = std::array::from_fn(|i| first[i + 1] - first[i]);
+    let third: [f64; 3] = std::array::from_fn(|i| second[i + 1] - second[i]);
+    let fourth = [third[1] - third[0], third[2] - third[1]];
+    let power =
+        [b[0], 5.0 * first[0], 10.0 * second[0], 10.0 * third[0], 5.0 * fourth[0], fourth[1] - fourth[0]];
+    // Where the control polygon crosses zero would be nearer, but later to know.
+    let guess = quintic_root(&power, order, (turn as f64 - 0.5) * (1.0 / 6.0))?;
+    let bend = upper(upper(second[0], second[1]), upper(second[2], second[3]));
+    let slope = upper(upper(first[0], first[1]), upper(upper(first[2], first[3]), first[4]));
+    if bend < -BEND_ERROR * eps || slope < -SLOPE_ERROR * eps {
+        return Some(Bracket { guess, lo: 0.0, hi: 1.0 });
+    }
+    near(&power, &second, guess, eps)
+}
+
+/// Remainders of slope and curvature per `eps`, over the factors of their Bernstein forms.
+const SLOPE_ERROR: f64 = 1.08 / 5.0;
+const BEND_ERROR: f64 = 7.5 / 20.0;
+
+/// The stretch around `guess` over which the slope is shown to be negative, if the root lies in it.
+#[inline(never)]
+fn near(power: &[f64; 6], second: &[f64; 4], guess: f64, eps: f64) -> Option<Bracket> {
+    let [p, slope] = quintic(power, guess);
     let s = -slope;
-    let bend = second_difference_bound(b);
-    let reach = 0.5 * s / bend;
+    let reach = 0.5 * s / (20.0 * second.iter().fold(0.0, |most, x| upper(most, x.abs())));
     let outer = lower(guess + reach, 1.0);
     let beta = lower(20.0 * outer * outer * outer, 0.3125);
     let steepness = 0.5 * s - 1.08 * eps * lower(60.0 * outer * outer, 1.0);
@@ -214,33 +262,39 @@ fn bracket(
     })
 }
 
-/// `20 max |second differences| >= max |p''|` of a quintic in Bernstein form.
+/// Coefficients of degree 5 of a quintic given by those of degree 6.
 #[inline(always)]
-fn second_difference_bound(b: &[f64; 6]) -> f64 {
-    let second = |i: usize| ((b[i + 2] - b[i + 1]) - (b[i + 1] - b[i])).abs();
-    20.0 * upper(upper(second(0), second(1)), upper(second(2), second(3)))
+fn lowered(c: &[f64; 7]) -> [f64; 6] {
+    [
+        c[0],
+        fma(1.2, c[1], -0.2 * c[0]),
+        fma(1.5, c[2], fma(-0.6, c[1], 0.1 * c[0])),
+        fma(1.5, c[4], fma(-0.6, c[5], 0.1 * c[6])),
+        fma(1.2, c[5], -0.2 * c[6]),
+        c[6],
+    ]
 }
 
-/// Where the control polygon crosses zero.
-#[inline(always)]
-fn polygon_root(c: &[f64; 7], turn: usize) -> f64 {
-    let (above, below) = (c[turn - 1], c[turn].min(0.0));
-    ((turn - 1) as f64 + above / (above - below)) * (1.0 / 6.0)
-}
-
-/// Newton on the quintic with its root at the start divided out: a few digits suffice.
+/// Halley's method on the quintic with its root at the start divided out: two digits suffice.
 #[inline(always)]
 fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
-    let deflated: [f64; 6] = std::array::from_fn(|i| power.get(i + order).copied().unwrap_or(0.0));
+    let deflated = match order {
+        0 => *power,
+        1 => [power[1], power[2], power[3], power[4], power[5], 0.0],
+        2 => [power[2], power[3], power[4], power[5], 0.0, 0.0],
+        _ => [power[3], power[4], power[5], 0.0, 0.0, 0.0],
+    };
+    let [_, _, c2, c3, c4, c5] = deflated;
     let mut u = start;
     for _ in 0..6 {
         let [p, slope] = quintic(&deflated, u);
-        let step = p / slope;
+        let bend = fma(u * u, fma(10.0 * c5, u, 6.0 * c4), fma(3.0 * c3, u, c2));
+        let step = p * slope / fma(slope, slope, -p * bend);
         u -= step;
         if !(u > 0.0 && u < 1.0 + 1e-6) {
             return None;
         }
-        if step.abs() < 1e-2 * u {
+        if step.abs() < 0.1 * u || step.abs() < 0.1 && u > 0.1 {
             return Some(u);
         }
     }
@@ -251,9 +305,9 @@ fn quintic_root(power: &[f64; 6], order: usize, start: f64) -> Option<f64> {
 #[inline(always)]
 fn quintic(c: &[f64; 6], u: f64) -> [f64; 2] {
     let square = u * u;
-    let fourth = square * square;
-    let value = ((c[0] + c[1] * u) + square * (c[2] + c[3] * u)) + fourth * (c[4] + c[5] * u);
-    let slope = ((c[1] + 2.0 * c[2] * u) + square * (3.0 * c[3] + 4.0 * c[4] * u)) + fourth * (5.0 * c[5]);
+    let value = fma(square, fma(square, fma(c[5], u, c[4]), fma(c[3], u, c[2])), fma(c[1], u, c[0]));
+    let tail = fma(square, 5.0 * c[5], fma(4.0 * c[4], u, 3.0 * c[3]));
+    let slope = fma(square, tail, fma(2.0 * c[2], u, c[1]));
     [value, slope]
 }
 
@@ -262,10 +316,12 @@ mod tests {
     use super::*;
 
     /// `f(u) = a + b u + c u^2 + d u^3` on a step of length 1.
-    fn cubic([a, b, c, d]: [f64; 4]) -> Hermite {
+    fn cubic([a, b, c, d]: [f64; 4]) -> Bernstein {
         let at =
             |u: f64| [a + u * (b + u * (c + u * d)), b + u * (2.0 * c + 3.0 * d * u), 2.0 * c + 6.0 * d * u];
-        Hermite::new(at(0.0), at(1.0), 1.0, b + c + d)
+        let departures =
+            Bernstein::departures(b, 2.0 * c, b + c + d, b + 2.0 * c + 3.0 * d, 2.0 * c + 6.0 * d);
+        Bernstein { start: at(0.0)[0], ..departures }
     }
 
     fn distance(f: [f64; 4], order: usize, remainder: f64) -> Verdict {
@@ -305,8 +361,7 @@ mod tests {
         // Leaves for good.
         assert!(matches!(distance([0.0, 0.25, 1.0, 0.0], 1, 1e-9), Verdict::Clear { .. }));
         // A departure far below the rounding of the wall's position.
-        let near =
-            judge(&Hermite::new([0.5, -1e-19, -1.0], [0.0, -1.0, -1.0], 1.0, -0.5), 0.5, -1.0, 1, 1e-9);
+        let near = judge(&Bernstein::new([0.5, -1e-19, -1.0], [0.0, -1.0, -1.0], 1.0), 0.5, -1.0, 1, 1e-9);
         assert!(matches!(near, Verdict::Clear { .. }));
     }
 }

@@ -18,10 +18,10 @@
 //!
 //! # How it is evaluated
 //!
-//! [`LinearFlow`] holds one Taylor table `(G h)^n / n!` for a step `h` with `|G| h <= 1.6`;
-//! at order 22 the remainder is below `2e-18`. Summing it gives the propagator of any part
-//! of the step, less the identity, so that a short flight keeps its relative accuracy.
-//! Propagators of `h, h/2, h/4, ...` are stored, and a few longer ones made by squaring.
+//! [`LinearFlow`] makes propagators from one Taylor table `(G h)^n / n!` for a step `h` with
+//! `|G| h <= 1.6`; at order 22 the remainder is below `2e-18`. They are kept less the identity,
+//! so that a short flight keeps its relative accuracy: those of `h, h/2, h/4, ...`, a few longer
+//! ones made by squaring, and a fine grid from which a short series leads to any instant between.
 //!
 //! # Bounds on derivatives
 //!
@@ -37,15 +37,18 @@
 //! That holds at resonance and without damping, costs one square root, and is tight where
 //! motion is slow: a stiff meshing spring that is not excited does not shorten the step.
 
+mod arc;
 mod columns;
+mod course;
 mod energy;
 mod generator;
 mod linear;
 
 use nalgebra::Matrix2;
 
-pub(crate) use columns::add;
+pub(crate) use arc::{Arc, REACH, TERMS};
 pub use linear::LinearFlow;
+pub(crate) use linear::Step;
 
 use crate::model::{Oscillator, Quiet, Side, State};
 

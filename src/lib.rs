@@ -18,6 +18,7 @@ pub mod classify;
 pub mod coexistence;
 pub mod engine;
 pub mod flow;
+mod fused;
 pub mod gpu;
 pub mod model;
 pub mod orbit;

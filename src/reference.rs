@@ -7,8 +7,8 @@
 //!
 //! # What it costs
 //!
-//! A clear step is one 4 x 7 product, one bound and one certificate; an event adds a sum of
-//! the Taylor table, four derivatives and the contact law.
+//! A clear step is four 4 x 7 products: its end, its bound and its certificate; an event adds
+//! ten, a search on one short polynomial, and the contact law.
 //!
 //! # How it can end
 //!
@@ -20,9 +20,9 @@ mod landing;
 mod outlook;
 mod tangent;
 
-use outlook::{Ahead, Crossing, Outlook};
+use outlook::{Crossing, Outlook};
 
-use crate::flow::{DomainKind, Flow, Gap, LinearFlow, Phasor, add};
+use crate::flow::{Arc, DomainKind, Flow, Gap, LinearFlow, Phasor, Step};
 use crate::model::{Law, Side, State};
 
 /// Events allowed in one forcing period.
@@ -378,47 +378,46 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         let flow = self.flow;
         let linear = flow.domain(self.mode.domain());
-        let remaining = until - self.t;
         let slot = usize::from(self.mode != Mode::Free);
         let mut level = self.level[slot];
-        // Steps beyond the Taylor table cannot be cut, so they must end before `until`.
-        while level < linear.taylor_level && linear.steps[level].h >= remaining {
-            level += 1;
-        }
         loop {
             self.work.steps += 1;
             self.steps_in_period += 1;
             if self.steps_in_period > STEPS_PER_PERIOD_CAP {
                 return Err(Stop::CapRoot);
             }
-            let propagator = &linear.steps[level].propagator;
-            let increment = propagator.increment(&self.q, &self.phasor);
-            let ahead = Ahead {
-                q: add(&self.q, &increment),
-                rise: increment[0],
-                phasor: propagator.rotate(&self.phasor),
+            let made;
+            let step = match linear.step(level) {
+                Some(step) => step,
+                None => {
+                    made = linear.new_step(level);
+                    &made
+                }
             };
-            match self.outlook(linear, level, &ahead) {
+            match self.outlook(linear, step) {
                 Outlook::Clear { roomy } => {
-                    self.level[slot] = if roomy && level > 0 { level - 1 } else { level };
-                    self.clear_step(linear, level, &ahead, until);
+                    self.level[slot] = level;
+                    if roomy && level > 0 {
+                        self.lengthen(slot);
+                    }
+                    self.clear_step(linear, step, until);
                     return Ok(());
                 }
                 Outlook::Rests => {
                     self.near_grazing = true;
-                    self.clear_step(linear, level, &ahead, until);
+                    self.clear_step(linear, step, until);
                     return Ok(());
                 }
                 Outlook::Crossing(crossing, bracket) => {
                     self.level[slot] = level;
-                    return self.cross(linear, linear.steps[level].u, crossing, bracket, until, observer);
+                    return self.cross(linear, step.u, crossing, bracket, until, observer);
                 }
                 Outlook::Unclear if self.settle_start(observer) => return self.check_events(),
-                Outlook::Unclear if level + 1 == linear.steps.len() => {
+                Outlook::Unclear if level + 1 == linear.levels => {
                     // What is not a number is never clear.
                     self.check_finite()?;
                     self.check_bounds(linear)?;
-                    self.settle_graze(linear, level, until, observer);
+                    self.settle_graze(linear, step.h, until, observer);
                     return self.check_events();
                 }
                 Outlook::Unclear => {
@@ -429,18 +428,24 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// Takes a longer step next time. Out of line, so that the next step need not wait for the
+    /// arithmetic of this one's certificate.
+    #[cold]
+    #[inline(never)]
+    fn lengthen(&mut self, slot: usize) {
+        self.level[slot] -= 1;
+    }
+
     /// Takes a step that is clear, cut at `until`.
     #[inline(always)]
-    fn clear_step(&mut self, linear: &LinearFlow, level: usize, ahead: &Ahead, until: f64) {
-        let step = &linear.steps[level];
+    fn clear_step(&mut self, linear: &LinearFlow, step: &Step, until: f64) {
         let remaining = until - self.t;
         self.from_wall = None;
         if step.h < remaining {
-            self.q = ahead.q;
-            self.phasor = ahead.phasor;
+            (self.q, self.phasor) = step.end(&self.q, &self.phasor);
             self.t += step.h;
             if N > 0 {
-                self.tangents = self.tangents.map(|u| step.propagator.apply_tangent(&u));
+                self.tangents = self.tangents.map(|u| step.propagator.carry_tangent(&u));
                 if self.steps_in_period.is_multiple_of(RESCALE_STEPS) {
                     self.rescale_tangents();
                 }
@@ -459,16 +464,24 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.t = until;
     }
 
-    /// Moves everything by a time of at most one Taylor step.
+    /// Moves everything by a time of at most the longest step.
     #[inline(always)]
     fn move_within(&mut self, linear: &LinearFlow, s: f64) {
-        let partial = linear.partial(s / linear.unit);
-        self.q = add(&self.q, &partial.increment(&self.q, &self.phasor));
-        self.phasor = partial.rotate(&self.phasor);
-        if N > 0 {
-            self.tangents = self.tangents.map(|u| partial.apply_tangent(&u));
-        }
+        let u = s * linear.per_unit;
+        let arc = linear.grid.arc(&self.q, &self.phasor, u);
+        self.arrive(linear, &arc, u);
         self.count_meshing(s);
+    }
+
+    /// Moves everything along an arc, to `u` Taylor steps from here.
+    #[inline(always)]
+    fn arrive(&mut self, linear: &LinearFlow, arc: &Arc, u: f64) {
+        let v = u - arc.start;
+        self.q = arc.state(v);
+        self.phasor = arc.phasor(linear.turn * v);
+        if N > 0 {
+            self.tangents = linear.grid.carry(u, self.tangents);
+        }
     }
 
     #[inline(always)]

@@ -1,6 +1,7 @@
 //! A 4 x 7 matrix on `a = (z, w, x, v, cos, sin, 1)` with the phasor's rotation: the form
 //! that propagators, vector fields and Taylor terms share.
 
+use nalgebra::Matrix4;
 use wide::f64x4;
 
 use super::generator::Generator;
@@ -14,6 +15,8 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
+    pub(super) const ZERO: Columns = Columns { columns: [f64x4::ZERO; 7], rotation: [0.0; 2] };
+
     /// The first four rows of a 7 x 7 matrix, and its rotation.
     pub(super) fn of(matrix: &Generator) -> Columns {
         Columns {
@@ -40,9 +43,72 @@ impl Columns {
         matrix
     }
 
+    /// One row of the matrix.
+    pub(super) fn row(&self, i: usize) -> [f64; 7] {
+        self.columns.map(|column| column.to_array()[i])
+    }
+
+    /// A row vector times the matrix.
+    pub(super) fn left(&self, row: &[f64; 7]) -> [f64; 7] {
+        let along = |column: &f64x4| {
+            let c = column.to_array();
+            (row[0] * c[0] + row[1] * c[1]) + (row[2] * c[2] + row[3] * c[3])
+        };
+        let mut product: [f64; 7] = std::array::from_fn(|j| along(&self.columns[j]));
+        let [c, s] = self.rotation;
+        product[4] += row[4] * c + row[5] * s;
+        product[5] += row[5] * c - row[4] * s;
+        product
+    }
+
+    /// The product of two 7 x 7 matrices whose last row is zero.
+    pub(super) fn times(&self, other: &Columns) -> Columns {
+        let b = &other.columns;
+        let [c, s] = other.rotation;
+        let inner = |j: usize| self.homogeneous(&b[j].to_array());
+        Columns {
+            columns: [
+                inner(0),
+                inner(1),
+                inner(2),
+                inner(3),
+                inner(4) + self.forcing(&[c, s], f64x4::ZERO),
+                inner(5) + self.forcing(&[-s, c], f64x4::ZERO),
+                inner(6),
+            ],
+            rotation: self.rotate(&other.rotation),
+        }
+    }
+
+    /// `(1 + A) (1 + B) - 1`: propagators less the identity, one after the other. The whole
+    /// would lose digits that the departures keep.
+    pub(super) fn after(&self, first: &Columns) -> Columns {
+        let product = self.times(first);
+        Columns {
+            columns: std::array::from_fn(|j| product.columns[j] + (self.columns[j] + first.columns[j])),
+            rotation: [0, 1].map(|i| product.rotation[i] + (self.rotation[i] + first.rotation[i])),
+        }
+    }
+
+    /// A multiple of the matrix.
+    pub(super) fn scaled(&self, factor: f64) -> Columns {
+        Columns {
+            columns: self.columns.map(|column| column * f64x4::splat(factor)),
+            rotation: self.rotation.map(|x| x * factor),
+        }
+    }
+
+    /// The rows of the matrix combined by another; the phasor is left out.
+    pub(super) fn weighted(&self, weight: &Matrix4<f64>) -> Columns {
+        let mut weights = Columns::ZERO;
+        for (j, column) in weights.columns.iter_mut().take(4).enumerate() {
+            *column = f64x4::from(std::array::from_fn::<f64, 4, _>(|i| weight[(i, j)]));
+        }
+        Columns { columns: self.columns.map(|c| weights.homogeneous(&c.to_array())), rotation: [0.0; 2] }
+    }
+
     /// `u (t_0 + u (t_1 + u (t_2 + ...)))`. Seven chains side by side keep both multipliers
     /// busy; splitting even and odd terms was tried and only spilled registers.
-    #[inline(always)]
     pub(super) fn horner(terms: &[Columns], u: f64) -> Columns {
         let wide = f64x4::splat(u);
         let mut sum = terms[terms.len() - 1];
@@ -52,26 +118,47 @@ impl Columns {
             }
             sum.rotation = [sum.rotation[0] * u + term.rotation[0], sum.rotation[1] * u + term.rotation[1]];
         }
-        Columns { columns: sum.columns.map(|c| c * wide), rotation: sum.rotation.map(|c| c * u) }
+        sum.scaled(u)
+    }
+
+    /// The same sum, applied to tangent vectors.
+    #[inline(always)]
+    pub(super) fn carry<const N: usize>(terms: &[Columns], u: f64, tangents: [Gap; N]) -> [Gap; N] {
+        let wide = f64x4::splat(u);
+        let mut sum = [f64x4::ZERO; 4];
+        for term in terms.iter().rev() {
+            for (sum, column) in sum.iter_mut().zip(&term.columns) {
+                *sum = sum.mul_add(wide, *column);
+            }
+        }
+        let sum = sum.map(|column| column * wide);
+        tangents.map(|t| {
+            let [t0, t1, t2, t3] = t.map(f64x4::splat);
+            let moved = sum[0].mul_add(t0, sum[1] * t1) + sum[2].mul_add(t2, sum[3] * t3);
+            (f64x4::from(t) + moved).to_array()
+        })
     }
 
     /// `sum_j column_j a_j`, in two halves to shorten the chain of additions.
     #[inline(always)]
-    pub(crate) fn apply(&self, q: &Gap, phasor: &Phasor) -> Gap {
-        let forced = self.forcing(phasor, self.columns[6]);
-        (self.homogeneous(q) + forced).to_array()
+    pub(crate) fn apply(&self, q: &Gap, phasor: &Phasor) -> f64x4 {
+        self.homogeneous(q) + self.forcing(phasor, self.columns[6])
     }
 
-    /// The same without the constant column: for derivatives.
+    /// The same in the fewest products, for many matrices side by side.
     #[inline(always)]
-    pub(crate) fn apply_unloaded(&self, q: &Gap, phasor: &Phasor) -> Gap {
-        (self.homogeneous(q) + self.forcing(phasor, f64x4::ZERO)).to_array()
+    pub(super) fn apply_lean(&self, q: &Gap, phasor: &Phasor) -> f64x4 {
+        let c = &self.columns;
+        let [q0, q1, q2, q3] = q.map(f64x4::splat);
+        let [cos, sin] = phasor.map(f64x4::splat);
+        let gap = c[2].mul_add(q2, c[1].mul_add(q1, c[0].mul_add(q0, c[6])));
+        gap + c[5].mul_add(sin, c[4].mul_add(cos, c[3] * q3))
     }
 
-    /// The same for a tangent vector, which feels neither forcing nor load.
+    /// The tangent vector after the step whose propagator, less the identity, this is.
     #[inline(always)]
-    pub(crate) fn apply_tangent(&self, u: &Gap) -> Gap {
-        self.homogeneous(u).to_array()
+    pub(crate) fn carry_tangent(&self, u: &Gap) -> Gap {
+        (f64x4::from(*u) + self.homogeneous(u)).to_array()
     }
 
     #[inline(always)]
@@ -93,10 +180,11 @@ impl Columns {
         let [c, s] = self.rotation;
         [c * p[0] - s * p[1], s * p[0] + c * p[1]]
     }
-}
 
-/// Sum of two vectors.
-#[inline(always)]
-pub(crate) fn add(a: &Gap, b: &Gap) -> Gap {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
+    /// The phasor after the step whose propagator, less the identity, this is.
+    #[inline(always)]
+    pub(crate) fn carry_phasor(&self, p: &Phasor) -> Phasor {
+        let [c, s] = self.rotate(p);
+        [p[0] + c, p[1] + s]
+    }
 }

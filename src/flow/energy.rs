@@ -3,8 +3,8 @@
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::columns::Columns;
-use super::generator::Generator;
 use super::{Gap, Phasor, displacement_matrix};
+use crate::fused::fma;
 use crate::model::{Domain, Oscillator};
 
 /// Energies below this are not told from zero by squaring.
@@ -23,11 +23,11 @@ pub(crate) struct EnergyBound {
 }
 
 impl EnergyBound {
-    /// A bound from the energy of `y^(n)`; `unit` is the Taylor step.
+    /// A bound from the energy of `y^(n)`; `term` is `(G unit)^n / n!` and `unit` the Taylor step.
     pub(super) fn new(
         oscillator: &Oscillator,
         domain: &Domain,
-        generator: &Generator,
+        term: &Columns,
         n: u32,
         unit: f64,
     ) -> EnergyBound {
@@ -35,16 +35,13 @@ impl EnergyBound {
         let gap = Vector2::from(oscillator.gap);
         let reach = gap.component_mul(&gap).component_div(&masses).sum().sqrt();
         let scale = reach * unit.powi(6) / 14400.0;
-
-        let weight = energy_root(oscillator, domain);
-        let power = generator.pow(n);
-        let rows = weight * power.fixed_view::<4, 7>(0, 0) * scale;
-        let mut padded = Generator::zeros();
-        padded.fixed_view_mut::<4, 7>(0, 0).copy_from(&rows);
         let force = Vector2::from(oscillator.force);
         let drive = force.component_mul(&force).component_div(&masses).sum().sqrt();
+        let factorial: u32 = (1..=n).product();
+        // Not a number, and so nothing that certifies a step, where powers leave the range of f64.
+        let power = scale / unit.powi(n as i32) * f64::from(factorial);
         EnergyBound {
-            columns: Columns::of(&padded),
+            columns: term.weighted(&(energy_root(oscillator, domain) * power)),
             growth: scale * drive * oscillator.omega.powi(n as i32) * unit,
         }
     }
@@ -53,15 +50,15 @@ impl EnergyBound {
     /// Taylor units that starts at `(q, phasor)`.
     #[inline]
     pub(crate) fn remainder(&self, q: &Gap, phasor: &Phasor, u: f64) -> f64 {
-        let sum = self.columns.apply(q, phasor);
-        let energy = (sum[0] * sum[0] + sum[1] * sum[1]) + (sum[2] * sum[2] + sum[3] * sum[3]);
+        let sum = self.columns.apply(q, phasor).to_array();
+        let energy = fma(sum[0], sum[0], sum[1] * sum[1]) + fma(sum[2], sum[2], sum[3] * sum[3]);
         // Squares of states this small underflow.
         let root = if energy < TINY {
             2.0 * sum.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
         } else {
             energy.sqrt()
         };
-        root + self.growth * u
+        fma(self.growth, u, root)
     }
 }
 

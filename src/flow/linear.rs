@@ -1,11 +1,15 @@
 //! One linear forced domain: generator, Taylor table, propagators.
 
 use nalgebra::{Matrix4, SMatrix};
+use wide::f64x4;
 
-use super::columns::{Columns, add};
+use super::arc::{FINEST_PART, Grid};
+use super::columns::Columns;
+use super::course::Course;
 use super::energy::EnergyBound;
 use super::generator::{Generator, generator, rate};
 use super::{Gap, Phasor};
+use crate::fused::fma;
 use crate::model::{Domain, Oscillator};
 
 /// Terms of the Taylor table: what is left out is below `1.6^23 / 23! < 2e-18`.
@@ -22,36 +26,13 @@ const DOUBLING_RADIUS: f64 = 0.5 * RADIUS;
 /// Halvings of the Taylor step, enough to resolve any grazing that rounding leaves visible.
 const FINE_LEVELS: usize = 26;
 
+/// How many of them are stored; only grazing and the last of a chatter need more.
+const STORED_FINE_LEVELS: usize = 10;
+
 /// Doublings of the Taylor step, by squaring; each costs about one bit.
 const COARSE_LEVELS: usize = 3;
 
-/// The propagator of a partial step, less the identity, so that small departures keep
-/// their relative accuracy.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Partial(Columns);
-
-impl Partial {
-    /// What is added to the state.
-    #[inline(always)]
-    pub(crate) fn increment(&self, q: &Gap, phasor: &Phasor) -> Gap {
-        self.0.apply(q, phasor)
-    }
-
-    /// The tangent vector after the partial step.
-    #[inline(always)]
-    pub(crate) fn apply_tangent(&self, u: &Gap) -> Gap {
-        add(u, &self.0.apply_tangent(u))
-    }
-
-    /// The forcing phasor after the partial step.
-    #[inline(always)]
-    pub(crate) fn rotate(&self, p: &Phasor) -> Phasor {
-        let [c, s] = self.0.rotate(p);
-        [p[0] + c, p[1] + s]
-    }
-}
-
-/// The propagator of one step length.
+/// All there is to know about steps of one length.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
     /// Step length.
@@ -60,24 +41,42 @@ pub(crate) struct Step {
     pub(crate) u: f64,
     pub(crate) u6: f64,
     /// The propagator, less the identity.
-    pub(crate) propagator: Partial,
+    pub(crate) propagator: Columns,
+    /// The course of the gap.
+    pub(crate) course: Course,
+}
+
+impl Step {
+    /// State and phasor at its end.
+    #[inline(always)]
+    pub(crate) fn end(&self, q: &Gap, phasor: &Phasor) -> (Gap, Phasor) {
+        let moved = self.propagator.apply(q, phasor);
+        ((f64x4::from(*q) + moved).to_array(), self.propagator.carry_phasor(phasor))
+    }
 }
 
 /// The exact flow of one linear domain.
 #[derive(Clone, Debug)]
 pub struct LinearFlow {
     generator: Generator,
-    omega: f64,
     /// A bound on all rates of the domain.
     pub(crate) rate: f64,
     /// The Taylor step: the unit of time of the series below.
     pub(crate) unit: f64,
-    /// Propagators, coarsest first, each half as long as the one before.
-    pub(crate) steps: Vec<Step>,
-    /// Index of the longest step that the Taylor table covers.
+    /// Its inverse.
+    pub(crate) per_unit: f64,
+    /// Angle of the forcing over a Taylor step.
+    pub(crate) turn: f64,
+    /// Steps, coarsest first, each half as long as the one before; the finest are made on demand.
+    steps: Vec<Step>,
+    /// Lengths there are.
+    pub(crate) levels: usize,
+    /// Which of them is the Taylor step.
     pub(crate) taylor_level: usize,
     /// Taylor table of the propagator: term `n` multiplies `u^(n+1)`.
     table: Vec<Columns>,
+    /// The way to any instant of the longest step.
+    pub(crate) grid: Grid,
     /// Columns of the vector field `(w, w', v, v')`.
     field: Columns,
     /// Rows of `z'', z''', z''''` on `a`.
@@ -99,26 +98,13 @@ impl LinearFlow {
         let generator = generator(oscillator, domain);
         let rate = rate(oscillator, domain);
         let unit = RADIUS / rate;
-        let table = taylor_table(&generator, unit);
-        let omega = oscillator.omega;
+        let columns = Columns::of(&generator);
+        let table = taylor_table(&columns, unit);
 
-        // Steps longer than half a forcing period would only be cut short by the strobe.
-        let fit = (0.5 * oscillator.period() / unit).log2().floor();
+        // Longer steps would only be cut short by the strobe.
+        let fit = (oscillator.period() / unit).log2().floor();
         let coarse = fit.clamp(0.0, COARSE_LEVELS as f64) as usize;
-        let mut longer = vec![departure(&table, 1.0)];
-        for _ in 0..coarse {
-            let last = longer[longer.len() - 1];
-            longer.push(doubled(&last));
-        }
-        let step = |halvings: i32, less: &Generator| {
-            let u = 0.5f64.powi(halvings);
-            Step { h: u * unit, u, u6: u.powi(6), propagator: Partial(Columns::of(less)) }
-        };
-        let mut steps: Vec<Step> =
-            longer.iter().enumerate().rev().map(|(i, less)| step(-(i as i32), less)).collect();
-        for halvings in 1..=FINE_LEVELS as i32 {
-            steps.push(step(halvings, &departure(&table, 0.5f64.powi(halvings))));
-        }
+        let grid = Grid::new(&table, 1 << coarse);
 
         let mut power = generator;
         let mut gap_rates = [[0.0; 7]; 3];
@@ -126,51 +112,50 @@ impl LinearFlow {
             power *= generator;
             *rates = std::array::from_fn(|j| power[(0, j)]);
         }
-        LinearFlow {
-            field: Columns::of(&generator),
-            gap_bound: EnergyBound::new(oscillator, domain, &generator, 5, unit),
-            pressing_bound: EnergyBound::new(oscillator, domain, &generator, 7, unit),
+        let mut linear = LinearFlow {
+            field: columns,
+            gap_bound: EnergyBound::new(oscillator, domain, &table[4], 5, unit),
+            pressing_bound: EnergyBound::new(oscillator, domain, &table[6], 7, unit),
             generator,
-            omega,
             rate,
             unit,
-            steps,
+            per_unit: 1.0 / unit,
+            turn: oscillator.omega * unit,
+            steps: Vec::new(),
+            levels: coarse + 1 + FINE_LEVELS,
             taylor_level: coarse,
             table,
+            grid,
             gap_rates,
-        }
+        };
+        linear.steps = (0..=coarse + STORED_FINE_LEVELS).map(|level| linear.new_step(level)).collect();
+        linear
+    }
+
+    /// The step of a level, where it is stored.
+    #[inline(always)]
+    pub(crate) fn step(&self, level: usize) -> Option<&Step> {
+        self.steps.get(level)
+    }
+
+    /// Makes the step of a level below [`levels`](Self::levels).
+    #[inline(never)]
+    pub(crate) fn new_step(&self, level: usize) -> Step {
+        let u = 0.5f64.powi(level as i32 - self.taylor_level as i32);
+        let propagator = if u < FINEST_PART {
+            Columns::horner(&self.table[..terms(u)], u)
+        } else {
+            self.grid.propagator(u)
+        };
+        let h = u * self.unit;
+        let course = Course::new(&propagator, &self.gap_rates[0], h);
+        Step { h, u, u6: u.powi(6), propagator, course }
     }
 
     /// The vector field `(w, w', v, v')` at a point.
     #[inline(always)]
     pub fn field(&self, q: &Gap, phasor: &Phasor) -> Gap {
-        self.field.apply(q, phasor)
-    }
-
-    /// The first four time derivatives of `q` along the solution.
-    #[inline(always)]
-    pub(crate) fn derivatives(&self, q: &Gap, phasor: &Phasor) -> [Gap; 4] {
-        let turn = |p: &Phasor| [-self.omega * p[1], self.omega * p[0]];
-        let p1 = turn(phasor);
-        let p2 = turn(&p1);
-        let d1 = self.field.apply(q, phasor);
-        let d2 = self.field.apply_unloaded(&d1, &p1);
-        let d3 = self.field.apply_unloaded(&d2, &p2);
-        [d1, d2, d3, self.field.apply_unloaded(&d3, &turn(&p2))]
-    }
-
-    /// The tangent vector a small time `delta` later, to second order.
-    #[inline(always)]
-    pub(crate) fn nudge_tangent(&self, u: &Gap, delta: f64) -> Gap {
-        let first = self.field.apply_tangent(u);
-        let second = self.field.apply_tangent(&first);
-        std::array::from_fn(|i| u[i] + delta * (first[i] + 0.5 * delta * second[i]))
-    }
-
-    /// The propagator, less the identity, of `u` Taylor units, `0 <= u <= 1`.
-    #[inline(always)]
-    pub(crate) fn partial(&self, u: f64) -> Partial {
-        Partial(Columns::horner(&self.table[..terms(u)], u))
+        self.field.apply(q, phasor).to_array()
     }
 
     /// The relative acceleration `w' = z''`.
@@ -202,14 +187,15 @@ impl LinearFlow {
     pub fn propagate(&self, q: Gap, phasor: Phasor, tau: f64) -> Gap {
         let a = SMatrix::<f64, 7, 1>::from([q[0], q[1], q[2], q[3], phasor[0], phasor[1], 1.0]);
         let moved = self.departure(tau) * a;
-        add(&q, &[moved[0], moved[1], moved[2], moved[3]])
+        std::array::from_fn(|i| q[i] + moved[i])
     }
 
-    /// `exp(G tau)`, less the identity.
+    /// `exp(G tau)`, less the identity: squaring that loses fewer digits than squaring the whole.
     fn departure(&self, tau: f64) -> Generator {
         let doublings = (self.rate * tau / DOUBLING_RADIUS).log2().ceil().max(0.0) as i32;
         let u = tau / self.unit * 0.5f64.powi(doublings);
-        (0..doublings).fold(departure(&self.table, u), |less, _| doubled(&less))
+        let part = Columns::horner(&self.table[..terms(u)], u).matrix();
+        (0..doublings).fold(part, |less, _| less * less + less * 2.0)
     }
 
     /// Trace of the generator on `q`: the rate at which phase volume shrinks.
@@ -220,40 +206,26 @@ impl LinearFlow {
 
 #[inline]
 fn dot(row: &[f64; 7], q: &Gap, phasor: &Phasor) -> f64 {
-    (row[0] * q[0] + row[1] * q[1])
-        + (row[2] * q[2] + row[3] * q[3])
-        + (row[4] * phasor[0] + row[5] * phasor[1])
-        + row[6]
+    let gap = fma(row[0], q[0], fma(row[1], q[1], row[6]));
+    let other = fma(row[2], q[2], row[3] * q[3]);
+    gap + fma(row[4], phasor[0], fma(row[5], phasor[1], other))
 }
 
 /// Terms `(G unit)^(n+1) / (n+1)!` of the propagator.
-fn taylor_table(generator: &Generator, unit: f64) -> Vec<Columns> {
-    let mut power = Generator::identity();
-    let mut term = |n: usize| {
-        power = power * generator * (unit / n as f64);
-        Columns::of(&power)
-    };
-    (1..=ORDER).map(&mut term).collect()
+fn taylor_table(generator: &Columns, unit: f64) -> Vec<Columns> {
+    let mut table = vec![generator.scaled(unit)];
+    for n in 2..=ORDER {
+        table.push(table[n - 2].times(generator).scaled(unit / n as f64));
+    }
+    table
 }
 
 /// Terms that matter, by the size of `u`: the first one left out is below 1e-17.
-#[inline(always)]
-fn terms(u: f64) -> usize {
+pub(super) fn terms(u: f64) -> usize {
     match u {
         u if u < 0.02 => 8,
         u if u < 0.15 => 12,
         u if u < 0.5 => 17,
         _ => ORDER,
     }
-}
-
-/// The propagator of `u` Taylor units, `0 <= u <= 1`, less the identity.
-fn departure(table: &[Columns], u: f64) -> Generator {
-    Columns::horner(table, u).matrix()
-}
-
-/// The propagator of twice the time, less the identity, from that of once: squaring the
-/// departure instead of the whole loses fewer digits.
-fn doubled(less: &Generator) -> Generator {
-    less * less + less * 2.0
 }

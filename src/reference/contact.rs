@@ -222,13 +222,13 @@ impl<const N: usize> Trajectory<'_, N> {
     pub(super) fn settle_graze(
         &mut self,
         linear: &LinearFlow,
-        level: usize,
+        h: f64,
         until: f64,
         observer: &mut impl Observer,
     ) {
         self.near_grazing = true;
         let remaining = until - self.t;
-        let s = linear.steps[level].h.min(remaining);
+        let s = h.min(remaining);
         self.move_within(linear, s);
         self.t = if s < remaining { self.t + s } else { until };
         self.from_wall = None;

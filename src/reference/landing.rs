@@ -2,29 +2,17 @@
 
 use super::{Crossing, Observer, Stop, Trajectory};
 use crate::certificate::Bracket;
-use crate::flow::{Gap, LinearFlow, Phasor, add};
+use crate::flow::{Arc, Gap, LinearFlow, Phasor, REACH, TERMS};
+use crate::fused::fma;
 
 /// Evaluations of the exact flow allowed for one root; one or two are needed.
 const ROOT_CAP: u32 = 60;
 
-/// The last correction, in Taylor units, below which four terms of the local Taylor series
-/// reach rounding: `(1.6 * 5e-4)^5 / 5! < 3e-18`.
-const LAST_CORRECTION: f64 = 5e-4;
+/// Newton steps allowed on one arc.
+const POLISH_CAP: u32 = 8;
 
-/// Largest share of the last correction that curvature may account for: reversion of the
-/// series then leaves `14e-8`, and one Newton step squares that.
-const LAST_CURL: f64 = 1e-2;
-
-/// Where a root search ended.
-struct Landing {
-    /// Time of flight.
-    s: f64,
-    /// Part of it covered by the propagator, in Taylor units, and the rest, in time.
-    u: f64,
-    delta: f64,
-    q: Gap,
-    phasor: Phasor,
-}
+/// The last correction may leave this much of the flight behind.
+const LEFT: f64 = 1e-17;
 
 impl<const N: usize> Trajectory<'_, N> {
     /// Goes to the crossing of a step of `h` Taylor units, or to `until` if that comes first.
@@ -41,35 +29,26 @@ impl<const N: usize> Trajectory<'_, N> {
         let remaining = until - self.t;
         if bracket.guess * h * linear.unit > remaining {
             // Probably after `until`. It is if what lies there is still before the one root.
-            let partial = linear.partial(remaining / linear.unit);
-            let q = add(&self.q, &partial.increment(&self.q, &self.phasor));
-            let phasor = partial.rotate(&self.phasor);
-            if self.before(crossing, linear, &q, &phasor) {
-                self.q = q;
-                self.phasor = phasor;
-                if N > 0 {
-                    self.tangents = self.tangents.map(|u| partial.apply_tangent(&u));
-                }
+            let u = remaining * linear.per_unit;
+            let arc = linear.grid.arc(&self.q, &self.phasor, u);
+            let v = u - arc.start;
+            if self.before(crossing, linear, &arc.state(v), &arc.phasor(linear.turn * v)) {
+                self.arrive(linear, &arc, u);
                 self.count_meshing(remaining);
                 self.from_wall = None;
                 self.t = until;
                 return Ok(());
             }
         }
-        let landing = self.land(linear, h, crossing, bracket).ok_or(Stop::CapRoot)?;
-        if landing.s > remaining {
+        let (arc, u) = self.land(linear, h, crossing, bracket).ok_or(Stop::CapRoot)?;
+        let s = u * linear.unit;
+        if s > remaining {
             self.move_to(linear, remaining, until);
             return Ok(());
         }
-        if N > 0 {
-            let partial = linear.partial(landing.u);
-            self.tangents =
-                self.tangents.map(|u| linear.nudge_tangent(&partial.apply_tangent(&u), landing.delta));
-        }
-        self.q = landing.q;
-        self.phasor = landing.phasor;
-        self.t += landing.s;
-        self.count_meshing(landing.s);
+        self.arrive(linear, &arc, u);
+        self.t += s;
+        self.count_meshing(s);
         self.from_wall = None;
         self.act(crossing, observer);
         self.check_events()
@@ -87,78 +66,106 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// The one root in a bracket, converged to rounding.
+    /// The one root in a bracket, converged to rounding: an arc near it, and its instant in
+    /// Taylor steps from here.
     ///
-    /// The exact flow at the guess, with its first four derivatives, leaves a quartic in
-    /// the correction; once that is below [`LAST_CORRECTION`] its own truncation is below
-    /// rounding. The displacement from the start is summed by itself, so that a flight from
-    /// the wall keeps its relative accuracy however short it is.
+    /// What is added to the gap is summed by itself, so that a flight from the wall keeps its
+    /// relative accuracy however short it is.
     #[inline(always)]
-    fn land(&mut self, linear: &LinearFlow, h: f64, crossing: Crossing, bracket: Bracket) -> Option<Landing> {
+    fn land(
+        &mut self,
+        linear: &LinearFlow,
+        h: f64,
+        crossing: Crossing,
+        bracket: Bracket,
+    ) -> Option<(Arc, f64)> {
         let (mut lo, mut hi) = (h * bracket.lo, h * bracket.hi);
         let mut u = h * bracket.guess;
-        let offset = match crossing {
-            Crossing::PressingEnds(_) => 0.0,
-            Crossing::Contact(side) | Crossing::Emerge(side) | Crossing::MeshEnds(side) => {
-                self.q[0] - self.flow.wall(side)
-            }
-        };
         for _ in 0..ROOT_CAP {
             self.work.root_iterations += 1;
-            let partial = linear.partial(u);
-            let moved = partial.increment(&self.q, &self.phasor);
-            let q = add(&self.q, &moved);
-            let phasor = partial.rotate(&self.phasor);
-            let d = linear.derivatives(&q, &phasor);
-            let series = match crossing {
-                Crossing::PressingEnds(_) => [d[0][1], d[1][1], d[2][1] / 2.0, d[3][1] / 6.0, 0.0],
-                _ => [offset + moved[0], q[1], d[0][1] / 2.0, d[1][1] / 6.0, d[2][1] / 24.0],
+            let arc = linear.grid.arc(&self.q, &self.phasor, u);
+            let root = match crossing {
+                Crossing::Contact(side) | Crossing::Emerge(side) | Crossing::MeshEnds(side) => {
+                    let mut series = arc.gap();
+                    series[0] += self.q[0] - self.flow.wall(side);
+                    root_near(&series, u - arc.start, u)
+                }
+                Crossing::PressingEnds(_) => self.pressing_root(linear, &arc, u),
             };
-            let (delta, curl) = nearby_root(&series);
-            if delta.abs() <= LAST_CORRECTION * linear.unit && curl.abs() <= LAST_CURL {
-                return Some(Landing {
-                    s: u * linear.unit + delta,
-                    u,
-                    delta,
-                    q: std::array::from_fn(|i| {
-                        let tail = d[1][i] + delta / 3.0 * (d[2][i] + delta / 4.0 * d[3][i]);
-                        q[i] + delta * (d[0][i] + delta / 2.0 * tail)
-                    }),
-                    phasor: turn(&phasor, self.flow.omega * delta),
-                });
+            let next = arc.start + root.unwrap_or(f64::NAN);
+            if root.is_some_and(|v| v.abs() <= REACH) && next >= lo && next <= hi {
+                return Some((arc, next));
             }
-            // The start's side of the root has the sign opposite to the slope's.
-            if series[0] * series[1] < 0.0 {
+            let v = u - arc.start;
+            if self.before(crossing, linear, &arc.state(v), &arc.phasor(linear.turn * v)) {
                 lo = u;
             } else {
                 hi = u;
             }
-            let next = u + delta / linear.unit;
             u = if next > lo && next < hi { next } else { 0.5 * (lo + hi) };
+        }
+        None
+    }
+
+    /// Where on an arc pressing ceases, by Newton's method on the exact flow from `u`.
+    #[inline(never)]
+    fn pressing_root(&self, linear: &LinearFlow, arc: &Arc, u: f64) -> Option<f64> {
+        let mut v = u - arc.start;
+        for _ in 0..POLISH_CAP {
+            let [pressing, rate, bend] =
+                linear.acceleration_rates(&arc.state(v), &arc.phasor(linear.turn * v));
+            let delta = -pressing / (rate * linear.unit);
+            v += delta;
+            if v.is_nan() || v.abs() > REACH {
+                return None;
+            }
+            if delta * delta * (bend * linear.unit).abs() <= LEFT * rate.abs() * u {
+                return Some(v);
+            }
         }
         None
     }
 }
 
-/// The root near 0 of `c0 + c1 x + ... + c4 x^4`, by reversion of the series and one Newton
-/// step, with the share of it that is due to curvature.
+/// The root of a series near `v`: reversion of the series there, then Newton's steps until what
+/// they leave is below rounding. `u` is the time of flight that it is measured by.
+///
+/// Few divisions and trees instead of chains: the next flight waits for this number.
 #[inline(always)]
-fn nearby_root(c: &[f64; 5]) -> (f64, f64) {
-    let inverse = 1.0 / c[1];
-    let first = -c[0] * inverse;
-    let curl = c[2] * inverse * first;
-    let twist = c[3] * inverse * first * first;
-    let x = first * (1.0 - curl + (2.0 * curl * curl - twist) + 5.0 * curl * (twist - curl * curl));
-    let value = c[0] + x * (c[1] + x * (c[2] + x * (c[3] + x * c[4])));
-    let slope = c[1] + x * (2.0 * c[2] + 3.0 * x * c[3]);
-    (x - value / slope, curl)
+fn root_near(c: &[f64; TERMS + 1], v: f64, u: f64) -> Option<f64> {
+    let value = sum(c, v);
+    // What follows need not be exact: the last terms of the series are below 1e-8 of the slope.
+    let square = v * v;
+    let tail = fma(square, fma(6.0 * c[6], v, 5.0 * c[5]), fma(4.0 * c[4], v, 3.0 * c[3]));
+    let slope = fma(square, tail, fma(2.0 * c[2], v, c[1]));
+    let bend = fma(square, fma(10.0 * c[5], v, 6.0 * c[4]), fma(3.0 * c[3], v, c[2]));
+    let twist = fma(square, 10.0 * c[5], fma(4.0 * c[4], v, c[3]));
+    let inverse = 1.0 / slope;
+    let (first, bend, twist) = (-value * inverse, bend * inverse, twist * inverse);
+    let curl = bend * first;
+    let curve = fma(2.0 * curl, curl, -twist * first * first);
+    let delta = fma(first, curve - curl, first);
+    let flatter = fma(-delta, fma(delta, fma(-4.0 * bend, bend, 3.0 * twist), 2.0 * bend), 1.0);
+    let inverse = inverse * flatter;
+    // The share of a correction that the slope's own error leaves.
+    let steepness = bend.abs() * delta.abs();
+    let share = steepness * steepness * steepness + (twist * delta * delta * delta).abs() * 64.0 + 1e-6;
+    let mut v = v + delta;
+    for _ in 0..POLISH_CAP {
+        let correction = sum(c, v) * inverse;
+        v -= correction;
+        if (correction * share).abs() <= LEFT * u {
+            return Some(v);
+        }
+    }
+    None
 }
 
-/// Rotates a phasor by a small angle.
+/// The sum of a series.
 #[inline(always)]
-fn turn(p: &Phasor, angle: f64) -> Phasor {
-    let square = angle * angle;
-    let less = square * (square / 24.0 - 0.5);
-    let sin = angle * (1.0 - square / 6.0);
-    [p[0] + (less * p[0] - sin * p[1]), p[1] + (sin * p[0] + less * p[1])]
+fn sum(c: &[f64; TERMS + 1], v: f64) -> f64 {
+    let square = v * v;
+    let low = fma(square, fma(c[4], v, c[3]), fma(c[2], v, c[1]));
+    let high = fma(square, fma(c[8], v, c[7]), fma(c[6], v, c[5]));
+    fma(v, fma(square * square, high, low), c[0])
 }

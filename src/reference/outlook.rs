@@ -1,8 +1,8 @@
 //! What a step ahead holds: nothing, one crossing, or not decided at this length.
 
 use super::{Mode, Trajectory};
-use crate::certificate::{Bracket, Hermite, ROOMY, Verdict, judge, range};
-use crate::flow::{Gap, LinearFlow, Phasor};
+use crate::certificate::{Bernstein, Bracket, ROOMY, Verdict, judge};
+use crate::flow::{Gap, LinearFlow, Phasor, Step};
 use crate::model::Side;
 
 /// Departures from a wall that are rounding, relative to its position.
@@ -21,14 +21,6 @@ pub(super) enum Crossing {
     MeshEnds(Side),
 }
 
-/// Where a step would end.
-pub(super) struct Ahead {
-    pub(super) q: Gap,
-    /// What is added to the gap on the way, to its own relative accuracy.
-    pub(super) rise: f64,
-    pub(super) phasor: Phasor,
-}
-
 /// What a step holds, over all that is watched.
 pub(super) enum Outlook {
     Clear { roomy: bool },
@@ -40,13 +32,11 @@ pub(super) enum Outlook {
 impl<const N: usize> Trajectory<'_, N> {
     /// Judges everything that could end the flight within one step to `ahead`.
     #[inline(always)]
-    pub(super) fn outlook(&self, linear: &LinearFlow, level: usize, ahead: &Ahead) -> Outlook {
-        let step = &linear.steps[level];
-        let jet = |q: &Gap, p: &Phasor| [q[0], q[1], linear.acceleration(q, p)];
-        let gap = Hermite::new(jet(&self.q, &self.phasor), jet(&ahead.q, &ahead.phasor), step.h, ahead.rise);
+    pub(super) fn outlook(&self, linear: &LinearFlow, step: &Step) -> Outlook {
+        let gap = step.course.from(&self.q, &self.phasor);
         let remainder = step.u6 * linear.gap_bound.remainder(&self.q, &self.phasor, step.u);
         let order = self.from_wall.map_or(0, |(_, order)| order);
-        let [lowest, highest] = range(&gap, order, remainder);
+        let [lowest, highest] = gap.range(order, remainder);
         let [right, left] = self.flow.walls;
         let room = match self.mode {
             Mode::Free => (right - highest).min(lowest - left),
@@ -54,14 +44,12 @@ impl<const N: usize> Trajectory<'_, N> {
             Mode::Pressed(Side::Left) => left - highest,
             Mode::Dip(_) => 0.0,
         };
-        if room > 0.0 {
+        // A remainder that is not a number shows nothing.
+        if room > 0.0 && !remainder.is_nan() {
             return Outlook::Clear { roomy: ROOMY * remainder < room };
         }
         if self.rests(lowest, highest) {
             return Outlook::Rests;
-        }
-        if level < linear.taylor_level {
-            return Outlook::Unclear;
         }
         match self.mode {
             Mode::Free if highest < right => self.wall_ahead(&gap, Side::Left, remainder),
@@ -73,7 +61,7 @@ impl<const N: usize> Trajectory<'_, N> {
             Mode::Pressed(side) => self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
             Mode::Dip(side) => first_of(
                 self.judge(&gap, side, -1.0, remainder, Crossing::Emerge(side)),
-                self.pressing_ahead(linear, level, ahead, side),
+                self.pressing_ahead(linear, step, side),
             ),
         }
     }
@@ -90,13 +78,20 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     #[inline(always)]
-    fn wall_ahead(&self, gap: &Hermite, side: Side, remainder: f64) -> Outlook {
+    fn wall_ahead(&self, gap: &Bernstein, side: Side, remainder: f64) -> Outlook {
         self.judge(gap, side, -1.0, remainder, Crossing::Contact(side))
     }
 
     /// Judges the distance of the gap from a wall; `inwards` is -1 on the free side of it.
     #[inline(always)]
-    fn judge(&self, gap: &Hermite, side: Side, inwards: f64, remainder: f64, crossing: Crossing) -> Outlook {
+    fn judge(
+        &self,
+        gap: &Bernstein,
+        side: Side,
+        inwards: f64,
+        remainder: f64,
+        crossing: Crossing,
+    ) -> Outlook {
         let order = self.from_wall.map_or(0, |(from, order)| if from == side { order } else { 0 });
         match judge(gap, self.flow.wall(side), inwards * side.sign(), order, remainder) {
             Verdict::Clear { roomy } => Outlook::Clear { roomy },
@@ -106,11 +101,10 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// Judges whether pressing ceases inside the dip.
-    fn pressing_ahead(&self, linear: &LinearFlow, level: usize, ahead: &Ahead, side: Side) -> Outlook {
-        let step = &linear.steps[level];
+    fn pressing_ahead(&self, linear: &LinearFlow, step: &Step, side: Side) -> Outlook {
         let rates = |q: &Gap, p: &Phasor| linear.acceleration_rates(q, p);
-        let (left, right) = (rates(&self.q, &self.phasor), rates(&ahead.q, &ahead.phasor));
-        let pressing = Hermite::new(left, right, step.h, right[0] - left[0]);
+        let (q, phasor) = step.end(&self.q, &self.phasor);
+        let pressing = Bernstein::new(rates(&self.q, &self.phasor), rates(&q, &phasor), step.h);
         let remainder = step.u6 * linear.pressing_bound.remainder(&self.q, &self.phasor, step.u);
         match judge(&pressing, 0.0, side.sign(), 0, remainder) {
             Verdict::Clear { roomy } => Outlook::Clear { roomy },
