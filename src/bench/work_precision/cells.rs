@@ -61,7 +61,7 @@ const SETTLED: [(Kind, f64, f64); 20] = [
     (Kind::Meshing, 0.1, 2.5),
     (Kind::Chatter, 0.2, 1.5),
     (Kind::Chatter, 0.56, 1.5),
-    (Kind::Chatter, 0.72, 1.5),
+    (Kind::Chatter, 0.7, 1.5),
     (Kind::Chatter, 0.5, 1.0),
     (Kind::Chatter, 0.3, 2.0),
     (Kind::Chaos, 0.72, 5.6),
