@@ -304,7 +304,7 @@ impl Gpu {
         // Until they need it, lanes go on without the tangent vector.
         let growths: &[bool] = if exponent { &[false, true] } else { &[false] };
         let precision = self.precision;
-        let variant = |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, keep };
+        let variant = |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, chatter: true, keep };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
         for &variant in &variants {
             if !self.pipelines.contains_key(&variant) {
