@@ -45,7 +45,17 @@ fn close_chatter(side: u32, u: Real) {
     enter(domain_of(tally.mode));
 }
 
-// Flights that one careful step may follow.
+// Whether the last event was an impact that the load presses back.
+var<private> chatters: bool;
+
+fn begins_chatter(side: u32, u: Real) -> bool {
+    let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
+    let e = law.restitution;
+    return u > 0.0 && 2.0 * u < LATER * SHORT * pressing && e * e * u > law.mesh_speed * h;
+}
+
+const LATER: Real = 1.0;
+// Flights that are followed in one go.
 const SHORT_FLIGHTS: u32 = 100u;
 
 // Follows the motion from an impact that the load presses back, impact by impact, for as long
@@ -99,6 +109,7 @@ fn follow_chatter(side: u32) {
             break;
         }
     }
+    renew_bound();
 }
 
 // As `expand`, for motion that starts on a wall and to fewer terms.

@@ -257,25 +257,17 @@ fn careful() -> bool {
     turn_phasor(found.tau);
     crossing = Crossing();
     let flown = Pull(here.gap_row, here.x_row, here.share, here.angle);
-    var is_pressed_back = false;
     if found.event {
-        is_pressed_back = act(found.second, found.tau);
+        act(found.second, found.tau);
     }
     if EXPONENT {
         carry_tangents(flown, found.tau);
     }
-    if CHATTER && is_pressed_back {
-        follow_chatter(tally.origin);
-    }
-    if found.event {
-        renew_bound();
-    }
     return tally.step >= mark;
 }
 
-// Acts on what ends the flight at the present state, `tau` after the expansion; true after an
-// impact that the load presses back, with the motion still free.
-fn act(second: bool, tau: Real) -> bool {
+// Acts on what ends the flight at the present state, `tau` after the expansion.
+fn act(second: bool, tau: Real) {
     let settling = tau == 0.0;
     let mode = tally.mode;
     var side = side_of(mode);
@@ -317,5 +309,6 @@ fn act(second: bool, tau: Real) -> bool {
     if jump.pressed_back > 0.0 {
         close_chatter(side, jump.pressed_back);
     }
-    return jump.pressed_back > 0.0 && tally.mode == MODE_FREE && tally.status == STATUS_OK;
+    chatters = tally.mode == MODE_FREE && begins_chatter(side, jump.pressed_back);
+    renew_bound();
 }

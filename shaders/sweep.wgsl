@@ -43,6 +43,23 @@ fn put_down() {
 // before.
 fn flight_to_mark() -> bool {
     while running() && trips < settings.trips {
+        if flight_to_chatter() {
+            return true;
+        }
+        // Lanes wait here for each other, too.
+        if CHATTER {
+            if chatters {
+                follow_chatter(tally.origin);
+            }
+        }
+    }
+    return false;
+}
+
+// From event to event to the next mark, or to an impact with which chatter may begin.
+fn flight_to_chatter() -> bool {
+    chatters = false;
+    while !(CHATTER && chatters) && running() && trips < settings.trips {
         if scan() == SCAN_BUDGET {
             break;
         }
