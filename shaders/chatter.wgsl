@@ -45,16 +45,28 @@ fn close_chatter(side: u32, u: Real) {
     enter(domain_of(tally.mode));
 }
 
-// Whether the last event was an impact that the load presses back.
+// Whether the last event was an impact from which chatter is to be followed.
 var<private> chatters: bool;
 
+// Meshing speeds above this leave too few short flights to pay for it; as in src/gpu.rs.
+const FOLLOWED: Real = 0.00390625;
+
+// Whether the flight from wall `side` is short, by its parabola, and two more after it, leaving
+// at speed `u`.
 fn begins_chatter(side: u32, u: Real) -> bool {
-    let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
     let e = law.restitution;
-    return u > 0.0 && 2.0 * u < LATER * SHORT * pressing && e * e * u > law.mesh_speed * h;
+    let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
+    return law.mesh_speed <= FOLLOWED && u > 0.0 && 2.0 * u < SHORT * pressing && e * e * u > least_leaving(pressing);
 }
 
-const LATER: Real = 1.0;
+// The leaving speed at which a series ends in meshing, or by its limit where it has no end.
+fn least_leaving(pressing: Real) -> Real {
+    let e = law.restitution;
+    let is_endless = e < 1.0 && law.mesh_speed * h <= NO_THRESHOLD * (walls[0] - walls[1]);
+    // A hundredth more than `close_chatter` asks for, so that it is met before.
+    return select(law.mesh_speed * h, 0.505 * closing * (1.0 - e) * pressing, is_endless);
+}
+
 // Flights that are followed in one go.
 const SHORT_FLIGHTS: u32 = 100u;
 
@@ -77,7 +89,6 @@ fn follow_chatter(side: u32) {
     let row = here.gap_row;
     let damping = kick * row[3] - row[1];
     let begun = motion.phasor;
-    let is_endless = law.mesh_speed * h <= NO_THRESHOLD * (walls[0] - walls[1]);
     var elapsed: Real = 0.0;
     for (var n = 0u; n < SHORT_FLIGHTS; n++) {
         expand_short();
@@ -89,8 +100,7 @@ fn follow_chatter(side: u32) {
         let removed = (1.0 + e) * end.rate;
         let leaving = e * sign * end.rate;
         let pressing = sign * (end.acceleration + damping * removed);
-        let least = select(law.mesh_speed * h, closing * (1.0 - e) * pressing, is_endless);
-        if !(pressing > 0.0 && leaving > least) {
+        if !(pressing > 0.0 && leaving > least_leaving(pressing)) {
             break;
         }
         trips += 1u;
