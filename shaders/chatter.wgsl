@@ -48,15 +48,12 @@ fn close_chatter(side: u32, u: Real) {
 // Whether the last event was an impact from which chatter is to be followed.
 var<private> chatters: bool;
 
-// Meshing speeds above this leave too few short flights to pay for it; as in src/gpu.rs.
-const FOLLOWED: Real = 0.00390625;
-
 // Whether the flight from wall `side` is short, by its parabola, and two more after it, leaving
 // at speed `u`.
 fn begins_chatter(side: u32, u: Real) -> bool {
     let e = law.restitution;
     let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
-    return law.mesh_speed <= FOLLOWED && u > 0.0 && 2.0 * u < SHORT * pressing && e * e * u > least_leaving(pressing);
+    return law.mesh_speed <= FOLLOWED_MESH_SPEED && u > 0.0 && 2.0 * u < SHORT * pressing && e * e * u > least_leaving(pressing);
 }
 
 // The leaving speed at which a series ends in meshing, or by its limit where it has no end.

@@ -120,8 +120,8 @@ pub enum GpuError {
 }
 
 /// Largest meshing speed with which lanes follow chatter by short flights: above it too few of
-/// them are left to pay for looking. The shader's constant is the same.
-pub const FOLLOWED_MESH_SPEED: f64 = 0.00390625;
+/// them are left to pay for.
+pub const FOLLOWED_MESH_SPEED: f64 = 0.001;
 
 /// One lane: which flow, which law, and where it starts at phase 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -312,7 +312,8 @@ impl Gpu {
         // Until they need it, lanes go on without the tangent vector.
         let growths: &[bool] = if exponent { &[false, true] } else { &[false] };
         let precision = self.precision;
-        let variant = |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, chatter, keep };
+        let variant =
+            |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, chatter, keep };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
         for &variant in &variants {
             if !self.pipelines.contains_key(&variant) {

@@ -1,5 +1,6 @@
 //! Shader variants: one source, put together from small files.
 
+use super::FOLLOWED_MESH_SPEED;
 use super::unroll::unroll;
 use crate::record::{WORD_SYMBOLS, valid};
 
@@ -50,7 +51,7 @@ pub struct Variant {
     pub mesh: bool,
     /// Whether cycles are compared with their mirror image.
     pub symmetry: bool,
-    /// Whether chatter is followed by short flights.
+    /// Whether chatter may be followed by short flights.
     pub chatter: bool,
     /// Whether lanes keep copies of all their constants: for software drivers.
     pub keep: bool,
@@ -110,7 +111,7 @@ impl Variant {
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
              const GROWTH: bool = {growth};\n\
              const WORD: bool = {word};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
-             const CHATTER: bool = {chatter};\n\
+             const CHATTER: bool = {chatter};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
              const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
         )
     }
@@ -129,8 +130,9 @@ const VALID: [(&str, u32); 7] = [
 
 /// A number that a precision's file declares.
 fn count(real: &str, name: &str) -> u32 {
-    let (_, after) =
-        real.split_once(&format!("const {name}: u32 = ")).expect("the precision declares its numbers of terms");
+    let (_, after) = real
+        .split_once(&format!("const {name}: u32 = "))
+        .expect("the precision declares its numbers of terms");
     let (number, _) = after.split_once("u;").expect("they are numbers");
     number.parse().expect("they are numbers")
 }
