@@ -1,4 +1,5 @@
-// Infinite chatter: without a meshing speed the load presses ever slower impacts together.
+// Chatter: ever slower impacts while the load presses. Short flights are followed by a
+// recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
 
 // A threshold below this, relative to the walls' distance, is none.
 const NO_THRESHOLD: Real = 1e-10;
@@ -53,7 +54,8 @@ var<private> chatters: bool;
 fn begins_chatter(side: u32, u: Real) -> bool {
     let e = law.restitution;
     let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
-    return law.mesh_speed <= FOLLOWED_MESH_SPEED && u > 0.0 && 2.0 * u < SHORT * pressing && e * e * u > least_leaving(pressing);
+    let is_short = u > 0.0 && 2.0 * u < SHORT * pressing;
+    return law.mesh_speed <= FOLLOWED_MESH_SPEED && is_short && e * e * u > least_leaving(pressing);
 }
 
 // The leaving speed at which a series ends in meshing, or by its limit where it has no end.
@@ -163,6 +165,7 @@ fn short_flight() -> Real {
     let quartic = first * first * gap_terms[4] * inverse;
     var t = first * (1.0 - cubic + (2.0 * cubic * cubic - quartic));
     var step: Real = 0.0;
+    trips += 2u;
     for (var n = 0u; n < 2u; n++) {
         var p: Real = 0.0;
         var p1: Real = 0.0;
