@@ -176,7 +176,9 @@ fn short_flight() -> Real {
         step = p / p1;
         t -= step;
     }
-    // All of the flight is pressed: it returns once.
+    // All of the flight is pressed by half of G at least: it returns once, and from less than
+    // `w^2 / G` off the wall. The other wall must be farther away.
+    let is_clear = w * w < abs(half) * (walls[0] - walls[1]);
     var change: Real = 0.0;
     //% for k in 3..SHORT_TERMS down
     change = change * t + ($k.0 * $(k-1).0) * abs(gap_terms[$k]);
@@ -193,8 +195,9 @@ fn short_flight() -> Real {
     //% for k in 2..SHORT_TERMS
     error *= share;
     //% end
-    let is_short = t > 0.0 && change * t <= abs(half) && error <= 2.0 * abs(half) && step * step <= ULP * t * t;
-    return select(Real(0.0), t, is_short);
+    let is_pressed = change * t <= abs(half);
+    let is_exact = error <= 2.0 * abs(half) && step * step <= ULP * t * t;
+    return select(Real(0.0), t, t > 0.0 && is_pressed && is_clear && is_exact);
 }
 
 // Where a short flight ends, before the impact.
