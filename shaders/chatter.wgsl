@@ -1,4 +1,5 @@
-// Infinite chatter: without a meshing speed the load presses ever slower impacts together.
+// Chatter: ever slower impacts while the load presses. Short flights are followed by a
+// recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
 
 // A threshold below this, relative to the walls' distance, is none.
 const NO_THRESHOLD: Real = 1e-10;
@@ -43,4 +44,208 @@ fn close_chatter(side: u32, u: Real) {
     tally.mode = MODE_PRESSED + side;
     tally.order = 2u;
     enter(domain_of(tally.mode));
+}
+
+// Whether the last event was an impact from which chatter is to be followed.
+var<private> chatters: bool;
+
+// Whether the flight from wall `side` is short, by its parabola, and two more after it, leaving
+// at speed `u`.
+fn begins_chatter(side: u32, u: Real) -> bool {
+    let e = law.restitution;
+    let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
+    let is_short = u > 0.0 && 2.0 * u < SHORT * pressing;
+    return law.mesh_speed <= FOLLOWED_MESH_SPEED && is_short && e * e * u > least_leaving(pressing);
+}
+
+// The leaving speed at which a series ends in meshing, or by its limit where it has no end.
+fn least_leaving(pressing: Real) -> Real {
+    let e = law.restitution;
+    let is_endless = e < 1.0 && law.mesh_speed * h <= NO_THRESHOLD * (walls[0] - walls[1]);
+    // A hundredth more than `close_chatter` asks for, so that it is met before.
+    return select(law.mesh_speed * h, 0.505 * closing * (1.0 - e) * pressing, is_endless);
+}
+
+// Flights that are followed in one go.
+const SHORT_FLIGHTS: u32 = 100u;
+
+// Follows the motion from an impact that the load presses back, impact by impact, for as long
+// as flights are short: fewer terms of the series then give the flight to rounding, its end
+// needs no search, and nothing else can happen on it.
+//
+// With n = SHORT_TERMS - 1 terms of the gap beyond its start, G the pressing acceleration and B
+// a bound on the n-th derivative (the next one is at most 2 B: a step turns the fastest mode
+// by a radian), a flight of length t ends with a speed that is wrong by
+// `4 (B / G) t^(n-1) / n! (1 + 2 / (n + 1))` of itself: at most ULP where
+// `B (t / SHORT)^(n-1) <= G`. Each flight being e times as long as the last, a whole series
+// errs by `1 / (1 - e^(n-1))` times that of its first flight.
+//
+// The impact with which meshing or the limit of an infinite series begins, and whatever comes
+// after the load has ceased to press, is left to the careful step.
+fn follow_chatter(side: u32) {
+    let sign = sign_of(side);
+    let e = law.restitution;
+    let row = here.gap_row;
+    let damping = kick * row[3] - row[1];
+    let begun = motion.phasor;
+    var elapsed: Real = 0.0;
+    for (var n = 0u; n < SHORT_FLIGHTS; n++) {
+        expand_short();
+        let t = short_flight();
+        if !(t > 0.0 && elapsed + t < 1.0 && t < to_mark(next_mark())) {
+            break;
+        }
+        let end = short_end(t);
+        let removed = (1.0 + e) * end.rate;
+        let leaving = e * sign * end.rate;
+        let pressing = sign * (end.acceleration + damping * removed);
+        if !(pressing > 0.0 && leaving > least_leaving(pressing)) {
+            break;
+        }
+        trips += 1u;
+        elapsed += t;
+        motion.q = array<Real, 4>(walls[side], -sign * leaving, end.x, end.x_rate + kick * removed);
+        advance_phase(t);
+        motion.phasor = begun;
+        turn_phasor(elapsed);
+        tally.passes_in_period += 1u;
+        tally.impacts += 1u;
+        count_event(side);
+        if EXPONENT {
+            carry_over_short(t, end, removed);
+        }
+        if tally.status != STATUS_OK {
+            break;
+        }
+    }
+    renew_bound();
+}
+
+// As `expand`, for motion that starts on a wall and to fewer terms.
+fn expand_short() {
+    let q = motion.q;
+    let g = here.gap_row;
+    let r = here.x_row;
+    let angle = here.angle;
+    var c = motion.phasor[0];
+    var s = motion.phasor[1];
+    gap_terms[0] = q[0];
+    gap_terms[1] = q[1];
+    x_terms[0] = q[2];
+    x_terms[1] = q[3];
+    var load_gap = g[5];
+    var load_x = r[5];
+    //% for k in 0..SHORT_TERMS-2
+    {
+        let z = gap_terms[$k];
+        let w = $(k+1).0 * gap_terms[$(k+1)];
+        let x = x_terms[$k];
+        let v = $(k+1).0 * x_terms[$(k+1)];
+        let next: Real = 1.0 / ($(k+1).0 * $(k+2).0);
+        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + load_gap));
+        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + load_x));
+        load_gap = 0.0;
+        load_x = 0.0;
+        let turn = angle * (1.0 / $(k+1).0);
+        let turned = -turn * s;
+        s = turn * c;
+        c = turned;
+    }
+    //% end
+}
+
+// How long the flight from the wall lasts, in steps; 0 if it is not short.
+fn short_flight() -> Real {
+    let w = gap_terms[1];
+    let half = gap_terms[2];
+    // The parabola's root, and two orders more.
+    let inverse = 1.0 / half;
+    let first = -w * inverse;
+    let cubic = first * gap_terms[3] * inverse;
+    let quartic = first * first * gap_terms[4] * inverse;
+    var t = first * (1.0 - cubic + (2.0 * cubic * cubic - quartic));
+    var step: Real = 0.0;
+    trips += 2u;
+    for (var n = 0u; n < 2u; n++) {
+        var p: Real = 0.0;
+        var p1: Real = 0.0;
+        //% for k in 1..SHORT_TERMS down
+        p1 = p1 * t + p;
+        p = p * t + gap_terms[$k];
+        //% end
+        step = p / p1;
+        t -= step;
+    }
+    // All of the flight is pressed by half of G at least: it returns once, and from less than
+    // `w^2 / G` off the wall. The other wall must be farther away.
+    let is_clear = w * w < abs(half) * (walls[0] - walls[1]);
+    var change: Real = 0.0;
+    //% for k in 3..SHORT_TERMS down
+    change = change * t + ($k.0 * $(k-1).0) * abs(gap_terms[$k]);
+    //% end
+    let last = SHORT_TERMS - 1u;
+    let bound = here.growth + derivative_bound(
+        SHORT_FACTORIAL * gap_terms[last - 1u],
+        Real(last) * SHORT_FACTORIAL * gap_terms[last],
+        SHORT_FACTORIAL * x_terms[last - 1u],
+        Real(last) * SHORT_FACTORIAL * x_terms[last],
+    );
+    var error = bound;
+    let share = t * (1.0 / SHORT);
+    //% for k in 2..SHORT_TERMS
+    error *= share;
+    //% end
+    let is_pressed = change * t <= abs(half);
+    let is_exact = error <= 2.0 * abs(half) && step * step <= ULP * t * t;
+    return select(Real(0.0), t, t > 0.0 && is_pressed && is_clear && is_exact);
+}
+
+// Where a short flight ends, before the impact.
+struct End {
+    rate: Real,
+    acceleration: Real,
+    x: Real,
+    x_rate: Real,
+    x_acceleration: Real,
+}
+
+fn short_end(t: Real) -> End {
+    var w: Real = 0.0;
+    var a: Real = 0.0;
+    var x: Real = 0.0;
+    var v: Real = 0.0;
+    var b: Real = 0.0;
+    //% for k in 0..SHORT_TERMS down
+    b = b * t + v;
+    v = v * t + x;
+    x = x * t + x_terms[$k];
+    //% end
+    //% for k in 1..SHORT_TERMS down
+    w = w * t + $k.0 * gap_terms[$k];
+    //% end
+    //% for k in 2..SHORT_TERMS down
+    a = a * t + ($k.0 * $(k-1).0) * gap_terms[$k];
+    //% end
+    return End(w, a, x, v, 2.0 * b);
+}
+
+// Carries the tangent vectors over a short flight and the impact at its end.
+fn carry_over_short(t: Real, end: End, removed: Real) {
+    let row = here.gap_row;
+    let x_row = here.x_row;
+    crossing.before = array<Real, 4>(end.rate, end.acceleration, end.x_rate, end.x_acceleration);
+    crossing.after = array<Real, 4>(
+        motion.q[1],
+        end.acceleration + (kick * row[3] - row[1]) * removed,
+        motion.q[3],
+        end.x_acceleration + (kick * x_row[3] - x_row[1]) * removed,
+    );
+    crossing.jump.rate = end.rate;
+    for (var i = 0u; i < tally.tangent_count; i++) {
+        trips += 1u;
+        set_tangent(i, saltate(glide_short(tangent(i), t)));
+    }
+    if tally.tangent_count == 1u {
+        tame();
+    }
 }

@@ -309,5 +309,8 @@ fn act(second: bool, tau: Real) {
     if jump.pressed_back > 0.0 {
         close_chatter(side, jump.pressed_back);
     }
+    if CHATTER {
+        chatters = tally.mode == MODE_FREE && begins_chatter(side, jump.pressed_back);
+    }
     renew_bound();
 }

@@ -2,6 +2,11 @@
 alias Real = f32;
 // Terms of a Taylor expansion over one step of at most a radian: the rest is below rounding.
 const TERMS: u32 = 12u;
+// Terms for short flights, and the factorial of SHORT_TERMS - 2.
+const SHORT_TERMS: u32 = 8u;
+const SHORT_FACTORIAL: Real = 720.0;
+// How long short flights are, in steps, for errors of ULP (chatter.wgsl).
+const SHORT: Real = 0.198;
 // Half a unit in the last place of 1.
 const ULP: Real = 6e-8;
 // Steps are not halved below this: what touches a wall there does so within rounding.

@@ -40,9 +40,27 @@ fn put_down() {
 }
 
 // From event to event to the next mark; false if the lane or its share of this dispatch ends
-// before.
+// before. Lanes wait for each other where chatter begins, too.
 fn flight_to_mark() -> bool {
-    while running() && trips < settings.trips {
+    if CHATTER {
+        while running() && trips < settings.trips {
+            if flight_to_chatter() {
+                return true;
+            }
+            if chatters {
+                follow_chatter(tally.origin);
+            }
+        }
+    } else {
+        return flight_to_chatter();
+    }
+    return false;
+}
+
+// From event to event to the next mark, or to an impact from which chatter is to be followed.
+fn flight_to_chatter() -> bool {
+    chatters = false;
+    while running() && !chatters && trips < settings.trips {
         if scan() == SCAN_BUDGET {
             break;
         }

@@ -123,6 +123,10 @@ pub enum GpuError {
     },
 }
 
+/// Largest meshing speed with which lanes follow chatter by short flights: above it too few of
+/// them are left to pay for.
+pub const FOLLOWED_MESH_SPEED: f64 = 0.001;
+
 /// One lane: which flow, which law, and where it starts at phase 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lane {
@@ -158,6 +162,9 @@ pub struct LaneSettings {
     pub mesh: bool,
     /// See `word`.
     pub symmetry: bool,
+    /// Whether chatter may be followed by short flights; lanes with meshing speeds up to
+    /// [`FOLLOWED_MESH_SPEED`] do so.
+    pub chatter: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
     pub exponent_from: u32,
     /// The first period at which chaos may be called, with early stops.
@@ -189,6 +196,7 @@ impl Default for LaneSettings {
             word: true,
             mesh: true,
             symmetry: true,
+            chatter: true,
             exponent_from: 100,
             chaos_from: 198,
             steps_per_period: None,
@@ -304,12 +312,13 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
-        let LaneSettings { workgroup, exponent, word, mesh, symmetry, .. } = *settings;
+        let LaneSettings { workgroup, exponent, word, mesh, symmetry, chatter, .. } = *settings;
         let keep = !is_hardware(&self.info);
         // Until they need it, lanes go on without the tangent vector.
         let growths: &[bool] = if exponent { &[false, true] } else { &[false] };
         let precision = self.precision;
-        let variant = |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, keep };
+        let variant =
+            |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, chatter, keep };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
         for &variant in &variants {
             if !self.pipelines.contains_key(&variant) {

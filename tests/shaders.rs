@@ -64,6 +64,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
             Variant { exponent: false, growth: false, ..everything },
             Variant { workgroup: 256, keep: true, ..class },
             Variant { growth: false, ..class },
+            Variant { chatter: false, keep: true, ..everything },
+            Variant { chatter: false, growth: false, ..class },
             Variant { workgroup: 32, exponent: false, growth: false, ..class },
             Variant { symmetry: true, ..class },
             Variant { mesh: true, keep: true, ..class },

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::EngineError;
-use crate::gpu::{self, GpuError, Lane, LaneSettings, Tables};
+use crate::gpu::{self, FOLLOWED_MESH_SPEED, GpuError, Lane, LaneSettings, Tables};
 use crate::plan::{Batch, Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use crate::scene::Steps;
@@ -150,6 +150,7 @@ fn lane_settings(plan: &Plan) -> LaneSettings {
         word: plan.needs().word,
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
+        chatter: (0..plan.law_count() as u32).any(|law| plan.law(law).mesh_speed <= FOLLOWED_MESH_SPEED),
         exponent_from: budget.exponent_from(),
         chaos_from: budget.chaos_from(),
         steps_per_period: match plan.steps_per_period() {

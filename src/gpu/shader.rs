@@ -1,5 +1,6 @@
 //! Shader variants: one source, put together from small files.
 
+use super::FOLLOWED_MESH_SPEED;
 use super::unroll::unroll;
 use crate::record::{WORD_SYMBOLS, valid};
 
@@ -50,6 +51,8 @@ pub struct Variant {
     pub mesh: bool,
     /// Whether cycles are compared with their mirror image.
     pub symmetry: bool,
+    /// Whether chatter may be followed by short flights.
+    pub chatter: bool,
     /// Whether lanes keep copies of all their constants: for software drivers.
     pub keep: bool,
 }
@@ -88,6 +91,7 @@ impl Variant {
             word: true,
             mesh: true,
             symmetry: true,
+            chatter: true,
             keep: false,
         }
     }
@@ -98,15 +102,16 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let Variant { workgroup, exponent, growth, word, mesh, symmetry, keep, .. } = self;
-        let terms = terms(real);
-        let body = unroll(BODY, terms);
+        let Variant { workgroup, exponent, growth, word, mesh, symmetry, chatter, keep, .. } = self;
+        let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
+        let body = unroll(BODY, &names);
         let bits: String =
             VALID.iter().map(|(name, bits)| format!("const VALID_{name}: u32 = {bits}u;\n")).collect();
         format!(
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
              const GROWTH: bool = {growth};\n\
              const WORD: bool = {word};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
+             const CHATTER: bool = {chatter};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
              const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
         )
     }
@@ -123,9 +128,11 @@ const VALID: [(&str, u32); 7] = [
     ("STROBE", valid::STROBE),
 ];
 
-/// The number of Taylor terms that a precision's file declares.
-fn terms(real: &str) -> u32 {
-    let (_, after) = real.split_once("const TERMS: u32 = ").expect("the precision declares TERMS");
-    let (number, _) = after.split_once("u;").expect("TERMS is a number");
-    number.parse().expect("TERMS is a number")
+/// A number that a precision's file declares.
+fn count(real: &str, name: &str) -> u32 {
+    let (_, after) = real
+        .split_once(&format!("const {name}: u32 = "))
+        .expect("the precision declares its numbers of terms");
+    let (number, _) = after.split_once("u;").expect("they are numbers");
+    number.parse().expect("they are numbers")
 }

@@ -11,8 +11,8 @@
 //!
 //! and copied out once per term before they are compiled.
 
-/// The source with every marked loop copied out; `terms` stands for `TERMS` in its bounds.
-pub(super) fn unroll(source: &str, terms: u32) -> String {
+/// The source with every marked loop copied out; `names` are constants that its bounds may name.
+pub(super) fn unroll(source: &str, names: &[(&str, u32)]) -> String {
     let mut out = String::with_capacity(4 * source.len());
     let mut lines = source.lines();
     while let Some(line) = lines.next() {
@@ -22,7 +22,7 @@ pub(super) fn unroll(source: &str, terms: u32) -> String {
             continue;
         };
         let body: Vec<&str> = lines.by_ref().take_while(|line| line.trim() != "//% end").collect();
-        for k in indices(header, terms) {
+        for k in indices(header, names) {
             for line in &body {
                 out.push_str(&with_index(line, k));
                 out.push('\n');
@@ -33,12 +33,12 @@ pub(super) fn unroll(source: &str, terms: u32) -> String {
 }
 
 /// The values that a header runs through.
-fn indices(header: &str, terms: u32) -> Vec<u32> {
+fn indices(header: &str, names: &[(&str, u32)]) -> Vec<u32> {
     let (range, down) = header.strip_suffix(" down").map_or((header, false), |range| (range, true));
-    let bound = |text: &str| match text.strip_prefix("TERMS-") {
-        Some(less) => terms - less.parse::<u32>().expect("a marker ends in a number"),
-        None if text == "TERMS" => terms,
-        None => text.parse().expect("a marker's bound is a number"),
+    let number = |text: &str| text.parse::<u32>().expect("a marker's bound is a number or a known name");
+    let bound = |text: &str| {
+        let (head, less) = text.split_once('-').map_or((text, 0), |(head, less)| (head, number(less)));
+        names.iter().find(|(name, _)| *name == head).map_or_else(|| number(head), |&(_, value)| value) - less
     };
     let (first, last) = range.split_once("..").expect("a marker names a range");
     let all = bound(first)..bound(last);
@@ -59,7 +59,8 @@ mod tests {
     #[test]
     fn a_marked_loop_is_copied_out() {
         let source = "a\n  //% for k in 1..TERMS-1 down\n  t[$(k+1)] = t[$k] + t[$(k-1)];\n  //% end\nb\n";
-        assert_eq!(unroll(source, 4), "a\n  t[3] = t[2] + t[1];\n  t[2] = t[1] + t[0];\nb\n");
-        assert_eq!(unroll("//% for k in 0..TERMS\n$k.0\n//% end", 2), "0.0\n1.0\n");
+        let four = [("TERMS", 4)];
+        assert_eq!(unroll(source, &four), "a\n  t[3] = t[2] + t[1];\n  t[2] = t[1] + t[0];\nb\n");
+        assert_eq!(unroll("//% for k in 0..TERMS\n$k.0\n//% end", &[("TERMS", 2)]), "0.0\n1.0\n");
     }
 }

@@ -1,8 +1,13 @@
 //! Forms of the lane that count their loops' trips, made from the shader's text.
 
 /// Every loop pays for its trips; counting them function by function counts the work.
-pub const LOOPS: [(&str, &str); 4] =
-    [("scan", "scan steps"), ("careful", "careful passes"), ("first_event", "looks"), ("root", "root trips")];
+pub const LOOPS: [(&str, &str); 5] = [
+    ("scan", "scan steps"),
+    ("careful", "careful passes"),
+    ("first_event", "looks"),
+    ("root", "root trips"),
+    ("follow_chatter", "short flights"),
+];
 
 /// Reports the loop trips of a function in place of impacts.
 pub fn counting(function: &str) -> fn(String) -> String {
@@ -10,7 +15,8 @@ pub fn counting(function: &str) -> fn(String) -> String {
         "scan" => |source| count_trips(&source, "scan"),
         "careful" => |source| count_trips(&source, "careful"),
         "first_event" => |source| count_trips(&source, "first_event"),
-        _ => |source| count_trips(&source, "root"),
+        "root" => |source| count_trips(&source, "root"),
+        _ => |source| count_trips(&source, "follow_chatter"),
     }
 }
 
