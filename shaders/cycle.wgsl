@@ -4,8 +4,8 @@
 const ON_CYCLE: f32 = 1e-4;
 // And at the end of its budget, if it came no closer, this close.
 const ABOUT: f32 = 0.01;
-// A lane that rests on a cycle which repels is moved by so many times the scatter of rounding.
-const KICK: f32 = 32.0;
+// A lane that rests on a cycle which repels is moved by so many times what counts as rest.
+const KICK: f32 = 8.0;
 // Newton's method is not asked again after it led nowhere so often.
 const VAIN: u32 = 2u;
 
@@ -103,6 +103,7 @@ fn judge_cycle() {
     } else {
         search_on();
     }
+    tally.asked = 0u;
 }
 
 // Reads the divisor of the period, if there is time left.
@@ -111,6 +112,7 @@ fn reads_divisor() -> bool {
         return false;
     }
     tally.candidate = tally.divisor;
+    tally.asked = 1u;
     tally.settled = 0u;
     begin_reading();
     return true;
@@ -120,6 +122,7 @@ fn reads_divisor() -> bool {
 fn look_again() {
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
+    tally.refuted = 0u;
     begin_counting();
     forget_growth();
     begin_window(strobe_state(), tally.window);
@@ -128,18 +131,21 @@ fn look_again() {
 // The exponent starts anew, but for what it has collected; recurrence from scratch.
 fn search_on() {
     // Rounding may hold a lane on a cycle that repels for ever.
-    if tally.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
-        motion.q[1] += Real(KICK * NOISE) * motion.rate_scale;
+    let repels = motion.cycle_growth > NEUTRAL * Real(tally.candidate);
+    if repels && tally.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
+        motion.q[1] += Real(KICK * exp2(-f32(AT_REST) / OCTAVE)) * motion.rate_scale;
         motion.bound = 0.0;
         // What grew there was no chaos.
         tally.blocks = 0u;
+        tally.block_periods = 0u;
+        motion.block_growth = 0.0;
         motion.growth_sum = 0.0;
         motion.growth_squares = 0.0;
     }
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
     tally.tries += 1u;
-    tally.refuted = tally.candidate;
+    tally.refuted = select(0u, tally.candidate, tally.asked == 1u);
     begin_counting();
     forget_growth();
     tally.window = 0u;
@@ -155,9 +161,9 @@ fn is_multiple() -> bool {
     return tally.divisor > 0u && exp2(-f32(tally.divisor_apart) / OCTAVE) < 4.0 * away();
 }
 
-// Whether the cycle of the divisor is known not to attract, and surely is another one.
+// Whether the divisor was read for this multiple, does not attract, and surely is another cycle.
 fn is_refuted() -> bool {
-    return tally.refuted == tally.divisor && exp2(-f32(tally.divisor_apart) / OCTAVE) > 4.0 * NOISE;
+    return tally.refuted == tally.divisor && tally.divisor_apart < AT_REST;
 }
 
 // What rounding moves the state by over a cycle at most, relative to the motion: every event rounds, and
@@ -169,6 +175,7 @@ fn noise() -> f32 {
     let scales = array<Real, 4>(motion.position_scale, motion.rate_scale, motion.position_scale, motion.rate_scale);
     var gain: Real = 1.0;
     for (var k = 0u; k < 16u; k++) {
+        trips += 1u;
         let unit = scales[k / 4u] / max(scales[k % 4u], Real(1e-30));
         gain = max(gain, abs(motions[lane].tangents[k]) * unit);
     }

@@ -201,9 +201,10 @@ struct TallyNow {
     // The divisor of its period after which it came nearest to its start, and how near.
     divisor: u32,
     divisor_apart: u32,
-    // Times that Newton's method led nowhere, and the period of the last cycle that was read and
-    // does not attract.
+    // Times that Newton's method led nowhere; 1 while a divisor is read because its multiple might be
+    // it, and the divisor whose cycle then was found not to attract.
     vain: u32,
+    asked: u32,
     refuted: u32,
 }
 

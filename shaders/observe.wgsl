@@ -18,9 +18,8 @@ const SLOW: u32 = 48u;
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Lags of the first window, and of any: the following ones are a quarter of the time that has
-// passed, or a few cycles.
-const FIRST_WINDOW: u32 = 4u;
+// Lags of any window, at least: they are a quarter of the time that has passed, or a few cycles.
+const LEAST_WINDOW: u32 = 4u;
 // Windows need not be longer than so many cycles that contract.
 const LAGS_PER_CYCLE: u32 = 4u;
 
@@ -128,7 +127,7 @@ fn departs(errors: Real) -> bool {
             nearest = min(nearest, last_distance_at(multiple));
         }
         lingers = lingers || nearest >= NEAR;
-        rests = nearest >= SLOW;
+        rests = nearest >= RESOLVED;
     }
     // What rests at a cycle is held there by rounding: its growth is no chaos.
     if rests {
@@ -227,14 +226,14 @@ fn recurs() -> bool {
     // points of a cycle may be so close that a shorter lag seems to recur.
     let cycle = max(closest_lag(), 1u);
     // A short lag that contracts is seen as well in short windows.
-    let enough = max(LAGS_PER_CYCLE * cycle, FIRST_WINDOW);
+    let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
     let lags = select(widest(), min(enough, widest()), is_fast && tally.tries == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
 
 fn widest() -> u32 {
-    return clamp(tally.period / 4u, FIRST_WINDOW, settings.max_period);
+    return clamp(tally.period / 4u, LEAST_WINDOW, settings.max_period);
 }
 
 // The lag that recurs best; a longer one must be better by a factor of four.

@@ -67,10 +67,12 @@ fn mesh_fraction(periods: u32) -> Real {
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
     // Contact-free motion has not been read. On a slow approach, or where rounding is amplified, a lost
-    // symmetry cannot be told from one not reached, unless it is lost by far.
+    // symmetry cannot be told from one not reached, unless it is lost by far. Every impact has a twin on a
+    // cycle that is its own mirror image.
     if SYMMETRY && shapes[cell.flow_index].mirror == 1u {
-        let is_symmetric = tally.has_read == 0u || (is_near_cycle() && tally.mirror >= MIRROR);
-        if is_symmetric || is_surely_unsymmetric() {
+        let has_twins = tally.impacts % 2u == 0u;
+        let is_symmetric = tally.has_read == 0u || (is_near_cycle() && tally.mirror >= MIRROR && has_twins);
+        if is_symmetric || !has_twins || is_surely_unsymmetric() {
             (*finding).valid |= VALID_SYMMETRIC;
             (*finding).symmetric = select(0u, 1u, is_symmetric);
         }

@@ -131,7 +131,9 @@ fn upper(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Rounding of a Bernstein coefficient, relative to the ends it is made of.
+/// Rounding of a Bernstein coefficient, relative to the ends it is made of. The proof is one for the state as
+/// it is rounded: near resonance, where displacements are far larger than the gap, both carry
+/// the rounding of the displacements.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// What a step holds.

@@ -30,7 +30,7 @@ const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
 
 /// Most flows that engines keep for all batches, or hand to a device at a time: below 1 GB but
 /// for motion that needs thousands of steps per forcing period.
-const KEPT_FLOWS: usize = 12_288;
+const KEPT_FLOWS: usize = 8_192;
 
 /// What a run of a cell is made of: indices of its flow and its law in the plan, and its start.
 #[derive(Clone, Copy, Debug, PartialEq)]

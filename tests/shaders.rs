@@ -205,6 +205,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     divisor,
                     divisor_apart,
                     vain,
+                    asked,
                     refuted,
                     distances,
                     last_distances,

@@ -91,7 +91,8 @@ impl LinearFlow {
     /// Bytes beside the struct itself.
     #[cfg(test)]
     pub(super) fn heap_bytes(&self) -> usize {
-        self.steps.capacity() * size_of::<Step>() + self.table.capacity() * size_of::<Columns>()
+        self.steps.capacity() * size_of::<Step>()
+            + (self.table.capacity() + self.grid.stored()) * size_of::<Columns>()
     }
 
     pub(super) fn new(oscillator: &Oscillator, domain: &Domain) -> LinearFlow {

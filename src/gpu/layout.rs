@@ -250,7 +250,9 @@ pub struct Tally {
     pub divisor_apart: u32,
     /// Times that Newton's method led nowhere.
     pub vain: u32,
-    /// Period of the last cycle that was read and does not attract.
+    /// 1 while a divisor is read because its multiple might be it.
+    pub asked: u32,
+    /// The divisor whose cycle then was found not to attract.
     pub refuted: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],

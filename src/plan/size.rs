@@ -13,7 +13,7 @@ const MEMORY_BESIDE: u64 = 64;
 const PER_PERIOD: u64 = 40;
 
 /// Bytes per flow that the reference keeps.
-const FLOW: u64 = 80_000;
+const FLOW: u64 = 100_000;
 
 /// Flows that are looked at to estimate the constants of all.
 const FLOWS_LOOKED_AT: usize = 256;
@@ -186,7 +186,7 @@ mod tests {
         assert_eq!(Size::of(&many).lane_tables, KEPT_FLOWS as u64 * one(&many));
         assert_eq!(Size::of(&many).flows, 0);
         // As slow a forcing as lanes can follow, times every cell, is not forgotten.
-        let slow = scene("omega", 0.002, 0.003, [2, 12_000]);
+        let slow = scene("omega", 0.002, 0.003, [2, 8_000]);
         assert!(Size::of(&slow).on_gpu() > 10_000_000_000, "{:?}", Size::of(&slow));
         assert!(Size::of(&slow).on_cpu(2) < 1_000_000_000, "{:?}", Size::of(&slow));
     }

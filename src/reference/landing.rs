@@ -8,6 +8,9 @@ use crate::fused::fma;
 /// Evaluations of the exact flow allowed for one root; one or two are needed.
 const ROOT_CAP: u32 = 60;
 
+/// A root this close to an end of its bracket, relatively, is there.
+const ENDS: f64 = 4.0 * f64::EPSILON;
+
 /// Newton steps allowed on one arc.
 const POLISH_CAP: u32 = 8;
 
@@ -93,8 +96,10 @@ impl<const N: usize> Trajectory<'_, N> {
                 Crossing::PressingEnds(_) => self.pressing_root(linear, &arc, u),
             };
             let next = arc.start + root.unwrap_or(f64::NAN);
-            if root.is_some_and(|v| v.abs() <= REACH) && next >= lo && next <= hi {
-                return Some((arc, next));
+            // Rounding may put a root at the step's end beyond it.
+            let is_within = next >= lo * (1.0 - ENDS) && next <= hi * (1.0 + ENDS);
+            if root.is_some_and(|v| v.abs() <= REACH) && is_within {
+                return Some((arc, next.clamp(lo, hi)));
             }
             let v = u - arc.start;
             if self.before(crossing, linear, &arc.state(v), &arc.phasor(linear.turn * v)) {

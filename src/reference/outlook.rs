@@ -30,7 +30,7 @@ pub(super) enum Outlook {
 }
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Judges everything that could end the flight within one step to `ahead`.
+    /// Judges everything that could end the flight within one step.
     #[inline(always)]
     pub(super) fn outlook(&self, linear: &LinearFlow, step: &Step) -> Outlook {
         let gap = step.course.from(&self.q, &self.phasor);

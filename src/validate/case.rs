@@ -21,6 +21,9 @@ pub(super) fn rounding(precision: Precision) -> f64 {
     }
 }
 
+/// No rounding moves the meshing speed by more than this share.
+const MOST_OF_MESH_SPEED: f64 = 0.01;
+
 /// States this close, relative to the motion, are the same to lanes (`MIRROR` in the shaders).
 pub(super) const LANE_RESOLUTION: f64 = 2.5e-4;
 
@@ -80,7 +83,11 @@ impl<'a> Case<'a> {
         // Leaving speeds carry the rounding of the whole motion's velocity.
         let speed = self.units(&self.record.strobe)[1] / self.law.mesh_speed.max(f64::MIN_POSITIVE);
         GearPair::PARAMETERS.iter().flat_map(move |parameter| {
-            let amount = if parameter.name == "mesh_speed" { amount * speed.clamp(1.0, 1e4) } else { amount };
+            let amount = if parameter.name == "mesh_speed" {
+                (amount * speed.clamp(1.0, 1e4)).min(MOST_OF_MESH_SPEED)
+            } else {
+                amount
+            };
             [amount, -amount].into_iter().filter_map(move |relative| {
                 let mut pair = self.pair;
                 let value = pair.get(parameter.name).ok()?;

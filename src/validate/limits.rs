@@ -24,6 +24,9 @@ const CONFIRMATION_WINDOWS: u32 = 3;
 /// Multipliers below this belong to a cycle that is about to double its period.
 const NEAR_FLIP: f64 = -0.8;
 
+/// A lane's scatter is that of one cycle; over several it may come to a few times as much.
+const SCATTERS: [f64; 2] = [1.0, 3.0];
+
 /// Starts within rounding that are tried before a transient counts as different: of a map's many
 /// transients some are rare.
 const SCATTERED_STARTS: usize = 1000;
@@ -178,20 +181,42 @@ pub(super) fn scattered(case: &Case<'_>) -> Option<Explanation> {
     case.scattered(SCATTERED_STARTS).any(|answer| case.is_the_records(&answer)).then_some(Explanation::Chaos)
 }
 
-/// The reference has the record's cycle if a parameter moves by as little as rounding makes the lane's
-/// strobes scatter.
+/// A border as near as rounding makes the lane's strobes scatter: where parameters move by so little, the
+/// reference has the record's cycle, with averages between those that it meets there; or, where the lane
+/// decides nothing, other cycles than its own.
 pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
-    let Class::Periodic { period } = classify(case.record) else { return None };
-    let from = strobe(case)?;
+    let (from, ours) = (strobe(case)?, classify(case.record));
+    let period = match (ours, case.truth.class) {
+        (Class::Periodic { period }, _) => period,
+        (Class::Undecided, Class::Periodic { period }) if is_spent(case) => period,
+        _ => return None,
+    };
     let scatter = case.unrest(&case.after(from, 0).ok()?, period);
-    if !case.is_lane || scatter > UNSETTLED {
+    // What rounding cannot do to the lane is no scatter.
+    if !case.is_lane || !is_shaken(case, &case.after(from, 0).ok()?, period)? {
         return None;
     }
-    let is_the_same = |pair: GearPair| {
-        let answer = Answer::from(&analyse(&pair, from, &case.budget.settings));
-        case.is_the_records(&answer)
+    let answer = |pair: GearPair| Answer::from(&analyse(&pair, from, &case.budget.settings));
+    let answers: Vec<Answer> =
+        SCATTERS.iter().flat_map(|times| case.nudged_pairs(times * scatter)).map(answer).collect();
+    if ours == Class::Undecided {
+        let is_another = |answer: &Answer| answer.class != case.truth.class || answer.word != case.truth.word;
+        return answers.iter().any(is_another).then_some(Explanation::UndecidedInBudget);
+    }
+    let lies_between = |ours: f64, of: fn(&Answer) -> Option<f64>| {
+        let known = || answers.iter().chain([&case.truth]).filter_map(of);
+        known().any(|theirs| theirs <= ours) && known().any(|theirs| theirs >= ours)
     };
-    case.nudged_pairs(scatter).any(is_the_same).then_some(Explanation::Border)
+    let claims = |answer: &Answer| {
+        let exponent = Some([case.record.lyapunov, 0.0]);
+        let mesh_fraction = Some(case.record.mesh_fraction);
+        case.is_the_records(&Answer { exponent, mesh_fraction, ..answer.clone() })
+    };
+    let is_between = lies_between(case.record.lyapunov, |answer| answer.exponent.map(|[value, _]| value))
+        && lies_between(case.record.mesh_fraction, |answer| answer.mesh_fraction);
+    let is_border = answers.iter().any(|answer| case.is_the_records(answer))
+        || (is_between && answers.iter().any(claims));
+    is_border.then_some(Explanation::Border)
 }
 
 /// A motion this close to where it was a cycle ago rests on it as nearly as lanes can that amplify no

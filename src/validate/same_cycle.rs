@@ -150,7 +150,13 @@ fn readings(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u3
         }
         state
     }));
-    places.into_iter().filter_map(|place| case.read_as_is(&stands.at(place, []), period)).collect()
+    // Another branch's cycle is another cycle.
+    let is_the_same = |answer: &Answer| answer.word == truth.word;
+    places
+        .into_iter()
+        .filter_map(|place| case.read_as_is(&stands.at(place, []), period))
+        .filter(is_the_same)
+        .collect()
 }
 
 /// Exponents of the cycle if its tangents are rounded again and again on the way.
@@ -161,6 +167,7 @@ fn rounded_exponents(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> O
     let span = f64::from(period) * case.flow.period;
     let exponent = |_| {
         let mut cycle = stands.carrying(UNIT);
+        let mut log_scale = 0.0;
         for k in 1..=period * ROUNDED_PER_PERIOD {
             match k % ROUNDED_PER_PERIOD {
                 0 => cycle.advance_period(&mut ()).ok()?,
@@ -169,6 +176,7 @@ fn rounded_exponents(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> O
                     cycle.advance_to(until, &mut ()).ok()?;
                 }
             }
+            log_scale += cycle.log_scale();
             cycle.set_tangents(cycle.tangents().map(|u| {
                 let size = (u[0].abs().max(u[2].abs()) / position).max(u[1].abs().max(u[3].abs()) / velocity);
                 let unit = [position, velocity, position, velocity];
@@ -177,7 +185,7 @@ fn rounded_exponents(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> O
         }
         let tangents = cycle.tangents();
         let [re, im] = *multipliers(&Matrix4::from_fn(|i, j| tangents[j][i]))?.first()?;
-        Some((re.hypot(im).ln() + cycle.log_scale()) / span)
+        Some((re.hypot(im).ln() + log_scale) / span)
     };
     Some((0..TRIALS).filter_map(exponent).collect())
 }
