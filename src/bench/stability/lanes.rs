@@ -5,7 +5,7 @@ use crate::model::{GearPair, State};
 use crate::record::Record;
 
 /// Cells are handed to a device so many at a time: every one has its own flow.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 2048;
 
 /// A cell and where it starts.
 pub(super) type Start = (GearPair, State);
