@@ -4,8 +4,10 @@ use crate::gpu::{self, AdapterChoice, Gpu, GpuError, Lane, LaneSettings, Precisi
 use crate::model::{GearPair, State};
 use crate::record::Record;
 
-/// Cells are handed to a device so many at a time: every one has its own flow.
-const CHUNK: usize = 2048;
+/// Cells are handed to a device so many at a time: every one has its own flow,
+const CHUNK: usize = 4096;
+/// and its own phasors, one per step: fewer cells where there are more steps than this.
+const STEPS_OF_CHUNK: usize = 1024;
 
 /// A cell and where it starts.
 pub(super) type Start = (GearPair, State);
@@ -54,7 +56,9 @@ impl Lanes {
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
         let mut records = Vec::with_capacity(cells.len());
-        for chunk in cells.chunks(CHUNK) {
+        let steps = settings.steps_per_period.map_or(0, |steps| steps as usize);
+        let most = CHUNK * STEPS_OF_CHUNK / steps.max(STEPS_OF_CHUNK);
+        for chunk in cells.chunks(most.max(1)) {
             let flows: Vec<_> =
                 chunk.iter().map(|(pair, _)| pair.oscillator().expect("cells are made valid")).collect();
             let laws: Vec<_> = chunk.iter().map(|(pair, _)| pair.law()).collect();
