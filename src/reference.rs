@@ -15,11 +15,13 @@
 //! Every loop has a cap and every ending a name: see [`Stop`].
 
 mod chatter;
+mod clock;
 mod contact;
 mod landing;
 mod outlook;
 mod tangent;
 
+use clock::Clock;
 use outlook::{Crossing, Outlook};
 
 use crate::flow::{Arc, DomainKind, Flow, Gap, LinearFlow, Phasor, Step};
@@ -152,7 +154,7 @@ pub struct Trajectory<'f, const N: usize = 0> {
     pending: Option<Side>,
     q: Gap,
     phasor: Phasor,
-    t: f64,
+    clock: Clock,
     /// Where the present call ends; no jump may lead beyond.
     goal: f64,
     period: u64,
@@ -203,7 +205,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             pending: None,
             q: flow.to_gap(y),
             phasor: [1.0, 0.0],
-            t: 0.0,
+            clock: Clock::default(),
             goal: 0.0,
             period: 0,
             level: levels,
@@ -230,7 +232,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             pending: self.pending,
             q: self.q,
             phasor: self.phasor,
-            t: self.t,
+            clock: self.clock,
             goal: self.goal,
             period: self.period,
             level: self.level,
@@ -301,7 +303,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
 
     /// Time since the last phase 0.
     pub fn time_in_period(&self) -> f64 {
-        self.t
+        self.clock.time()
     }
 
     /// Time spent meshing so far.
@@ -331,7 +333,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
         let period = self.flow.period;
         self.advance_to(period, observer)?;
-        self.t = 0.0;
+        self.clock.set(0.0);
         self.phasor = [1.0, 0.0];
         self.period += 1;
         self.events_in_period = 0;
@@ -348,7 +350,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if let Some(side) = self.pending.take() {
             self.contact(side, observer);
         }
-        while self.t < until {
+        while self.clock.time() < until {
             self.step(until, observer)?;
         }
         self.check_finite()
@@ -439,11 +441,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Takes a step that is clear, cut at `until`.
     #[inline(always)]
     fn clear_step(&mut self, linear: &LinearFlow, step: &Step, until: f64) {
-        let remaining = until - self.t;
+        let remaining = self.clock.remaining(until);
         self.from_wall = None;
         if step.h < remaining {
             (self.q, self.phasor) = step.end(&self.q, &self.phasor);
-            self.t += step.h;
+            self.clock.advance(step.h);
             if N > 0 {
                 self.tangents = self.tangents.map(|u| step.propagator.carry_tangent(&u));
                 if self.steps_in_period.is_multiple_of(RESCALE_STEPS) {
@@ -461,7 +463,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     fn move_to(&mut self, linear: &LinearFlow, s: f64, until: f64) {
         self.move_within(linear, s);
         self.from_wall = None;
-        self.t = until;
+        self.clock.set(until);
     }
 
     /// Moves everything by a time of at most the longest step.

@@ -64,7 +64,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let bend = side.sign() * sliding.acceleration_rate / (3.0 * pressing) + sliding.damping / 6.0;
         let duration = whole * (1.0 - bend * whole);
         // A series cut by the strobe goes on bouncing until it lies within one stretch.
-        if duration <= 0.0 || self.t + duration >= self.goal {
+        if duration <= 0.0 || duration >= self.clock.remaining(self.goal) {
             return;
         }
         let v = closed[3];
@@ -78,8 +78,8 @@ impl<const N: usize> Trajectory<'_, N> {
             let behind = -s * pressing * late;
             [0.0, behind, u[2] + kick * u[0], u[3] + kick * (u[1] - behind)]
         });
-        self.t += duration;
-        let (sin, cos) = (flow.omega * self.t).sin_cos();
+        self.clock.advance(duration);
+        let (sin, cos) = (flow.omega * self.clock.time()).sin_cos();
         self.phasor = [cos, sin];
         let before = self.q;
         self.record(EventKind::MeshStart, side, before, observer);

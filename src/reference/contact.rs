@@ -163,7 +163,7 @@ impl<const N: usize> Trajectory<'_, N> {
             side,
             symbol,
             period: self.period,
-            t: self.t,
+            t: self.clock.time(),
             before,
             after: self.q,
         });
@@ -227,10 +227,14 @@ impl<const N: usize> Trajectory<'_, N> {
         observer: &mut impl Observer,
     ) {
         self.near_grazing = true;
-        let remaining = until - self.t;
+        let remaining = self.clock.remaining(until);
         let s = h.min(remaining);
         self.move_within(linear, s);
-        self.t = if s < remaining { self.t + s } else { until };
+        if s < remaining {
+            self.clock.advance(s);
+        } else {
+            self.clock.set(until);
+        }
         self.from_wall = None;
         self.settle_start(observer);
     }

@@ -29,7 +29,7 @@ impl<const N: usize> Trajectory<'_, N> {
         until: f64,
         observer: &mut impl Observer,
     ) -> Result<(), Stop> {
-        let remaining = until - self.t;
+        let remaining = self.clock.remaining(until);
         if bracket.guess * h * linear.unit > remaining {
             // Probably after `until`. It is if what lies there is still before the one root.
             let u = remaining * linear.per_unit;
@@ -39,7 +39,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.arrive(linear, &arc, u);
                 self.count_meshing(remaining);
                 self.from_wall = None;
-                self.t = until;
+                self.clock.set(until);
                 return Ok(());
             }
         }
@@ -50,7 +50,7 @@ impl<const N: usize> Trajectory<'_, N> {
             return Ok(());
         }
         self.arrive(linear, &arc, u);
-        self.t += s;
+        self.clock.advance(s);
         self.count_meshing(s);
         self.from_wall = None;
         self.act(crossing, observer);
