@@ -30,6 +30,9 @@ const LARGEST_MULTIPLIER: f64 = 2.0;
 /// direction along which a family of orbits runs near a saddle-node or pitchfork.
 const SINGULAR_CUTOFF: f64 = 1e-10;
 
+/// Pivots no smaller than this, relative to the largest, leave nothing to cut off.
+const WELL_CONDITIONED: f64 = 1e-6;
+
 /// Sweeps of the singular value iteration allowed.
 const SVD_CAP: usize = 1000;
 
@@ -53,11 +56,24 @@ pub(crate) fn refine_nearby(
     is_near: impl Fn(&State) -> bool,
 ) -> Option<Cycle> {
     let image = map.apply(seed, seed.state()).ok()?;
-    let [re, im] = *multipliers(&image.scaled)?.first()?;
-    if re.hypot(im).ln() + image.log_scale > LARGEST_MULTIPLIER.ln() {
+    if expands(&image)? {
         return None;
     }
     search(seed, map, image, HASTY, is_near)
+}
+
+/// Whether the derivative has a multiplier above [`LARGEST_MULTIPLIER`]; none if that cannot be told.
+fn expands(image: &Image) -> Option<bool> {
+    // A power's trace is at most four times the largest multiplier's power.
+    let mut power = image.derivative() / LARGEST_MULTIPLIER;
+    for _ in 0..3 {
+        if power.trace().abs() > 4.0 {
+            return Some(true);
+        }
+        power *= power;
+    }
+    let [re, im] = *multipliers(&image.scaled)?.first()?;
+    Some(re.hypot(im).ln() + image.log_scale > LARGEST_MULTIPLIER.ln())
 }
 
 /// Newton's method from the state of `seed` with its `image`, as long as its steps aim at states
@@ -104,6 +120,11 @@ fn newton_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<Vec
     let matrix = derivative - Matrix4::identity();
     if !matrix.iter().all(|x| x.is_finite()) {
         return None;
+    }
+    let lu = matrix.full_piv_lu();
+    let pivots = lu.u().diagonal().abs();
+    if pivots.min() > WELL_CONDITIONED * pivots.max() {
+        return lu.solve(&-residual);
     }
     let svd = matrix.try_svd(true, true, f64::EPSILON, SVD_CAP)?;
     let cutoff = SINGULAR_CUTOFF * svd.singular_values.max();
