@@ -388,8 +388,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let flow = self.flow;
         let linear = flow.domain(self.mode.domain());
         if std::mem::take(&mut self.brief) && self.fly_back(linear, until, observer)? {
-            self.work.steps += 1;
-            self.steps_in_period += 1;
             return Ok(());
         }
         let slot = usize::from(self.mode != Mode::Free);

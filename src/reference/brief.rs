@@ -41,6 +41,9 @@ impl<const N: usize> Trajectory<'_, N> {
         if s >= self.clock.remaining(until) {
             return Ok(false);
         }
+        self.work.steps += 1;
+        self.work.root_iterations += 1;
+        self.steps_in_period += 1;
         let [w, x, v] = rise.gained(u, linear.per_unit);
         self.q = [self.flow.wall(side), self.q[1] + w, self.q[2] + x, self.q[3] + v];
         self.phasor = turned(&self.phasor, linear.turn * u);
