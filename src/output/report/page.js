@@ -371,6 +371,7 @@ function tellRefinement({ integrated, filled, rounds, audits }) {
     + "filled with what lies around them. " + (last
     ? `Of ${count(last.sampled, "filled cell")}, drawn at random and integrated, ${last.wrong} turned out wrong: `
       + `${percent(last.rate)} (95 %: ${percent(last.interval[0])} to ${percent(last.interval[1])}).`
+      + (last.words ? ` Of ${count(last.words, "filled word")} among them, ${last.wrong_words} turned out wrong.` : "")
     : "No audit was asked for.");
   if (audits.length > 1) {
     byId("audits").append(...audits.map((audit, k) => {
