@@ -5,7 +5,7 @@ use crate::orbit::Class;
 use crate::plan::Needs;
 use crate::record::{Record, valid, word_hash};
 
-/// Class and period, and symmetry and word where they are asked for.
+/// Class, period and whether there is contact; symmetry and word where they are asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Label {
     /// See [`word_of`].
@@ -22,9 +22,10 @@ impl Label {
             Class::Chaotic => 3,
             Class::Periodic { period } => 3 + period,
         };
+        let free = u32::from(record.is_contact_free());
         let knows_symmetry = needs.symmetric && record.valid & valid::SYMMETRIC != 0;
         let symmetry = if knows_symmetry { 1 + record.symmetric } else { 0 };
-        Label { word: if needs.word { word_of(record) } else { 0 }, kind: 4 * class + symmetry }
+        Label { word: if needs.word { word_of(record) } else { 0 }, kind: 8 * class + 4 * free + symmetry }
     }
 
     pub(super) fn is_known(self) -> bool {

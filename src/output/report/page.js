@@ -177,6 +177,7 @@ function facts({ i, j }) {
   const error = number("lyapunov_error");
   const exponent = number("lyapunov");
   const symmetric = { 0: "no", 1: "yes" }[at("symmetric")];
+  const word = map.words?.[at("word")];
   return [
     [map.axes[0].parameter, a], [map.axes[1].parameter, b],
     ["class", kind === "periodic" ? `period ${at("period")}` : kind],
@@ -184,7 +185,7 @@ function facts({ i, j }) {
     ["impacts per period", number("impacts_per_period")],
     ["meshing", number("mesh_fraction")],
     ["symmetric", symmetric],
-    ["word", at("word") === undefined || at("word") === 0xffffffff ? undefined : map.words[at("word")] || "no events"],
+    ["word", word === "" ? "no events" : word],
     ...(values.attractors ? [["attractors found", at("attractors")]] : []),
     ["status", map.statuses[at("status")]],
     ["periods run", at("periods_run")],
