@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::cells::{EngineName, REST, apart, bar, flow_of, paper, sensitivity};
 use super::grazing::{contact_speed, swing};
 use super::lanes::{Lanes, Start, periods};
-use super::{Size, Verdict, readout};
+use super::{Part, Size, Verdict, Watch, readout};
 use crate::gpu::{Constants, GpuError, LaneSettings, MOST_STEPS};
 use crate::model::GearPair;
 use crate::orbit::Status;
@@ -92,10 +92,10 @@ pub struct Rows {
 ///
 /// # Errors
 /// A [`GpuError`].
-pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Rows, GpuError> {
+pub fn measure(size: Size, seed: u64, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Rows, GpuError> {
     let asked: Vec<u32> = (0..=size.pick(3, 12, 14)).map(|k| 1 << k).collect();
     let mut rows = Rows::default();
-    measure_swings(&asked, size.pick(8, 64, 1024), seed, lanes, &mut rows.swings)?;
+    measure_swings(&asked, size.pick(8, 64, 1024), seed, lanes, watch, &mut rows.swings)?;
     let motions = &MOTIONS[..size.pick(2, 8, 8)];
     measure_motions(&asked, motions, lanes, &mut rows.motions)?;
     Ok(rows)
@@ -110,6 +110,7 @@ fn measure_swings(
     per_depth: usize,
     seed: u64,
     lanes: &mut Lanes,
+    watch: &dyn Watch,
     rows: &mut Vec<Swings>,
 ) -> Result<(), GpuError> {
     let mut random = Random::new(seed);
@@ -118,8 +119,11 @@ fn measure_swings(
         .flat_map(|&depth| (0..per_depth).map(|_| swing(depth, &mut random)).collect::<Vec<_>>())
         .collect();
     lanes.rewrite(readout::first_contact);
-    for precision in lanes.precisions() {
-        for &steps_asked in asked {
+    let precisions = lanes.precisions();
+    let all = asked.len() * precisions.len();
+    for (nth, &precision) in precisions.iter().enumerate() {
+        for (grid, &steps_asked) in asked.iter().enumerate() {
+            watch.progress("grids", nth * asked.len() + grid, all);
             let records = lanes.run(precision, &starts, &at_least(steps_asked, periods(1)))?;
             let taken = steps_taken(&starts, steps_asked);
             for (i, &depth) in DEPTHS.iter().enumerate() {
@@ -142,6 +146,7 @@ fn measure_swings(
         }
     }
     lanes.rewrite(readout::whole);
+    watch.progress("grids", all, all);
     Ok(())
 }
 
@@ -226,7 +231,7 @@ pub fn judge(rows: &Rows) -> Verdict {
     let obeyed =
         rows.swings.iter().all(|row| row.steps_least >= row.steps_asked && row.steps_most <= MOST_STEPS);
     Verdict {
-        part: "grid",
+        part: Part::Grid.name(),
         holds: missed == 0 && bad == 0 && obeyed && swings > 0,
         sentence: format!(
             "N = {least} to {most} steps per period: {missed} of {swings} contacts missed ({by_ends} by steps that \
