@@ -96,7 +96,8 @@ fn stability_judges_every_part_and_writes_its_folder() {
     }
 
     // Parts on their own leave nothing of the other ones behind.
-    let said = run(&["--part", "grazing", "--part", "chatter", "--force"]).success().get_output().stderr.clone();
+    let said =
+        run(&["--part", "grazing", "--part", "chatter", "--force"]).success().get_output().stderr.clone();
     let said = String::from_utf8(said).unwrap();
     let judged: Vec<&str> = said.lines().filter(|line| line.contains("holds: ")).collect();
     assert!(judged.len() == 2 && judged[0].starts_with("grazing"), "{said}");

@@ -3,9 +3,9 @@
 use super::super::cells::{REST, flow_of};
 use super::super::lanes::Start;
 use super::each;
+use crate::bench::stability::Watch;
 use crate::gpu::Constants;
 use crate::model::GearPair;
-use crate::bench::stability::Watch;
 use crate::random::Random;
 use crate::reference::Trajectory;
 
