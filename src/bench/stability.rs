@@ -16,6 +16,7 @@ pub mod impacts;
 mod lanes;
 pub mod long_runs;
 mod readout;
+mod shaken;
 pub mod stiffness;
 
 pub use cells::EngineName;
