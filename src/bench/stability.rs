@@ -129,6 +129,9 @@ pub trait Watch: Sync {
     /// thread, in any order.
     fn progress(&self, work: &'static str, done: usize, total: usize);
 
+    /// Something was found that makes a part fail, long before its end.
+    fn found(&self, what: &str);
+
     /// A part has ended.
     fn judged(&self, verdict: &Verdict);
 }
@@ -136,6 +139,8 @@ pub trait Watch: Sync {
 /// Nobody.
 impl Watch for () {
     fn progress(&self, _: &'static str, _: usize, _: usize) {}
+
+    fn found(&self, _: &str) {}
 
     fn judged(&self, _: &Verdict) {}
 }

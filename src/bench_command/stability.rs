@@ -54,6 +54,15 @@ impl Watch for Teller {
         }
     }
 
+    fn found(&self, what: &str) {
+        // Held, so that lines do not mix with progress.
+        let work = self.work.lock().expect("nobody panics while telling");
+        match &*work {
+            Some((_, progress)) if !self.quiet => progress.suspend(|| eprintln!("{what}")),
+            _ => eprintln!("{what}"),
+        }
+    }
+
     fn judged(&self, verdict: &Verdict) {
         let done = self.work.lock().expect("nobody panics while telling").take();
         let mark = if verdict.holds { "holds" } else { "FAILS" };

@@ -66,7 +66,13 @@ pub(super) fn all(
     Random::new(seed).draw(&mut different, examined);
     let left = different.split_off(examined).len();
     let told = Told::new(watch, "lanes examined", examined);
-    let examine = |&i: &usize| told.count(Cell::new(precision, cells[i], records[i]).examine());
+    let examine = |&i: &usize| {
+        let mismatch = Cell::new(precision, cells[i], records[i]).examine();
+        if let Some(Mismatch { engine, pair, start, differences, explanation: None }) = &mismatch {
+            watch.found(&format!("unexplained: {} {pair:?} from {start:?}: {differences:?}", engine.name()));
+        }
+        told.count(mismatch)
+    };
     let mismatches = each(&different, examine).into_iter().flatten().collect();
     Comparison { silent: silent.len(), mismatches, left }
 }
