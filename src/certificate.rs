@@ -93,7 +93,7 @@ impl Bernstein {
     /// the first `order` coefficients as [`range`](Self::range) does: compares instead of extremes.
     #[inline(always)]
     pub(crate) fn between(&self, order: usize, remainder: f64, floor: f64, ceiling: f64) -> [bool; 2] {
-        let blur = f64x4::from([0.0, 0.0, remainder, 0.0]);
+        let blur = MIDDLE * f64x4::splat(remainder);
         let mut low = self.low;
         if order > 1 {
             let [_, c2, c3, c4] = low.to_array();
@@ -134,6 +134,9 @@ impl Bernstein {
         [self.start + (least - rounding), self.start + (most + rounding)]
     }
 }
+
+/// The middle one of `c_1 .. c_4`.
+const MIDDLE: f64x4 = f64x4::new([0.0, 0.0, 1.0, 0.0]);
 
 /// The smallest of four numbers.
 #[inline(always)]

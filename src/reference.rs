@@ -8,7 +8,8 @@
 //! # What it costs
 //!
 //! A clear step is four 4 x 7 products: its end, its bound and its certificate; an event adds
-//! ten, a search on one short polynomial, and the contact law.
+//! ten, a search on one short polynomial, and the contact law. A flight pressed back to its wall
+//! before it has gone far is six in all, and its own series is its certificate.
 //!
 //! # How it can end
 //!
@@ -398,8 +399,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         let flow = self.flow;
         let linear = flow.domain(self.mode.domain());
         if std::mem::take(&mut self.brief) && self.fly_back(linear, until, observer)? {
-            self.work.steps += 1;
-            self.steps_in_period += 1;
             return Ok(());
         }
         let slot = usize::from(self.mode != Mode::Free);

@@ -147,8 +147,11 @@ impl Grid {
     pub(crate) fn carry<const N: usize>(&self, u: f64, tangents: [Gap; N]) -> [Gap; N] {
         let (instant, whole, part) = self.nearest(u);
         let v = u - instant;
-        let (whole, part) = (&self.wholes[whole], &self.parts[part]);
-        let here = tangents.map(|t| part.carry_tangent(&whole.carry_tangent(&t)));
+        let mut here = tangents;
+        if whole > 0 {
+            here = here.map(|t| self.wholes[whole].carry_tangent(&t));
+        }
+        here = here.map(|t| self.parts[part].carry_tangent(&t));
         Columns::carry(&self.terms, v, here)
     }
 }

@@ -157,3 +157,104 @@ impl Rise {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::{DomainKind, Flow, turned};
+    use crate::model::{GearPair, Side};
+
+    /// Starts on the right wall: free, or at the start of a dip.
+    fn starts() -> impl Iterator<Item = (DomainKind, Gap, Phasor)> {
+        (0..4000u32).map(|i| {
+            let t = f64::from(i);
+            let kind = if i % 2 == 0 { DomainKind::Free } else { DomainKind::Meshing(Side::Right) };
+            let leaving = 10f64.powf(-8.0 + 8.0 * (0.618 * t).fract());
+            let q = [0.5, -leaving, 2.0 * (1.7 * t).sin(), 6.0 * (2.3 * t).cos()];
+            (kind, q, [(0.9 * t).cos(), (0.9 * t).sin()])
+        })
+    }
+
+    /// What is called a first return is one, on the exact flow, and pressing holds until then.
+    #[test]
+    fn returns_are_first_returns() {
+        let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
+        let (mut found, mut refused) = (0, 0);
+        for (kind, q, phasor) in starts() {
+            let linear = flow.domain(kind);
+            let rise = linear.brief.from(&q, &phasor);
+            let Some(u) = rise.back(1.0) else {
+                refused += 1;
+                continue;
+            };
+            found += 1;
+            let case = format!("{kind:?} from {q:?}, {phasor:?}");
+            let [w, x, v] = rise.gained(u, linear.per_unit);
+            let s = u * linear.unit;
+            let end = linear.propagate(q, phasor, s);
+            assert!((end[0] - q[0]).abs() <= 4.0 * f64::EPSILON, "{case}: {} off the wall", end[0] - q[0]);
+            for (ours, exact, size) in
+                [(q[1] + w, end[1], 6.0), (q[2] + x, end[2], 2.0), (q[3] + v, end[3], 6.0)]
+            {
+                assert!((ours - exact).abs() <= 8.0 * f64::EPSILON * size, "{case}: {ours} for {exact}");
+            }
+            for part in 1..64 {
+                let part = f64::from(part) / 64.0;
+                let between = linear.propagate(q, phasor, part * s);
+                let at = turned(&phasor, part * u * linear.turn);
+                // Short flights rise by less than an ulp of the wall.
+                let short = 4.0 * f64::EPSILON;
+                assert!(between[0] < q[0] + short, "{case}: beyond the wall on the way");
+                assert!(linear.acceleration(&between, &at) > 0.0, "{case}: not pressed on the way");
+            }
+        }
+        assert!(found > 500 && refused > 500, "{found} found, {refused} refused");
+    }
+
+    /// Very short flights keep their relative accuracy: uniformly accelerated motion and a little more.
+    #[test]
+    fn short_flights_keep_their_shape() {
+        let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
+        let linear = flow.domain(DomainKind::Free);
+        let phasor = [1.0, 0.0];
+        for leaving in [1e-3, 1e-6, 1e-9, 1e-12] {
+            let q = [0.5, -leaving, 0.3, 0.1];
+            let pressing = linear.acceleration(&[0.5, 0.0, 0.3, 0.1], &phasor);
+            let rise = linear.brief.from(&q, &phasor);
+            let s = rise.back(1.0).unwrap() * linear.unit;
+            let uniform = 2.0 * leaving / pressing;
+            assert!((s / uniform - 1.0).abs() < 2.0 * leaving + 1e-14, "{s} for {uniform}");
+            let [w, ..] = rise.gained(s * linear.per_unit, linear.per_unit);
+            assert!(((w - leaving) / leaving - 1.0).abs() < 2.0 * leaving + 1e-14);
+        }
+    }
+
+    #[test]
+    fn no_return_is_made_up() {
+        let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
+        let linear = flow.domain(DomainKind::Free);
+        // Pulled away from the wall; fast; wider than allowed.
+        let pulled = linear.brief.from(&[0.5, -0.01, -2.0, 0.0], &[-1.0, 0.0]);
+        assert!(linear.acceleration(&[0.5, -0.01, -2.0, 0.0], &[-1.0, 0.0]) < 0.0);
+        assert_eq!(pulled.back(1.0), None);
+        let fast = linear.brief.from(&[0.5, -3.0, 0.3, 0.1], &[1.0, 0.0]);
+        assert_eq!(fast.back(1.0), None);
+        let near = linear.brief.from(&[0.5, -0.1, 0.3, 0.1], &[1.0, 0.0]);
+        assert!(near.back(1.0).is_some());
+        assert_eq!(near.back(1e-4), None);
+        let nothing = linear.brief.from(&[f64::NAN; 4], &[1.0, 0.0]);
+        assert_eq!(nothing.back(1.0), None);
+    }
+
+    #[test]
+    fn phasors_turn_to_rounding() {
+        for i in 0..=200 {
+            let (from, angle) = (0.37 * f64::from(i), 0.001 * f64::from(i));
+            let [cos, sin] = turned(&[from.cos(), from.sin()], angle);
+            let exact = (from + angle).sin_cos();
+            assert!(
+                (cos - exact.1).abs() < 3e-16 + from * 1e-16 && (sin - exact.0).abs() < 3e-16 + from * 1e-16
+            );
+        }
+    }
+}

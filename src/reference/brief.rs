@@ -5,11 +5,11 @@ use super::{Crossing, Mode, Observer, Stop, Trajectory};
 use crate::flow::{BRIEF, LinearFlow, turned};
 use crate::model::Side;
 
-/// Flights that promise to last this share of the longest are tried.
+/// Flights that promise to last no more than this share of the longest are tried.
 const PROMISE: f64 = 0.9;
 
-/// A pressing acceleration below this, relative to the walls' distance and the square of the rate, is left
-/// to the certificate.
+/// Speeds gained in a Taylor step below this, relative to the walls' distance and the rate of free
+/// motion, may be rounding: the certificate judges such flights.
 const PRESSING: f64 = 1e-6;
 
 impl<const N: usize> Trajectory<'_, N> {
@@ -41,6 +41,9 @@ impl<const N: usize> Trajectory<'_, N> {
         if s >= self.clock.remaining(until) {
             return Ok(false);
         }
+        self.work.steps += 1;
+        self.work.root_iterations += 1;
+        self.steps_in_period += 1;
         let [w, x, v] = rise.gained(u, linear.per_unit);
         self.q = [self.flow.wall(side), self.q[1] + w, self.q[2] + x, self.q[3] + v];
         self.phasor = turned(&self.phasor, linear.turn * u);

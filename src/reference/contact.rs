@@ -74,7 +74,7 @@ impl<const N: usize> Trajectory<'_, N> {
 
         let free = self.flow.domain(DomainKind::Free);
         let pressing = side.sign() * free.acceleration(&after, &self.phasor);
-        let pressed = self.presses(DomainKind::Free, side, &after);
+        let pressed = pressing > 0.0 || pressing == 0.0 && self.presses(DomainKind::Free, side, &after);
         let meshes = leaving <= self.law.mesh_speed
             && pressed
             && self.presses(DomainKind::Meshing(side), side, &after);
