@@ -211,6 +211,22 @@ impl Default for LaneSettings {
     }
 }
 
+impl LaneSettings {
+    /// So many periods from the start and nothing else: no cycle is looked for, no exponent
+    /// taken, and no lane ends early.
+    pub fn only(periods: u32) -> Self {
+        LaneSettings {
+            periods,
+            transient_periods: 0,
+            max_period: 0,
+            early_stop: false,
+            exponent: false,
+            exponent_from: 0,
+            ..LaneSettings::default()
+        }
+    }
+}
+
 /// A device that integrates lanes in one precision.
 pub struct Gpu {
     device: wgpu::Device,

@@ -14,6 +14,7 @@
 //!
 //! Every loop has a cap and every ending a name: see [`Stop`].
 
+mod brief;
 mod chatter;
 mod clock;
 mod contact;
@@ -150,6 +151,8 @@ pub struct Trajectory<'f, const N: usize = 0> {
     origin: Option<Side>,
     /// The wall the gap starts from, and the order of that root of the distance.
     from_wall: Option<(Side, usize)>,
+    /// Whether the flight that begins here promises to be brief.
+    brief: bool,
     /// A contact to act on before anything else: a start on a wall.
     pending: Option<Side>,
     q: Gap,
@@ -202,6 +205,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: Mode::Free,
             origin: None,
             from_wall: None,
+            brief: false,
             pending: None,
             q: flow.to_gap(y),
             phasor: [1.0, 0.0],
@@ -229,6 +233,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: self.mode,
             origin: self.origin,
             from_wall: self.from_wall,
+            brief: self.brief,
             pending: self.pending,
             q: self.q,
             phasor: self.phasor,
@@ -255,6 +260,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: self.mode,
             origin: self.origin,
             from_wall: None,
+            brief: false,
             pending: None,
             ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
         }
@@ -391,6 +397,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         let flow = self.flow;
         let linear = flow.domain(self.mode.domain());
+        if std::mem::take(&mut self.brief) && self.fly_back(linear, until, observer)? {
+            self.work.steps += 1;
+            self.steps_in_period += 1;
+            return Ok(());
+        }
         let slot = usize::from(self.mode != Mode::Free);
         let mut level = self.level[slot];
         loop {

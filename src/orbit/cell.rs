@@ -11,7 +11,7 @@ use super::{Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine, refine_nearby};
 use crate::word::Word;
 
 /// An exponent that is shown accumulates from this period on, or from the end of a shorter
@@ -49,6 +49,9 @@ const NEUTRAL_ORDER: f64 = 2.0;
 
 /// Cycles, at least, over which an approach must have been seen.
 const APPROACH_CYCLES: usize = 4;
+
+/// Newton's method looks for a cycle this many times as far off as it may lie.
+const AIM: f64 = 3.0;
 
 /// How long one cell is integrated, and what for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -270,7 +273,10 @@ impl<'a> Watch<'a> {
         for candidate in candidates(window, &metric, max_period) {
             let state = self.strobes[self.strobes.len() - 1];
             for map in self.analysis.maps(candidate.period) {
-                let Some(cycle) = refine(seed, map) else { continue };
+                let is_near = |y: &State| metric.distance(&state, y) < AIM * NEAR;
+                let found = if is_last { refine(seed, map) } else { refine_nearby(seed, map, is_near) };
+                // One that repels does so at any of its periods.
+                let Some(cycle) = found.filter(|cycle| cycle.spectral_radius() < 1.0) else { continue };
                 let Some(cycle) = self.analysis.smallest(seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
                 if cycle.spectral_radius() < 1.0 && distance < NEAR {

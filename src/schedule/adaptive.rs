@@ -4,15 +4,16 @@
 use super::audit::{Audit, sample};
 use super::blocks::{Block, coarse};
 use super::fill::filled;
-use super::label::Label;
+use super::label::{Label, word_of};
 use crate::plan::{Needs, Plan};
-use crate::record::Record;
+use crate::record::{Record, valid};
 use crate::scene::Refine;
 
 /// The state of an adaptive map between rounds.
 pub(super) struct Adaptive {
     counts: [usize; 2],
     refine: Refine,
+    /// What makes borders: what the scene asks for, words only where they are to.
     needs: Needs,
     /// By cell id; unknown where nothing was integrated.
     labels: Vec<Label>,
@@ -45,7 +46,7 @@ impl Adaptive {
         Adaptive {
             counts,
             refine,
-            needs: *plan.needs(),
+            needs: Needs { word: plan.needs().word && refine.word, ..*plan.needs() },
             labels: vec![Label::default(); plan.cell_count()],
             open: coarse(counts, refine.minimum_grid as usize),
             closed: Vec::new(),
@@ -103,7 +104,7 @@ impl Adaptive {
         self.audited = sample(candidates, self.refine.audited(filled), seed);
         self.stage = if self.audited.is_empty() { Stage::Done } else { Stage::Auditing };
         if !self.audited.is_empty() {
-            self.audits.push(Audit { filled, sampled: self.audited.len(), wrong: 0 });
+            self.audits.push(Audit { filled, sampled: self.audited.len(), ..Audit::default() });
         }
         self.audited.clone()
     }
@@ -137,7 +138,7 @@ impl Adaptive {
     /// blocks with wrong cells are cut, right there.
     fn judge_audit(&mut self, records: &[Record]) {
         let mut wrong = vec![false; self.labels.len()];
-        let mut count = 0;
+        let mut audit = self.audits.pop().unwrap_or_default();
         let closed = std::mem::take(&mut self.closed);
         let mut is_audited = vec![false; self.labels.len()];
         self.audited.iter().for_each(|&id| is_audited[id as usize] = true);
@@ -149,19 +150,18 @@ impl Adaptive {
                 if !std::mem::take(&mut is_audited[id]) {
                     continue;
                 }
-                let fill = Label::of(&filled(block, corners, at), &self.needs);
-                if fill != self.labels[id] {
-                    wrong[id] = true;
-                    count += 1;
+                let fill = filled(block, corners, at);
+                wrong[id] = Label::of(&fill, &self.needs) != self.labels[id];
+                audit.wrong += usize::from(wrong[id]);
+                if fill.valid & valid::WORD != 0 {
+                    audit.words += 1;
+                    audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id]));
                 }
             }
         }
         self.audited.clear();
-        let rate = self.audits.last_mut().map_or(0.0, |audit| {
-            audit.wrong = count;
-            audit.rate()
-        });
-        let all = rate > self.refine.max_error && closed.iter().any(Block::has_inside);
+        self.audits.push(audit);
+        let all = audit.rate() > self.refine.max_error && closed.iter().any(Block::has_inside);
         self.stage = if all { Stage::Halving } else { Stage::Mending };
         for block in closed {
             let first_wrong = block.cells().find(|&at| wrong[self.id(at)]);
