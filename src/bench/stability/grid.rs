@@ -114,7 +114,7 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes, watch: &dyn Watch) -> R
     let mut rows = Rows::default();
     measure_swings(&asked, size.pick(8, 64, 1024), seed, lanes, watch, &mut rows.swings)?;
     let motions = &MOTIONS[..size.pick(2, 8, 8)];
-    let asked: Vec<u32> = powers(size.pick(3, 14, 14)).chain([FINEST]).collect();
+    let asked: Vec<u32> = powers(size.pick(3, 12, 14)).chain([FINEST]).collect();
     measure_motions(&asked, motions, lanes, &mut rows.motions)?;
     Ok(rows)
 }

@@ -58,7 +58,7 @@ pub(super) fn all_bounded(count: usize, seed: u64, watch: &dyn Watch) -> Vec<Sta
     let mut cells = Vec::with_capacity(count);
     while cells.len() < count {
         let drawn: Vec<Start> = (0..BLOCK).map(|_| candidate(&mut random)).collect();
-        let kept = each(&drawn, |cell| is_bounded(cell));
+        let kept = each(&drawn, is_bounded);
         cells.extend(drawn.into_iter().zip(kept).filter_map(|(cell, kept)| kept.then_some(cell)));
         cells.truncate(count);
         watch.progress("cells drawn", cells.len(), count);
