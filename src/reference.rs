@@ -267,6 +267,17 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// Multiplies the state by `1 + shares`, as rounding would in the coordinates of a lane: the
+    /// gap, from its wall while the teeth mesh, its rate, and `x2`, `v2`. A gap that is just leaving
+    /// a wall stays on it.
+    pub(crate) fn shake(&mut self, shares: [f64; 4]) {
+        let wall = self.meshing().map_or(0.0, |side| self.flow.wall(side));
+        if self.from_wall.is_none() {
+            self.q[0] += shares[0] * (self.q[0] - wall);
+        }
+        (1..4).for_each(|i| self.q[i] += shares[i] * self.q[i]);
+    }
+
     /// The flow it follows.
     pub fn flow(&self) -> &'f Flow {
         self.flow
