@@ -7,6 +7,7 @@
 //! refined cycle the period is simply its smallest divisor that closes.
 
 mod analysis;
+mod approach;
 mod cell;
 mod reading;
 mod recurrence;

@@ -32,7 +32,7 @@ pub(super) const ON_CYCLE: f64 = 1e-8;
 pub(super) const APPROACH: f64 = 0.7;
 
 /// A trajectory farther from a cycle than this, relative to the motion, is elsewhere.
-const WITHIN_REACH: f64 = 0.3;
+pub(super) const WITHIN_REACH: f64 = 0.3;
 
 /// Looks at an approach on the way; at each the trajectory must have come nearer.
 const APPROACH_LOOKS: u32 = 4;
@@ -223,6 +223,10 @@ impl Analysis<'_> {
         let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
         for period in divisors {
             for map in self.maps(period) {
+                // It closes after its own period, and need not be refined again.
+                if period == cycle.period && (cycle.symmetric || map == StrobeMap::Periods(period)) {
+                    return Some(cycle);
+                }
                 let image = map.apply(seed, cycle.state).ok()?;
                 if metric.distance(&image.state, &cycle.state) < ON_CYCLE
                     && let Some(shorter) = refine(&seed.at(cycle.state, []), map)

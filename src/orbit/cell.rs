@@ -5,30 +5,33 @@
 //! strobe states that have passed, so that nothing is integrated ahead of the budget.
 
 use super::CHAOS_ERRORS;
-use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, TANGENT_PERIODS, status_of};
+use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, TANGENT_PERIODS, WITHIN_REACH, status_of};
+use super::approach::{LINEAR_CYCLES, is_linear};
 use super::recurrence::{Metric, NEAR, candidates, lingering};
 use super::{Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine, refine_near};
 use crate::word::Word;
 
 /// An exponent that is shown accumulates from this period on, or from the end of a shorter
 /// transient.
 const SHOWN_EXPONENT_FROM: u32 = 100;
 
-/// One that only tells chaos from the rest may contain more of the transient.
+/// One that only tells chaos from the rest may contain more of the transient, and its tangent
+/// vector may take fewer periods to turn: by then nearly all cycles have been found.
 const EXPONENT_FROM: u32 = 50;
+const HASTY_TANGENT_PERIODS: u32 = 18;
 
 /// Periods after which an early stop is first considered; then every sixth as many more.
 const FIRST_LOOK: u32 = 16;
 const LOOKS: u32 = 6;
 
-/// A cell stops early only this close to its cycle, relative to the motion: inside the region
-/// where the multipliers tell what happens next. A leaving speed near `mesh_speed` makes that
-/// region small: at 2e-3 one cell of 4,000 over restitution and frequency was taken for a period
-/// that it then left, at 1e-6 cells take half as many periods again.
+/// A cell stops early only inside the region where the multipliers tell what happens next: this
+/// close to its cycle, relative to the motion, or within `NEAR` where it is seen to move as they
+/// say. A leaving speed near `mesh_speed` makes that region small: unseen, at 2e-3 one cell of
+/// 4,000 over restitution and frequency was taken for a period that it then left.
 const SETTLED: f64 = 5e-4;
 
 /// With early stops chaos is called before the budget is spent if the exponent exceeds zero by
@@ -78,6 +81,12 @@ impl Budget {
         from.min(self.settings.transient_periods)
     }
 
+    /// The period from which a tangent vector is carried.
+    fn tangent_from(&self) -> u32 {
+        let turning = if self.shows_exponent { TANGENT_PERIODS } else { HASTY_TANGENT_PERIODS };
+        self.exponent_from().saturating_sub(turning)
+    }
+
     /// The first period at which chaos may be called, with early stops.
     pub fn chaos_from(&self) -> u32 {
         let eighths = if self.shows_exponent { EARLY_CHAOS_FROM } else { HASTY_CHAOS_FROM };
@@ -109,7 +118,7 @@ pub struct Measured {
     pub symmetric: Option<bool>,
     /// The cycle's word.
     pub word: Option<Word>,
-    /// The last strobe state.
+    /// The last strobe state; one of the cycle's where the cell stopped early on the way to it.
     pub strobe: State,
     /// Forcing periods integrated; what Newton's method needs beside them is not counted.
     pub periods_run: u32,
@@ -166,8 +175,7 @@ impl<'a> Watch<'a> {
         let more = if self.budget.early_stop { self.budget.undecided_periods } else { 0 };
         let last = budget.saturating_add(more);
         let exponent_from = self.budget.exponent_from();
-        let turning_from =
-            if self.budget.exponent { exponent_from.saturating_sub(TANGENT_PERIODS) } else { last };
+        let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
         let mut look = if self.budget.early_stop { FIRST_LOOK.min(budget) } else { last };
         let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start);
         while bare.period() < u64::from(turning_from) {
@@ -213,7 +221,8 @@ impl<'a> Watch<'a> {
         if let Some(orbit) = self.settled(&trajectory.carrying([]), is_last)?
             && (is_last || self.is_own(&orbit))
         {
-            return Ok(Some(self.periodic(orbit)));
+            let strobe = if is_last { trajectory.state() } else { orbit.strobe };
+            return Ok(Some(self.periodic(orbit, strobe)));
         }
         Ok(match now {
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
@@ -270,7 +279,10 @@ impl<'a> Watch<'a> {
         for candidate in candidates(window, &metric, max_period) {
             let state = self.strobes[self.strobes.len() - 1];
             for map in self.analysis.maps(candidate.period) {
-                let Some(cycle) = refine(seed, map) else { continue };
+                // Newton's method would go on for long about a cycle that is not there.
+                let within = |y: &State| metric.distance(&state, y) < WITHIN_REACH;
+                let refined = if is_last { refine(seed, map) } else { refine_near(seed, map, within) };
+                let Some(cycle) = refined else { continue };
                 let Some(cycle) = self.analysis.smallest(seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
                 if cycle.spectral_radius() < 1.0 && distance < NEAR {
@@ -278,8 +290,10 @@ impl<'a> Watch<'a> {
                     self.approaches = true;
                     let at = self.strobes.len() - 1;
                     self.cycle = Some(Found { cycle, seed: seed.clone(), at, distance });
-                    if let Some(orbit) = self.approached(&metric, near)? {
-                        return Ok(Some(orbit));
+                    let orbit = self.approached(&metric, near)?;
+                    // One find is enough for now.
+                    if orbit.is_some() || !is_last {
+                        return Ok(orbit);
                     }
                 }
             }
@@ -303,7 +317,10 @@ impl<'a> Watch<'a> {
         }
         let halving = (0.5f64.ln() / radius.max(0.1).ln()).ceil();
         let back = (halving.min(1e6) as usize).max(APPROACH_CYCLES).min(now / 2 / period);
-        if present > near || back < 2 {
+        // At a last look `near` is the farthest that counts.
+        let beside = |n: usize| self.strobes[now - n * period];
+        let is_seen = || now > LINEAR_CYCLES * period && is_linear(cycle, beside, metric);
+        if back < 2 || present > NEAR || present > near && !is_seen() {
             return Ok(None);
         }
         // A multiplier near 1 shrinks little; half of what it promises must be seen.
@@ -318,13 +335,13 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Whether the last periods had the cycle's impacts: beyond a fold of the strobe map there may
-    /// be another cycle, as close as the motion's own.
+    /// Whether the last cycles had the cycle's impacts: beyond a fold of the strobe map there may be
+    /// another cycle, as close as the motion's own.
     fn is_own(&self, orbit: &Orbit) -> bool {
         let (now, cycle) = (self.counts.len() - 1, orbit.cycle_periods as usize);
-        let [impacts, _] = self.counts[now];
-        now >= cycle
-            && impacts - self.counts[now - cycle][0] == (orbit.impacts_per_period * cycle as f64).round()
+        let each = (orbit.impacts_per_period * cycle as f64).round();
+        let impacts = |end: usize| self.counts[end][0] - self.counts[end - cycle][0];
+        now >= LINEAR_CYCLES * cycle && (0..LINEAR_CYCLES).all(|n| impacts(now - n * cycle) == each)
     }
 
     /// The last strobe that the cycle's state belongs to: the others, unless the period is 1,
@@ -339,7 +356,7 @@ impl<'a> Watch<'a> {
         metric.distance(&self.strobes[self.last_beside(found)], &found.cycle.state)
     }
 
-    fn periodic(&self, orbit: Orbit) -> Measured {
+    fn periodic(&self, orbit: Orbit, strobe: State) -> Measured {
         Measured {
             period: Some(orbit.cycle_periods),
             status: orbit.status,
@@ -348,7 +365,7 @@ impl<'a> Watch<'a> {
             mesh_fraction: orbit.mesh_fraction,
             symmetric: orbit.symmetric,
             word: Some(orbit.word),
-            strobe: self.strobes[self.strobes.len() - 1],
+            strobe,
             periods_run: self.strobes.len() as u32 - 1,
         }
     }

@@ -10,8 +10,12 @@ use crate::reference::Trajectory;
 
 const NEWTON_CAP: u32 = 40;
 
-/// Halvings of a Newton step that does not reduce the residual.
+/// Lengths of a Newton step that are tried, each half the last one, until one reduces the residual.
 const DAMPING_CAP: u32 = 12;
+
+/// And those allowed on the way to a fixed point that is near.
+const NEAR_CAP: u32 = 10;
+const NEAR_DAMPING_CAP: u32 = 2;
 
 /// Singular values of `P' - I` below this, relative to the largest, are cut off: the
 /// direction along which a family of orbits runs near a saddle-node or pitchfork.
@@ -23,21 +27,48 @@ const SVD_CAP: usize = 1000;
 /// Residuals below this, relative to the state, are rounding.
 const CONVERGED: f64 = 1e-13;
 
+/// And so are these where no step reduces them.
+const NEARLY_CONVERGED: f64 = 1e-10;
+
 /// Refines the state of `seed`, a trajectory at phase 0, to a fixed point of `map`; none if
 /// Newton does not converge.
 ///
 /// Nothing is said about stability: plain Newton likes unstable orbits as much.
 pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
+    newton(seed, map, [NEWTON_CAP, DAMPING_CAP], |_| true)
+}
+
+/// [`refine`] for a fixed point that is near or none: none, too, as soon as a whole step would lead
+/// to a state that is not `within` reach, or where convergence is slow.
+pub(crate) fn refine_near(
+    seed: &Trajectory<'_>,
+    map: StrobeMap,
+    within: impl Fn(&State) -> bool,
+) -> Option<Cycle> {
+    newton(seed, map, [NEAR_CAP, NEAR_DAMPING_CAP], within)
+}
+
+fn newton(
+    seed: &Trajectory<'_>,
+    map: StrobeMap,
+    [steps, lengths]: [u32; 2],
+    within: impl Fn(&State) -> bool,
+) -> Option<Cycle> {
     let mut y = Vector4::from(seed.state());
     let mut image = map.apply(seed, seed.state()).ok()?;
     let mut residual = Vector4::from(image.state) - y;
-    for _ in 0..NEWTON_CAP {
+    for _ in 0..steps {
         let size = size_of(seed, &y);
         if residual.amax() <= CONVERGED * size {
             break;
         }
         let step = newton_step(&image.derivative(), &residual)?;
-        match damped(seed, map, &y, &residual, &step) {
+        if !within(&(y + step).into()) {
+            return None;
+        }
+        // There, halving a step only tries rounding's luck.
+        let tries = if residual.amax() <= NEARLY_CONVERGED * size { 1 } else { lengths };
+        match damped(seed, map, &y, &residual, &step, tries) {
             Some((next, next_image)) => {
                 residual = Vector4::from(next_image.state) - next;
                 (y, image) = (next, next_image);
@@ -47,7 +78,7 @@ pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
         }
     }
     let size = size_of(seed, &y);
-    if residual.amax() <= 1e3 * CONVERGED * size { cycle(map, y.into(), &image) } else { None }
+    if residual.amax() <= NEARLY_CONVERGED * size { cycle(map, y.into(), &image) } else { None }
 }
 
 /// What residuals are measured by: the state, or the walls' distance where it is small.
@@ -73,9 +104,10 @@ fn damped(
     y: &Vector4<f64>,
     residual: &Vector4<f64>,
     step: &Vector4<f64>,
+    tries: u32,
 ) -> Option<(Vector4<f64>, Image)> {
     let mut share = 1.0;
-    for _ in 0..DAMPING_CAP {
+    for _ in 0..tries {
         let next = y + step * share;
         if let Ok(image) = map.apply(seed, next.into())
             && (Vector4::from(image.state) - next).amax() < residual.amax()
