@@ -2,15 +2,13 @@
 
 // Distances are kept as quarter octaves below 1: 4 means half.
 const OCTAVE: f32 = 4.0;
-// Recurrences farther apart than 2^-5 of the motion are none, nor is what lingers if it is farther
-// than 2^-6 from where it was.
-const NEAR: u32 = 20u;
-const LINGERS: u32 = 24u;
+// Recurrences farther apart than 2^-6 of the motion are none.
+const NEAR: u32 = 24u;
 // A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
 // comes within 2^-12 of a cycle by chance.
 const SETTLED: f32 = 56.0;
-// 2^-5 where Newton's method shows what the limit is.
-const REFINABLE: f32 = 20.0;
+// 2^-6 where Newton's method shows what the limit is.
+const REFINABLE: f32 = 24.0;
 // Slower approaches than this, per period, are not waited for, only for a recurrence as close as
 // if they were as fast.
 const SLOWEST: f32 = 0.008;
@@ -18,9 +16,8 @@ const SLOWEST: f32 = 0.008;
 const SLOW: u32 = 48u;
 // A distance must have shrunk by this much (a factor of 0.7) since the last window.
 const SHRUNK: u32 = 2u;
-// Windows over which a candidate must have contracted, and before Newton's method is asked.
+// Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-const REFINABLE_STREAK: u32 = 1u;
 // Lags of any window, at least: they are a fifth of the time that has passed, or a few cycles.
 const LEAST_WINDOW: u32 = 3u;
 // Windows need not be longer than so many cycles that contract.
@@ -85,7 +82,7 @@ const FEWEST_BLOCKS: u32 = 6u;
 
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
-    if tally.block_periods > 0u || tally.blocks < FEWEST_BLOCKS || tally.period < settings.chaos_from || nears() {
+    if tally.block_periods > 0u || tally.blocks < FEWEST_BLOCKS || tally.streak >= STREAK || tally.period < settings.chaos_from {
         return false;
     }
     // Averages that a cycle read in vain has interrupted begin anew.
@@ -94,11 +91,6 @@ fn is_chaos() -> bool {
     }
     let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
     return grows(errors) && outgrows(errors) && !departs(errors);
-}
-
-// Whether a recurrence contracts, and not just within reach of chance.
-fn nears() -> bool {
-    return tally.streak >= STREAK && last_distance_at(tally.candidate) >= LINGERS;
 }
 
 // Whether the exponent exceeds zero by so many standard errors.
@@ -130,11 +122,11 @@ fn departs(errors: Real) -> bool {
     var rests = false;
     for (var lag = 1u; 2u * lag <= tally.known_lags && !rests; lag++) {
         var nearest = 255u;
-        for (var multiple = lag; multiple <= tally.known_lags && nearest >= LINGERS; multiple += lag) {
+        for (var multiple = lag; multiple <= tally.known_lags && nearest >= NEAR; multiple += lag) {
             trips += 1u;
             nearest = min(nearest, last_distance_at(multiple));
         }
-        lingers = lingers || nearest >= LINGERS;
+        lingers = lingers || nearest >= NEAR;
         rests = nearest >= RESOLVED;
     }
     // What rests at a cycle is held there by rounding: its growth is no chaos.
@@ -359,9 +351,10 @@ fn judge_lag(found: u32) -> bool {
     tally.streak = select(1u, tally.streak + 1u, found == tally.candidate);
     tally.candidate = found;
     // Weak chaos contracts by chance, the oftener it is looked at: ask for more of it.
-    let more = tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
-    tally.settled = select(0u, 1u, tally.streak >= STREAK + more && has_settled(found));
-    return tally.settled != 0u || (tally.streak >= REFINABLE_STREAK + more && is_refinable(found));
+    let windows = STREAK + tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
+    let has_contracted = tally.streak >= windows;
+    tally.settled = select(0u, 1u, has_contracted && has_settled(found));
+    return has_contracted && (tally.settled != 0u || is_refinable(found));
 }
 
 // Half a period after the middle of a cycle of odd period: how far is the state from the mirror

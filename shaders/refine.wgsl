@@ -4,7 +4,7 @@
 const REFINEMENTS: u32 = 5u;
 // The cycle must lie this close to the motion, relative to it: what contracts from farther off
 // may still have a fold of the strobe map before it.
-const REACH: f32 = 0.03;
+const REACH: f32 = 0.016;
 // And from farther off than 2^-7 the strobe map must be linear between them: the first step may err
 // by 2^-5 of its length.
 const FAR: u32 = 28u;
