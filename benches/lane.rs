@@ -52,15 +52,7 @@ impl Plane {
 
     /// Integrates every cell; the seconds that it took, and what came of it.
     fn run(&self, gpu: &mut Gpu, size: &Size, exponent: bool) -> (f64, Vec<Record>) {
-        let settings = LaneSettings {
-            periods: size.periods,
-            transient_periods: 0,
-            max_period: 0,
-            early_stop: false,
-            exponent,
-            exponent_from: 0,
-            ..LaneSettings::default()
-        };
+        let settings = LaneSettings { exponent, ..LaneSettings::only(size.periods) };
         let start = Instant::now();
         let run = gpu.run(&self.flows, &self.laws, &self.lanes, &settings);
         let records = pollster::block_on(run).expect("the device runs the lanes");

@@ -1,4 +1,4 @@
-//! What the reference costs: per forcing period, per event, per flow. See `README.md`.
+//! What the reference costs: per forcing period, per event, per period of a map, per flow. See `README.md`.
 
 #![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
 
@@ -7,6 +7,7 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use rattlemap::flow::Flow;
 use rattlemap::model::{GearPair, State};
+use rattlemap::orbit::{Budget, Settings, measure};
 use rattlemap::reference::Trajectory;
 
 /// Sizes of one run.
@@ -107,6 +108,29 @@ fn per_event(c: &mut Criterion) {
     run(c, "per event", [1.0, 4.5], [], true);
 }
 
+/// Cells of a map that shows their class alone, from rest until they are decided.
+fn per_period_of_a_map(c: &mut Criterion) {
+    let cells = grid(size().side, [1.0, 12.0]);
+    let budget = Budget {
+        settings: Settings::default(),
+        early_stop: true,
+        undecided_periods: 0,
+        exponent: true,
+        shows_exponent: false,
+    };
+    let work = || -> u64 {
+        let periods = |cell: &Cell| measure(&cell.flow, cell.pair.law(), [0.0; 4], &budget).periods_run;
+        cells.iter().map(|cell| u64::from(periods(cell))).sum()
+    };
+    let periods = work();
+    println!("per period of a map: {} cells, {periods} periods", cells.len());
+    let mut group = c.benchmark_group("per period of a map");
+    group.throughput(Throughput::Elements(periods));
+    group.sample_size(10);
+    group.bench_function(format!("{} cells", cells.len()), |b| b.iter(|| black_box(work())));
+    group.finish();
+}
+
 fn flow(c: &mut Criterion) {
     let oscillator = GearPair::paper(0.5).oscillator().expect("valid parameters");
     c.bench_function("flow of one frequency", |b| b.iter(|| Flow::new(black_box(&oscillator))));
@@ -116,6 +140,6 @@ criterion_group! {
     name = benches;
     // Its plots want fonts of the system, which the figures do without.
     config = Criterion::default().without_plots();
-    targets = per_period, per_period_with_tangent, per_event, flow
+    targets = per_period, per_period_with_tangent, per_event, per_period_of_a_map, flow
 }
 criterion_main!(benches);

@@ -135,23 +135,7 @@ fn expand_short() {
     x_terms[1] = q[3];
     var load_gap = g[5];
     var load_x = r[5];
-    //% for k in 0..SHORT_TERMS-2
-    {
-        let z = gap_terms[$k];
-        let w = $(k+1).0 * gap_terms[$(k+1)];
-        let x = x_terms[$k];
-        let v = $(k+1).0 * x_terms[$(k+1)];
-        let next: Real = 1.0 / ($(k+1).0 * $(k+2).0);
-        gap_terms[$(k+2)] = next * (((g[0] * z + g[2] * x) + (g[1] * w + g[3] * v)) + (g[4] * c + load_gap));
-        x_terms[$(k+2)] = next * (((r[0] * z + r[2] * x) + (r[1] * w + r[3] * v)) + (r[4] * c + load_x));
-        load_gap = 0.0;
-        load_x = 0.0;
-        let turn = angle * (1.0 / $(k+1).0);
-        let turned = -turn * s;
-        s = turn * c;
-        c = turned;
-    }
-    //% end
+    //% again expand for k in 0..SHORT_TERMS-2
 }
 
 // How long the flight from the wall lasts, in steps; 0 if it is not short.

@@ -30,7 +30,7 @@ fn scan() -> u32 {
     let m = here.step;
     let row = here.gap_row;
     let growth = here.growth;
-    let less = here.turn_less;
+    let half = here.turn_half;
     let sine = here.turn_sin;
     let share = here.share;
     let substeps = here.substeps;
@@ -81,8 +81,12 @@ fn scan() -> u32 {
         let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + m[13]));
         let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + m[20]));
         let v1 = v + (((m[21] * z + m[22] * w) + (m[23] * x + m[24] * v)) + ((m[25] * c + m[26] * s) + m[27]));
-        let c1 = c + (less * c - sine * s);
-        let s1 = s + (sine * c + less * s);
+        // The turn as three shears. Its two sums of products, `c + ((cos - 1) c - sin s)`, drivers
+        // put together anew, and `c + (cos - 1) c` loses what is below rounding, the same way at
+        // every step.
+        let sheared = c - half * s;
+        let s1 = s + sine * sheared;
+        let c1 = sheared - half * s1;
         let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + row[5]);
         let bound1 = bound + growth;
         if !(room(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {

@@ -15,9 +15,9 @@ struct Domain {
     energy: array<Real, 6>,
     // Growth per step of that bound for n = 5.
     growth: Real,
-    // Forcing angle of one step, cos - 1 of it and sin of it.
+    // Forcing angle of one step, tan of half of it and sin of it.
     angle: Real,
-    turn_less: Real,
+    turn_half: Real,
     turn_sin: Real,
     // Free steps per step of this domain: a power of two, at most 1.
     share: Real,

@@ -146,7 +146,7 @@ fn glide(flown: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
     var v = u[3];
     var sum = u;
     // (z, w, x, v) are the derivatives of order k, k + 1 times tau^k / k!.
-    //% for k in 1..TERMS
+    //% for k in 1..TERMS: glide
     {
         let step = tau * (1.0 / $k.0);
         let a = (g[0] * z + g[2] * x) + (g[1] * w + g[3] * v);
@@ -173,21 +173,7 @@ fn glide_short(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
     var x = u[2];
     var v = u[3];
     var sum = u;
-    //% for k in 1..SHORT_TERMS
-    {
-        let step = tau * (1.0 / $k.0);
-        let a = (g[0] * z + g[2] * x) + (g[1] * w + g[3] * v);
-        let b = (r[0] * z + r[2] * x) + (r[1] * w + r[3] * v);
-        z = step * w;
-        x = step * v;
-        w = step * a;
-        v = step * b;
-        sum[0] += z;
-        sum[1] += w;
-        sum[2] += x;
-        sum[3] += v;
-    }
-    //% end
+    //% again glide for k in 1..SHORT_TERMS
     return sum;
 }
 

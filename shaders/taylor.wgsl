@@ -21,7 +21,7 @@ fn expand() {
     x_terms[1] = share * q[3];
     var load_gap = g[5];
     var load_x = r[5];
-    //% for k in 0..TERMS-2
+    //% for k in 0..TERMS-2: expand
     {
         let z = gap_terms[$k];
         let w = $(k+1).0 * gap_terms[$(k+1)];

@@ -11,6 +11,6 @@ pub(crate) fn run(ask: &Bench) -> Result<(), Failure> {
     match ask {
         Bench::WorkPrecision(ask) => work_precision::run(ask),
         Bench::Engines(ask) => engines::run(ask),
-        Bench::Stability(ask) => stability::run(&ask.run),
+        Bench::Stability(ask) => stability::run(ask),
     }
 }

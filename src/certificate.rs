@@ -89,6 +89,30 @@ impl Bernstein {
         Bernstein { start, low, high }
     }
 
+    /// Whether the function surely stays above `floor` and below `ceiling` on the step, leaving out
+    /// the first `order` coefficients as [`range`](Self::range) does: compares instead of extremes.
+    #[inline(always)]
+    pub(crate) fn between(&self, order: usize, remainder: f64, floor: f64, ceiling: f64) -> [bool; 2] {
+        let blur = MIDDLE * f64x4::splat(remainder);
+        let mut low = self.low;
+        if order > 1 {
+            let [_, c2, c3, c4] = low.to_array();
+            low = f64x4::from([c2, c2, c3, c4]);
+        }
+        let rounding = ROUNDING * (self.start.abs() + self.end().abs());
+        let (least, most) = ((floor - self.start) + rounding, (ceiling - self.start) - rounding);
+        let (floor, ceiling) = (f64x4::splat(least), f64x4::splat(most));
+        let above = bits((low - blur).cmp_gt(floor), self.high.cmp_gt(floor));
+        let below = bits((low + blur).cmp_lt(ceiling), self.high.cmp_lt(ceiling));
+        [above == ALL && (order > 0 || least < 0.0), below == ALL && (order > 0 || most > 0.0)]
+    }
+
+    /// The value at the end of the step.
+    #[inline(always)]
+    pub(crate) fn end(&self) -> f64 {
+        self.start + self.high.to_array()[1]
+    }
+
     /// Lowest and highest value that the function can take on the step, leaving out the first
     /// `order` coefficients: the quick test, good for both walls at once.
     ///
@@ -104,13 +128,15 @@ impl Bernstein {
         }
         let lowest = smallest((low - blur).fast_min(self.high));
         let highest = -smallest((-(low + blur)).fast_min(-self.high));
-        let end = self.start + self.high.to_array()[1];
-        let rounding = ROUNDING * (self.start.abs() + end.abs());
+        let rounding = ROUNDING * (self.start.abs() + self.end().abs());
         let (least, most) =
             if order > 0 { (lowest, highest) } else { (lower(lowest, 0.0), upper(highest, 0.0)) };
         [self.start + (least - rounding), self.start + (most + rounding)]
     }
 }
+
+/// The middle one of `c_1 .. c_4`.
+const MIDDLE: f64x4 = f64x4::new([0.0, 0.0, 1.0, 0.0]);
 
 /// The smallest of four numbers.
 #[inline(always)]

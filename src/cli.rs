@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use rattlemap::bench::stability::Part;
 use rattlemap::bench::work_precision::measure::Method;
 use rattlemap::gpu::Precision;
 use rattlemap::model::State;
@@ -118,6 +119,16 @@ pub(crate) struct Engines {
 pub(crate) struct Stability {
     #[command(flatten)]
     pub(crate) run: BenchOptions,
+
+    /// Run this part, and others named so; all unless given. fuzz, random parameters, takes longest
+    #[arg(long = "part", value_name = "NAME", value_parser = part)]
+    pub(crate) parts: Vec<Part>,
+}
+
+fn part(text: &str) -> Result<Part, String> {
+    let names = Part::ALL.map(Part::name);
+    let named = Part::ALL.into_iter().find(|part| part.name() == text);
+    named.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
 }
 
 /// Where measurements go, and how thorough they are.

@@ -38,6 +38,7 @@
 //! motion is slow: a stiff meshing spring that is not excited does not shorten the step.
 
 mod arc;
+mod brief;
 mod columns;
 mod course;
 mod energy;
@@ -46,7 +47,8 @@ mod linear;
 
 use nalgebra::Matrix2;
 
-pub(crate) use arc::{Arc, REACH, TERMS};
+pub(crate) use arc::{Arc, REACH, TERMS, turned};
+pub(crate) use brief::BRIEF;
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
 

@@ -169,7 +169,9 @@ pub struct LaneSettings {
     pub exponent_from: u32,
     /// The first period at which chaos may be called, with early stops.
     pub chaos_from: u32,
-    /// Free steps per period at least; none for as many as the motion needs.
+    /// Free steps per period at least; none for as many as the motion needs. More gain nothing:
+    /// roundings add up like a random walk, and a short flight between impacts that spans
+    /// several steps is known to the rounding of the gap, no longer to its own.
     pub steps_per_period: Option<u32>,
     /// Lanes per batch at most; none for what the adapter's limits allow.
     pub batch: Option<usize>,
@@ -205,6 +207,22 @@ impl Default for LaneSettings {
             workgroup: WORKGROUP,
             passes_per_period: MOST_STEPS,
             events_per_period: 10_000,
+        }
+    }
+}
+
+impl LaneSettings {
+    /// So many periods from the start and nothing else: no cycle is looked for, no exponent
+    /// taken, and no lane ends early.
+    pub fn only(periods: u32) -> Self {
+        LaneSettings {
+            periods,
+            transient_periods: 0,
+            max_period: 0,
+            early_stop: false,
+            exponent: false,
+            exponent_from: 0,
+            ..LaneSettings::default()
         }
     }
 }

@@ -230,8 +230,12 @@ fn refinement(refined: &Refined, count: usize) -> String {
     let audit = refined.audits.last().map_or(String::new(), |audit| {
         let [low, high] = audit.interval().map(|rate| 100.0 * rate);
         let (wrong, sampled, rate) = (audit.wrong, audit.sampled, 100.0 * audit.rate());
+        let words = match (audit.wrong_words, audit.words) {
+            (_, 0) => String::new(),
+            (wrong, words) => format!(", and {wrong} of {words} filled words"),
+        };
         format!(
-            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %)"
+            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}"
         )
     });
     format!(

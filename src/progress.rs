@@ -63,6 +63,14 @@ impl Progress {
         }
     }
 
+    /// Says something else meanwhile.
+    pub(crate) fn suspend(&self, say: impl FnOnce()) {
+        match self {
+            Progress::Bar(bar) => bar.suspend(say),
+            Progress::Quiet | Progress::Lines(_) => say(),
+        }
+    }
+
     /// Clears the bar, if there is one, and says one last line unless quiet.
     pub(crate) fn finish(&self, line: &str) {
         match self {

@@ -69,3 +69,11 @@ pub struct Record {
     /// Reserved; zero.
     pub reserved: [u32; 8],
 }
+
+impl Record {
+    /// Whether it was seen to have neither impacts nor meshing; both must have been asked for.
+    pub fn is_contact_free(&self) -> bool {
+        let seen = valid::IMPACTS | valid::MESH;
+        self.valid & seen == seen && self.impacts_per_period == 0.0 && self.mesh_fraction == 0.0
+    }
+}

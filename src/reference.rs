@@ -8,12 +8,14 @@
 //! # What it costs
 //!
 //! A clear step is four 4 x 7 products: its end, its bound and its certificate; an event adds
-//! ten, a search on one short polynomial, and the contact law.
+//! ten, a search on one short polynomial, and the contact law. A flight pressed back to its wall
+//! before it has gone far is six in all, and its own series is its certificate.
 //!
 //! # How it can end
 //!
 //! Every loop has a cap and every ending a name: see [`Stop`].
 
+mod brief;
 mod chatter;
 mod clock;
 mod contact;
@@ -150,6 +152,8 @@ pub struct Trajectory<'f, const N: usize = 0> {
     origin: Option<Side>,
     /// The wall the gap starts from, and the order of that root of the distance.
     from_wall: Option<(Side, usize)>,
+    /// Whether the flight that begins here promises to be brief.
+    brief: bool,
     /// A contact to act on before anything else: a start on a wall.
     pending: Option<Side>,
     q: Gap,
@@ -202,6 +206,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: Mode::Free,
             origin: None,
             from_wall: None,
+            brief: false,
             pending: None,
             q: flow.to_gap(y),
             phasor: [1.0, 0.0],
@@ -229,6 +234,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: self.mode,
             origin: self.origin,
             from_wall: self.from_wall,
+            brief: self.brief,
             pending: self.pending,
             q: self.q,
             phasor: self.phasor,
@@ -255,9 +261,21 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             mode: self.mode,
             origin: self.origin,
             from_wall: None,
+            brief: false,
             pending: None,
             ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
         }
+    }
+
+    /// Multiplies the state by `1 + shares`, as rounding would in the coordinates of a lane: the
+    /// gap, from its wall while the teeth mesh, its rate, and `x2`, `v2`. A gap that is just leaving
+    /// a wall stays on it.
+    pub(crate) fn shake(&mut self, shares: [f64; 4]) {
+        let wall = self.meshing().map_or(0.0, |side| self.flow.wall(side));
+        if self.from_wall.is_none() {
+            self.q[0] += shares[0] * (self.q[0] - wall);
+        }
+        (1..4).for_each(|i| self.q[i] += shares[i] * self.q[i]);
     }
 
     /// The flow it follows.
@@ -380,6 +398,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         let flow = self.flow;
         let linear = flow.domain(self.mode.domain());
+        if std::mem::take(&mut self.brief) && self.fly_back(linear, until, observer)? {
+            return Ok(());
+        }
         let slot = usize::from(self.mode != Mode::Free);
         let mut level = self.level[slot];
         loop {

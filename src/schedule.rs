@@ -245,6 +245,25 @@ mod tests {
         assert_eq!(wrong(&records, 241, one), 0, "{refined:?}");
     }
 
+    /// A plain region does not pay for what is wrong elsewhere.
+    #[test]
+    fn only_what_is_wrong_too_often_is_refined_further() {
+        let islands = |i: usize, j: usize| match (i < 121, i % 16, j % 16) {
+            (true, ..) => 1,
+            (false, 2..7, 3..9) => 5,
+            (false, ..) => 2,
+        };
+        let plan = plan([241, 241], "minimum_grid = 16\nmax_error = 0.01");
+        let (records, refined) = run(&plan, islands);
+        assert!(refined.audits.len() > 1 && refined.audits[0].rate() > 0.02);
+        assert!(wrong(&records, 241, islands) <= refined.filled / 100, "{refined:?}");
+        // Centres of the plain region's blocks: a few are audited, none is asked for by a halving.
+        let centres = (8..241).step_by(16).flat_map(|j| (8..96).step_by(16).map(move |i| 241 * j + i));
+        let (all, integrated) =
+            (centres.clone().count(), centres.filter(|&id| records[id].periods_run > 0).count());
+        assert!(4 * integrated < all, "{integrated} of {all}");
+    }
+
     #[test]
     fn rounds_bound_the_refinement() {
         let plan = plan([129, 129], "minimum_grid = 16\nrounds = 2\nmax_error = 0.9\naudit = 1");

@@ -12,7 +12,7 @@ mod newton;
 
 pub use exponent::Exponent;
 pub(crate) use exponent::FRESH_TANGENT;
-pub(crate) use newton::refine_near;
+pub(crate) use newton::refine_nearby;
 pub use newton::{pitchfork, refine};
 
 use nalgebra::linalg::Schur;

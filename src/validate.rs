@@ -28,8 +28,10 @@ pub use sample::{Pick, Sample, Stratum, StratumCount, sample};
 pub use states::{Quantiles, StateCheck, StateSource};
 
 use crate::gpu::Precision;
+use crate::orbit::Measured;
 use crate::plan::Plan;
 use crate::record::Record;
+use answer::{Answer, Bars};
 use case::Case;
 use states::Errors;
 
@@ -159,10 +161,16 @@ pub fn replay(
     }
 }
 
-/// Where the record of one cell differs from the reference, without asking why.
-pub fn differences(subject: &Subject<'_>, id: u32) -> Vec<Difference> {
-    let case = Case::new(subject, id, None);
-    case.truth.compare(case.record, &case.bars).into_iter().filter_map(|(_, differs)| differs).collect()
+/// Where a record differs from what was measured on the reference within the same budget,
+/// without asking why.
+pub fn disagreements(
+    measured: &Measured,
+    record: &Record,
+    precision: Precision,
+    forcing_period: f64,
+) -> Vec<Difference> {
+    let compared = Answer::from(measured).compare(record, &Bars::new(precision, forcing_period));
+    compared.into_iter().filter_map(|(_, differs)| differs).collect()
 }
 
 fn replay_cell(subject: &Subject<'_>, id: u32, lane: Option<&Record>) -> Replayed {

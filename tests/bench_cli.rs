@@ -76,9 +76,11 @@ fn engines_agree_and_say_where_their_time_goes() {
 #[test]
 fn stability_judges_every_part_and_writes_its_folder() {
     let folder = tempfile::tempdir().unwrap();
-    let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder.path()).args(["bench", "stability", "--quick"]);
-    let said = command.assert().success().stdout("").get_output().stderr.clone();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("rattlemap").unwrap();
+        command.current_dir(folder.path()).args(["bench", "stability", "--quick"]).args(arguments).assert()
+    };
+    let said = run(&[]).success().stdout("").get_output().stderr.clone();
     let said = String::from_utf8(said).unwrap();
     for part in ["long_runs", "impacts", "grazing", "chatter", "stiffness", "grid", "fuzz"] {
         let line = said.lines().find(|line| line.starts_with(part));
@@ -92,6 +94,18 @@ fn stability_judges_every_part_and_writes_its_folder() {
         let size = out.join(file.as_str().unwrap()).metadata().unwrap().len();
         assert!(size > 0, "{file} is empty");
     }
+
+    // Parts on their own leave nothing of the other ones behind.
+    let said =
+        run(&["--part", "grazing", "--part", "chatter", "--force"]).success().get_output().stderr.clone();
+    let said = String::from_utf8(said).unwrap();
+    let judged: Vec<&str> = said.lines().filter(|line| line.contains("holds: ")).collect();
+    assert!(judged.len() == 2 && judged[0].starts_with("grazing"), "{said}");
+    let mut names: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["chatter.csv", "grazing.csv", "grazing.png", "manifest.json"]);
+    let refused = run(&["--part", "grinding", "--force"]).code(2).get_output().clone();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("long_runs, impacts"), "{refused:?}");
 }
 
 #[test]

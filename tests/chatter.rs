@@ -37,18 +37,6 @@ fn run(gpu: &mut Gpu, pairs: &[GearPair], settings: &LaneSettings) -> Vec<Record
     pollster::block_on(gpu.run(&flows, &laws, &lanes, settings)).unwrap()
 }
 
-/// So many periods and nothing else.
-fn only(periods: u32) -> LaneSettings {
-    LaneSettings {
-        periods,
-        transient_periods: 0,
-        max_period: 0,
-        early_stop: false,
-        exponent: false,
-        ..LaneSettings::default()
-    }
-}
-
 /// The reference after the horizon, and its impacts.
 fn reference(pair: &GearPair) -> Result<(State, u64), Stop> {
     let flow = flow_of(pair);
@@ -101,10 +89,10 @@ fn chatter_is_that_of_the_reference() {
     let truth: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap()).collect();
     for precision in Precision::ALL {
         let mut gpu = open(precision);
-        let records = run(&mut gpu, &cells, &only(HORIZON));
-        let ordinary = run(&mut gpu, &cells, &LaneSettings { chatter: false, ..only(HORIZON) });
+        let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
+        let ordinary = run(&mut gpu, &cells, &LaneSettings { chatter: false, ..LaneSettings::only(HORIZON) });
         gpu.rewrite_shaders(counting("follow_chatter"));
-        let followed = run(&mut gpu, &cells, &only(HORIZON));
+        let followed = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
         let bars: Vec<_> = cells.par_iter().map(|pair| bar(pair, precision)).collect();
         let (mut short, mut all) = ([0.0; MESH_SPEEDS.len()], [0.0; MESH_SPEEDS.len()]);
         let mut errors = [Vec::new(), Vec::new()];
@@ -201,9 +189,9 @@ fn errors_stay_below_the_stated_bound() {
     // ULP is left out at this length; the terms, less two, are the power with which it grows.
     for (precision, short, power) in [(Precision::F32, 0.198, 6), (Precision::F64, 0.191, 11)] {
         let mut gpu = open(precision);
-        let shipped = run(&mut gpu, &cells, &only(HORIZON));
+        let shipped = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
         gpu.rewrite_shaders(too_long);
-        let records = run(&mut gpu, &cells, &only(HORIZON));
+        let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
         let left_out = ulp(precision) * f64::powi(0.8 / short, power);
         let mut beyond = 0;
         for ((record, shipped), pair) in records.iter().zip(&shipped).zip(&cells) {
@@ -244,7 +232,7 @@ fn errors_fall_by_the_order_of_the_series() {
     for (order, forms) in forms {
         let errors = forms.map(|form| {
             gpu.rewrite_shaders(form);
-            let records = run(&mut gpu, &cells, &only(HORIZON));
+            let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
             records.iter().zip(&truth).map(|(r, truth)| apart(&r.strobe, truth)).collect::<Vec<_>>()
         });
         let slopes: Vec<f64> = (0..cells.len()).map(|i| 0.5 * (errors[0][i] / errors[2][i]).log2()).collect();

@@ -82,14 +82,7 @@ fn lanes_do_as_much_work_as_before() {
     let flows = pairs.map(|pair| pair.oscillator().unwrap());
     let laws = pairs.map(|pair| pair.law());
     let lanes: Vec<_> = (0..pairs.len() as u32).map(|i| Lane { flow: i, law: i, start: REST }).collect();
-    let settings = LaneSettings {
-        periods: SETTLING + COUNTED,
-        transient_periods: SETTLING,
-        max_period: 0,
-        early_stop: false,
-        exponent: false,
-        ..LaneSettings::default()
-    };
+    let settings = LaneSettings { transient_periods: SETTLING, ..LaneSettings::only(SETTLING + COUNTED) };
     let mut rows = Vec::new();
     for precision in Precision::ALL {
         let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();

@@ -28,18 +28,6 @@ fn run(gpu: &mut Gpu, cells: &[(GearPair, State)], settings: &LaneSettings) -> V
     pollster::block_on(gpu.run(&flows, &laws, &lanes, settings)).unwrap()
 }
 
-fn periods(periods: u32) -> LaneSettings {
-    // So many periods and nothing else.
-    let only = LaneSettings {
-        transient_periods: 0,
-        max_period: 0,
-        early_stop: false,
-        exponent: false,
-        ..LaneSettings::default()
-    };
-    LaneSettings { periods, ..only }
-}
-
 /// Strobe states of the reference after `periods` and one more.
 fn reference(pair: &GearPair, start: State, periods: u32) -> [State; 2] {
     let flow = Flow::new(&pair.oscillator().unwrap());
@@ -84,7 +72,7 @@ fn sensitivity(pair: &GearPair, horizon: u32, precision: Precision) -> f64 {
 fn check(cells: &[(GearPair, State)], horizon: u32, bar: impl Fn(Precision) -> f64) {
     let truth: Vec<_> = cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
     for precision in Precision::ALL {
-        let records = run(&mut open(precision), cells, &periods(horizon));
+        let records = run(&mut open(precision), cells, &LaneSettings::only(horizon));
         for ((record, truth), (pair, start)) in records.iter().zip(&truth).zip(cells) {
             let at = format!("{precision:?}, e = {}, omega = {} from {start:?}", pair.e, pair.omega);
             assert_eq!(record.status, Status::Ok.code(), "{at}");
@@ -114,7 +102,7 @@ fn stable_cells_of_the_plane_agree() {
     for (precision, median_bar, bar_99, worst_bar) in
         [(Precision::F64, 1e-12, 1e-10, 1e-9), (Precision::F32, 2e-6, 2e-4, 1e-3)]
     {
-        let records = run(&mut open(precision), &cells, &periods(HORIZON));
+        let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
         let mut errors: Vec<_> = records
             .iter()
             .zip(&truth)
@@ -194,10 +182,10 @@ fn closed_chatter_agrees() {
             impacts.0
         })
         .collect();
-    let meshing = run(&mut open(Precision::F64), &cells, &periods(HORIZON));
+    let meshing = run(&mut open(Precision::F64), &cells, &LaneSettings::only(HORIZON));
     assert!(meshing.iter().filter(|record| record.mesh_fraction > 0.0).count() > 10, "too little chatter");
     for precision in Precision::ALL {
-        let records = run(&mut open(precision), &cells, &periods(HORIZON));
+        let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
         for ((record, &impacts), (pair, _)) in records.iter().zip(&truth).zip(&cells) {
             let counted = record.impacts_per_period * f64::from(HORIZON);
             let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
@@ -244,7 +232,7 @@ fn a_graze_is_neither_missed_nor_made_up() {
             let start = if sign > 0.0 { [0.0; 4] } else { start };
             let truth = reference(&grazing, start, 2)[0];
             for precision in Precision::ALL {
-                let record = run(&mut open(precision), &[(grazing, start)], &periods(2))[0];
+                let record = run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
                 let error = apart(&record.strobe, &truth);
                 assert!(error < bar(precision), "{precision:?}, {hair} {sign}: {error:.2e}");
                 if sign < 0.0 {
@@ -315,8 +303,8 @@ fn hostile_lanes_end_in_a_status() {
     }
     for precision in Precision::ALL {
         let mut gpu = open(precision);
-        let alone = run(&mut gpu, &ordinary, &periods(5));
-        let together = run(&mut gpu, &mixed, &periods(5));
+        let alone = run(&mut gpu, &ordinary, &LaneSettings::only(5));
+        let together = run(&mut gpu, &mixed, &LaneSettings::only(5));
         for (i, record) in alone.iter().enumerate() {
             let at = if i <= hostile.len() { 2 * i } else { i + hostile.len() };
             assert!(*record == together[at], "{precision:?}: ordinary lane {i} was disturbed");

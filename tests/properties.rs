@@ -273,6 +273,45 @@ fn a_stiff_flight_late_in_a_period_ends_where_it_says() {
     free_flights_hold(&pair, [start, 0.0, start, 0.0]).expect("a flight that ends where it says");
 }
 
+/// Meshing starts with hardly any pressing left: where that ceases hangs on rounding, but it does.
+#[test]
+fn pressing_that_hardly_begins_ceases() {
+    let pair = GearPair {
+        m1: 0.360_926_782_500_657_3,
+        m2: 1.279_671_013_419_157,
+        r1: 3.321_036_086_643_82,
+        r2: 0.0,
+        k1: 0.0,
+        k2: 0.0,
+        r: 4.906_999_323_832_98,
+        k: 94.331_105_298_561_91,
+        force: 12.159_123_368_975_937,
+        omega: 6.696_986_044_308_057,
+        b: 0.056_905_186_449_552_28,
+        e: 0.285_430_285_787_210_1,
+        mesh_speed: 0.043_454_217_307_052_935,
+    };
+    let start =
+        [0.385_414_006_558_098_93, 3.661_243_976_023_188_7, 0.328_508_820_108_546_65, 3.661_243_974_235_642];
+    let mut ceased = 0;
+    // Pressing from 1e-13 to 1e-3 of the acceleration; 0 is where it was found not to end.
+    for k in 0..=400 {
+        let more = if k == 0 { 0.0 } else { 10f64.powf(-13.0 + f64::from(k) / 40.0) };
+        let pair = GearPair { force: pair.force * (1.0 + more), ..pair };
+        let flow = flow_of(&pair);
+        let events = events_of(&flow, &pair, start, 1).expect("no stop");
+        let meshing = flow.domain(DomainKind::Meshing(Side::Right));
+        let ends = |event: &&Happening| event.kind == EventKind::MeshEnd && event.side == Side::Right;
+        for end in events.iter().filter(ends).filter(|end| end.before[0] < pair.b) {
+            let (sin, cos) = (pair.omega * end.t).sin_cos();
+            let pressing = meshing.acceleration(&end.before, &[cos, sin]);
+            assert!(pressing.abs() < 1e-12 * pair.force / pair.m1, "{pressing:e} left: {end:?}");
+            ceased += 1;
+        }
+    }
+    assert!(ceased > 100, "{ceased}");
+}
+
 /// Cells are independent: the number of threads changes no bit of any result.
 #[test]
 fn threads_change_no_bit() {

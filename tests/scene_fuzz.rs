@@ -5,10 +5,11 @@ use proptest::prelude::*;
 use rattlemap::model::{GearPair, Parameter};
 use rattlemap::scene::{Axis, Place, Problem, Purpose, Scene, SceneError, Steps};
 
-const SCENES: [&str; 3] = [
+const SCENES: [&str; 4] = [
     include_str!("../scenes/e_omega.toml"),
     include_str!("../scenes/paper_fig5.toml"),
     include_str!("../scenes/smoke.toml"),
+    include_str!("../scenes/adaptive.toml"),
 ];
 
 /// Values of every type, most of them out of place.
@@ -47,7 +48,7 @@ const VALUES: [&str; 28] = [
 fn names() -> Vec<&'static str> {
     let fields = "title model parameters axis integration start refine outputs parameter min max count \
                   steps_per_period transient_periods observed_periods early_stop undecided_periods max_period policy \
-                  state minimum_grid rounds max_error audit continuous quantities files axis.0.min axis.1.count \
+                  state minimum_grid rounds max_error audit word continuous quantities files axis.0.min axis.1.count \
                   axis.9.min integration.max_period K Omega eps \u{3c9} a.b.c";
     fields.split_whitespace().chain(GearPair::PARAMETERS.iter().map(|p: &Parameter| p.name)).collect()
 }

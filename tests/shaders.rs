@@ -78,7 +78,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 layout::Domain,
                 real,
                 8,
-                [step, gap_row, x_row, energy, growth, angle, turn_less, turn_sin, share, substeps]
+                [step, gap_row, x_row, energy, growth, angle, turn_half, turn_sin, share, substeps]
             );
             same_layout!(
                 module,

@@ -17,7 +17,7 @@ fn holds(verdict: &Verdict) {
 
 #[test]
 fn errors_do_not_grow_with_time() {
-    let rows = stability::long_runs::measure(Size::Small, &mut lanes()).unwrap();
+    let rows = stability::long_runs::measure(Size::Small, &mut lanes(), &()).unwrap();
     rows.iter().for_each(|row| println!("{row:?}"));
     holds(&stability::long_runs::judge(&rows));
 }
@@ -52,7 +52,7 @@ fn stiff_meshing_costs_steps_and_nothing_else() {
 
 #[test]
 fn no_grid_is_too_coarse_to_see_an_event() {
-    let rows = stability::grid::measure(Size::Small, SEED, &mut lanes()).unwrap();
+    let rows = stability::grid::measure(Size::Small, SEED, &mut lanes(), &()).unwrap();
     rows.swings.iter().for_each(|row| println!("{row:?}"));
     rows.motions.iter().for_each(|row| println!("{row:?}"));
     holds(&stability::grid::judge(&rows));
@@ -60,7 +60,7 @@ fn no_grid_is_too_coarse_to_see_an_event() {
 
 #[test]
 fn random_parameters_end_as_on_the_reference() {
-    let rows = stability::fuzz::measure(Size::Small, SEED, &mut lanes()).unwrap();
+    let rows = stability::fuzz::measure(Size::Small, SEED, &mut lanes(), &()).unwrap();
     rows.counts.iter().for_each(|row| println!("{row:?}"));
     rows.mismatches.iter().for_each(|row| println!("{row:?}"));
     holds(&stability::fuzz::judge(&rows));

@@ -16,12 +16,58 @@ pub mod impacts;
 mod lanes;
 pub mod long_runs;
 mod readout;
+mod shaken;
 pub mod stiffness;
 
 pub use cells::EngineName;
 pub use lanes::Lanes;
 
 use crate::gpu::GpuError;
+
+/// One of the seven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// [`long_runs`].
+    LongRuns,
+    /// [`impacts`].
+    Impacts,
+    /// [`grazing`].
+    Grazing,
+    /// [`chatter`].
+    Chatter,
+    /// [`stiffness`].
+    Stiffness,
+    /// [`grid`].
+    Grid,
+    /// [`fuzz`].
+    Fuzz,
+}
+
+impl Part {
+    /// Every part, in the order in which they run.
+    pub const ALL: [Part; 7] = [
+        Part::LongRuns,
+        Part::Impacts,
+        Part::Grazing,
+        Part::Chatter,
+        Part::Stiffness,
+        Part::Grid,
+        Part::Fuzz,
+    ];
+
+    /// Its name on the command line and in file names.
+    pub fn name(self) -> &'static str {
+        match self {
+            Part::LongRuns => "long_runs",
+            Part::Impacts => "impacts",
+            Part::Grazing => "grazing",
+            Part::Chatter => "chatter",
+            Part::Stiffness => "stiffness",
+            Part::Grid => "grid",
+            Part::Fuzz => "fuzz",
+        }
+    }
+}
 
 /// How much of everything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,55 +102,76 @@ pub struct Verdict {
     pub sentence: String,
 }
 
-/// The rows of every part and what they come to.
-#[derive(Clone, Debug)]
+/// The rows of the parts that ran and what they come to.
+#[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Errors over many periods.
-    pub long_runs: Vec<long_runs::Row>,
+    pub long_runs: Option<Vec<long_runs::Row>>,
     /// Momentum and energy at impacts.
-    pub impacts: Vec<impacts::Row>,
+    pub impacts: Option<Vec<impacts::Row>>,
     /// Approach speeds near grazing.
-    pub grazing: Vec<grazing::Row>,
+    pub grazing: Option<Vec<grazing::Row>>,
     /// Endless series of impacts.
-    pub chatter: Vec<chatter::Row>,
+    pub chatter: Option<Vec<chatter::Row>>,
     /// Stiff meshing.
-    pub stiffness: Vec<stiffness::Row>,
+    pub stiffness: Option<Vec<stiffness::Row>>,
     /// Coarse grids.
-    pub grid: grid::Rows,
+    pub grid: Option<grid::Rows>,
     /// Random parameters.
-    pub fuzz: fuzz::Rows,
-    /// One verdict per part, in this order.
+    pub fuzz: Option<fuzz::Rows>,
+    /// One verdict per part that ran, in this order.
     pub verdicts: Vec<Verdict>,
 }
 
-/// Runs every part; `tell` hears of each verdict as it falls.
+/// Who hears how a run goes.
+pub trait Watch: Sync {
+    /// Of some work, such as cells on the reference, `done` of `total` units are done; from any
+    /// thread, in any order.
+    fn progress(&self, work: &'static str, done: usize, total: usize);
+
+    /// Something was found that makes a part fail, long before its end.
+    fn found(&self, what: &str);
+
+    /// A part has ended.
+    fn judged(&self, verdict: &Verdict);
+}
+
+/// Nobody.
+impl Watch for () {
+    fn progress(&self, _: &'static str, _: usize, _: usize) {}
+
+    fn found(&self, _: &str) {}
+
+    fn judged(&self, _: &Verdict) {}
+}
+
+/// Runs the parts in `asked`.
 ///
 /// # Errors
 /// A [`GpuError`] if a device gives up.
 pub fn run(
+    asked: &[Part],
     size: Size,
     seed: u64,
     lanes: &mut Lanes,
-    tell: &mut dyn FnMut(&Verdict),
+    watch: &dyn Watch,
 ) -> Result<Report, GpuError> {
-    let mut verdicts = Vec::new();
-    let mut judged = |verdict: Verdict| {
-        tell(&verdict);
-        verdicts.push(verdict);
-    };
-    let long_runs = long_runs::measure(size, lanes)?;
-    judged(long_runs::judge(&long_runs));
-    let impacts = impacts::measure(size, seed, lanes)?;
-    judged(impacts::judge(&impacts));
-    let grazing = grazing::measure(size, seed, lanes)?;
-    judged(grazing::judge(&grazing));
-    let chatter = chatter::measure(size, lanes)?;
-    judged(chatter::judge(&chatter));
-    let stiffness = stiffness::measure(size, lanes)?;
-    judged(stiffness::judge(&stiffness));
-    let grid = grid::measure(size, seed, lanes)?;
-    judged(grid::judge(&grid));
-    let fuzz = fuzz::measure(size, seed, lanes)?;
-    judged(fuzz::judge(&fuzz));
-    Ok(Report { long_runs, impacts, grazing, chatter, stiffness, grid, fuzz, verdicts })
+    let mut report = Report::default();
+    for part in Part::ALL.into_iter().filter(|part| asked.contains(part)) {
+        let verdict = match part {
+            Part::LongRuns => {
+                let rows = report.long_runs.insert(long_runs::measure(size, lanes, watch)?);
+                long_runs::judge(rows)
+            }
+            Part::Impacts => impacts::judge(report.impacts.insert(impacts::measure(size, seed, lanes)?)),
+            Part::Grazing => grazing::judge(report.grazing.insert(grazing::measure(size, seed, lanes)?)),
+            Part::Chatter => chatter::judge(report.chatter.insert(chatter::measure(size, lanes)?)),
+            Part::Stiffness => stiffness::judge(report.stiffness.insert(stiffness::measure(size, lanes)?)),
+            Part::Grid => grid::judge(report.grid.insert(grid::measure(size, seed, lanes, watch)?)),
+            Part::Fuzz => fuzz::judge(report.fuzz.insert(fuzz::measure(size, seed, lanes, watch)?)),
+        };
+        watch.judged(&verdict);
+        report.verdicts.push(verdict);
+    }
+    Ok(report)
 }

@@ -75,7 +75,13 @@ fn processor() -> String {
 fn engines() -> Vec<Engine> {
     let most = cores();
     let mut list = vec![Engine::Cpu { threads: most }];
+    let mut cards: Vec<Card> = Vec::new();
     for adapter in pollster::block_on(gpu::adapters()) {
+        let card = [adapter.info.vendor, adapter.info.device];
+        if is_listed(card, &cards) {
+            continue;
+        }
+        cards.push(card);
         let device = gpu::describe(&adapter.info);
         let is_hardware = gpu::is_hardware(&adapter.info);
         let lanes = |precision| Engine::Gpu { precision, device: device.clone(), is_hardware };
@@ -87,6 +93,14 @@ fn engines() -> Vec<Engine> {
         threads *= 2;
     }
     list
+}
+
+/// Maker and model, 0 where an interface does not tell.
+type Card = [u32; 2];
+
+/// Whether a card has been listed by a better interface: OpenGL does not tell the model.
+fn is_listed([maker, model]: Card, cards: &[Card]) -> bool {
+    cards.iter().any(|&[other, its]| other == maker && (its == model || model == 0))
 }
 
 fn measure(
@@ -214,4 +228,18 @@ fn verdict(all: &[Series]) -> Result<(), Failure> {
     }
     let cells = unexplained.join(". ");
     Err(Failure::Run(anyhow!("cells differ from the reference without an explanation. {cells}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_card_is_measured_by_one_interface() {
+        let listed = [[0x10de, 0x2331]];
+        assert!(is_listed([0x10de, 0x2331], &listed), "the same card");
+        assert!(is_listed([0x10de, 0], &listed), "the same maker's, by an interface that tells no more");
+        assert!(!is_listed([0x10de, 0x2335], &listed), "another model");
+        assert!(!is_listed([0x1002, 0], &listed), "another maker's");
+    }
 }

@@ -1,39 +1,76 @@
-//! `rattlemap bench stability`: every part, its verdict as it falls, and the folder.
+//! `rattlemap bench stability`: the parts asked for, each verdict as it falls, and the folder.
 
+use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, anyhow};
-use rattlemap::bench::stability::{self, Lanes, Size};
+use rattlemap::bench::stability::{self, Lanes, Part, Size, Verdict, Watch};
 use rattlemap::gpu::AdapterChoice;
 use rattlemap::output::{self, Folder};
 
-use crate::cli::BenchOptions;
+use crate::cli::Stability;
 use crate::error::Failure;
+use crate::progress::Progress;
 
 /// Decides every random cell: whoever runs this meets the same ones.
 const SEED: u64 = 1;
 
-pub(crate) fn run(ask: &BenchOptions) -> Result<(), Failure> {
-    let folder = Folder::open(&ask.out("stability"), ask.force)?;
-    let (size, name) = if ask.quick { (Size::Quick, "quick") } else { (Size::Full, "full") };
+pub(crate) fn run(ask: &Stability) -> Result<(), Failure> {
+    let folder = Folder::open(&ask.run.out("stability"), ask.run.force)?;
+    let (size, name) = if ask.run.quick { (Size::Quick, "quick") } else { (Size::Full, "full") };
+    let parts = if ask.parts.is_empty() { &Part::ALL[..] } else { &ask.parts };
     let mut lanes =
         pollster::block_on(Lanes::open(&AdapterChoice::default())).context("no lanes to look at")?;
     let clock = Instant::now();
-    let report = stability::run(size, SEED, &mut lanes, &mut |verdict| {
-        if !ask.quiet || !verdict.holds {
-            let mark = if verdict.holds { "holds" } else { "FAILS" };
-            eprintln!("{:<10} {mark}: {}", verdict.part, verdict.sentence);
-        }
-    });
-    let report = report.context("a device gave up")?;
+    let teller = Teller { quiet: ask.run.quiet, work: Mutex::default() };
+    let report = stability::run(parts, size, SEED, &mut lanes, &teller).context("a device gave up")?;
     let device = lanes.device();
     let made = output::stability::Made { size: name, seed: SEED, device: &device, elapsed: clock.elapsed() };
     let files = output::stability::write(&folder, &report, &made)?;
-    if !ask.quiet {
+    if !ask.run.quiet {
         eprintln!("{}: {}", folder.path().display(), files.join(", "));
     }
     match report.verdicts.iter().filter(|verdict| !verdict.holds).count() {
         0 => Ok(()),
         failed => Err(anyhow!("{failed} of {} parts fail", report.verdicts.len()).into()),
+    }
+}
+
+/// Says how far a part has come, and what came of it.
+struct Teller {
+    quiet: bool,
+    /// What is being done.
+    work: Mutex<Option<(&'static str, Progress)>>,
+}
+
+impl Watch for Teller {
+    fn progress(&self, work: &'static str, done: usize, total: usize) {
+        let mut current = self.work.lock().expect("nobody panics while telling");
+        if current.as_ref().is_none_or(|(of, _)| *of != work) {
+            *current = Some((work, Progress::new(total, 0, work, self.quiet)));
+        }
+        if let Some((_, progress)) = &*current {
+            progress.report(done, total);
+        }
+    }
+
+    fn found(&self, what: &str) {
+        // Held, so that lines do not mix with progress.
+        let work = self.work.lock().expect("nobody panics while telling");
+        match &*work {
+            Some((_, progress)) if !self.quiet => progress.suspend(|| eprintln!("{what}")),
+            _ => eprintln!("{what}"),
+        }
+    }
+
+    fn judged(&self, verdict: &Verdict) {
+        let done = self.work.lock().expect("nobody panics while telling").take();
+        let mark = if verdict.holds { "holds" } else { "FAILS" };
+        let line = format!("{:<10} {mark}: {}", verdict.part, verdict.sentence);
+        match done {
+            Some((_, progress)) if !self.quiet => progress.finish(&line),
+            _ if !self.quiet || !verdict.holds => eprintln!("{line}"),
+            _ => {}
+        }
     }
 }

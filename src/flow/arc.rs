@@ -36,6 +36,25 @@ const MASK: u64 = 0xffff;
 const SIN: [f64; 3] = [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0];
 const COS: [f64; 4] = [0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40320.0];
 
+/// Their next terms, for angles up to 0.2.
+const SIN_TAIL: [f64; 2] = [1.0 / 362_880.0, 1.0 / 39_916_800.0];
+const COS_TAIL: [f64; 2] = [1.0 / 3_628_800.0, 1.0 / 479_001_600.0];
+
+/// The phasor after a turn by an angle of up to 0.2.
+#[inline(always)]
+pub(crate) fn turned([cos, sin]: &Phasor, angle: f64) -> Phasor {
+    let square = angle * angle;
+    let fourth = square * square;
+    let series = |a: f64, b: f64, c: f64, d: f64, e: f64| {
+        fma(fourth, fma(fourth, e, fma(-square, d, c)), fma(-square, b, a))
+    };
+    let s = angle * fma(-square, series(SIN[0], SIN[1], SIN[2], SIN_TAIL[0], SIN_TAIL[1]), 1.0);
+    let tail = fma(-square, COS_TAIL[1], COS_TAIL[0]);
+    let less =
+        -square * fma(fourth, fma(fourth, tail, fma(-square, COS[3], COS[2])), fma(-square, COS[1], COS[0]));
+    [cos + fma(less, *cos, -s * sin), sin + fma(s, *cos, less * sin)]
+}
+
 /// Propagators of a grid of instants, less the identity, and the terms of the Taylor series.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
@@ -128,8 +147,11 @@ impl Grid {
     pub(crate) fn carry<const N: usize>(&self, u: f64, tangents: [Gap; N]) -> [Gap; N] {
         let (instant, whole, part) = self.nearest(u);
         let v = u - instant;
-        let (whole, part) = (&self.wholes[whole], &self.parts[part]);
-        let here = tangents.map(|t| part.carry_tangent(&whole.carry_tangent(&t)));
+        let mut here = tangents;
+        if whole > 0 {
+            here = here.map(|t| self.wholes[whole].carry_tangent(&t));
+        }
+        here = here.map(|t| self.parts[part].carry_tangent(&t));
         Columns::carry(&self.terms, v, here)
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::{Matrix4, SMatrix};
 use wide::f64x4;
 
 use super::arc::{FINEST_PART, Grid};
+use super::brief::Brief;
 use super::columns::Columns;
 use super::course::Course;
 use super::energy::EnergyBound;
@@ -77,6 +78,8 @@ pub struct LinearFlow {
     table: Vec<Columns>,
     /// The way to any instant of the longest step.
     pub(crate) grid: Grid,
+    /// Brief flights from a wall.
+    pub(crate) brief: Brief,
     /// Columns of the vector field `(w, w', v, v')`.
     field: Columns,
     /// Rows of `z'', z''', z''''` on `a`.
@@ -125,6 +128,7 @@ impl LinearFlow {
             steps: Vec::new(),
             levels: coarse + 1 + FINE_LEVELS,
             taylor_level: coarse,
+            brief: Brief::new(&table),
             table,
             grid,
             gap_rates,

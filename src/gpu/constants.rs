@@ -205,7 +205,7 @@ fn domain(
         energy,
         growth: growth * angle.powi(5),
         angle,
-        turn_less: -2.0 * (0.5 * angle).sin().powi(2),
+        turn_half: (0.5 * angle).tan(),
         turn_sin: angle.sin(),
         share: substeps.recip(),
         substeps,

@@ -21,8 +21,8 @@ pub struct Domain {
     pub growth: f64,
     /// Forcing angle per step.
     pub angle: f64,
-    /// `cos - 1` of it.
-    pub turn_less: f64,
+    /// `tan` of half of it.
+    pub turn_half: f64,
     /// `sin` of it.
     pub turn_sin: f64,
     /// Free steps per step of this domain.

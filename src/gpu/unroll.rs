@@ -9,27 +9,65 @@
 //! //% end
 //! ```
 //!
-//! and copied out once per term before they are compiled.
+//! and copied out once per term before they are compiled. A loop with a name may be repeated
+//! elsewhere over other terms, in functions that name their variables alike:
+//!
+//! ```text
+//! //% for k in FIRST..LAST: NAME
+//! ...
+//! //% end
+//! //% again NAME for k in FIRST..LAST
+//! ```
+
+use std::collections::HashMap;
 
 /// The source with every marked loop copied out; `names` are constants that its bounds may name.
 pub(super) fn unroll(source: &str, names: &[(&str, u32)]) -> String {
     let mut out = String::with_capacity(4 * source.len());
+    let copies = |body: &[&str], range: &str| -> String {
+        indices(range, names)
+            .into_iter()
+            .flat_map(|k| body.iter().map(move |line| with_index(line, k) + "\n"))
+            .collect()
+    };
+    let mut known: HashMap<&str, Vec<&str>> = HashMap::new();
     let mut lines = source.lines();
     while let Some(line) = lines.next() {
-        let Some(header) = line.trim().strip_prefix("//% for k in ") else {
-            out.push_str(line);
-            out.push('\n');
-            continue;
-        };
-        let body: Vec<&str> = lines.by_ref().take_while(|line| line.trim() != "//% end").collect();
-        for k in indices(header, names) {
-            for line in &body {
-                out.push_str(&with_index(line, k));
+        match Marker::of(line) {
+            None => {
+                out.push_str(line);
                 out.push('\n');
             }
+            Some(Marker::Loop { range, name }) => {
+                let body: Vec<&str> = lines.by_ref().take_while(|line| line.trim() != "//% end").collect();
+                out.push_str(&copies(&body, range));
+                known.extend(name.map(|name| (name, body)));
+            }
+            Some(Marker::Again { range, name }) => out.push_str(&copies(&known[name], range)),
         }
     }
     out
+}
+
+/// A line that is not copied as it stands.
+enum Marker<'a> {
+    Loop { range: &'a str, name: Option<&'a str> },
+    Again { range: &'a str, name: &'a str },
+}
+
+impl Marker<'_> {
+    fn of(line: &str) -> Option<Marker<'_>> {
+        let marker = line.trim().strip_prefix("//% ")?;
+        let (again, header) = marker.split_once("for k in ").expect("a marker runs over k");
+        match again.strip_prefix("again ") {
+            Some(name) => Some(Marker::Again { range: header, name: name.trim() }),
+            None => {
+                let named = header.split_once(": ");
+                let (range, name) = named.map_or((header, None), |(range, name)| (range, Some(name)));
+                Some(Marker::Loop { range, name })
+            }
+        }
+    }
 }
 
 /// The values that a header runs through.
@@ -61,6 +99,8 @@ mod tests {
         let source = "a\n  //% for k in 1..TERMS-1 down\n  t[$(k+1)] = t[$k] + t[$(k-1)];\n  //% end\nb\n";
         let four = [("TERMS", 4)];
         assert_eq!(unroll(source, &four), "a\n  t[3] = t[2] + t[1];\n  t[2] = t[1] + t[0];\nb\n");
+        let named = "//% for k in 1..3: sum\ns += $k;\n//% end\nt\n//% again sum for k in 5..6\n";
+        assert_eq!(unroll(named, &four), "s += 1;\ns += 2;\nt\ns += 5;\n");
         assert_eq!(unroll("//% for k in 0..TERMS\n$k.0\n//% end", &[("TERMS", 2)]), "0.0\n1.0\n");
     }
 }

@@ -32,7 +32,7 @@ pub(super) const ON_CYCLE: f64 = 1e-8;
 pub(super) const APPROACH: f64 = 0.7;
 
 /// A trajectory farther from a cycle than this, relative to the motion, is elsewhere.
-pub(super) const WITHIN_REACH: f64 = 0.3;
+const WITHIN_REACH: f64 = 0.3;
 
 /// Looks at an approach on the way; at each the trajectory must have come nearer.
 const APPROACH_LOOKS: u32 = 4;

@@ -5,14 +5,14 @@
 //! strobe states that have passed, so that nothing is integrated ahead of the budget.
 
 use super::CHAOS_ERRORS;
-use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, WITHIN_REACH, status_of};
+use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, status_of};
 use super::approach::{LINEAR_CYCLES, is_linear};
 use super::recurrence::{Metric, NEAR, candidates, lingering};
 use super::{Budget, Orbit, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine, refine_near};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine, refine_nearby};
 use crate::word::Word;
 
 /// Periods after which an early stop is first considered; then every sixth as many more.
@@ -30,6 +30,9 @@ const NEUTRAL_ORDER: f64 = 2.0;
 
 /// Cycles, at least, over which an approach must have been seen.
 const APPROACH_CYCLES: usize = 4;
+
+/// Newton's method looks for a cycle this many times as far off as it may lie.
+const AIM: f64 = 3.0;
 
 /// What one cell showed.
 #[derive(Clone, Debug, PartialEq)]
@@ -210,10 +213,10 @@ impl<'a> Watch<'a> {
         for candidate in candidates(window, &metric, max_period) {
             let state = self.strobes[self.strobes.len() - 1];
             for map in self.analysis.maps(candidate.period) {
-                // Newton's method would go on for long about a cycle that is not there.
-                let within = |y: &State| metric.distance(&state, y) < WITHIN_REACH;
-                let refined = if is_last { refine(seed, map) } else { refine_near(seed, map, within) };
-                let Some(cycle) = refined else { continue };
+                let is_near = |y: &State| metric.distance(&state, y) < AIM * NEAR;
+                let found = if is_last { refine(seed, map) } else { refine_nearby(seed, map, is_near) };
+                // One that repels does so at any of its periods.
+                let Some(cycle) = found.filter(|cycle| cycle.spectral_radius() < 1.0) else { continue };
                 let Some(cycle) = self.analysis.smallest(seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
                 if cycle.spectral_radius() < 1.0 && distance < NEAR {

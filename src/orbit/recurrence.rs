@@ -57,13 +57,12 @@ pub(super) fn candidates(strobes: &[State], metric: &Metric, max_period: u32) ->
     let n = strobes.len();
     let mut list: Vec<Candidate> = (1..=max_period as usize)
         .take_while(|lag| 2 * lag <= n)
-        .map(|lag| Candidate {
-            period: lag as u32,
-            distance: (n - lag..n)
-                .map(|i| metric.distance(&strobes[i], &strobes[i - lag]))
-                .fold(0.0, f64::max),
+        .filter_map(|lag| {
+            let mut distances = (n - lag..n).map(|i| metric.distance(&strobes[i], &strobes[i - lag]));
+            // Most lags end here after a few strobes.
+            let distance = distances.try_fold(0.0f64, |most, d| (d < NEAR).then(|| most.max(d)))?;
+            Some(Candidate { period: lag as u32, distance })
         })
-        .filter(|candidate| candidate.distance < NEAR)
         .collect();
     // A lag that recurs ten times as well as all shorter ones is worth its own look.
     let mut best = f64::INFINITY;

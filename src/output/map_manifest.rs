@@ -95,7 +95,8 @@ pub(super) struct RefinementObject {
 }
 
 /// `rate` is the fraction of filled cells that integration shows to be wrong, `interval` its
-/// 95 % interval (Wilson).
+/// 95 % interval (Wilson); `words` of the sampled cells had been filled with a word, of which
+/// `wrong_words` were not theirs.
 #[derive(Serialize)]
 struct AuditObject {
     filled: usize,
@@ -103,6 +104,8 @@ struct AuditObject {
     wrong: usize,
     rate: f64,
     interval: [f64; 2],
+    words: usize,
+    wrong_words: usize,
 }
 
 impl From<&Refined> for RefinementObject {
@@ -113,6 +116,8 @@ impl From<&Refined> for RefinementObject {
             wrong: audit.wrong,
             rate: audit.rate(),
             interval: audit.interval(),
+            words: audit.words,
+            wrong_words: audit.wrong_words,
         };
         let Refined { integrated, filled, rounds, ref audits } = *refined;
         RefinementObject { integrated, filled, rounds, audits: audits.iter().map(audit).collect() }

@@ -11,6 +11,24 @@ use super::stability_figures as figures;
 use crate::bench::stability::{Report, Verdict, fuzz};
 use crate::model::GearPair;
 
+/// All that a folder may hold: what an earlier run left goes before anything is written.
+const FILES: [&str; 14] = [
+    MANIFEST,
+    "long_runs.csv",
+    "long_runs.png",
+    "impacts.csv",
+    "grazing.csv",
+    "grazing.png",
+    "chatter.csv",
+    "stiffness.csv",
+    "stiffness.png",
+    "grid_swings.csv",
+    "grid_motions.csv",
+    "grid.png",
+    "fuzz.csv",
+    "fuzz_mismatches.csv",
+];
+
 /// How a report was made.
 #[derive(Clone, Copy, Debug)]
 pub struct Made<'a> {
@@ -56,26 +74,40 @@ impl<'a> From<&'a Verdict> for VerdictObject<'a> {
 /// # Errors
 /// If a file cannot be written.
 pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> anyhow::Result<Vec<&'static str>> {
-    folder.remove(&[MANIFEST])?;
+    folder.remove(&FILES)?;
     let mut files = Vec::new();
     let mut file = |name: &'static str, write: &dyn Fn(&Path) -> anyhow::Result<()>| {
         files.push(name);
         folder.replace(name, write)
     };
-    file("long_runs.csv", &|path| rows(path, &report.long_runs))?;
-    file("impacts.csv", &|path| rows(path, &report.impacts))?;
-    file("grazing.csv", &|path| rows(path, &report.grazing))?;
-    file("chatter.csv", &|path| rows(path, &report.chatter))?;
-    file("stiffness.csv", &|path| rows(path, &report.stiffness))?;
-    file("grid_swings.csv", &|path| rows(path, &report.grid.swings))?;
-    file("grid_motions.csv", &|path| rows(path, &report.grid.motions))?;
-    file("fuzz.csv", &|path| rows(path, &report.fuzz.counts))?;
-    file("fuzz_mismatches.csv", &|path| mismatches(path, &report.fuzz.mismatches))?;
     let device = made.device;
-    file("long_runs.png", &|path| figures::long_runs(path, device, &report.long_runs))?;
-    file("grazing.png", &|path| figures::grazing(path, device, &report.grazing))?;
-    file("stiffness.png", &|path| figures::stiffness(path, device, &report.stiffness))?;
-    file("grid.png", &|path| figures::grid(path, device, &report.grid.swings))?;
+    if let Some(found) = &report.long_runs {
+        file("long_runs.csv", &|path| rows(path, found))?;
+        file("long_runs.png", &|path| figures::long_runs(path, device, found))?;
+    }
+    if let Some(found) = &report.impacts {
+        file("impacts.csv", &|path| rows(path, found))?;
+    }
+    if let Some(found) = &report.grazing {
+        file("grazing.csv", &|path| rows(path, found))?;
+        file("grazing.png", &|path| figures::grazing(path, device, found))?;
+    }
+    if let Some(found) = &report.chatter {
+        file("chatter.csv", &|path| rows(path, found))?;
+    }
+    if let Some(found) = &report.stiffness {
+        file("stiffness.csv", &|path| rows(path, found))?;
+        file("stiffness.png", &|path| figures::stiffness(path, device, found))?;
+    }
+    if let Some(found) = &report.grid {
+        file("grid_swings.csv", &|path| rows(path, &found.swings))?;
+        file("grid_motions.csv", &|path| rows(path, &found.motions))?;
+        file("grid.png", &|path| figures::grid(path, device, &found.swings))?;
+    }
+    if let Some(found) = &report.fuzz {
+        file("fuzz.csv", &|path| rows(path, &found.counts))?;
+        file("fuzz_mismatches.csv", &|path| mismatches(path, &found.mismatches))?;
+    }
     files.push(MANIFEST);
     let manifest = Manifest {
         head: Head::of("bench stability"),

@@ -82,6 +82,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let (sin, cos) = (flow.omega * self.clock.time()).sin_cos();
         self.phasor = [cos, sin];
         let before = self.q;
+        self.brief = false;
         self.record(EventKind::MeshStart, side, before, observer);
         self.start_meshing(side, 0.0);
     }

@@ -72,7 +72,9 @@ impl<const N: usize> Trajectory<'_, N> {
         let reset = move |u: &Gap| [u[0], -e * u[1], u[2], u[3] + kick * (1.0 + e) * u[1]];
         let after = reset(&before);
 
-        let pressed = self.presses(DomainKind::Free, side, &after);
+        let free = self.flow.domain(DomainKind::Free);
+        let pressing = side.sign() * free.acceleration(&after, &self.phasor);
+        let pressed = pressing > 0.0 || pressing == 0.0 && self.presses(DomainKind::Free, side, &after);
         let meshes = leaving <= self.law.mesh_speed
             && pressed
             && self.presses(DomainKind::Meshing(side), side, &after);
@@ -85,7 +87,6 @@ impl<const N: usize> Trajectory<'_, N> {
             (EventKind::Impact, DomainKind::Free)
         };
         if N > 0 {
-            let free = self.flow.domain(DomainKind::Free);
             let field_before = free.field(&before, &self.phasor);
             let field_after = self.flow.domain(next).field(&after, &self.phasor);
             self.saltate(reset, &ALONG_GAP, before[1], &field_before, &field_after);
@@ -94,9 +95,13 @@ impl<const N: usize> Trajectory<'_, N> {
         self.record(kind, side, before, observer);
         if meshes {
             self.start_meshing(side, leaving);
+            let meshing = self.flow.domain(DomainKind::Meshing(side));
+            let pressing = side.sign() * meshing.acceleration(&after, &self.phasor);
+            self.brief = self.promises_brief(meshing, leaving, pressing);
         } else {
             self.work.impacts += 1;
             self.leave(side);
+            self.brief = self.promises_brief(free, leaving, pressing);
             if pressed {
                 self.close_chatter(side, leaving, observer);
             }

@@ -5,8 +5,12 @@ use crate::certificate::Bracket;
 use crate::flow::{Arc, Gap, LinearFlow, Phasor, REACH, TERMS};
 use crate::fused::fma;
 
-/// Evaluations of the exact flow allowed for one root; one or two are needed.
-const ROOT_CAP: u32 = 60;
+/// Evaluations of the exact flow allowed for one root; one or two are needed, and bisection ends
+/// after 110.
+const ROOT_CAP: u32 = 120;
+
+/// Newton's method may choose where to look next so many times; then bisection does.
+const NEWTON_CAP: u32 = 8;
 
 /// A root this close to an end of its bracket, relatively, is there.
 const ENDS: f64 = 4.0 * f64::EPSILON;
@@ -84,7 +88,7 @@ impl<const N: usize> Trajectory<'_, N> {
     ) -> Option<(Arc, f64)> {
         let (mut lo, mut hi) = (h * bracket.lo, h * bracket.hi);
         let mut u = h * bracket.guess;
-        for _ in 0..ROOT_CAP {
+        for n in 0..ROOT_CAP {
             self.work.root_iterations += 1;
             let arc = linear.grid.arc(&self.q, &self.phasor, u);
             let root = match crossing {
@@ -107,7 +111,12 @@ impl<const N: usize> Trajectory<'_, N> {
             } else {
                 hi = u;
             }
-            u = if next > lo && next < hi { next } else { 0.5 * (lo + hi) };
+            // Where the slope is so small that the root hangs on rounding, Newton's steps go on
+            // for ever; bisection ends.
+            if hi - lo <= ENDS * hi.max(ENDS * h) {
+                return Some((arc, u));
+            }
+            u = if n < NEWTON_CAP && next > lo && next < hi { next } else { 0.5 * (lo + hi) };
         }
         None
     }

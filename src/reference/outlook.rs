@@ -36,24 +36,25 @@ impl<const N: usize> Trajectory<'_, N> {
         let gap = step.course.from(&self.q, &self.phasor);
         let remainder = step.u6 * linear.gap_bound.remainder(&self.q, &self.phasor, step.u);
         let order = self.from_wall.map_or(0, |(_, order)| order);
-        let [lowest, highest] = gap.range(order, remainder);
         let [right, left] = self.flow.walls;
-        let room = match self.mode {
-            Mode::Free => (right - highest).min(lowest - left),
-            Mode::Pressed(Side::Right) => lowest - right,
-            Mode::Pressed(Side::Left) => left - highest,
-            Mode::Dip(_) => 0.0,
+        let (floor, ceiling) = match self.mode {
+            Mode::Free => (left, right),
+            Mode::Pressed(Side::Right) => (right, f64::INFINITY),
+            Mode::Pressed(Side::Left) => (f64::NEG_INFINITY, left),
+            Mode::Dip(_) => (f64::INFINITY, f64::NEG_INFINITY),
         };
-        // A remainder that is not a number shows nothing.
-        if room > 0.0 && !remainder.is_nan() {
-            return Outlook::Clear { roomy: ROOMY * remainder < room };
+        let [above, below] = gap.between(order, remainder, floor, ceiling);
+        if above && below {
+            let room = ROOMY * remainder;
+            let roomy = gap.between(order, remainder, floor + room, ceiling - room) == [true; 2];
+            return Outlook::Clear { roomy };
         }
-        if self.rests(lowest, highest) {
+        if self.rests(&gap, order, remainder) {
             return Outlook::Rests;
         }
         match self.mode {
-            Mode::Free if highest < right => self.wall_ahead(&gap, Side::Left, remainder),
-            Mode::Free if lowest > left => self.wall_ahead(&gap, Side::Right, remainder),
+            Mode::Free if below => self.wall_ahead(&gap, Side::Left, remainder),
+            Mode::Free if above => self.wall_ahead(&gap, Side::Right, remainder),
             Mode::Free => first_of(
                 self.wall_ahead(&gap, Side::Right, remainder),
                 self.wall_ahead(&gap, Side::Left, remainder),
@@ -69,12 +70,14 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Whether the gap stays within rounding of a wall: teeth that rest there neither part
     /// nor press, and no step is short enough to tell which.
     #[inline(always)]
-    fn rests(&self, lowest: f64, highest: f64) -> bool {
+    fn rests(&self, gap: &Bernstein, order: usize, remainder: f64) -> bool {
+        let ends_on = |wall: f64| (gap.end() - wall).abs() < REST * wall.abs();
         let within = |wall: f64| {
             let rounding = REST * wall.abs();
+            let [lowest, highest] = gap.range(order, remainder);
             highest - wall < rounding && wall - lowest < rounding
         };
-        self.flow.walls.into_iter().any(within)
+        self.flow.walls.into_iter().any(|wall| ends_on(wall) && within(wall))
     }
 
     #[inline(always)]

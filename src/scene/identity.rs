@@ -46,6 +46,7 @@ impl Scene {
         if let Some(refine) = self.refine() {
             tell("refine.minimum_grid".into(), refine.minimum_grid.to_string());
             tell("refine.rounds".into(), refine.rounds.map_or("all".to_owned(), |n| n.to_string()));
+            tell("refine.word".into(), refine.word.to_string());
             tell("refine.max_error".into(), format!("{:?}", refine.max_error));
             tell("refine.audit".into(), refine.audit.map_or("default".to_owned(), |n| n.to_string()));
         }

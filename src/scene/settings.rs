@@ -62,6 +62,10 @@ pub struct Refine {
     /// Filled cells that one audit integrates; none for [`AUDIT`], or a quarter of the filled ones
     /// if that is less.
     pub audit: Option<u32>,
+    /// Whether a change of the word alone is a border, where the scene asks for words. At low
+    /// frequencies words change from one cell to the next but few, while class, period and
+    /// symmetry stay.
+    pub word: bool,
     /// What filled cells show of quantities that vary continuously.
     pub continuous: Continuous,
 }
@@ -196,7 +200,7 @@ fn read_max_period(section: &Section<'_>, observed_periods: u32) -> Result<u32, 
 }
 
 pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option<Refine>, SceneError> {
-    let known = ["minimum_grid", "rounds", "max_error", "audit", "continuous"];
+    let known = ["minimum_grid", "rounds", "max_error", "audit", "word", "continuous"];
     let section = root.section("refine", &known)?;
     if !section.is_present() {
         return Ok(None);
@@ -217,13 +221,14 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
     let minimum_grid = section.get("minimum_grid").map_or(Ok(8), |field| field.whole(1..=1024))?;
     let rounds = section.get("rounds").map(|field| field.whole(0..=32)).transpose()?;
     let audit = section.get("audit").map(|field| field.whole(1..=10_000_000)).transpose()?;
+    let word = section.get("word").map_or(Ok(false), |field| field.flag())?;
     let continuous = match section.get("continuous") {
         Some(field) => {
             field.choice(&[("interpolated", Continuous::Interpolated), ("empty", Continuous::Empty)])?
         }
         None => Continuous::Interpolated,
     };
-    Ok(Some(Refine { minimum_grid, rounds, max_error, audit, continuous }))
+    Ok(Some(Refine { minimum_grid, rounds, max_error, audit, word, continuous }))
 }
 
 pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {

@@ -1,18 +1,21 @@
 //! Refinement: coarse blocks first, then only those whose corners differ or that touch one
 //! whose corners do, down to single cells; then an audit of what was not integrated.
 
+use std::collections::{HashMap, HashSet};
+
 use super::audit::{Audit, sample};
 use super::blocks::{Block, coarse};
 use super::fill::filled;
-use super::label::Label;
+use super::label::{Label, word_of};
 use crate::plan::{Needs, Plan};
-use crate::record::Record;
+use crate::record::{Record, valid};
 use crate::scene::Refine;
 
 /// The state of an adaptive map between rounds.
 pub(super) struct Adaptive {
     counts: [usize; 2],
     refine: Refine,
+    /// What makes borders: what the scene asks for, words only where they are to.
     needs: Needs,
     /// By cell id; unknown where nothing was integrated.
     labels: Vec<Label>,
@@ -39,13 +42,21 @@ enum Stage {
     Done,
 }
 
+/// What an audit showed.
+struct Verdict {
+    /// Whether a cell was filled wrongly, by id.
+    wrong: Vec<bool>,
+    /// Kinds that are wrong too often; none if the audit is passed.
+    bad: HashSet<u32>,
+}
+
 impl Adaptive {
     pub(super) fn new(plan: &Plan, refine: Refine) -> Adaptive {
         let counts = plan.axes().each_ref().map(|axis| axis.count());
         Adaptive {
             counts,
             refine,
-            needs: *plan.needs(),
+            needs: Needs { word: plan.needs().word && refine.word, ..*plan.needs() },
             labels: vec![Label::default(); plan.cell_count()],
             open: coarse(counts, refine.minimum_grid as usize),
             closed: Vec::new(),
@@ -103,7 +114,7 @@ impl Adaptive {
         self.audited = sample(candidates, self.refine.audited(filled), seed);
         self.stage = if self.audited.is_empty() { Stage::Done } else { Stage::Auditing };
         if !self.audited.is_empty() {
-            self.audits.push(Audit { filled, sampled: self.audited.len(), wrong: 0 });
+            self.audits.push(Audit { filled, sampled: self.audited.len(), ..Audit::default() });
         }
         self.audited.clone()
     }
@@ -133,15 +144,34 @@ impl Adaptive {
         }
     }
 
-    /// Counts the wrong cells of an audit. Too many of them: all blocks are halved. Else only
-    /// blocks with wrong cells are cut, right there.
+    /// After an audit blocks with wrong cells are cut right there. If there are too many of them,
+    /// all blocks are halved that are filled with what is wrong too often: mostly chaos with its
+    /// windows, which the plain regions around need not pay for.
     fn judge_audit(&mut self, records: &[Record]) {
-        let mut wrong = vec![false; self.labels.len()];
-        let mut count = 0;
         let closed = std::mem::take(&mut self.closed);
+        let Verdict { wrong, bad } = self.count_wrong(&closed, records);
+        let mut halves = false;
+        for block in closed {
+            let first_wrong = block.cells().find(|&at| wrong[self.id(at)]);
+            let is_bad = block.has_inside() && bad.contains(&self.corner_labels(&block)[0].kind);
+            halves |= is_bad;
+            match first_wrong {
+                Some(at) => self.open.extend(block.cut(at)),
+                None if is_bad => self.open.extend(block.halves()),
+                None => self.closed.push(block),
+            }
+        }
+        self.stage = if halves { Stage::Halving } else { Stage::Mending };
+    }
+
+    /// Compares what was filled into the audited cells of the `closed` blocks with their records.
+    fn count_wrong(&mut self, closed: &[Block], records: &[Record]) -> Verdict {
+        let mut wrong = vec![false; self.labels.len()];
         let mut is_audited = vec![false; self.labels.len()];
-        self.audited.iter().for_each(|&id| is_audited[id as usize] = true);
-        for block in &closed {
+        self.audited.drain(..).for_each(|id| is_audited[id as usize] = true);
+        let mut audit = self.audits.pop().unwrap_or_default();
+        let mut by_kind: HashMap<u32, [usize; 2]> = HashMap::new();
+        for block in closed {
             let corners = block.corners().map(|at| &records[self.id(at)]);
             for at in block.cells() {
                 let id = self.id(at);
@@ -149,28 +179,24 @@ impl Adaptive {
                 if !std::mem::take(&mut is_audited[id]) {
                     continue;
                 }
-                let fill = Label::of(&filled(block, corners, at), &self.needs);
-                if fill != self.labels[id] {
-                    wrong[id] = true;
-                    count += 1;
+                let fill = filled(block, corners, at);
+                let label = Label::of(&fill, &self.needs);
+                wrong[id] = label != self.labels[id];
+                audit.wrong += usize::from(wrong[id]);
+                let [sampled, amiss] = by_kind.entry(label.kind).or_default();
+                *sampled += 1;
+                *amiss += usize::from(wrong[id]);
+                if fill.valid & valid::WORD != 0 {
+                    audit.words += 1;
+                    audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id]));
                 }
             }
         }
-        self.audited.clear();
-        let rate = self.audits.last_mut().map_or(0.0, |audit| {
-            audit.wrong = count;
-            audit.rate()
-        });
-        let all = rate > self.refine.max_error && closed.iter().any(Block::has_inside);
-        self.stage = if all { Stage::Halving } else { Stage::Mending };
-        for block in closed {
-            let first_wrong = block.cells().find(|&at| wrong[self.id(at)]);
-            match first_wrong {
-                Some(at) => self.open.extend(block.cut(at)),
-                None if all => self.open.extend(block.halves()),
-                None => self.closed.push(block),
-            }
-        }
+        self.audits.push(audit);
+        let max_error = self.refine.max_error;
+        let is_bad = |[sampled, amiss]: [usize; 2]| amiss as f64 > max_error * sampled as f64;
+        by_kind.retain(|_, counts| audit.rate() > max_error && is_bad(*counts));
+        Verdict { wrong, bad: by_kind.into_keys().collect() }
     }
 
     fn id(&self, [i, j]: [usize; 2]) -> usize {

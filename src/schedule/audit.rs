@@ -3,14 +3,19 @@
 use crate::random::Random;
 
 /// What an audit measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Audit {
     /// Filled cells before it.
     pub filled: usize,
     /// Cells of them that were integrated, chosen at random.
     pub sampled: usize,
-    /// Those among them that had been filled wrongly.
+    /// Those among them that had been filled wrongly: class, period, symmetry where it is
+    /// asked for, and the word where it makes borders.
     pub wrong: usize,
+    /// Those that had been filled with a word.
+    pub words: usize,
+    /// Those that had been filled with another word than their own.
+    pub wrong_words: usize,
 }
 
 /// The 97.5 % point of the normal distribution.
@@ -45,7 +50,7 @@ mod tests {
 
     #[test]
     fn intervals_are_those_of_the_textbook() {
-        let audit = |wrong, sampled| Audit { filled: 10_000, sampled, wrong };
+        let audit = |wrong, sampled| Audit { filled: 10_000, sampled, wrong, words: 0, wrong_words: 0 };
         // R: binom::binom.confint(10, 1000, methods = "wilson")
         let [low, high] = audit(10, 1000).interval();
         assert!((low - 0.005_441).abs() < 1e-5 && (high - 0.018_309).abs() < 1e-5, "{low} {high}");

@@ -1,13 +1,14 @@
 //! Filling a block whose corners agree.
 
 use super::blocks::Block;
+use super::label::word_of;
 use crate::classify::classify;
 use crate::orbit::Class;
 use crate::record::{Record, valid};
 
 /// The record of the cell `[i, j]` of a block, from the records of its corners (in the order
 /// of [`Block::corners`]): the nearest corner's, with bilinear averages of what varies
-/// continuously inside a region.
+/// continuously inside a region. A word is filled where all corners have the same.
 pub(super) fn filled(block: &Block, corners: [&Record; 4], [i, j]: [usize; 2]) -> Record {
     let share = |at: usize, [from, to]: [usize; 2]| {
         if to > from { (at - from) as f64 / (to - from) as f64 } else { 0.0 }
@@ -22,6 +23,9 @@ pub(super) fn filled(block: &Block, corners: [&Record; 4], [i, j]: [usize; 2]) -
     let common = corners.iter().fold(u32::MAX, |bits, corner| bits & corner.valid);
     record.valid &= common & !valid::STROBE;
     record.valid |= valid::FILLED;
+    if corners.iter().any(|corner| word_of(corner) != word_of(corners[0])) {
+        record.valid &= !valid::WORD;
+    }
     // Of undecided cells an average might be a decision.
     let decided = matches!(classify(&record), Class::Periodic { .. } | Class::Chaotic);
     if decided && corners.iter().all(|corner| classify(corner) == classify(&record)) {
@@ -36,6 +40,7 @@ pub(super) fn filled(block: &Block, corners: [&Record; 4], [i, j]: [usize; 2]) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::word::Word;
 
     fn corner(lyapunov: f64) -> Record {
         let valid = valid::PERIOD | valid::LYAPUNOV | valid::STROBE;
@@ -60,5 +65,20 @@ mod tests {
         let mut corners = [0.0; 4].map(corner);
         corners[3].valid &= !valid::LYAPUNOV;
         assert_eq!(filled(&block, corners.each_ref(), [0, 0]).valid & valid::LYAPUNOV, 0);
+    }
+
+    #[test]
+    fn words_are_filled_where_all_corners_agree() {
+        let block = Block { i: [0, 2], j: [0, 2] };
+        let spelled = |symbols: &[u8]| {
+            let mut record = corner(0.0);
+            record.set_word(&Word::cyclic(symbols));
+            record
+        };
+        let word = |corners: &[Record; 4]| filled(&block, corners.each_ref(), [1, 1]).word();
+        let mut corners = [spelled(b"25"); 4];
+        assert_eq!(word(&corners), corners[0].word());
+        corners[2] = spelled(b"255");
+        assert_eq!(word(&corners), None);
     }
 }

@@ -5,11 +5,10 @@ use crate::orbit::Class;
 use crate::plan::Needs;
 use crate::record::{Record, valid, word_hash};
 
-/// Class and period, and symmetry and word where they are asked for.
+/// Class, period and whether there is contact; symmetry and word where they are asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Label {
-    /// Hash of the word or of that of the mirror twin, whichever is smaller: twins coexist,
-    /// and which one a cell shows says nothing.
+    /// See [`word_of`].
     word: u64,
     /// What makes a border; 0 for a cell that nothing is known of.
     pub(super) kind: u32,
@@ -23,14 +22,20 @@ impl Label {
             Class::Chaotic => 3,
             Class::Periodic { period } => 3 + period,
         };
+        let free = u32::from(record.is_contact_free());
         let knows_symmetry = needs.symmetric && record.valid & valid::SYMMETRIC != 0;
         let symmetry = if knows_symmetry { 1 + record.symmetric } else { 0 };
-        let word = if needs.word { record.word_hash } else { 0 };
-        let twin = record.word().filter(|_| needs.word).map(|word| word_hash(word.mirrored().symbols()));
-        Label { word: twin.map_or(word, |twin| twin.min(word)), kind: 4 * class + symmetry }
+        Label { word: if needs.word { word_of(record) } else { 0 }, kind: 8 * class + 4 * free + symmetry }
     }
 
     pub(super) fn is_known(self) -> bool {
         self.kind != 0
     }
+}
+
+/// Hash of the word or of that of the mirror twin, whichever is smaller: twins coexist, and
+/// which one a cell shows says nothing. 0 where there is no word.
+pub(super) fn word_of(record: &Record) -> u64 {
+    let twin = record.word().map(|word| word_hash(word.mirrored().symbols()));
+    twin.map_or(record.word_hash, |twin| twin.min(record.word_hash))
 }

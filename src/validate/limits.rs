@@ -75,9 +75,10 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
             (!early && wanders() && is_transient() && settles()).then_some(Explanation::Chaos)
         }
         _ if !is_spent(case) => None,
-        // The reference, too, is still on its way.
+        // The reference, too, is still on its way, to a cycle that is reached from here as well.
         (Class::Undecided, Class::Periodic { .. }) if case.truth.status == Status::Slow => {
-            Some(Explanation::UndecidedInBudget)
+            let settles = case.at_leisure(from).class == case.truth.class;
+            settles.then_some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Periodic { period }) => {
             let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;

@@ -153,16 +153,7 @@ pub async fn lane_states(
     ids: &[u32],
     steps_per_period: Option<u32>,
 ) -> Result<Vec<Record>, GpuError> {
-    let settings = LaneSettings {
-        periods: HORIZON,
-        transient_periods: 0,
-        max_period: 0,
-        early_stop: false,
-        exponent: false,
-        exponent_from: 0,
-        steps_per_period,
-        ..LaneSettings::default()
-    };
+    let settings = LaneSettings { steps_per_period, ..LaneSettings::only(HORIZON) };
     run_lanes(gpu, plan, records, ids, &settings).await
 }
 

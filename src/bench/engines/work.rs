@@ -58,14 +58,7 @@ fn count(device: &mut Gpu, side: u32) -> Result<Work, GpuError> {
     let settings = LaneSettings { undecided_periods, ..LaneSettings::default() };
     let weights = pollster::block_on(run_lanes(device, &plan, &[], &ids, &settings))?;
     let weights: Vec<f64> = weights.iter().map(|record| f64::from(record.periods_run)).collect();
-    let settings = LaneSettings {
-        periods: PERIODS,
-        transient_periods: 0,
-        max_period: 0,
-        early_stop: false,
-        exponent_from: 0,
-        ..LaneSettings::default()
-    };
+    let settings = LaneSettings { exponent: true, ..LaneSettings::only(PERIODS) };
     let mut trips = [0.0; 3];
     for (mean, function) in trips.iter_mut().zip(COUNTED) {
         device.rewrite_shaders(counting(function));

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::cells::{EngineName, UNFORESEEN, after, apart, flow_of, paper, sensitivity, sensitivity_to};
 use super::lanes::{Lanes, Start, periods};
-use super::{Size, Verdict};
+use super::{Part, Size, Verdict};
 use crate::gpu::{GpuError, LaneSettings};
 use crate::model::GearPair;
 use crate::orbit::{Status, status_of};
@@ -162,7 +162,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
         })
         .collect();
     Verdict {
-        part: "chatter",
+        part: Part::Chatter.name(),
         holds: bad == 0 && foreseen > rows.len() / 3,
         sentence: format!(
             "{} series of impacts, {ok} followed to their ends ({}), the others ended by cap_events; {foreseen} \

@@ -10,6 +10,7 @@ mod compare;
 mod space;
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
@@ -18,15 +19,14 @@ use serde::Serialize;
 pub use compare::Mismatch;
 
 use super::cells::{EngineName, flow_of};
-use super::lanes::{Lanes, Start};
-use super::{Size, Verdict};
+use super::lanes::{CHUNK, Lanes, Start};
+use super::{Part, Size, Verdict, Watch};
 use crate::classify::{classify, status};
 use crate::engine::measured_record;
-use crate::gpu::{GpuError, LaneSettings};
+use crate::gpu::{GpuError, LaneSettings, Precision};
 use crate::model::GearPair;
-use crate::orbit::{Budget, Settings, Status, measure as measure_cell, status_of};
+use crate::orbit::{Budget, Measured, Settings, Status, measure as measure_cell, status_of};
 use crate::plan::Needs;
-use crate::random::Random;
 use crate::record::Record;
 use crate::reference::Trajectory;
 
@@ -36,6 +36,10 @@ pub(super) const SETTINGS: Settings =
 
 /// Periods of wild cells.
 const WILD_PERIODS: u32 = 4;
+
+/// All that a record can tell.
+const EVERYTHING: Needs =
+    Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
 
 /// A cell that takes longer than this hangs.
 const HANGS: Duration = Duration::from_secs(120);
@@ -77,31 +81,75 @@ pub struct Rows {
 ///
 /// # Errors
 /// A [`GpuError`].
-pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Rows, GpuError> {
-    let mut random = Random::new(seed);
-    let mut cells: Vec<Start> =
-        (0..size.pick(64, 1000, 100_000)).map(|_| space::bounded(&mut random)).collect();
+pub fn measure(size: Size, seed: u64, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Rows, GpuError> {
+    let mut cells = space::all_bounded(size.pick(64, 1000, 100_000), seed, watch);
     // Lanes that take as many steps run side by side.
     cells.sort_by_cached_key(|(pair, _)| space::trips(pair));
-    let ranks: Vec<u64> = cells.iter().map(|_| random.next()).collect();
     let mut rows = Rows::default();
-    let truth: Vec<Record> = cells.par_iter().with_max_len(1).map(on_reference).collect();
-    rows.count("bounded", EngineName::Reference, &truth);
+    let told = Told::new(watch, "cells on the reference", cells.len());
+    let truth = each(&cells, |cell| told.count(on_reference(cell)));
+    let records: Vec<Record> = truth.iter().map(|measured| measured_record(measured, &EVERYTHING)).collect();
+    rows.count("bounded", EngineName::Reference, &records);
+    let most = size.pick(8, 60, 1000);
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &cells, &lane_settings())?;
+        let records = on_lanes(precision, &cells, lanes, watch)?;
         rows.count("bounded", precision.into(), &records);
-        let compared = compare::all(precision, &cells, &records, &ranks, size.pick(8, 60, 1000));
+        let compared = compare::all(precision, &cells, &truth, &records, (seed, most), watch);
         rows.silent += compared.silent;
         rows.left += compared.left;
         rows.mismatches.extend(compared.mismatches);
     }
-    let wild: Vec<GearPair> = (0..size.pick(20, 100, 1000)).map(|_| space::wild(&mut random)).collect();
-    let ends: Vec<_> = wild.par_iter().with_max_len(1).map(on_reference_for_a_while).collect();
-    rows.count_wild(&ends);
+    let wild = space::all_wild(size.pick(20, 100, 1000), seed);
+    let told = Told::new(watch, "wild cells", wild.len());
+    rows.count_wild(&each(&wild, |pair| told.count(on_reference_for_a_while(pair))));
     Ok(rows)
 }
 
-fn budget() -> Budget {
+/// What `of` says of every one. They differ a thousandfold in cost: no task holds more than one.
+fn each<T: Sync, R: Send>(list: &[T], of: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+    list.par_iter().with_max_len(1).map(of).collect()
+}
+
+fn on_lanes(
+    precision: Precision,
+    cells: &[Start],
+    lanes: &mut Lanes,
+    watch: &dyn Watch,
+) -> Result<Vec<Record>, GpuError> {
+    let told = match precision {
+        Precision::F32 => "lanes in f32",
+        Precision::F64 => "lanes in f64",
+    };
+    let mut records = Vec::with_capacity(cells.len());
+    for chunk in cells.chunks(CHUNK) {
+        records.extend(lanes.run(precision, chunk, &lane_settings())?);
+        watch.progress(told, records.len(), cells.len());
+    }
+    Ok(records)
+}
+
+/// Counts what is done.
+struct Told<'w> {
+    watch: &'w dyn Watch,
+    work: &'static str,
+    done: AtomicUsize,
+    total: usize,
+}
+
+impl Told<'_> {
+    fn new<'w>(watch: &'w dyn Watch, work: &'static str, total: usize) -> Told<'w> {
+        Told { watch, work, done: AtomicUsize::new(0), total }
+    }
+
+    /// One more is done, and this is what came of it.
+    fn count<R>(&self, result: R) -> R {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        self.watch.progress(self.work, done, self.total);
+        result
+    }
+}
+
+pub(super) fn budget() -> Budget {
     Budget {
         settings: SETTINGS,
         early_stop: true,
@@ -124,10 +172,8 @@ pub(super) fn lane_settings() -> LaneSettings {
 }
 
 /// As the CPU engine does it.
-fn on_reference((pair, start): &Start) -> Record {
-    let everything =
-        Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
-    measured_record(&measure_cell(&flow_of(pair), pair.law(), *start, &budget()), &everything)
+fn on_reference((pair, start): &Start) -> Measured {
+    measure_cell(&flow_of(pair), pair.law(), *start, &budget())
 }
 
 /// How a wild cell ends, whether its state is finite, and how long it took.
@@ -212,7 +258,7 @@ pub fn judge(rows: &Rows) -> Verdict {
         .map(|engine| format!("{} ({})", engine.name(), rows.statuses("bounded", engine)))
         .collect();
     Verdict {
-        part: "fuzz",
+        part: Part::Fuzz.name(),
         holds,
         sentence: format!(
             "{bounded} random cells on every engine, {}; {} lanes decide nothing where the reference does, {} say \

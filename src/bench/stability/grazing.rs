@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::cells::{EngineName, flow_of, paper};
 use super::lanes::{Lanes, Start, periods};
-use super::{Size, Verdict, readout};
+use super::{Part, Size, Verdict, readout};
 use crate::gpu::GpuError;
 use crate::model::{GearPair, Side};
 use crate::random::Random;
@@ -149,7 +149,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
     let holds = missed == 0 && made_up == 0 && worst <= 1.0;
     let cells: usize = rows.iter().map(|row| row.cells).sum();
     Verdict {
-        part: "grazing",
+        part: Part::Grazing.name(),
         holds,
         sentence: format!(
             "{cells} swings up to a wall: {missed} contacts missed, {made_up} made up beyond rounding; errors of \

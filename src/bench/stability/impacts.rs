@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::cells::{EngineName, flow_of, paper};
 use super::lanes::{Lanes, Start, periods};
 use super::readout::{self, Contact};
-use super::{Size, Verdict};
+use super::{Part, Size, Verdict};
 use crate::flow::Gap;
 use crate::gpu::GpuError;
 use crate::model::{GearPair, State};
@@ -167,7 +167,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
     let told: Vec<String> = told.collect();
     let kept = if holds { "kept" } else { "NOT kept" };
     Verdict {
-        part: "impacts",
+        part: Part::Impacts.name(),
         holds,
         sentence: format!(
             "momentum and the law of energy are {kept} to rounding; largest deviations in unit roundoffs: {}",

@@ -5,7 +5,7 @@ use crate::model::{GearPair, State};
 use crate::record::Record;
 
 /// Cells are handed to a device so many at a time: every one has its own flow,
-const CHUNK: usize = 4096;
+pub(super) const CHUNK: usize = 4096;
 /// and its own phasors, one per step: fewer cells where there are more steps than this.
 const STEPS_OF_CHUNK: usize = 1024;
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::cells::{EngineName, after, apart, flow_of, paper};
 use super::lanes::{Lanes, Start, periods};
-use super::{Size, Verdict};
+use super::{Part, Size, Verdict, Watch};
 use crate::gpu::GpuError;
 use crate::model::{GearPair, State};
 use crate::orbit::Status;
@@ -63,7 +63,7 @@ struct Settled {
 ///
 /// # Errors
 /// A [`GpuError`].
-pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
+pub fn measure(size: Size, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Vec<Row>, GpuError> {
     let horizons: &[u32] = size.pick(
         &[10, 30, 100],
         &[100, 300, 1000, 10_000],
@@ -74,6 +74,8 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
     let starts: Vec<Start> =
         cells.iter().flat_map(|cell| cell.starts.iter().map(|&start| (cell.pair, start))).collect();
     let mut rows = Vec::new();
+    let all = horizons.iter().map(|&horizon| horizon as usize).sum();
+    let mut done = 0;
     for &horizon in horizons {
         let truth: Vec<State> =
             starts.par_iter().map(|(pair, start)| reference(pair, *start, horizon)).collect();
@@ -89,6 +91,8 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
                 rows.push(row(cell, precision.into(), horizon, error.fold(0.0, f64::max)));
             }
         }
+        done += horizon as usize;
+        watch.progress("periods of lanes", done, all);
     }
     rows.par_extend(cells.par_iter().flat_map_iter(|cell| on_reference(cell, longest)));
     Ok(rows)
@@ -172,7 +176,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
     }
     let grows = if holds { "no error grows" } else { "an error GROWS" };
     Verdict {
-        part: "long_runs",
+        part: Part::LongRuns.name(),
         holds,
         sentence: format!("{grows} on 8 stable cycles: largest {}", told.join(", ")),
     }

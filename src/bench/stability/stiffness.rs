@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::cells::{EngineName, REST, UNFORESEEN, after, apart, bar, flow_of, paper, sensitivity};
 use super::lanes::{Lanes, Start, periods};
-use super::{Size, Verdict};
+use super::{Part, Size, Verdict};
 use crate::gpu::{Constants, GpuError, LaneSettings};
 use crate::model::GearPair;
 use crate::orbit::{Status, status_of};
@@ -150,7 +150,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
     };
     let [f32s, f64s] = [EngineName::LanesF32, EngineName::LanesF64];
     Verdict {
-        part: "stiffness",
+        part: Part::Stiffness.name(),
         holds: bad == 0 && compared > 0,
         sentence: format!(
             "k = {soft:.0e} to {stiff:.0e}: {compared} lanes, {bad} off by more than rounding; lanes against twice \

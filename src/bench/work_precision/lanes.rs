@@ -94,14 +94,7 @@ impl Device {
     /// # Errors
     /// As [`Gpu::run_on`].
     pub fn run(&mut self, tables: &Tables) -> Result<(Duration, Vec<Outcome>), GpuError> {
-        let settings = LaneSettings {
-            periods: PERIODS,
-            transient_periods: 0,
-            max_period: 0,
-            early_stop: false,
-            exponent: false,
-            ..LaneSettings::default()
-        };
+        let settings = LaneSettings::only(PERIODS);
         let clock = Instant::now();
         let records = pollster::block_on(self.gpu.run_on(tables, &self.lanes, &settings))?;
         let elapsed = clock.elapsed();

@@ -1,5 +1,6 @@
 //! Every method at every setting, in turns.
 
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use super::cells::{Subject, by_reference};
@@ -153,13 +154,26 @@ pub fn measure(
     Ok(runners.iter().flat_map(|runner| runner.curves(subjects)).collect())
 }
 
+/// The flow and law of each subject; neighbours of one oscillator share its flow.
+fn flows(subjects: &[Subject]) -> Vec<(Rc<Flow>, Law)> {
+    let mut flows: Vec<(Rc<Flow>, Law)> = Vec::new();
+    for (n, subject) in subjects.iter().enumerate() {
+        let flow = match flows.last() {
+            Some((flow, _)) if subjects[n - 1].oscillator == subject.oscillator => Rc::clone(flow),
+            _ => Rc::new(Flow::new(&subject.oscillator)),
+        };
+        flows.push((flow, subject.law));
+    }
+    flows
+}
+
 /// A method ready to run, and what it has done.
 struct Runner {
     method: Method,
     settings: Vec<Setting>,
     device: Option<(Device, Vec<Tables>)>,
-    /// Solved outside the clock, as a map solves one per column.
-    flows: Vec<(Flow, Law)>,
+    /// Solved outside the clock, and shared by the cells of an oscillator, as a map does.
+    flows: Vec<(Rc<Flow>, Law)>,
     outcomes: Vec<Vec<Outcome>>,
     times: Vec<Vec<f64>>,
 }
@@ -189,7 +203,7 @@ impl Runner {
             device = Some((opened, tables));
         }
         let flows = match method {
-            Method::Reference => subjects.iter().map(|s| (Flow::new(&s.oscillator), s.law)).collect(),
+            Method::Reference => flows(subjects),
             _ => Vec::new(),
         };
         let times = vec![Vec::new(); settings.len()];

@@ -60,9 +60,7 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
 /// Which kind of period 1, as far as it was measured; on a slow approach lanes do not know.
 fn first_period(record: &Record, asks_symmetry: bool) -> u8 {
     let measured = |bit| record.valid & bit != 0;
-    let no_impacts = measured(valid::IMPACTS) && record.impacts_per_period == 0.0;
-    let no_meshing = measured(valid::MESH) && record.mesh_fraction == 0.0;
-    if no_impacts && no_meshing {
+    if record.is_contact_free() {
         0
     } else if asks_symmetry && !measured(valid::SYMMETRIC) {
         3

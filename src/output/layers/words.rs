@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use super::colors::{NO_VALUE, distinct};
 use super::{Color, Entry, Layer};
+use crate::classify::classify;
+use crate::orbit::Class;
 use crate::output::cells::Cells;
 use crate::record::{Record, Spelling};
 
@@ -12,21 +14,28 @@ const NAMED: usize = 20;
 /// Words that get a colour of their own.
 const COLORED: usize = 240;
 
-/// Two places in the palette that no word has.
+/// Places in the palette that no word has.
 const EMPTY: u8 = 0;
 const NONE: u8 = 1;
-const FIRST_WORD: u8 = 2;
+const UNFILLED: u8 = 2;
+const FIRST_WORD: u8 = 3;
+
+/// Numbers of cells without a word: no periodic motion, or a periodic one whose word is not
+/// known: a filled cell between several words, or a lane still far from its cycle.
+const APERIODIC: u32 = u32::MAX;
+const UNKNOWN: u32 = u32::MAX - 1;
 
 const WITHOUT_EVENTS: Color = [0xf2, 0xf2, 0xf2];
 const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
 const RARE: Color = [0x5a, 0x5a, 0x5a];
+const NOT_KNOWN: Color = [0xcf, 0xcf, 0xcf];
 
 /// Every word on a map, the most frequent first, and which one each cell has.
 #[derive(Clone, Debug)]
 pub(in crate::output) struct Words {
     /// Texts by number, with the number of cells that have it.
     pub(in crate::output) list: Vec<(String, usize)>,
-    /// Number of each cell's word, by id; `u32::MAX` where there is none.
+    /// Number of each cell's word, by id; none of `list` where there is none.
     pub(in crate::output) numbers: Vec<u32>,
 }
 
@@ -50,7 +59,8 @@ pub(in crate::output) fn read(cells: &Cells<'_>) -> Option<Words> {
     for id in 0..columns * rows {
         let record = cells.record(id);
         if record.valid & crate::record::valid::WORD == 0 {
-            numbers.push(u32::MAX);
+            let is_periodic = matches!(classify(record), Class::Periodic { .. });
+            numbers.push(if is_periodic { UNKNOWN } else { APERIODIC });
             continue;
         }
         let number = *seen.entry(packed(record)).or_insert_with(|| {
@@ -75,7 +85,7 @@ fn by_frequency(list: Vec<(String, usize)>, mut numbers: Vec<u32>) -> Words {
     order.iter().enumerate().for_each(|(place, &number)| rank[number] = place as u32);
     numbers
         .iter_mut()
-        .filter(|number| **number != u32::MAX)
+        .filter(|number| **number < UNKNOWN)
         .for_each(|number| *number = rank[*number as usize]);
     Words { list: order.into_iter().map(|number| list[number].clone()).collect(), numbers }
 }
@@ -86,8 +96,12 @@ pub(super) fn layer(words: &Words) -> Layer {
         false => FIRST_WORD + number.min(COLORED) as u8,
     };
     let places: Vec<u8> = (0..words.list.len()).map(place).collect();
-    let index = |&number: &u32| places.get(number as usize).copied().unwrap_or(NONE);
-    let mut palette = vec![WITHOUT_EVENTS, NO_VALUE];
+    let index = |&number: &u32| match number {
+        APERIODIC => NONE,
+        UNKNOWN => UNFILLED,
+        _ => places[number as usize],
+    };
+    let mut palette = vec![WITHOUT_EVENTS, NO_VALUE, NOT_KNOWN];
     // The word that covers most of the map should not shout.
     palette.push(COMMONEST);
     palette.extend((1..COLORED).map(distinct));
@@ -115,9 +129,9 @@ fn entries(words: &Words, places: &[u8], palette: &[Color]) -> Vec<Entry> {
         let text = format!("{} other words", rest.len());
         list.push(Entry { color: RARE, text, cells: rest.map(|(_, cells)| cells).sum() });
     }
-    let none = words.numbers.iter().filter(|&&number| number == u32::MAX).count();
-    if none > 0 {
-        list.push(Entry { color: NO_VALUE, text: "not periodic".to_owned(), cells: none });
-    }
+    let count = |number: u32| words.numbers.iter().filter(|&&other| other == number).count();
+    list.push(Entry { color: NOT_KNOWN, text: "word not known".to_owned(), cells: count(UNKNOWN) });
+    list.push(Entry { color: NO_VALUE, text: "not periodic".to_owned(), cells: count(APERIODIC) });
+    list.retain(|entry| entry.cells > 0);
     list
 }

@@ -177,6 +177,7 @@ function facts({ i, j }) {
   const error = number("lyapunov_error");
   const exponent = number("lyapunov");
   const symmetric = { 0: "no", 1: "yes" }[at("symmetric")];
+  const word = map.words?.[at("word")];
   return [
     [map.axes[0].parameter, a], [map.axes[1].parameter, b],
     ["class", kind === "periodic" ? `period ${at("period")}` : kind],
@@ -184,7 +185,7 @@ function facts({ i, j }) {
     ["impacts per period", number("impacts_per_period")],
     ["meshing", number("mesh_fraction")],
     ["symmetric", symmetric],
-    ["word", at("word") === undefined || at("word") === 0xffffffff ? undefined : map.words[at("word")] || "no events"],
+    ["word", word === "" ? "no events" : word],
     ...(values.attractors ? [["attractors found", at("attractors")]] : []),
     ["status", map.statuses[at("status")]],
     ["periods run", at("periods_run")],
@@ -371,6 +372,7 @@ function tellRefinement({ integrated, filled, rounds, audits }) {
     + "filled with what lies around them. " + (last
     ? `Of ${count(last.sampled, "filled cell")}, drawn at random and integrated, ${last.wrong} turned out wrong: `
       + `${percent(last.rate)} (95 %: ${percent(last.interval[0])} to ${percent(last.interval[1])}).`
+      + (last.words ? ` Of ${count(last.words, "filled word")} among them, ${last.wrong_words} turned out wrong.` : "")
     : "No audit was asked for.");
   if (audits.length > 1) {
     byId("audits").append(...audits.map((audit, k) => {

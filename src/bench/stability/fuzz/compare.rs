@@ -1,19 +1,19 @@
 //! Lanes against the reference, cell by cell, with the machinery of [`crate::validate`].
 
-use rayon::prelude::*;
-
 use super::super::cells::EngineName;
 use super::super::lanes::Start;
-use super::{SETTINGS, lane_settings};
+use super::{SETTINGS, Told, each, lane_settings};
+use crate::bench::stability::Watch;
 use crate::classify::classify;
 use crate::gpu::Precision;
 use crate::model::{GearPair, State};
-use crate::orbit::Class;
+use crate::orbit::{Class, Measured};
 use crate::plan::Plan;
+use crate::random::Random;
 use crate::record::Record;
 use crate::scene::{Purpose, Scene};
 use crate::validate::{
-    Difference, Explanation, Pick, Sample, StateSource, Stratum, Subject, differences, replay,
+    Difference, Explanation, Pick, Sample, StateSource, Stratum, Subject, disagreements, replay,
 };
 
 /// A lane whose record is not what the reference says.
@@ -43,33 +43,38 @@ pub(super) struct Comparison {
     pub(super) left: usize,
 }
 
-/// Compares every lane, and examines at most so many of those that differ: the first in the
-/// order of `ranks`, which is random.
+/// Compares every lane with what was measured on the reference, and examines at most so many of
+/// those that differ, which `seed` chooses.
 pub(super) fn all(
     precision: Precision,
     cells: &[Start],
+    truth: &[Measured],
     records: &[Record],
-    ranks: &[u64],
-    most: usize,
+    (seed, most): (u64, usize),
+    watch: &dyn Watch,
 ) -> Comparison {
-    let ids = (0..cells.len()).into_par_iter().with_max_len(1);
-    let mut different: Vec<usize> =
-        ids.filter(|&i| Cell::new(precision, cells[i], records[i]).differs()).collect();
-    let mut comparison = Comparison::default();
-    let is_silent = |i: &usize| {
-        classify(&records[*i]) == Class::Undecided && records[*i].periods_run >= lane_settings().periods
+    let differs = |&i: &usize| {
+        let period = std::f64::consts::TAU / cells[i].0.omega;
+        !disagreements(&truth[i], &records[i], precision, period).is_empty()
     };
-    comparison.silent = different.iter().filter(|i| is_silent(i)).count();
-    different.retain(|i| !is_silent(i));
-    different.sort_by_key(|&i| ranks[i]);
-    comparison.left = different.len().saturating_sub(most);
-    different.truncate(most);
-    comparison.mismatches = different
-        .par_iter()
-        .with_max_len(1)
-        .filter_map(|&i| Cell::new(precision, cells[i], records[i]).examine())
-        .collect();
-    comparison
+    let is_silent = |&i: &usize| {
+        classify(&records[i]) == Class::Undecided && records[i].periods_run >= lane_settings().periods
+    };
+    let (silent, mut different): (Vec<usize>, Vec<usize>) =
+        (0..cells.len()).filter(differs).partition(is_silent);
+    let examined = different.len().min(most);
+    Random::new(seed).draw(&mut different, examined);
+    let left = different.split_off(examined).len();
+    let told = Told::new(watch, "lanes examined", examined);
+    let examine = |&i: &usize| {
+        let mismatch = Cell::new(precision, cells[i], records[i]).examine();
+        if let Some(Mismatch { engine, pair, start, differences, explanation: None }) = &mismatch {
+            watch.found(&format!("unexplained: {} {pair:?} from {start:?}: {differences:?}", engine.name()));
+        }
+        told.count(mismatch)
+    };
+    let mismatches = each(&different, examine).into_iter().flatten().collect();
+    Comparison { silent: silent.len(), mismatches, left }
 }
 
 /// A cell and its record as a map of which it is the first cell.
@@ -91,10 +96,6 @@ impl Cell {
 
     fn subject(&self) -> Subject<'_> {
         Subject { plan: &self.plan, records: &self.records, precision: self.precision, is_lane: true }
-    }
-
-    fn differs(&self) -> bool {
-        !differences(&self.subject(), 0).is_empty()
     }
 
     fn examine(&self) -> Option<Mismatch> {
@@ -139,17 +140,15 @@ fn plan(pair: &GearPair, start: State) -> Plan {
 
 #[cfg(test)]
 mod tests {
-    use super::super::space;
+    use super::super::{budget, space};
     use super::*;
-    use crate::random::Random;
 
     #[test]
     fn the_first_cell_of_the_plan_is_the_cell() {
-        let mut random = Random::new(3);
-        for _ in 0..200 {
-            let (pair, start) = space::bounded(&mut random);
+        for (pair, start) in space::all_bounded(200, 3, &()) {
             let plan = plan(&pair, start);
             assert_eq!((plan.gear_pair(0), plan.start(0, &[])), (pair, start));
+            assert_eq!(plan.budget(), &budget());
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use super::super::cells::{REST, flow_of};
 use super::super::lanes::Start;
+use super::each;
+use crate::bench::stability::Watch;
 use crate::gpu::Constants;
 use crate::model::GearPair;
 use crate::random::Random;
@@ -47,33 +49,54 @@ pub(super) fn trips(pair: &GearPair) -> Option<u64> {
     Some((f64::from(constants.steps) * finest) as u64)
 }
 
-/// A cell of bounded stiffness and its start.
-pub(super) fn bounded(random: &mut Random) -> Start {
-    loop {
-        let pair = GearPair {
-            m1: logarithmic(random, -2.0, 2.0),
-            m2: logarithmic(random, -2.0, 2.0),
-            r1: or_none(random, 0.2, -3.0, 2.0),
-            r2: or_none(random, 0.2, -3.0, 2.0),
-            k1: or_none(random, 0.15, -1.0, 4.0),
-            k2: or_none(random, 0.15, -1.0, 4.0),
-            r: or_none(random, 0.1, -3.0, 3.0),
-            k: or_none(random, 0.05, 0.0, 7.0),
-            force: or_none(random, 0.05, -3.0, 4.0) * if random.unit() < 0.5 { 1.0 } else { -1.0 },
-            omega: logarithmic(random, -1.0, 2.0),
-            b: logarithmic(random, -4.0, 2.0),
-            e: restitution(random),
-            mesh_speed: or_none(random, 0.2, -6.0, 2.0),
-        };
-        let cell = (pair, start(&pair, random));
-        if trips(&pair).is_some_and(|trips| trips < TRIPS) && is_bounded(&cell) {
-            return cell;
-        }
+/// Candidates that are looked at together.
+const BLOCK: usize = 1024;
+
+/// So many cells of bounded stiffness and their starts.
+pub(super) fn all_bounded(count: usize, seed: u64, watch: &dyn Watch) -> Vec<Start> {
+    let mut random = Random::new(seed);
+    let mut cells = Vec::with_capacity(count);
+    while cells.len() < count {
+        let drawn: Vec<Start> = (0..BLOCK).map(|_| candidate(&mut random)).collect();
+        let kept = each(&drawn, is_bounded);
+        cells.extend(drawn.into_iter().zip(kept).filter_map(|(cell, kept)| kept.then_some(cell)));
+        cells.truncate(count);
+        watch.progress("cells drawn", cells.len(), count);
     }
+    cells
 }
 
-/// Whether the reference has little enough to do.
+/// So many cells of any magnitude at all.
+pub(super) fn all_wild(count: usize, seed: u64) -> Vec<GearPair> {
+    let mut random = Random::new(!seed);
+    (0..count).map(|_| wild(&mut random)).collect()
+}
+
+/// A cell that may be too stiff, or keep the reference too busy.
+fn candidate(random: &mut Random) -> Start {
+    let pair = GearPair {
+        m1: logarithmic(random, -2.0, 2.0),
+        m2: logarithmic(random, -2.0, 2.0),
+        r1: or_none(random, 0.2, -3.0, 2.0),
+        r2: or_none(random, 0.2, -3.0, 2.0),
+        k1: or_none(random, 0.15, -1.0, 4.0),
+        k2: or_none(random, 0.15, -1.0, 4.0),
+        r: or_none(random, 0.1, -3.0, 3.0),
+        k: or_none(random, 0.05, 0.0, 7.0),
+        force: or_none(random, 0.05, -3.0, 4.0) * if random.unit() < 0.5 { 1.0 } else { -1.0 },
+        omega: logarithmic(random, -1.0, 2.0),
+        b: logarithmic(random, -4.0, 2.0),
+        e: restitution(random),
+        mesh_speed: or_none(random, 0.2, -6.0, 2.0),
+    };
+    (pair, start(&pair, random))
+}
+
+/// Whether lanes and the reference have little enough to do.
 fn is_bounded((pair, start): &Start) -> bool {
+    if trips(pair).is_none_or(|trips| trips >= TRIPS) {
+        return false;
+    }
     let flow = flow_of(pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), *start);
     let mut before = 0;
@@ -112,7 +135,7 @@ fn start(pair: &GearPair, random: &mut Random) -> [f64; 4] {
 }
 
 /// A cell of any magnitude at all.
-pub(super) fn wild(random: &mut Random) -> GearPair {
+fn wild(random: &mut Random) -> GearPair {
     loop {
         let mut any = |share: f64| match random.unit() {
             x if x < share => 0.0,
@@ -139,9 +162,8 @@ mod tests {
 
     #[test]
     fn every_cell_is_valid_and_edges_are_met() {
-        let mut random = Random::new(1);
-        let bounded: Vec<Start> = (0..2000).map(|_| bounded(&mut random)).collect();
-        let wild: Vec<GearPair> = (0..500).map(|_| wild(&mut random)).collect();
+        let bounded = all_bounded(2000, 1, &());
+        let wild = all_wild(500, 1);
         let pairs = || bounded.iter().map(|(pair, _)| pair);
         assert!(pairs().chain(&wild).all(|pair| pair.validate().is_ok()));
         for (what, count) in [
