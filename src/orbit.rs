@@ -7,6 +7,8 @@
 //! refined cycle the period is simply its smallest divisor that closes.
 
 mod analysis;
+mod approach;
+mod budget;
 mod cell;
 mod reading;
 mod recurrence;
@@ -14,7 +16,8 @@ mod trace;
 
 pub(crate) use analysis::status_of;
 pub use analysis::{CHAOS_ERRORS, analyse, analyse_flow, analyse_over};
-pub use cell::{Budget, Measured, measure};
+pub use budget::Budget;
+pub use cell::{Measured, measure};
 pub use trace::trace;
 
 use crate::model::{Side, State};

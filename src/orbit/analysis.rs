@@ -223,6 +223,10 @@ impl Analysis<'_> {
         let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
         for period in divisors {
             for map in self.maps(period) {
+                // It closes after its own period, and need not be refined again.
+                if period == cycle.period && (cycle.symmetric || map == StrobeMap::Periods(period)) {
+                    return Some(cycle);
+                }
                 let image = map.apply(seed, cycle.state).ok()?;
                 if metric.distance(&image.state, &cycle.state) < ON_CYCLE
                     && let Some(shorter) = refine(&seed.at(cycle.state, []), map)

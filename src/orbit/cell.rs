@@ -5,44 +5,25 @@
 //! strobe states that have passed, so that nothing is integrated ahead of the budget.
 
 use super::CHAOS_ERRORS;
-use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, TANGENT_PERIODS, status_of};
+use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, status_of};
+use super::approach::{LINEAR_CYCLES, is_linear};
 use super::recurrence::{Metric, NEAR, candidates, lingering};
-use super::{Orbit, Settings, Status};
+use super::{Budget, Orbit, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine, refine_nearby};
 use crate::word::Word;
 
-/// An exponent that is shown accumulates from this period on, or from the end of a shorter
-/// transient.
-const SHOWN_EXPONENT_FROM: u32 = 100;
-
-/// One that only tells chaos from the rest may contain more of the transient.
-const EXPONENT_FROM: u32 = 50;
-
 /// Periods after which an early stop is first considered; then every sixth as many more.
 const FIRST_LOOK: u32 = 16;
 const LOOKS: u32 = 6;
 
-/// A cell stops early only this close to its cycle, relative to the motion: inside the region
-/// where the multipliers tell what happens next. A leaving speed near `mesh_speed` makes that
-/// region small: at 2e-3 one cell of 4,000 over restitution and frequency was taken for a period
-/// that it then left, at 1e-6 cells take half as many periods again.
+/// A cell stops early only inside the region where the multipliers tell what happens next: this
+/// close to its cycle, relative to the motion, or within `NEAR` where it is seen to move as they
+/// say. A leaving speed near `mesh_speed` makes that region small: unseen, at 2e-3 one cell of
+/// 4,000 over restitution and frequency was taken for a period that it then left.
 const SETTLED: f64 = 5e-4;
-
-/// With early stops chaos is called before the budget is spent if the exponent exceeds zero by
-/// this many standard errors ...
-const EARLY_CHAOS_ERRORS: f64 = 6.0;
-const HASTY_CHAOS_ERRORS: f64 = 5.0;
-
-/// ... after this fraction of the budget, in eighths: of 20,000 cells 38 transients are taken
-/// for chaos so, 33 if it is half, 17 if all of it is spent. Without an exponent to show, 46.
-const EARLY_CHAOS_FROM: u32 = 3;
-const HASTY_CHAOS_FROM: u32 = 2;
-
-/// Periods, at least, over which an exponent is averaged before chaos is called early.
-const LEAST_AVERAGED: u32 = 32;
 
 /// Chaos has to outgrow this power of time.
 const NEUTRAL_ORDER: f64 = 2.0;
@@ -52,47 +33,6 @@ const APPROACH_CYCLES: usize = 4;
 
 /// Newton's method looks for a cycle this many times as far off as it may lie.
 const AIM: f64 = 3.0;
-
-/// How long one cell is integrated, and what for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Budget {
-    /// Periods of transient and observation, and the longest cycle.
-    pub settings: Settings,
-    /// Whether the cell may stop as soon as its class is certain; otherwise exactly
-    /// `transient_periods + observed_periods` are integrated.
-    pub early_stop: bool,
-    /// Periods beyond these for cells that are undecided by then; with early stops alone.
-    pub undecided_periods: u32,
-    /// Whether motion that is not periodic gets an exponent. It costs a tangent vector.
-    pub exponent: bool,
-    /// Whether that exponent is shown; otherwise it need only be sure that it is positive.
-    pub shows_exponent: bool,
-}
-
-impl Budget {
-    /// Forcing periods of a cell that is decided by then.
-    pub fn periods(&self) -> u32 {
-        self.settings.transient_periods.saturating_add(self.settings.observed_periods)
-    }
-
-    /// The period from which the exponent accumulates.
-    pub fn exponent_from(&self) -> u32 {
-        let from = if self.shows_exponent { SHOWN_EXPONENT_FROM } else { EXPONENT_FROM };
-        from.min(self.settings.transient_periods)
-    }
-
-    /// The first period at which chaos may be called, with early stops.
-    pub fn chaos_from(&self) -> u32 {
-        let eighths = if self.shows_exponent { EARLY_CHAOS_FROM } else { HASTY_CHAOS_FROM };
-        let from = (self.periods() / 8 * eighths).max(self.settings.observed_periods);
-        from.max(self.exponent_from() + LEAST_AVERAGED)
-    }
-
-    /// Standard errors by which the exponent must exceed zero then.
-    pub fn chaos_errors(&self) -> f64 {
-        if self.shows_exponent { EARLY_CHAOS_ERRORS } else { HASTY_CHAOS_ERRORS }
-    }
-}
 
 /// What one cell showed.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +52,7 @@ pub struct Measured {
     pub symmetric: Option<bool>,
     /// The cycle's word.
     pub word: Option<Word>,
-    /// The last strobe state.
+    /// The last strobe state; one of the cycle's where the cell stopped early on the way to it.
     pub strobe: State,
     /// Forcing periods integrated; what Newton's method needs beside them is not counted.
     pub periods_run: u32,
@@ -169,8 +109,7 @@ impl<'a> Watch<'a> {
         let more = if self.budget.early_stop { self.budget.undecided_periods } else { 0 };
         let last = budget.saturating_add(more);
         let exponent_from = self.budget.exponent_from();
-        let turning_from =
-            if self.budget.exponent { exponent_from.saturating_sub(TANGENT_PERIODS) } else { last };
+        let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
         let mut look = if self.budget.early_stop { FIRST_LOOK.min(budget) } else { last };
         let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start);
         while bare.period() < u64::from(turning_from) {
@@ -216,7 +155,8 @@ impl<'a> Watch<'a> {
         if let Some(orbit) = self.settled(&trajectory.carrying([]), is_last)?
             && (is_last || self.is_own(&orbit))
         {
-            return Ok(Some(self.periodic(orbit)));
+            let strobe = if is_last { trajectory.state() } else { orbit.strobe };
+            return Ok(Some(self.periodic(orbit, strobe)));
         }
         Ok(match now {
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
@@ -284,8 +224,10 @@ impl<'a> Watch<'a> {
                     self.approaches = true;
                     let at = self.strobes.len() - 1;
                     self.cycle = Some(Found { cycle, seed: seed.clone(), at, distance });
-                    if let Some(orbit) = self.approached(&metric, near)? {
-                        return Ok(Some(orbit));
+                    let orbit = self.approached(&metric, near)?;
+                    // One find is enough for now.
+                    if orbit.is_some() || !is_last {
+                        return Ok(orbit);
                     }
                 }
             }
@@ -309,7 +251,9 @@ impl<'a> Watch<'a> {
         }
         let halving = (0.5f64.ln() / radius.max(0.1).ln()).ceil();
         let back = (halving.min(1e6) as usize).max(APPROACH_CYCLES).min(now / 2 / period);
-        if present > near || back < 2 {
+        let beside = |n: usize| self.strobes[now - n * period];
+        let is_seen = || now > LINEAR_CYCLES * period && is_linear(cycle, beside, metric);
+        if back < 2 || present > NEAR || (present > near && !is_seen()) {
             return Ok(None);
         }
         // A multiplier near 1 shrinks little; half of what it promises must be seen.
@@ -324,13 +268,13 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Whether the last periods had the cycle's impacts: beyond a fold of the strobe map there may
-    /// be another cycle, as close as the motion's own.
+    /// Whether the last cycles had the cycle's impacts: beyond a fold of the strobe map there may be
+    /// another cycle, as close as the motion's own.
     fn is_own(&self, orbit: &Orbit) -> bool {
         let (now, cycle) = (self.counts.len() - 1, orbit.cycle_periods as usize);
-        let [impacts, _] = self.counts[now];
-        now >= cycle
-            && impacts - self.counts[now - cycle][0] == (orbit.impacts_per_period * cycle as f64).round()
+        let each = (orbit.impacts_per_period * cycle as f64).round();
+        let impacts = |end: usize| self.counts[end][0] - self.counts[end - cycle][0];
+        now >= LINEAR_CYCLES * cycle && (0..LINEAR_CYCLES).all(|n| impacts(now - n * cycle) == each)
     }
 
     /// The last strobe that the cycle's state belongs to: the others, unless the period is 1,
@@ -345,7 +289,7 @@ impl<'a> Watch<'a> {
         metric.distance(&self.strobes[self.last_beside(found)], &found.cycle.state)
     }
 
-    fn periodic(&self, orbit: Orbit) -> Measured {
+    fn periodic(&self, orbit: Orbit, strobe: State) -> Measured {
         Measured {
             period: Some(orbit.cycle_periods),
             status: orbit.status,
@@ -354,7 +298,7 @@ impl<'a> Watch<'a> {
             mesh_fraction: orbit.mesh_fraction,
             symmetric: orbit.symmetric,
             word: Some(orbit.word),
-            strobe: self.strobes[self.strobes.len() - 1],
+            strobe,
             periods_run: self.strobes.len() as u32 - 1,
         }
     }
