@@ -210,3 +210,48 @@ pub fn pitchfork(pair: &GearPair, parameter: &str, lo: f64, hi: f64, guess: Stat
     }
     Some(b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seed_of<'f>(flow: &'f Flow, pair: &GearPair, periods: u32) -> Trajectory<'f> {
+        let mut seed = Trajectory::new(flow, pair.law(), [0.0; 4]);
+        (0..periods).for_each(|_| seed.advance_period(&mut ()).unwrap());
+        seed
+    }
+
+    /// On its way to a cycle a motion is led there by either search.
+    #[test]
+    fn hasty_searches_find_what_attracts_close_by() {
+        for e in [0.06, 0.3, 0.45, 0.58] {
+            let pair = GearPair::paper(e);
+            let flow = Flow::new(&pair.oscillator().unwrap());
+            let seed = seed_of(&flow, &pair, 40);
+            let patient = refine(&seed, StrobeMap::Periods(1)).unwrap();
+            let hasty = refine_nearby(&seed, StrobeMap::Periods(1), |_| true).unwrap();
+            assert!(patient.spectral_radius() < 1.0, "e = {e}");
+            for (a, b) in patient.state.into_iter().zip(hasty.state) {
+                assert!((a - b).abs() < 1e-11, "e = {e}: {:?}, {:?}", patient.state, hasty.state);
+            }
+            assert!(refine_nearby(&seed, StrobeMap::Periods(1), |_| false).is_none(), "e = {e}");
+        }
+    }
+
+    /// Traces never call expanding what is not: as the multipliers have it, all along chaos.
+    #[test]
+    fn expansion_is_that_of_the_multipliers() {
+        let pair = GearPair { omega: 2.8172, ..GearPair::paper(0.7224) };
+        let flow = Flow::new(&pair.oscillator().unwrap());
+        let (mut expanding, mut others) = (0, 0);
+        for periods in 50..150 {
+            let seed = seed_of(&flow, &pair, periods);
+            let image = StrobeMap::Periods(1).apply(&seed, seed.state()).unwrap();
+            let [re, im] = multipliers(&image.derivative()).unwrap()[0];
+            let expands_much = re.hypot(im) > LARGEST_MULTIPLIER;
+            assert_eq!(expands(&image), Some(expands_much), "after {periods} periods: {re} + {im} i");
+            if expands_much { expanding += 1 } else { others += 1 }
+        }
+        assert!(expanding > 10 && others > 10, "{expanding} expand, {others} do not");
+    }
+}
