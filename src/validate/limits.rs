@@ -47,8 +47,7 @@ pub(super) fn undecided_chaos(case: &Case<'_>) -> Option<Explanation> {
         return Some(Explanation::UndecidedInBudget);
     }
     // What a standard error is depends on the length of its blocks.
-    if case.is_lane {
-        let [theirs, error] = in_lane_blocks(case)?;
+    if let Some([theirs, error]) = case.is_lane.then(|| in_lane_blocks(case)).flatten() {
         let same = (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own);
         if same && theirs > CHAOS_ERRORS * error {
             return Some(Explanation::UndecidedInBudget);
