@@ -78,13 +78,12 @@ fn judge_cycle() {
     let is_smooth = tally.grazes == 0u || tally.refinements > 0u;
     // And where rounding is amplified it throws the lane off: such cycles are waited for.
     let helps = is_smooth && tally.vain < VAIN;
-    let leads = is_linear();
-    if attracts && helps && leads && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
+    if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
         tally.stage = STAGE_READING;
         return;
     }
     let is_here = is_on_cycle() || (is_last && (tally.settled != 0u || away() < ABOUT));
-    let is_cycle = attracts && leads && is_own() && is_here;
+    let is_cycle = attracts && is_own() && is_here;
     if is_cycle && (!is_multiple() || is_refuted()) {
         tally.cycle = tally.candidate;
         return;
@@ -92,7 +91,7 @@ fn judge_cycle() {
     if is_cycle && reads_divisor() {
         return;
     }
-    if attracts && leads && is_own() && tally.refinements > 0u {
+    if attracts && is_own() && tally.refinements > 0u {
         tally.vain += 1u;
     }
     give_up();

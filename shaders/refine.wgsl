@@ -4,11 +4,7 @@
 const REFINEMENTS: u32 = 5u;
 // The cycle must lie this close to the motion, relative to it: what contracts from farther off
 // may still have a fold of the strobe map before it.
-const REACH: f32 = 0.016;
-// And from farther off than 2^-7 the strobe map must be linear between them: the first step may err
-// by 2^-5 of its length.
-const FAR: u32 = 28u;
-const LINEAR: u32 = 20u;
+const REACH: f32 = 1e-2;
 
 // The monodromy matrix has been read along one candidate cycle from the anchor to the present
 // strobe. Moves the lane to where the linearised strobe map has its fixed point, to read on from
@@ -38,16 +34,6 @@ fn refine() -> bool {
     tally.apart_before = tally.apart;
     begin_reading();
     return true;
-}
-
-// Whether Newton's first step, from farther off, led where the linear map said. The state from
-// which it set out went to `home`, the next to the anchor's image.
-fn is_linear() -> bool {
-    if tally.refinements != 1u {
-        return true;
-    }
-    let leap = octaves(distance_between(motion.home, motion.anchor));
-    return leap >= FAR || tally.apart >= leap + LINEAR;
 }
 
 // The events of the cycle that has been read: along one branch of the strobe map they are the
