@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{EngineName, UNFORESEEN, after, apart, flow_of, paper, sensitivity, sensitivity_to};
-use super::lanes::{Lanes, Start, periods};
+use super::lanes::{Lanes, Start};
 use super::{Part, Size, Verdict};
 use crate::gpu::{GpuError, LaneSettings};
 use crate::model::GearPair;
@@ -72,7 +72,7 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
     let cases: Vec<Case> = starts.par_iter().map(|&start| case(start)).collect();
     let mut rows: Vec<Row> = cases.par_iter().map(on_reference).collect();
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &starts, &periods(1))?;
+        let records = lanes.run(precision, &starts, &LaneSettings::only(1))?;
         rows.extend(
             cases
                 .par_iter()

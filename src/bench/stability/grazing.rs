@@ -17,9 +17,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{EngineName, flow_of, paper};
-use super::lanes::{Lanes, Start, periods};
+use super::lanes::{Lanes, Start};
 use super::{Part, Size, Verdict, readout};
-use crate::gpu::GpuError;
+use crate::gpu::{GpuError, LaneSettings};
 use crate::model::{GearPair, Side};
 use crate::random::Random;
 use crate::record::Record;
@@ -90,7 +90,7 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Vec<Row>, Gpu
     let mut rows = tabulate(EngineName::Reference, &distances, &starts, &speeds);
     lanes.rewrite(readout::first_contact);
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &starts, &periods(1))?;
+        let records = lanes.run(precision, &starts, &LaneSettings::only(1))?;
         let speeds = starts.iter().zip(&records).map(|(start, record)| contact_speed(start, record, None));
         let speeds: Vec<Option<f64>> = speeds.collect();
         rows.extend(tabulate(precision.into(), &distances, &starts, &speeds));

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::cells::{EngineName, REST, apart, flow_of, paper, sensitivity};
 use super::grazing::{contact_speed, swing};
-use super::lanes::{Lanes, Start, periods};
+use super::lanes::{Lanes, Start};
 use super::shaken::{Shaken, shaken};
 use super::{Part, Size, Verdict, Watch, readout};
 use crate::gpu::{Constants, GpuError, LaneSettings, MOST_STEPS};
@@ -142,7 +142,7 @@ fn measure_swings(
     for (nth, &precision) in precisions.iter().enumerate() {
         for (grid, &steps_asked) in asked.iter().enumerate() {
             watch.progress("grids", nth * asked.len() + grid, all);
-            let records = lanes.run(precision, &starts, &at_least(steps_asked, periods(1)))?;
+            let records = lanes.run(precision, &starts, &at_least(steps_asked, LaneSettings::only(1)))?;
             let taken = steps_taken(&starts, steps_asked);
             for (i, &depth) in DEPTHS.iter().enumerate() {
                 let here = i * per_depth..(i + 1) * per_depth;
@@ -201,7 +201,8 @@ fn measure_motions(
         let sensitivities: Vec<f64> =
             starts.par_iter().map(|(pair, start)| sensitivity(pair, *start, PERIODS, engine)).collect();
         for &steps_asked in asked {
-            let records = lanes.run(precision, &starts, &at_least(steps_asked, periods(PERIODS)))?;
+            let records =
+                lanes.run(precision, &starts, &at_least(steps_asked, LaneSettings::only(PERIODS)))?;
             let taken = steps_taken(&starts, steps_asked);
             let shaken: Vec<Shaken> =
                 (0..starts.len()).into_par_iter().map(|i| shaken_by(engine, &starts[i], taken[i])).collect();

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{EngineName, flow_of, paper};
-use super::lanes::{Lanes, Start, periods};
+use super::lanes::{Lanes, Start};
 use super::readout::{self, Contact};
 use super::{Part, Size, Verdict};
 use crate::flow::Gap;
-use crate::gpu::GpuError;
+use crate::gpu::{GpuError, LaneSettings};
 use crate::model::{GearPair, State};
 use crate::random::Random;
 use crate::reference::{Happening, Observer, Trajectory};
@@ -113,7 +113,7 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Vec<Row>, Gpu
         .collect();
     lanes.rewrite(readout::first_contact);
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &starts, &periods(1))?;
+        let records = lanes.run(precision, &starts, &LaneSettings::only(1))?;
         for (i, pair) in pairs.iter().enumerate() {
             let mut worst = Worst::new(pair, precision.into());
             for k in i * starts_per_pair..(i + 1) * starts_per_pair {

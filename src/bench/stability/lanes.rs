@@ -75,16 +75,3 @@ impl Lanes {
         found.expect("the precision is one of `precisions`")
     }
 }
-
-/// So many periods and nothing else.
-pub(super) fn periods(periods: u32) -> LaneSettings {
-    LaneSettings {
-        periods,
-        transient_periods: 0,
-        max_period: 0,
-        early_stop: false,
-        exponent: false,
-        exponent_from: 0,
-        ..LaneSettings::default()
-    }
-}

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{EngineName, after, apart, flow_of, paper};
-use super::lanes::{Lanes, Start, periods};
+use super::lanes::{Lanes, Start};
 use super::{Part, Size, Verdict, Watch};
-use crate::gpu::GpuError;
+use crate::gpu::{GpuError, LaneSettings};
 use crate::model::{GearPair, State};
 use crate::orbit::Status;
 use crate::reference::Trajectory;
@@ -80,7 +80,7 @@ pub fn measure(size: Size, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Vec<R
         let truth: Vec<State> =
             starts.par_iter().map(|(pair, start)| reference(pair, *start, horizon)).collect();
         for precision in lanes.precisions() {
-            let records = lanes.run(precision, &starts, &periods(horizon))?;
+            let records = lanes.run(precision, &starts, &LaneSettings::only(horizon))?;
             let per_cell = cells[0].starts.len();
             for (i, cell) in cells.iter().enumerate() {
                 let of_cell = i * per_cell..(i + 1) * per_cell;

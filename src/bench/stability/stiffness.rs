@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::{EngineName, REST, UNFORESEEN, after, apart, bar, flow_of, paper, sensitivity};
-use super::lanes::{Lanes, Start, periods};
+use super::lanes::{Lanes, Start};
 use super::{Part, Size, Verdict};
 use crate::gpu::{Constants, GpuError, LaneSettings};
 use crate::model::GearPair;
@@ -90,10 +90,11 @@ pub fn measure(size: Size, lanes: &mut Lanes) -> Result<Vec<Row>, GpuError> {
         rows.push(row(i, EngineName::Reference, status, steps));
     }
     for precision in lanes.precisions() {
-        let records = lanes.run(precision, &cells, &periods(PERIODS))?;
+        let records = lanes.run(precision, &cells, &LaneSettings::only(PERIODS))?;
         let constants: Vec<Option<Constants>> = cells.iter().map(|(pair, _)| constants(pair)).collect();
         let most = constants.iter().flatten().map(|constants| constants.steps).max();
-        let twice = LaneSettings { steps_per_period: most.map(|most| 2 * most), ..periods(PERIODS) };
+        let twice =
+            LaneSettings { steps_per_period: most.map(|most| 2 * most), ..LaneSettings::only(PERIODS) };
         let finer = lanes.run(precision, &cells, &twice)?;
         for i in 0..cells.len() {
             let status = Status::from_code(records[i].status).unwrap_or(Status::NonFinite);
