@@ -26,7 +26,6 @@ mod unroll;
 
 use std::collections::HashMap;
 
-pub(crate) use batch::exponent_block;
 pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
 pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware};
 pub use shader::{Precision, Variant, WORKGROUP};

@@ -66,9 +66,9 @@ pub(super) fn largest_batch(limits: &wgpu::Limits) -> usize {
     by_binding.min(by_grid).clamp(1, LARGEST_BATCH as u64) as usize
 }
 
-/// Periods per block of an exponent that accumulates from period `from` on.
-pub(crate) fn exponent_block(periods: u32, from: u32) -> u32 {
-    (periods.saturating_sub(from) / EXPONENT_BLOCKS).max(SHORTEST_BLOCK)
+/// Periods per block of the exponent.
+fn exponent_block(settings: &LaneSettings) -> u32 {
+    (settings.periods.saturating_sub(settings.exponent_from) / EXPONENT_BLOCKS).max(SHORTEST_BLOCK)
 }
 
 /// One batch on the device: its buffers.
@@ -202,7 +202,7 @@ fn uniform(lanes: usize, row: u32, settings: &LaneSettings) -> Settings {
         transient_periods,
         growth_from: settings.exponent_from.saturating_sub(ALIGNMENT.min(settings.exponent_from / 2)),
         exponent_from: settings.exponent_from,
-        exponent_block: exponent_block(periods, settings.exponent_from),
+        exponent_block: exponent_block(settings),
         max_period: settings.max_period.min(LONGEST_PERIOD),
         early_stop: u32::from(early_stop),
     }

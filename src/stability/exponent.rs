@@ -34,17 +34,6 @@ impl Exponent {
         self.growth.clear();
     }
 
-    /// The same from as many blocks of so many periods, at least one, as fit, the first ones first;
-    /// none for fewer than two of them.
-    pub(crate) fn estimate_in_blocks(&self, periods: usize, forcing_period: f64) -> Option<[f64; 2]> {
-        let blocks = self.growth.chunks_exact(periods);
-        let means: Vec<f64> = blocks.map(|block| block.iter().sum::<f64>() / periods as f64).collect();
-        let count = means.len() as f64;
-        let mean = means.iter().sum::<f64>() / count;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        (means.len() > 1).then(|| [mean / forcing_period, (variance / count).sqrt() / forcing_period])
-    }
-
     /// Mean growth rate per unit time and its standard error, from the means of
     /// 16 blocks; the error is infinite for fewer than 16 periods.
     pub fn estimate(&self, forcing_period: f64) -> (f64, f64) {

@@ -5,12 +5,12 @@ use super::case::{Case, rounding};
 use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
 use super::same_cycle::{may_repel, within_reach};
 use crate::classify::classify;
-use crate::gpu::{Precision, exponent_block};
+use crate::gpu::Precision;
 use crate::model::GearPair;
 use crate::orbit::{CHAOS_ERRORS, Class, Status, analyse};
 use crate::record::valid;
 use crate::reference::Trajectory;
-use crate::stability::{Exponent, FRESH_TANGENT, StrobeMap, multipliers};
+use crate::stability::{StrobeMap, multipliers};
 
 /// A motion this far from where it was a cycle ago has not settled.
 const UNSETTLED: f64 = 1e-4;
@@ -32,8 +32,7 @@ const SCATTERS: [f64; 2] = [1.0, 3.0];
 const SCATTERED_STARTS: usize = 1000;
 
 /// The record says chaotic where the reference decides nothing within the same budget: it is the
-/// same average, which exceeds zero by enough errors on one side and not on the other, or by
-/// enough of the reference's own from blocks as long as the lane's; or the
+/// same average, which exceeds zero by enough errors on one side and not on the other; or the
 /// reference, too, is chaotic from a start or with parameters moved within rounding: then the
 /// chaos is a transient that one side has left.
 pub(super) fn undecided_chaos(case: &Case<'_>) -> Option<Explanation> {
@@ -46,31 +45,7 @@ pub(super) fn undecided_chaos(case: &Case<'_>) -> Option<Explanation> {
     if is_weak && (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own) {
         return Some(Explanation::UndecidedInBudget);
     }
-    // What a standard error is depends on the length of its blocks.
-    if let Some([theirs, error]) = case.is_lane.then(|| in_lane_blocks(case)).flatten() {
-        let same = (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own);
-        if same && theirs > CHAOS_ERRORS * error {
-            return Some(Explanation::UndecidedInBudget);
-        }
-    }
     case.nudged().any(|answer| answer.class == Class::Chaotic).then_some(Explanation::Chaos)
-}
-
-/// The exponent of the reference over the record's periods, and its standard error from blocks as
-/// long as the lane's.
-fn in_lane_blocks(case: &Case<'_>) -> Option<[f64; 2]> {
-    let from = case.budget.exponent_from();
-    let block = exponent_block(case.budget.periods(), from);
-    let mut trajectory = Trajectory::with_tangents(&case.flow, case.law, case.start, [FRESH_TANGENT]);
-    let mut exponent = Exponent::default();
-    for period in 1..=case.record.periods_run {
-        trajectory.advance_period(&mut ()).ok()?;
-        exponent.renormalise(&mut trajectory);
-        if period == from {
-            exponent.forget();
-        }
-    }
-    exponent.estimate_in_blocks(block as usize, case.flow.period)
 }
 
 /// The same start, and as long as it takes.
