@@ -74,6 +74,11 @@ fn judge_cycle() {
     motion.cycle_growth = spectral_growth();
     note_branch();
     let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    let is_far = tallies[lane].is_far == 1u;
+    if is_far && tally.refinements == 0u && !(attracts && sees_cycle(LOOSE)) {
+        look_on();
+        return;
+    }
     // Beside a graze the map has no derivative that tells where the cycle is.
     let is_smooth = tally.grazes == 0u || tally.refinements > 0u;
     // And where rounding is amplified it throws the lane off: such cycles are waited for.
@@ -83,7 +88,7 @@ fn judge_cycle() {
         return;
     }
     let is_here = is_on_cycle() || (is_last && (tally.settled != 0u || away() < ABOUT));
-    let is_cycle = attracts && is_own() && is_here;
+    let is_cycle = attracts && is_own() && is_here && (!is_far || has_arrived());
     if is_cycle && (!is_multiple() || is_refuted()) {
         tally.cycle = tally.candidate;
         return;
@@ -91,14 +96,17 @@ fn judge_cycle() {
     if is_cycle && reads_divisor() {
         return;
     }
-    if attracts && is_own() && tally.refinements > 0u {
+    if is_far {
+        tallies[lane].is_far = 0u;
+        tallies[lane].strayed += 1u;
+    } else if attracts && is_own() && tally.refinements > 0u {
         tally.vain += 1u;
     }
     give_up();
     if is_last {
         return;
     }
-    if attracts {
+    if attracts || is_far {
         look_again();
     } else {
         search_on();

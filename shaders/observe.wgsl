@@ -9,6 +9,8 @@ const NEAR: u32 = 24u;
 const SETTLED: f32 = 56.0;
 // 2^-7 where Newton's method shows what the limit is.
 const REFINABLE: f32 = 28.0;
+// And 2^-5 where the motion is seen to approach it as it says.
+const FAR: f32 = 20.0;
 // Slower approaches than this, per period, are not waited for, only for a recurrence as close as
 // if they were as fast.
 const SLOWEST: f32 = 0.008;
@@ -67,8 +69,7 @@ fn begin_period() {
 // Periods over which averages are taken, at least, before chaos is called early.
 const LEAST_COUNTED: u32 = 32u;
 
-// Standard errors by which the exponent must exceed zero: before the budget is spent, and after.
-const EARLY_CHAOS_ERRORS: Real = 6.0;
+// Standard errors by which the exponent must exceed zero once the budget is spent.
 const CHAOS_ERRORS: Real = 3.0;
 // And those that cast doubt on a cycle that has not settled.
 const DOUBT: Real = 1.0;
@@ -89,7 +90,8 @@ fn is_chaos() -> bool {
     if tally.period < tally.counted_from + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
-    let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
+    let early = Real(bitcast<f32>(settings.chaos_errors));
+    let errors = select(early, CHAOS_ERRORS, tally.period >= settings.periods);
     return grows(errors) && outgrows(errors) && !departs(errors);
 }
 
@@ -170,6 +172,7 @@ fn begin_counting() {
     tally.hash_low = 0u;
     tally.hash_high = 0u;
     tally.recent = 0u;
+    tallies[lane].trail_length = 0u;
     if WORD {
         tallies[lane].word = array<u32, 7>();
     }
@@ -207,6 +210,7 @@ fn recurs() -> bool {
     let q = strobe_state();
     motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
     motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
+    follow(q);
     if tally.window == 0u {
         begin_window(q, widest());
         return false;
@@ -229,7 +233,7 @@ fn recurs() -> bool {
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
     let lags = select(widest(), min(enough, widest()), is_fast && tally.tries == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
-    return settled;
+    return settled || looks();
 }
 
 fn widest() -> u32 {
@@ -331,10 +335,19 @@ fn has_settled(lag: u32) -> bool {
 
 // Whether Newton's method may show what the limit is.
 fn is_refinable(lag: u32) -> bool {
+    return limit_is_within(lag, REFINABLE) && tally.vain < VAIN;
+}
+
+// Or will, once it has shown that the motion moves about it as it says.
+fn is_traced(lag: u32) -> bool {
+    return limit_is_within(lag, FAR) && has_trail(lag) && tallies[lane].strayed < STRAYED && tally.tries == 0u;
+}
+
+fn limit_is_within(lag: u32, octaves: f32) -> bool {
     let now = f32(distance_at(lag));
     let shrunk = now - f32(last_distance_at(lag));
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), SLOWEST, 1.0);
-    return EXPONENT && tally.vain < VAIN && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
+    return EXPONENT && settings.early_stop == 1u && now >= octaves - OCTAVE * log2(away);
 }
 
 // Natural logarithm of a quarter octave.
@@ -354,7 +367,15 @@ fn judge_lag(found: u32) -> bool {
     let windows = STREAK + tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
     let has_contracted = tally.streak >= windows;
     tally.settled = select(0u, 1u, has_contracted && has_settled(found));
-    return has_contracted && (tally.settled != 0u || is_refinable(found));
+    tallies[lane].is_far = 0u;
+    if has_contracted && (tally.settled != 0u || is_refinable(found)) {
+        return true;
+    }
+    if tally.streak >= windows - 1u && is_traced(found) {
+        tallies[lane].is_far = 1u;
+        return true;
+    }
+    return false;
 }
 
 // Half a period after the middle of a cycle of odd period: how far is the state from the mirror

@@ -25,7 +25,7 @@ fn refine() -> bool {
     if tally.mode != MODE_FREE {
         q[0] -= walls[side_of(tally.mode)];
     }
-    if !(is_within(q[0]) && distance_between(to, motion.home) < Real(REACH)) {
+    if !(is_within(q[0]) && distance_between(to, motion.home) < Real(select(REACH, 2.0 * FAR_REACH, tallies[lane].is_far == 1u))) {
         return false;
     }
     motion.q = q;

@@ -107,7 +107,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     position_scale,
                     rate_scale,
                     cycle_growth,
-                    tangents
+                    tangents,
+                    trail
                 ]
             );
             same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);
@@ -151,7 +152,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     exponent_from,
                     exponent_block,
                     max_period,
-                    early_stop
+                    early_stop,
+                    chaos_errors
                 ]
             );
             same_layout!(
@@ -209,7 +211,14 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     refuted,
                     distances,
                     last_distances,
-                    word
+                    word,
+                    trail_length,
+                    trail_pitch,
+                    trail_at,
+                    trail_events,
+                    trail_each,
+                    is_far,
+                    strayed
                 ]
             );
         }

@@ -205,6 +205,7 @@ fn uniform(lanes: usize, row: u32, settings: &LaneSettings) -> Settings {
         exponent_block: exponent_block(settings),
         max_period: settings.max_period.min(LONGEST_PERIOD),
         early_stop: u32::from(early_stop),
+        chaos_errors: settings.chaos_errors.to_bits(),
     }
 }
 
