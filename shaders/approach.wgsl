@@ -73,15 +73,13 @@ fn looks() -> bool {
     return true;
 }
 
-// It has been read. Whether the strobe map has a cycle there and moves about it like this.
-fn sees_cycle(linear: Real) -> bool {
-    let to = fixed_point();
-    return distance_between(to, first_read()) < Real(FAR_REACH) && is_approached(to, linear);
-}
-
-// Newton's method has come to its end: whether the lane is at such a cycle.
-fn has_arrived() -> bool {
-    return distance_between(fixed_point(), strobe_state()) < Real(ON_CYCLE) && sees_cycle(LINEAR);
+// Whether the strobe map has a cycle at `to`, as it says that has been read, and the motion has come to it on
+// such a map; once Newton's method has ended, whether the lane is there, too.
+fn sees_cycle(to: array<Real, 4>) -> bool {
+    let first = tally.refinements == 0u;
+    let is_there = first || distance_between(to, strobe_state()) < Real(ON_CYCLE);
+    return is_there && distance_between(to, first_read()) < Real(FAR_REACH)
+        && is_approached(to, select(LINEAR, LOOSE, first));
 }
 
 // The strobe at which the cycle was first read.

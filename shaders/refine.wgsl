@@ -9,7 +9,7 @@ const REACH: f32 = 1e-2;
 // The monodromy matrix has been read along one candidate cycle from the anchor to the present
 // strobe. Moves the lane to where the linearised strobe map has its fixed point, to read on from
 // there; false where that brings it no closer or is no part of the motion.
-fn refine() -> bool {
+fn refine(to: array<Real, 4>) -> bool {
     if tally.refinements == 0u {
         motion.home = strobe_state();
         tally.home_mode = tally.mode;
@@ -20,7 +20,6 @@ fn refine() -> bool {
     if stalls || is_over || tally.mode >= MODE_DIP || tally.order > 0u {
         return false;
     }
-    let to = fixed_point();
     var q = to;
     if tally.mode != MODE_FREE {
         q[0] -= walls[side_of(tally.mode)];

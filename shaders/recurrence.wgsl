@@ -1,0 +1,181 @@
+// Does the motion come back? Strobes are compared with an anchor, window by window.
+
+// Recurrences farther apart than 2^-6 of the motion are none.
+const NEAR: u32 = 24u;
+// A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
+// comes within 2^-12 of a cycle by chance.
+const SETTLED: f32 = 56.0;
+// 2^-7 where Newton's method shows what the limit is.
+const REFINABLE: f32 = 28.0;
+// And 2^-5 where the motion is seen to approach it as it says.
+const FAR: f32 = 20.0;
+// Slower approaches than this, per period, are not waited for, only for a recurrence as close as
+// if they were as fast.
+const SLOWEST: f32 = 0.008;
+// Recurrences this close, 2^-12 of the motion, need not shrink, only not grow.
+const SLOW: u32 = 48u;
+// A distance must have shrunk by this much (a factor of 0.7) since the last window.
+const SHRUNK: u32 = 2u;
+// Windows over which a candidate must have contracted.
+const STREAK: u32 = 2u;
+// Lags of any window, at least: they are a quarter of the time that has passed, or a few cycles.
+const LEAST_WINDOW: u32 = 4u;
+// Windows need not be longer than so many cycles that contract.
+const LAGS_PER_CYCLE: u32 = 4u;
+
+// Looks at a strobe; true once a period is confirmed.
+fn recurs() -> bool {
+    let q = strobe_state();
+    motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
+    motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
+    follow(q);
+    if tally.window == 0u {
+        begin_window(q, widest());
+        return false;
+    }
+    let lag = tally.period - tally.anchor_period;
+    let apart = octaves(distance_between(q, motion.anchor));
+    tallies[lane].distances[(lag - 1u) / 4u] |= apart << (8u * ((lag - 1u) % 4u));
+    if lag < tally.window {
+        return false;
+    }
+    let found = contracting_lag();
+    let is_fast = found > 0u && shrinks(found);
+    let settled = judge_lag(found);
+    tally.known_lags = tally.window;
+    tallies[lane].last_distances = tallies[lane].distances;
+    // The next anchor lies at the same place of the cycle: only there do distances compare. The
+    // points of a cycle may be so close that a shorter lag seems to recur.
+    let cycle = max(closest_lag(), 1u);
+    // A short lag that contracts is seen as well in short windows.
+    let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
+    let lags = select(widest(), min(enough, widest()), is_fast && tally.tries == 0u);
+    begin_window(q, max(lags - lags % cycle, 1u));
+    return settled || looks();
+}
+
+fn widest() -> u32 {
+    return clamp(tally.period / 4u, LEAST_WINDOW, settings.max_period);
+}
+
+// The lag that recurs best; a longer one must be better by a factor of four.
+fn closest_lag() -> u32 {
+    return closest_of(tally.known_lags);
+}
+
+fn closest_of(lags: u32) -> u32 {
+    var best = 0u;
+    var distance = NEAR;
+    for (var lag = 1u; lag <= lags; lag++) {
+        trips += 1u;
+        if distance_at(lag) >= distance {
+            best = lag;
+            distance = distance_at(lag) + 8u;
+        }
+    }
+    return best;
+}
+
+fn begin_window(q: array<Real, 4>, lags: u32) {
+    motion.anchor = q;
+    tally.anchor_period = tally.period;
+    tally.window = min(lags, settings.max_period);
+    tallies[lane].distances = array<u32, 16>();
+}
+
+fn distance_at(lag: u32) -> u32 {
+    return (tallies[lane].distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+}
+
+fn last_distance_at(lag: u32) -> u32 {
+    return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+}
+
+// The smallest lag that recurs at all its multiples and contracts, or has reached rounding.
+// Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
+fn contracting_lag() -> u32 {
+    // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
+    let best = closest_of(tally.window);
+    for (var lag = 1u; lag <= min(tally.window, tally.known_lags); lag++) {
+        trips += 1u;
+        let now = distance_at(lag);
+        let before = last_distance_at(lag);
+        let contracts = shrinks(lag) || (now >= SLOW && now >= before && lag == best);
+        if now < NEAR || !contracts {
+            continue;
+        }
+        var kept = true;
+        for (var multiple = 2u * lag; multiple <= tally.window; multiple += lag) {
+            trips += 1u;
+            kept = kept && distance_at(multiple) >= NEAR;
+        }
+        if kept {
+            return lag;
+        }
+    }
+    return 0u;
+}
+
+// Whether the distance at a lag has shrunk since the last window, or is rounding.
+fn shrinks(lag: u32) -> bool {
+    let now = distance_at(lag);
+    return now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
+}
+
+// Whether the limit is near enough: strobes `d` apart that shrink by `mu` per period are
+// `d / (1 - mu)` away from it. A slow approach must come closer.
+fn has_settled(lag: u32) -> bool {
+    let now = distance_at(lag);
+    let shrunk = f32(now) - f32(last_distance_at(lag));
+    if now >= RESOLVED {
+        return true;
+    }
+    // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), 1e-6, 1.0);
+    return f32(now) >= SETTLED - OCTAVE * log2(away);
+}
+
+// Whether Newton's method may show what the limit is.
+fn is_refinable(lag: u32) -> bool {
+    return limit_is_within(lag, REFINABLE) && tally.vain < VAIN;
+}
+
+// Or will, once it has shown that the motion moves about it as it says.
+fn is_traced(lag: u32) -> bool {
+    return limit_is_within(lag, FAR) && has_trail(lag) && tallies[lane].strayed < STRAYED && tally.tries == 0u;
+}
+
+fn limit_is_within(lag: u32, octaves: f32) -> bool {
+    let now = f32(distance_at(lag));
+    let shrunk = now - f32(last_distance_at(lag));
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), SLOWEST, 1.0);
+    return EXPONENT && settings.early_stop == 1u && now >= octaves - OCTAVE * log2(away);
+}
+
+// Natural logarithm of a quarter octave.
+const QUARTER_OCTAVE: f32 = 0.1733;
+
+// Keeps the books on the candidate; true once it is settled.
+fn judge_lag(found: u32) -> bool {
+    tally.settled = 0u;
+    if found == 0u {
+        tally.candidate = 0u;
+        tally.streak = 0u;
+        return false;
+    }
+    tally.streak = select(1u, tally.streak + 1u, found == tally.candidate);
+    tally.candidate = found;
+    // Weak chaos contracts by chance, the oftener it is looked at: ask for more of it.
+    let windows = STREAK + tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
+    let has_contracted = tally.streak >= windows;
+    tally.settled = select(0u, 1u, has_contracted && has_settled(found));
+    tallies[lane].is_far = 0u;
+    if has_contracted && (tally.settled != 0u || is_refinable(found)) {
+        return true;
+    }
+    if tally.streak >= windows - 1u && is_traced(found) {
+        tallies[lane].is_far = 1u;
+        return true;
+    }
+    return false;
+}
