@@ -93,7 +93,7 @@ struct Settings {
     max_period: u32,
     // 1: lanes end once they are decided.
     early_stop: u32,
-    // Standard errors by which the exponent must exceed zero before the budget is spent: the bits of an f32.
+    // Standard errors by which the exponent must exceed zero before the budget is spent: bits of an f32.
     chaos_errors: u32,
 }
 
