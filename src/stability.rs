@@ -9,10 +9,11 @@
 
 mod exponent;
 mod newton;
+mod unit_circle;
 
 pub use exponent::Exponent;
 pub(crate) use exponent::FRESH_TANGENT;
-pub(crate) use newton::refine_nearby;
+pub(crate) use newton::Newton;
 pub use newton::{pitchfork, refine};
 
 use nalgebra::linalg::Schur;
@@ -94,6 +95,14 @@ impl StrobeMap {
         match self {
             StrobeMap::Periods(_) => (image.scaled, image.log_scale),
             StrobeMap::MirroredHalves(_) => unit_size(image.scaled * image.scaled, 2.0 * image.log_scale),
+        }
+    }
+
+    /// Half forcing periods that one application integrates.
+    fn half_periods(self) -> u32 {
+        match self {
+            StrobeMap::Periods(p) => 2 * p,
+            StrobeMap::MirroredHalves(p) => p,
         }
     }
 
