@@ -18,8 +18,8 @@ pub(super) fn lies_within_unit_circle(matrix: &Matrix4<f64>) -> Option<bool> {
     // first, and the one of degree n - 1 that elimination with its reverse leaves has as well.
     for degree in (1..=4).rev() {
         let (first, last) = (polynomial[0], polynomial[degree]);
-        // Written so that what overflows is not inside.
-        if !(last.abs() < first.abs()) {
+        // What has overflowed on the way is not inside.
+        if last.abs() >= first.abs() || last.is_nan() || first.is_nan() {
             return Some(false);
         }
         let reverse = polynomial;
@@ -34,9 +34,9 @@ pub(super) fn lies_within_unit_circle(matrix: &Matrix4<f64>) -> Option<bool> {
 fn characteristic(a: &Matrix4<f64>) -> [f64; 5] {
     let mut coefficients = [1.0; 5];
     let mut product = *a;
-    for n in 1..=4 {
-        coefficients[n] = -product.trace() / n as f64;
-        product = a * (product + Matrix4::identity() * coefficients[n]);
+    for (n, coefficient) in coefficients.iter_mut().enumerate().skip(1) {
+        *coefficient = -product.trace() / n as f64;
+        product = a * (product + Matrix4::identity() * *coefficient);
     }
     coefficients
 }
