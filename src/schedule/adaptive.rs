@@ -15,6 +15,10 @@ use crate::scene::Refine;
 /// their common edge show whether it goes on here.
 const NARROW: usize = 4;
 
+/// Rounds in which nothing is done but to follow borders. Longer ones are few, and a round takes as
+/// long as its slowest cell.
+const FOLLOWED: u32 = 16;
+
 /// The state of an adaptive map between rounds.
 pub(super) struct Adaptive {
     counts: [usize; 2],
@@ -31,6 +35,8 @@ pub(super) struct Adaptive {
     halvings: u32,
     /// Halvings that take a coarse block down to single cells.
     levels: u32,
+    /// Rounds that followed borders since then, or since the last audit.
+    followed: u32,
     /// Cells of the audit under way.
     audited: Vec<u32>,
     audits: Vec<Audit>,
@@ -67,6 +73,7 @@ impl Adaptive {
             open: coarse(counts, refine.minimum_grid as usize),
             closed: Vec::new(),
             halvings: 0,
+            followed: 0,
             levels: refine.minimum_grid.next_power_of_two().ilog2(),
             audited: Vec::new(),
             audits: Vec::new(),
@@ -137,7 +144,8 @@ impl Adaptive {
 
     /// Opens closed blocks again in which a neighbour's halving has found a border.
     fn reopen(&mut self) {
-        if !self.is_spent() {
+        self.followed += u32::from(self.open.is_empty());
+        if !self.is_spent() && self.followed <= FOLLOWED {
             let closed = std::mem::take(&mut self.closed);
             let (crossed, closed) = closed.into_iter().partition(|block| self.is_crossed(block));
             self.closed = closed;
@@ -175,6 +183,7 @@ impl Adaptive {
     /// all blocks are halved that are filled with what is wrong too often: mostly chaos with its
     /// windows, which the plain regions around need not pay for.
     fn judge_audit(&mut self, records: &[Record]) {
+        self.followed = 0;
         let closed = std::mem::take(&mut self.closed);
         let Verdict { wrong, bad } = self.count_wrong(&closed, records);
         let mut halves = false;
