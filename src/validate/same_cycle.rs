@@ -6,6 +6,7 @@ use nalgebra::Matrix4;
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
 use super::explanation::{ELSEWHERE, Explanation, strobe};
+use super::rounded::{Rounded, counts};
 use super::states::{ROUNDINGS_PER_STEP, unit_roundoff};
 use crate::classify::classify;
 use crate::gpu::Constants;
@@ -113,7 +114,12 @@ fn exponent(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u3
         return Some(Explanation::Border);
     }
     let rounded = rounded_exponents(case, stands, period)?;
-    (case.is_lane && contains(&rounded)).then_some(Explanation::BelowResolution)
+    if case.is_lane && contains(&rounded) {
+        return Some(Explanation::BelowResolution);
+    }
+    let at_every_step: Vec<f64> =
+        rounded_readings(case, stands, truth, period)?.into_iter().filter_map(read).collect();
+    contains(&at_every_step).then_some(Explanation::BelowResolution)
 }
 
 fn mesh_fraction(
@@ -125,9 +131,50 @@ fn mesh_fraction(
     let ours = case.record.mesh_fraction;
     let about: Vec<f64> =
         readings(case, stands, truth, period).into_iter().filter_map(|answer| answer.mesh_fraction).collect();
-    let hides =
-        about.iter().any(|&fraction| fraction <= ours) && about.iter().any(|&fraction| fraction >= ours);
-    hides.then_some(Explanation::Unsettled)
+    let contains = |list: &[f64]| {
+        list.iter().any(|&fraction| fraction <= ours) && list.iter().any(|&fraction| fraction >= ours)
+    };
+    if contains(&about) {
+        return Some(Explanation::Unsettled);
+    }
+    let rounded: Vec<f64> = rounded_readings(case, stands, truth, period)?
+        .into_iter()
+        .filter_map(|answer| answer.mesh_fraction)
+        .collect();
+    contains(&rounded).then_some(Explanation::BelowResolution)
+}
+
+/// The cycle as it is read, as lanes read it, where every step rounds.
+fn rounded_readings(
+    case: &Case<'_>,
+    stands: &Trajectory<'_>,
+    truth: &Answer,
+    period: u32,
+) -> Option<Vec<Answer>> {
+    if !case.is_lane {
+        return None;
+    }
+    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let span = f64::from(period) * case.flow.period;
+    let reading = |run: u64| {
+        let mut rounded = Rounded::new(stands.carrying(UNIT), &constants, case.precision, run);
+        (0..period).try_for_each(|_| rounded.advance_period()).ok()?;
+        rounded.set_tangents(UNIT);
+        let before = counts(rounded.trajectory());
+        (0..period).try_for_each(|_| rounded.advance_period()).ok()?;
+        let (tangents, log_scale) = rounded.tangents();
+        let [re, im] = *multipliers(&Matrix4::from_fn(|i, j| tangents[j][i]))?.first()?;
+        let after = counts(rounded.trajectory());
+        Some(Answer {
+            exponent: Some([(re.hypot(im).ln() + log_scale) / span, 0.0]),
+            impacts_per_period: Some((after[0] - before[0]) / f64::from(period)),
+            mesh_fraction: Some((after[1] - before[1]) / span),
+            ..truth.clone()
+        })
+    };
+    // Another branch's cycle is another cycle.
+    let is_the_same = |answer: &Answer| answer.impacts_per_period == truth.impacts_per_period;
+    Some((0..TRIALS as u64).filter_map(reading).filter(is_the_same).collect())
 }
 
 /// The cycle as it is read where the lane was, and as far about that as the cycle itself may be.
@@ -135,11 +182,11 @@ fn readings(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u3
     let from = stands.state();
     let span = f64::from(period) * case.flow.period;
     let multiplier = truth.exponent.map_or(0.0, |[exponent, _]| (exponent * span).exp());
-    // States `d` apart that shrink by a factor per cycle are `d / (1 - factor)` from their limit.
-    let reach = case.unrest(stands, period) / (1.0 - multiplier).max(f64::MIN_POSITIVE);
-    if reach > ELSEWHERE {
-        return Vec::new();
-    }
+    // States `d` apart that shrink by a factor per cycle are `d / (1 - factor)` from their limit, less if
+    // they alternate about it.
+    let shrinking = case.unrest(stands, period) / (1.0 - multiplier).max(f64::MIN_POSITIVE);
+    let reaches = [Some(shrinking), case.from_limit(stands, period)].into_iter().flatten();
+    let Some(reach) = reaches.filter(|&reach| reach <= ELSEWHERE).reduce(f64::max) else { return Vec::new() };
     let units = case.units(&from);
     let mut random = Random::new(u64::from(period));
     let mut places = vec![from];

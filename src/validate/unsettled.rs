@@ -1,0 +1,58 @@
+//! Cycles that a lane read before the motion had settled on them.
+
+use super::case::{Case, LANE_RESOLUTION};
+use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
+use super::limits::whole_budget;
+use super::same_cycle::within_reach;
+use crate::classify::classify;
+use crate::orbit::Class;
+use crate::reference::Trajectory;
+
+/// Forcing periods in which a motion that is about to rest is seen to stay.
+const STAYING_PERIODS: u32 = 1024;
+
+/// The record's cycle, read off a motion that is still on its way to it: the reference, read where the
+/// lane read, gives the record's answer.
+///
+/// If the reference itself decides nothing, the motion has to stay there, or to be there as far as the
+/// last period of the budget could tell.
+pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    let is_open = case.truth.class == Class::Undecided;
+    if case.truth.class != classify(case.record) && !is_open {
+        return None;
+    }
+    let stands = case.after(strobe(case)?, 0).ok()?;
+    let before = case.record.periods_run.saturating_sub(period);
+    // Averages are read one cycle after the multipliers.
+    let earlier = before.saturating_sub(period);
+    let places = [before, earlier].map(|periods| case.after(case.start, periods).ok());
+    let mut places = places.iter().flatten().chain([&stands]);
+    let is_the_records = |place: &Trajectory<'_>| {
+        let Some(answer) = case.read_as_is(place, period) else { return false };
+        case.is_the_records(&answer) || (is_open && within_reach(case, place.state(), &answer).is_some())
+    };
+    if !places.any(is_the_records) {
+        return None;
+    }
+    let is_there =
+        !is_open || (is_least(case)? && (stays(case, &stands, period) || arrives(case, &stands, period)));
+    is_there.then_some(Explanation::Unsettled)
+}
+
+/// Whether the reference, from where the record says that the motion was at last, comes to rest on a cycle of
+/// `period` close by: one that neither attracts nor repels, as that of a free body, is never decided.
+fn stays(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
+    let mut ahead = stands.clone();
+    let rests = (0..STAYING_PERIODS).all(|_| ahead.advance_period(&mut ()).is_ok());
+    rests
+        && case.unrest(&ahead, period) < LANE_RESOLUTION
+        && case.apart(&stands.state(), &ahead.state()) < ELSEWHERE
+}
+
+/// Whether the budget is spent, and the motion as near to its cycle as lanes then ask for (`ABOUT` in the
+/// shaders), by its derivative.
+fn arrives(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
+    let is_spent = case.record.periods_run + period >= whole_budget(case);
+    is_spent && case.from_limit(stands, period).is_some_and(|apart| apart < ELSEWHERE)
+}
