@@ -16,6 +16,7 @@ mod explanation;
 mod lane_growth;
 mod limits;
 mod rounded;
+mod rounding;
 mod same_cycle;
 mod sample;
 pub mod states;

@@ -161,15 +161,13 @@ impl<'a> Case<'a> {
         self.apart(&before, &ahead.state())
     }
 
-    /// How far a motion is from the cycle that its strobe map, linearised there, has: `(1 - M)^-1 (P(y) - y)`,
-    /// relative to its size.
-    pub(super) fn from_limit(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<f64> {
-        let y = trajectory.state();
-        let image = StrobeMap::Periods(period).apply(trajectory, y).ok()?;
-        let residual = Vector4::from(image.state) - Vector4::from(y);
+    /// Where the strobe map, linearised about a motion, has its cycle: `y + (1 - M)^-1 (P(y) - y)`.
+    pub(super) fn limit(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<State> {
+        let y = Vector4::from(trajectory.state());
+        let image = StrobeMap::Periods(period).apply(trajectory, y.into()).ok()?;
+        let residual = Vector4::from(image.state) - y;
         let step = (Matrix4::identity() - image.derivative()).lu().solve(&residual)?;
-        let limit = (Vector4::from(y) + step).into();
-        Some(self.apart(&y, &limit)).filter(|apart| apart.is_finite())
+        Some((y + step).into()).filter(|limit: &State| limit.iter().all(|x| x.is_finite()))
     }
 
     /// The distance of two states relative to the size of the first and to the walls.

@@ -8,8 +8,9 @@ use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION};
 use super::lane_growth::weak_chaos;
 use super::limits::{
-    at_rest, flip, held, is_shaken, is_spent, late, longer, scattered, undecided_chaos, within_scatter,
+    self, flip, held, is_shaken, is_spent, late, longer, scattered, undecided_chaos, within_scatter,
 };
+use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
 use super::unsettled::unsettled;
 use crate::classify::{classify, status};
@@ -31,6 +32,9 @@ const SENSITIVE: f64 = 0.1;
 
 /// Starts within rounding from which a motion may meet its caps: chaos decides which does.
 const SCATTERED_STARTS: usize = 100;
+
+/// And motions that are rounded at every step.
+const ROUNDED_RUNS: u64 = 8;
 
 /// Why a cell's record is not what the reference says within the same budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -124,7 +128,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 16] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 18] = [
         engine_cap,
         longer,
         other_attractor,
@@ -140,6 +144,8 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         grazing,
         held,
         within_scatter,
+        rounded_cycle,
+        at_rest,
         scattered,
     ];
     CHECKS.iter().find_map(|check| check(case))
@@ -161,6 +167,7 @@ fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
         Status::CapEvents => {
             let starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
             starts.chain(case.scattered_starts(SCATTERED_STARTS)).any(|start| needs_more(case, start, &caps))
+                || (0..ROUNDED_RUNS).any(|run| rounding::needs_more(case, run, &caps) == Some(true))
         }
         _ => false,
     };
@@ -238,8 +245,11 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     let hides = divides && case.unrest(&stands, period) < LANE_RESOLUTION;
     // Or rounding keeps the lane off its cycle in a pattern of its own.
     let multiplies = period > theirs && period.is_multiple_of(theirs);
-    let is_kept_off = (at_rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
-    let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)?;
+    let is_kept_off =
+        (limits::at_rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
+    let scatters = multiplies
+        && is_kept_off
+        && (is_shaken(case, &stands, theirs)? || rounding::throws_off(case, &stands, theirs)?);
     (hides || scatters).then_some(Explanation::BelowResolution)
 }
 

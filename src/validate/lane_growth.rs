@@ -73,7 +73,7 @@ impl Watched for Trajectory<'_, 1> {
 
 impl Watched for Rounded<'_, '_, 1> {
     fn advance(&mut self) -> Result<(), Stop> {
-        self.advance_period()
+        self.advance_period(&mut ())
     }
 
     fn tangent(&self) -> (State, f64) {
@@ -116,7 +116,7 @@ impl<'c, 'a> AsLane<'c, 'a> {
         let fresh = start.carrying([self.constants.to_state(FRESH)]);
         let mut rounded = Rounded::new(fresh, &self.constants, self.case.precision, seed);
         for _ in 0..self.averaging.growth_from {
-            rounded.advance_period().ok()?;
+            rounded.advance_period(&mut ()).ok()?;
         }
         self.average(&mut rounded)
     }

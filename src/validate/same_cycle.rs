@@ -6,7 +6,6 @@ use nalgebra::Matrix4;
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
 use super::explanation::{ELSEWHERE, Explanation, strobe};
-use super::rounded::{Rounded, counts};
 use super::states::{ROUNDINGS_PER_STEP, unit_roundoff};
 use crate::classify::classify;
 use crate::gpu::Constants;
@@ -104,22 +103,12 @@ fn exponent(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u3
     if contains(&about) {
         return Some(Explanation::Unsettled);
     }
-    let moved: Vec<f64> = case
-        .nudged_pairs(rounding(case.precision))
-        .map(|pair| Answer::from(&analyse(&pair, stands.state(), &case.budget.settings)))
-        .filter(|other| other.class == truth.class && other.word == truth.word)
-        .filter_map(read)
-        .collect();
+    let moved: Vec<f64> = moved_cycles(case, stands, truth).into_iter().filter_map(read).collect();
     if contains(&moved) {
         return Some(Explanation::Border);
     }
     let rounded = rounded_exponents(case, stands, period)?;
-    if case.is_lane && contains(&rounded) {
-        return Some(Explanation::BelowResolution);
-    }
-    let at_every_step: Vec<f64> =
-        rounded_readings(case, stands, truth, period)?.into_iter().filter_map(read).collect();
-    contains(&at_every_step).then_some(Explanation::BelowResolution)
+    (case.is_lane && contains(&rounded)).then_some(Explanation::BelowResolution)
 }
 
 fn mesh_fraction(
@@ -129,52 +118,23 @@ fn mesh_fraction(
     period: u32,
 ) -> Option<Explanation> {
     let ours = case.record.mesh_fraction;
-    let about: Vec<f64> =
-        readings(case, stands, truth, period).into_iter().filter_map(|answer| answer.mesh_fraction).collect();
-    let contains = |list: &[f64]| {
-        list.iter().any(|&fraction| fraction <= ours) && list.iter().any(|&fraction| fraction >= ours)
+    let contains = |answers: Vec<Answer>| {
+        let fractions: Vec<f64> = answers.into_iter().filter_map(|answer| answer.mesh_fraction).collect();
+        fractions.iter().any(|&fraction| fraction <= ours)
+            && fractions.iter().any(|&fraction| fraction >= ours)
     };
-    if contains(&about) {
+    if contains(readings(case, stands, truth, period)) {
         return Some(Explanation::Unsettled);
     }
-    let rounded: Vec<f64> = rounded_readings(case, stands, truth, period)?
-        .into_iter()
-        .filter_map(|answer| answer.mesh_fraction)
-        .collect();
-    contains(&rounded).then_some(Explanation::BelowResolution)
+    contains(moved_cycles(case, stands, truth)).then_some(Explanation::Border)
 }
 
-/// The cycle as it is read, as lanes read it, where every step rounds.
-fn rounded_readings(
-    case: &Case<'_>,
-    stands: &Trajectory<'_>,
-    truth: &Answer,
-    period: u32,
-) -> Option<Vec<Answer>> {
-    if !case.is_lane {
-        return None;
-    }
-    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
-    let span = f64::from(period) * case.flow.period;
-    let reading = |run: u64| {
-        let mut rounded = Rounded::new(stands.carrying(UNIT), &constants, case.precision, run);
-        (0..period).try_for_each(|_| rounded.advance_period()).ok()?;
-        rounded.set_tangents(UNIT);
-        let before = counts(rounded.trajectory());
-        (0..period).try_for_each(|_| rounded.advance_period()).ok()?;
-        let (tangents, log_scale) = rounded.tangents();
-        let [re, im] = *multipliers(&Matrix4::from_fn(|i, j| tangents[j][i]))?.first()?;
-        let after = counts(rounded.trajectory());
-        Some(Answer {
-            exponent: Some([(re.hypot(im).ln() + log_scale) / span, 0.0]),
-            impacts_per_period: Some((after[0] - before[0]) / f64::from(period)),
-            mesh_fraction: Some((after[1] - before[1]) / span),
-            ..truth.clone()
-        })
-    };
-    // Another branch's cycle is another cycle.
-    let is_the_same = |answer: &Answer| answer.impacts_per_period == truth.impacts_per_period;
-    Some((0..TRIALS as u64).filter_map(reading).filter(is_the_same).collect())
+/// The same cycle with parameters moved within rounding: a lane's constants are rounded, too.
+fn moved_cycles(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Vec<Answer> {
+    case.nudged_pairs(rounding(case.precision))
+        .map(|pair| Answer::from(&analyse(&pair, stands.state(), &case.budget.settings)))
+        .filter(|other| other.class == truth.class && other.word == truth.word)
+        .collect()
 }
 
 /// The cycle as it is read where the lane was, and as far about that as the cycle itself may be.
@@ -185,7 +145,8 @@ fn readings(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u3
     // States `d` apart that shrink by a factor per cycle are `d / (1 - factor)` from their limit, less if
     // they alternate about it.
     let shrinking = case.unrest(stands, period) / (1.0 - multiplier).max(f64::MIN_POSITIVE);
-    let reaches = [Some(shrinking), case.from_limit(stands, period)].into_iter().flatten();
+    let by_derivative = case.limit(stands, period).map(|limit| case.apart(&from, &limit));
+    let reaches = [Some(shrinking), by_derivative].into_iter().flatten();
     let Some(reach) = reaches.filter(|&reach| reach <= ELSEWHERE).reduce(f64::max) else { return Vec::new() };
     let units = case.units(&from);
     let mut random = Random::new(u64::from(period));

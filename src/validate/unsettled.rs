@@ -3,8 +3,10 @@
 use super::case::{Case, LANE_RESOLUTION};
 use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
 use super::limits::whole_budget;
+use super::rounding::whole_units;
 use super::same_cycle::within_reach;
 use crate::classify::classify;
+use crate::model::State;
 use crate::orbit::Class;
 use crate::reference::Trajectory;
 
@@ -45,14 +47,20 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
 fn stays(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
     let mut ahead = stands.clone();
     let rests = (0..STAYING_PERIODS).all(|_| ahead.advance_period(&mut ()).is_ok());
-    rests
-        && case.unrest(&ahead, period) < LANE_RESOLUTION
-        && case.apart(&stands.state(), &ahead.state()) < ELSEWHERE
+    let [here, there] = [stands.state(), ahead.state()];
+    rests && case.unrest(&ahead, period) < LANE_RESOLUTION && apart(case, &here, &there) < ELSEWHERE
 }
 
 /// Whether the budget is spent, and the motion as near to its cycle as lanes then ask for (`ABOUT` in the
 /// shaders), by its derivative.
 fn arrives(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
     let is_spent = case.record.periods_run + period >= whole_budget(case);
-    is_spent && case.from_limit(stands, period).is_some_and(|apart| apart < ELSEWHERE)
+    let limit = case.limit(stands, period);
+    is_spent && limit.is_some_and(|limit| apart(case, &stands.state(), &limit) < ELSEWHERE)
+}
+
+/// The distance of two states relative to all of the motion, as lanes measure it.
+fn apart(case: &Case<'_>, a: &State, b: &State) -> f64 {
+    let units = whole_units(case);
+    (0..4).map(|i| (a[i] - b[i]).abs() / units[i % 2]).fold(0.0, f64::max)
 }
