@@ -56,3 +56,45 @@ impl Averaging {
         growth * f64::from(counted) > NEUTRAL_ORDER * ((began + f64::from(counted)) / began).ln()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_fit_the_periods() {
+        let of_map = Averaging::new(528, 100);
+        assert_eq!(of_map, Averaging { growth_from: 50, exponent_from: 100, block: 13 });
+        let of_few = Averaging::new(64, 32);
+        assert_eq!(of_few, Averaging { growth_from: 16, exponent_from: 32, block: 4 });
+    }
+
+    #[test]
+    fn means_are_of_whole_blocks() {
+        let averaging = Averaging::new(64, 32);
+        assert_eq!(averaging.estimate(&[0.5; 32]), Some([0.5, 0.0]));
+        // What goes up and down within a block is no error of the mean.
+        let swings: Vec<f64> = (0..32).map(|n| if n % 2 == 0 { 3.0 } else { -2.0 }).collect();
+        assert_eq!(averaging.estimate(&swings), Some([0.5, 0.0]));
+        // Block means 0, 1, 2, 3; the last two periods are none.
+        let mut steps: Vec<f64> = (0..16).map(|n| f64::from(n / 4)).collect();
+        steps.extend([100.0; 2]);
+        let [mean, error] = averaging.estimate(&steps).unwrap();
+        assert!(
+            (mean - 1.5).abs() < 1e-15 && (error - (1.25f64 / 3.0).sqrt()).abs() < 1e-15,
+            "{mean} {error}"
+        );
+        assert_eq!(averaging.estimate(&[1.0; 7]), None);
+    }
+
+    #[test]
+    fn powers_of_time_are_no_chaos() {
+        let averaging = Averaging::new(64, 32);
+        let mean = |order: f64| order * 2f64.ln() / 32.0;
+        for (order, is_more) in [(1.0, false), (1.99, false), (2.01, true)] {
+            assert_eq!(averaging.outgrows(mean(order), 32), is_more, "{order}");
+        }
+        // The last block is not complete.
+        assert!(!averaging.outgrows(mean(2.01), 31));
+    }
+}

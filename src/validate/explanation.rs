@@ -148,7 +148,10 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         at_rest,
         scattered,
     ];
-    CHECKS.iter().find_map(|check| check(case))
+    CHECKS
+        .iter()
+        .enumerate()
+        .find_map(|(i, check)| check(case).inspect(|e| eprintln!("CHECK {i} {e:?} {:?}", case.truth)))
 }
 
 fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
@@ -247,9 +250,7 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     let multiplies = period > theirs && period.is_multiple_of(theirs);
     let is_kept_off =
         (limits::at_rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
-    let scatters = multiplies
-        && is_kept_off
-        && (is_shaken(case, &stands, theirs)? || rounding::throws_off(case, &stands, theirs)?);
+    let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)?;
     (hides || scatters).then_some(Explanation::BelowResolution)
 }
 

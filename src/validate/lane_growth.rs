@@ -32,7 +32,7 @@ pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
         return None;
     }
     let lane = AsLane::new(case)?;
-    let same = |answer: Option<Answer>| answer.is_some_and(|answer| case.is_the_records(&answer));
+    let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
     if same(lane.answer(case.start)) {
         return Some(Explanation::UndecidedInBudget);
     }
@@ -41,6 +41,15 @@ pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
         return Some(Explanation::Chaos);
     }
     (0..RUNS).map(|run| lane.rounded(run)).any(same).then_some(Explanation::BelowResolution)
+}
+
+/// Whether an average of few blocks is the record's, its standard error too.
+fn is_the_records(case: &Case<'_>, answer: &Answer) -> bool {
+    let Some([theirs, error]) = answer.exponent else { return false };
+    let (ours, own) = (case.record.lyapunov, case.record.lyapunov_error);
+    let is_near = (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own);
+    let is_as_sure = own <= UNSURE * error && error <= UNSURE * own;
+    is_near && is_as_sure && case.is_the_records(answer)
 }
 
 /// A motion with one tangent vector that is looked at period by period.
@@ -89,6 +98,9 @@ impl Watched for Rounded<'_, '_, 1> {
         counts(self.trajectory())
     }
 }
+
+/// Standard errors of eight blocks differ by less than this factor, 99 times of 100.
+const UNSURE: f64 = 3.0;
 
 /// What is the same for all motions of a cell.
 struct AsLane<'c, 'a> {

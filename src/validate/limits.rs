@@ -153,8 +153,7 @@ pub(super) fn is_shaken(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -
     let image = StrobeMap::Periods(period).apply(stands, stands.state()).ok()?;
     let [re, im] = *multipliers(&image.derivative())?.first()?;
     let radius = re.hypot(im);
-    // What a cycle forgets is rounded again at its end.
-    let gain = image.derivative().singular_values().max().max(1.0) / (1.0 - radius);
+    let gain = image.derivative().singular_values().max() / (1.0 - radius);
     // Every event rounds.
     let events = 1.0 + case.truth.impacts_per_period.unwrap_or(0.0) * f64::from(period);
     Some(radius < 1.0 && case.unrest(stands, period) <= rounding(case.precision) * events * gain)

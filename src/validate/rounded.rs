@@ -105,14 +105,6 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
         }));
     }
 
-    /// Once around a cycle and on: how far the last cycle took the motion, relative to its size.
-    pub(super) fn scatter(&mut self, case: &Case<'_>, period: u32) -> Option<f64> {
-        (0..period).try_for_each(|_| self.advance_period(&mut ())).ok()?;
-        let before = self.trajectory.state();
-        (0..period).try_for_each(|_| self.advance_period(&mut ())).ok()?;
-        Some(case.apart(&before, &self.trajectory.state()))
-    }
-
     /// Tangent vectors, but for the exponential of the logarithm that is returned with them.
     pub(super) fn tangents(&self) -> ([State; N], f64) {
         (self.trajectory.tangents(), self.log_scale)

@@ -7,66 +7,56 @@ use super::rounded::{Rounded, read_cycle};
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
 use crate::orbit::{Class, Status};
-use crate::random::Random;
 use crate::reference::Trajectory;
+
+/// Looks at a period of a motion at rest.
+const LOOKS: u32 = 64;
 
 /// Motions that are rounded, each in its own way.
 const RUNS: u64 = 32;
 
-/// Lanes take themselves to be on a cycle this close to it, relative to all of the motion (`ON_CYCLE` in
-/// the shaders).
-const ON_CYCLE: f64 = 1e-4;
-
-/// The record's cycle is the reference's, read where every step rounds, or as far from it as lanes take
-/// for being there: one reading has its word and impacts, and its exponent and averages lie between those
-/// that are read.
+/// The record's cycle is the reference's, read where every step rounds: one reading has its word and
+/// impacts, and its exponent and averages lie between those that are read.
 pub(super) fn rounded_cycle(case: &Case<'_>) -> Option<Explanation> {
+    if case.truth.class != classify(case.record) {
+        return None;
+    }
+    let stands = case.after(strobe(case)?, 0).ok()?;
+    is_read_rounded(case, &stands, &case.truth)?.then_some(Explanation::BelowResolution)
+}
+
+/// Whether the record's cycle is the one that `truth` describes, read from where a motion stands where
+/// every step rounds.
+pub(super) fn is_read_rounded(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Option<bool> {
     let Class::Periodic { period } = classify(case.record) else { return None };
-    if !case.is_lane || case.truth.class != classify(case.record) {
+    if !case.is_lane {
         return None;
     }
     let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
-    let stands = case.after(strobe(case)?, 0).ok()?;
-    let settled = |run: u64| {
+    let read = |run: u64| {
         let mut before = Rounded::new(stands.clone(), &constants, case.precision, run);
         (0..period).try_for_each(|_| before.advance_period(&mut ())).ok()?;
         read_cycle(case, &constants, before.trajectory(), period, !run)
     };
-    if is_between(case, (0..RUNS).filter_map(settled)) {
-        return Some(Explanation::BelowResolution);
-    }
-    let units = whole_units(case);
-    let about = |run: u64| {
-        let mut random = Random::new(run);
-        let reach = units.map(|unit| ON_CYCLE * unit);
-        let y = stands.state();
-        let place = std::array::from_fn(|i| y[i] + reach[i % 2] * (2.0 * random.unit() - 1.0));
-        read_cycle(case, &constants, &stands.at(place, []), period, run)
-    };
-    is_between(case, (0..RUNS).filter_map(about)).then_some(Explanation::Unsettled)
-}
-
-/// Whether one reading has all that the record says but for its exponent and meshing, and these lie between
-/// those of such readings and of the reference's cycle.
-fn is_between(case: &Case<'_>, readings: impl Iterator<Item = Answer>) -> bool {
     let claims = |answer: &Answer| {
         let exponent = Some([case.record.lyapunov, 0.0]);
         let mesh_fraction = Some(case.record.mesh_fraction);
         case.is_the_records(&Answer { exponent, mesh_fraction, ..answer.clone() })
     };
-    let same: Vec<Answer> = readings.filter(claims).collect();
+    let same: Vec<Answer> = (0..RUNS).filter_map(read).filter(claims).collect();
     let lies_between = |ours: f64, of: fn(&Answer) -> Option<f64>| {
-        let known: Vec<f64> = same.iter().chain([&case.truth]).filter_map(of).collect();
+        let known: Vec<f64> = same.iter().chain([truth]).filter_map(of).collect();
         known.iter().any(|&theirs| theirs <= ours) && known.iter().any(|&theirs| theirs >= ours)
     };
-    let agrees = |field: Field| {
-        let compared = case.truth.compare(case.record, &case.bars);
-        compared.iter().all(|(of, differs)| *of != field || differs.is_none())
-    };
+    let compared = truth.compare(case.record, &case.bars);
+    let agrees = |field: Field| compared.iter().all(|(of, differs)| *of != field || differs.is_none());
     let exponent = |answer: &Answer| answer.exponent.map(|[value, _]| value);
-    !same.is_empty()
-        && (agrees(Field::Exponent) || lies_between(case.record.lyapunov, exponent))
-        && (agrees(Field::Mesh) || lies_between(case.record.mesh_fraction, |answer| answer.mesh_fraction))
+    Some(
+        !same.is_empty()
+            && (agrees(Field::Exponent) || lies_between(case.record.lyapunov, exponent))
+            && (agrees(Field::Mesh)
+                || lies_between(case.record.mesh_fraction, |answer| answer.mesh_fraction)),
+    )
 }
 
 /// Units of position and velocity by which lanes measure: of all strobes up to the record's last.
@@ -83,23 +73,13 @@ pub(super) fn whole_units(case: &Case<'_>) -> [f64; 2] {
     units
 }
 
-/// Whether rounding at every step takes a motion on its cycle of `period` as far from where it was a cycle
-/// ago as the record's is.
-pub(super) fn throws_off(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> Option<bool> {
-    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
-    let unrest = case.unrest(stands, period);
-    let scatter = |run| Rounded::new(stands.clone(), &constants, case.precision, run).scatter(case, period);
-    Some((0..RUNS).filter_map(scatter).any(|scatter| scatter >= unrest))
-}
-
 /// The motion rests on a wall: what it still does in a period, its gap and the rate of that too, is less
 /// than a lane's numbers hold. Whatever is said of its events is rounding, be it that there are too many.
 pub(super) fn at_rest(case: &Case<'_>) -> Option<Explanation> {
-    let claims_rest = match (classify(case.record), status(case.record)) {
-        (Class::Periodic { period: 1 }, _) | (_, Status::CapEvents) => true,
-        _ => false,
-    };
-    if !case.is_lane || !claims_rest {
+    let is_cap = status(case.record) == Status::CapEvents;
+    let is_open =
+        classify(case.record) == (Class::Periodic { period: 1 }) && case.truth.class == Class::Undecided;
+    if !case.is_lane || !(is_cap || is_open) {
         return None;
     }
     let there = strobe(case)?;
@@ -120,9 +100,6 @@ pub(super) fn at_rest(case: &Case<'_>) -> Option<Explanation> {
     }
     (case.apart(&before, &there) < LANE_RESOLUTION).then_some(Explanation::BelowResolution)
 }
-
-/// Looks at a period of a motion at rest.
-const LOOKS: u32 = 64;
 
 /// Whether a motion of the cell that is rounded as a lane is has more events in some period up to the
 /// record's last than lanes may have.

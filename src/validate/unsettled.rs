@@ -3,8 +3,7 @@
 use super::case::{Case, LANE_RESOLUTION};
 use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
 use super::limits::whole_budget;
-use super::rounding::whole_units;
-use super::same_cycle::within_reach;
+use super::rounding::{is_read_rounded, whole_units};
 use crate::classify::classify;
 use crate::model::State;
 use crate::orbit::Class;
@@ -28,13 +27,18 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     let before = case.record.periods_run.saturating_sub(period);
     // Averages are read one cycle after the multipliers.
     let earlier = before.saturating_sub(period);
-    let places = [before, earlier].map(|periods| case.after(case.start, periods).ok());
-    let mut places = places.iter().flatten().chain([&stands]);
+    // Motions at rest in different places are different motions.
+    let is_own = |own: Trajectory<'_>| apart(case, &own.state(), &stands.state()) < ELSEWHERE;
+    let is_on_the_way = !is_open || case.after(case.start, case.record.periods_run).is_ok_and(is_own);
+    let passed = if is_on_the_way { vec![before, earlier] } else { Vec::new() };
+    let passed: Vec<_> =
+        passed.into_iter().filter_map(|periods| case.after(case.start, periods).ok()).collect();
+    let mut places = passed.iter().chain([&stands]);
     let is_the_records = |place: &Trajectory<'_>| {
-        let Some(answer) = case.read_as_is(place, period) else { return false };
-        case.is_the_records(&answer) || (is_open && within_reach(case, place.state(), &answer).is_some())
+        case.read_as_is(place, period).is_some_and(|answer| case.is_the_records(&answer))
     };
-    if !places.any(is_the_records) {
+    let is_rounded = || is_read_rounded(case, &stands, &case.read_as_is(&stands, period)?);
+    if !places.any(is_the_records) && !(is_open && is_rounded() == Some(true)) {
         return None;
     }
     let is_there =
