@@ -38,7 +38,8 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
         case.read_as_is(place, period).is_some_and(|answer| case.is_the_records(&answer))
     };
     let is_rounded = || is_read_rounded(case, &stands, &case.read_as_is(&stands, period)?);
-    if !places.any(is_the_records) && !(is_open && is_rounded() == Some(true)) {
+    let is_read = places.any(is_the_records) || (is_open && is_rounded() == Some(true));
+    if !is_read {
         return None;
     }
     let is_there =
