@@ -55,6 +55,14 @@ impl Mode {
             Mode::Dip(side) | Mode::Pressed(side) => DomainKind::Meshing(side),
         }
     }
+
+    fn mirrored(self) -> Mode {
+        match self {
+            Mode::Free => Mode::Free,
+            Mode::Dip(side) => Mode::Dip(side.mirrored()),
+            Mode::Pressed(side) => Mode::Pressed(side.mirrored()),
+        }
+    }
 }
 
 /// One oscillator on its way, with `N` tangent vectors (0, 1 for an exponent, 4 for a
@@ -180,6 +188,17 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             brief: false,
             pending: None,
             ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
+        }
+    }
+
+    /// A trajectory from the mirror image of the present state at phase 0, in the mirrored domain:
+    /// half a period on, a motion goes on as this one does.
+    pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
+        let y = self.state().map(|value| -value);
+        Trajectory {
+            mode: self.mode.mirrored(),
+            origin: self.origin.map(Side::mirrored),
+            ..self.at(y, tangents)
         }
     }
 

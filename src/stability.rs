@@ -71,8 +71,12 @@ impl StrobeMap {
                 image = read(&trajectory, 1.0);
             }
             StrobeMap::MirroredHalves(p) => {
-                for _ in 0..p {
-                    let mut half = seed.at(image.state, UNIT);
+                // The points of the cycle need not lie in one domain.
+                let mut half = seed.at(y, UNIT);
+                for turn in 0..p {
+                    if turn > 0 {
+                        half = half.mirrored(UNIT);
+                    }
                     half.advance_to(0.5 * seed.flow().period, &mut ())?;
                     let step = read(&half, -1.0);
                     let (scaled, log_scale) =
