@@ -181,9 +181,10 @@ fn search_on() {
     tallies[lane].last_distances = array<u32, 16>();
 }
 
-// Whether the cycle closes earlier, as far as the lane's distance from it lets one tell.
+// Whether the cycle closes earlier, as far as rounding and the lane's distance from it let one tell.
 fn is_multiple() -> bool {
-    return tally.divisor > 0u && exp2(-f32(tally.divisor_apart) / OCTAVE) < 4.0 * away();
+    let is_closed = tally.divisor_apart >= AT_REST || exp2(-f32(tally.divisor_apart) / OCTAVE) < 4.0 * away();
+    return tally.divisor > 0u && is_closed;
 }
 
 // Whether the divisor was read for this multiple, does not attract, and surely is another cycle.

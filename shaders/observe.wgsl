@@ -109,10 +109,12 @@ fn strobe_state() -> array<Real, 4> {
     return q;
 }
 
-// The distance of two strobes, relative to the motion.
+// The distance of two strobes, relative to the motion. Where strobes catch it at its turning point, their
+// rates are all rounding.
 fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
+    let least = flows[cell.flow_index].domains[0].angle * motion.position_scale;
     let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(motion.position_scale, Real(1e-30));
-    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / max(motion.rate_scale, Real(1e-30));
+    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / max(max(motion.rate_scale, least), Real(1e-30));
     return max(p, r);
 }
 

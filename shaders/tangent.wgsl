@@ -193,8 +193,9 @@ fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     let after = crossing.after;
     let inverse = select(1.0 / jump.rate, Real(0.0), abs(jump.rate) < NO_RATE);
     let along = inverse * ((jump.normal[0] * u[0] + jump.normal[1] * u[1]) + (jump.normal[2] * u[2] + jump.normal[3] * u[3]));
+    // The first row is the quotient of the gap's rates; as a sum it would lose what a small `e` keeps.
     return array<Real, 4>(
-        u[0] + (after[0] - before[0]) * along,
+        jump.kept * u[0],
         jump.kept * u[1] + (after[1] - jump.kept * before[1]) * along,
         u[2] + (after[2] - before[2]) * along,
         u[3] + jump.kick * u[1] + (after[3] - before[3] - jump.kick * before[1]) * along,

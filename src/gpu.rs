@@ -9,6 +9,7 @@
 //! ([`crate::model`]) and nothing else. A fixed grid of steps with the exact propagator
 //! carries it from event to event; see `shaders/`.
 
+mod averaging;
 mod batch;
 mod constants;
 mod device;
@@ -26,6 +27,7 @@ mod unroll;
 
 use std::collections::HashMap;
 
+pub(crate) use averaging::Averaging;
 pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
 pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware};
 pub use shader::{Precision, Variant, WORKGROUP};

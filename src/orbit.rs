@@ -10,6 +10,7 @@ mod analysis;
 mod approach;
 mod budget;
 mod cell;
+mod prospects;
 mod reading;
 mod recurrence;
 mod trace;

@@ -19,107 +19,23 @@ mod brief;
 mod chatter;
 mod clock;
 mod contact;
+mod event;
 mod landing;
 mod outlook;
 mod tangent;
 
 use clock::Clock;
+pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, Happening, Observer, STEPS_PER_PERIOD_CAP, Stop, Work};
 use outlook::{Crossing, Outlook};
 
 use crate::flow::{Arc, DomainKind, Flow, Gap, LinearFlow, Phasor, Step};
 use crate::model::{Law, Side, State};
-
-/// Events allowed in one forcing period.
-pub const EVENTS_PER_PERIOD_CAP: u64 = 1_000_000;
-
-/// Steps allowed in one forcing period, halved ones included.
-pub const STEPS_PER_PERIOD_CAP: u64 = 200_000_000;
 
 /// Steps between looks at the tangents' size: a step changes it by less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
 
 /// States beyond this are taken for a loss of finiteness.
 const HUGE: f64 = 1e150;
-
-/// Why a trajectory could not be continued.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Stop {
-    /// More than [`EVENTS_PER_PERIOD_CAP`] events in one period.
-    #[error("more than {EVENTS_PER_PERIOD_CAP} events in one forcing period")]
-    CapEvents,
-    /// A root that does not converge, or more than [`STEPS_PER_PERIOD_CAP`] steps in one period.
-    #[error("more than {STEPS_PER_PERIOD_CAP} steps in one forcing period, or a root that does not converge")]
-    CapRoot,
-    /// More steps in all than the caller allows one cell.
-    #[error("too stiff: more steps than one cell is allowed")]
-    TooStiff,
-    /// The state is not finite any more.
-    #[error("the state is not finite any more")]
-    NonFinite,
-}
-
-/// What an event is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum EventKind {
-    /// A contact after which motion stays free.
-    Impact,
-    /// A contact after which the teeth mesh.
-    MeshStart,
-    /// Meshing ends and free motion follows.
-    MeshEnd,
-}
-
-/// An event as the integrator meets it, in gap coordinates.
-#[derive(Clone, Copy, Debug)]
-pub struct Happening {
-    /// What happened.
-    pub kind: EventKind,
-    /// At which wall.
-    pub side: Side,
-    /// Symbol `b'1'..=b'6'` of the flight that ends here; none for the first flight of all,
-    /// which comes from no wall.
-    pub symbol: Option<u8>,
-    /// Forcing periods completed before.
-    pub period: u64,
-    /// Time since the last phase 0, in `[0, T]`.
-    pub t: f64,
-    /// Gap coordinates just before.
-    pub before: Gap,
-    /// Gap coordinates just after.
-    pub after: Gap,
-}
-
-/// Is told of every event. `()` ignores them.
-pub trait Observer {
-    /// Called once per event, in order of time.
-    fn event(&mut self, happening: &Happening);
-}
-
-impl Observer for () {
-    #[inline]
-    fn event(&mut self, _: &Happening) {}
-}
-
-impl Observer for Vec<Happening> {
-    fn event(&mut self, happening: &Happening) {
-        self.push(*happening);
-    }
-}
-
-/// Work done so far: what a change in cost shows up in first.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Work {
-    /// Steps tried, halved ones included.
-    pub steps: u64,
-    /// Steps that had to be halved.
-    pub halvings: u64,
-    /// Events: impacts, starts and ends of meshing.
-    pub events: u64,
-    /// Impacts among them.
-    pub impacts: u64,
-    /// Iterations on exact Taylor polynomials.
-    pub root_iterations: u64,
-}
 
 /// What governs the motion at present.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,6 +53,14 @@ impl Mode {
         match self {
             Mode::Free => DomainKind::Free,
             Mode::Dip(side) | Mode::Pressed(side) => DomainKind::Meshing(side),
+        }
+    }
+
+    fn mirrored(self) -> Mode {
+        match self {
+            Mode::Free => Mode::Free,
+            Mode::Dip(side) => Mode::Dip(side.mirrored()),
+            Mode::Pressed(side) => Mode::Pressed(side.mirrored()),
         }
     }
 }
@@ -264,6 +188,17 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             brief: false,
             pending: None,
             ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
+        }
+    }
+
+    /// A trajectory from the mirror image of the present state at phase 0, in the mirrored domain:
+    /// half a period on, a motion goes on as this one does.
+    pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
+        let y = self.state().map(|value| -value);
+        Trajectory {
+            mode: self.mode.mirrored(),
+            origin: self.origin.map(Side::mirrored),
+            ..self.at(y, tangents)
         }
     }
 

@@ -196,9 +196,23 @@ mod tests {
         let plan = plan([257, 230], "minimum_grid = 16");
         let (records, refined) = run(&plan, disc);
         assert_eq!(wrong(&records, 257, disc), 0);
-        assert!(refined.integrated * 8 < plan.cell_count(), "{refined:?}");
+        assert!(refined.integrated * 14 < plan.cell_count(), "{refined:?}");
         assert_eq!(refined.audits.len(), 1);
         assert_eq!(refined.audits[0].wrong, 0);
+    }
+
+    /// A winding band narrower than the blocks: where a corner meets it, it is followed to its ends.
+    #[test]
+    fn a_narrow_band_is_followed() {
+        let band = |i: usize, j: usize| {
+            let middle = 120.0 + 40.0 * (i as f64 / 40.0).sin();
+            if (j as f64 - middle).abs() < 2.5 { 3 } else { 1 }
+        };
+        let plan = plan([257, 257], "minimum_grid = 16\naudit = 1");
+        let (records, refined) = run(&plan, band);
+        assert_eq!(wrong(&records, 257, band), 0);
+        assert!(refined.integrated * 6 < plan.cell_count(), "{refined:?}");
+        assert!(refined.rounds < 24, "{refined:?}");
     }
 
     #[test]

@@ -9,10 +9,11 @@
 
 mod exponent;
 mod newton;
+mod unit_circle;
 
 pub use exponent::Exponent;
 pub(crate) use exponent::FRESH_TANGENT;
-pub(crate) use newton::refine_nearby;
+pub(crate) use newton::Newton;
 pub use newton::{pitchfork, refine};
 
 use nalgebra::linalg::Schur;
@@ -70,8 +71,12 @@ impl StrobeMap {
                 image = read(&trajectory, 1.0);
             }
             StrobeMap::MirroredHalves(p) => {
-                for _ in 0..p {
-                    let mut half = seed.at(image.state, UNIT);
+                // The points of the cycle need not lie in one domain.
+                let mut half = seed.at(y, UNIT);
+                for turn in 0..p {
+                    if turn > 0 {
+                        half = half.mirrored(UNIT);
+                    }
                     half.advance_to(0.5 * seed.flow().period, &mut ())?;
                     let step = read(&half, -1.0);
                     let (scaled, log_scale) =
@@ -94,6 +99,14 @@ impl StrobeMap {
         match self {
             StrobeMap::Periods(_) => (image.scaled, image.log_scale),
             StrobeMap::MirroredHalves(_) => unit_size(image.scaled * image.scaled, 2.0 * image.log_scale),
+        }
+    }
+
+    /// Half forcing periods that one application integrates.
+    fn half_periods(self) -> u32 {
+        match self {
+            StrobeMap::Periods(p) => 2 * p,
+            StrobeMap::MirroredHalves(p) => p,
         }
     }
 

@@ -13,10 +13,14 @@
 mod answer;
 mod case;
 mod explanation;
+mod lane_growth;
 mod limits;
+mod rounded;
+mod rounding;
 mod same_cycle;
 mod sample;
 pub mod states;
+mod unsettled;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 

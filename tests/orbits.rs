@@ -157,3 +157,27 @@ fn exponents_survive_periods_in_which_tangents_leave_the_range_of_f64() {
         assert!((orbit.lyapunov + 0.15).abs() < 1e-9, "{omega}: {}", orbit.lyapunov);
     }
 }
+
+/// A symmetric cycle of period 5 that is met in meshing at some strobes and free at others: half a period
+/// on, the mirror image lies in another domain.
+#[test]
+fn a_symmetric_cycle_may_change_domains_between_its_half_periods() {
+    let pair = GearPair {
+        m1: 0.19829369296457494,
+        m2: 0.16481503350571672,
+        r1: 0.7128113202276247,
+        r2: 0.04627789270791416,
+        k1: 0.1954662279504476,
+        k2: 4.405273555023123,
+        r: 0.006787690015440622,
+        k: 0.0,
+        force: -22.829526459853465,
+        omega: 0.7616376809036782,
+        b: 3.9759925668661555,
+        e: 0.9422111622332906,
+        mesh_speed: 60.746353712543986,
+    };
+    let orbit = analyse(&pair, [0.0; 4], &Settings::default());
+    assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 5 }, Some(true)));
+    assert_eq!(orbit.word, orbit.word.mirrored());
+}

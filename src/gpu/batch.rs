@@ -1,5 +1,6 @@
 //! Batches: buffers, dispatches and reading back.
 
+use super::averaging::Averaging;
 use super::device::{BEGIN, CONCLUDE, Pipelines};
 use super::guard::guarded;
 use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
@@ -18,18 +19,8 @@ const LARGEST_BATCH: usize = 1 << 20;
 /// Longest period that a lane can look for: a byte per lag.
 const LONGEST_PERIOD: u32 = 64;
 
-/// Periods in which the tangent vector turns into the direction of fastest growth.
-const ALIGNMENT: u32 = 50;
-
 /// Numbers of the queue before its lanes.
 const QUEUE_HEAD: usize = 3;
-
-/// Blocks whose means give the exponent's standard error.
-const EXPONENT_BLOCKS: u32 = 32;
-
-/// Periods of a block at least: neighbouring periods are alike, and a standard error made of them
-/// is too small.
-const SHORTEST_BLOCK: u32 = 4;
 
 pub(super) async fn run(
     gpu: &Gpu,
@@ -64,11 +55,6 @@ pub(super) fn largest_batch(limits: &wgpu::Limits) -> usize {
     let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
     let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
     by_binding.min(by_grid).clamp(1, LARGEST_BATCH as u64) as usize
-}
-
-/// Periods per block of the exponent.
-fn exponent_block(settings: &LaneSettings) -> u32 {
-    (settings.periods.saturating_sub(settings.exponent_from) / EXPONENT_BLOCKS).max(SHORTEST_BLOCK)
 }
 
 /// One batch on the device: its buffers.
@@ -190,6 +176,7 @@ fn uniform(lanes: usize, row: u32, settings: &LaneSettings) -> Settings {
     } else {
         settings.transient_periods
     };
+    let averaging = Averaging::new(periods, settings.exponent_from);
     Settings {
         lanes: lanes as u32,
         periods,
@@ -200,9 +187,9 @@ fn uniform(lanes: usize, row: u32, settings: &LaneSettings) -> Settings {
         events_per_period: settings.events_per_period,
         row: row * settings.workgroup,
         transient_periods,
-        growth_from: settings.exponent_from.saturating_sub(ALIGNMENT.min(settings.exponent_from / 2)),
-        exponent_from: settings.exponent_from,
-        exponent_block: exponent_block(settings),
+        growth_from: averaging.growth_from,
+        exponent_from: averaging.exponent_from,
+        exponent_block: averaging.block,
         max_period: settings.max_period.min(LONGEST_PERIOD),
         early_stop: u32::from(early_stop),
         chaos_errors: settings.chaos_errors.to_bits(),

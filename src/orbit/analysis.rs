@@ -6,7 +6,7 @@ use super::{Class, Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{GearPair, Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, FRESH_TANGENT, StrobeMap, refine};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap};
 use crate::word::Word;
 
 /// Forcing periods whose events are shown where the motion is not periodic.
@@ -196,8 +196,9 @@ impl Analysis<'_> {
         candidate: &Candidate,
     ) -> Result<Option<Orbit>, Stop> {
         for map in self.maps(candidate.period) {
-            let Some(cycle) = refine(trajectory, map) else { continue };
-            let Some(cycle) = self.smallest(trajectory, cycle, &window.metric) else { continue };
+            let newton = &mut Newton::default();
+            let Some(cycle) = newton.refine(trajectory, map) else { continue };
+            let Some(cycle) = self.smallest(newton, trajectory, cycle, &window.metric) else { continue };
             if cycle.spectral_radius() < 1.0
                 && let Some(distance) = self.approach(trajectory, &cycle, &window.metric)?
             {
@@ -219,7 +220,13 @@ impl Analysis<'_> {
     }
 
     /// The same orbit with its smallest period, and its symmetry looked at.
-    pub(super) fn smallest(&self, seed: &Trajectory<'_>, cycle: Cycle, metric: &Metric) -> Option<Cycle> {
+    pub(super) fn smallest(
+        &self,
+        newton: &mut Newton,
+        seed: &Trajectory<'_>,
+        cycle: Cycle,
+        metric: &Metric,
+    ) -> Option<Cycle> {
         let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
         for period in divisors {
             for map in self.maps(period) {
@@ -227,9 +234,9 @@ impl Analysis<'_> {
                 if period == cycle.period && (cycle.symmetric || map == StrobeMap::Periods(period)) {
                     return Some(cycle);
                 }
-                let image = map.apply(seed, cycle.state).ok()?;
+                let image = newton.apply(map, seed, cycle.state)?;
                 if metric.distance(&image.state, &cycle.state) < ON_CYCLE
-                    && let Some(shorter) = refine(&seed.at(cycle.state, []), map)
+                    && let Some(shorter) = newton.refine(&seed.at(cycle.state, []), map)
                 {
                     return Some(shorter);
                 }

@@ -7,12 +7,13 @@
 use super::CHAOS_ERRORS;
 use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, status_of};
 use super::approach::{LINEAR_CYCLES, is_linear};
+use super::prospects::{Repelling, contraction};
 use super::recurrence::{Metric, NEAR, candidates, lingering};
 use super::{Budget, Orbit, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::{Cycle, Exponent, FRESH_TANGENT, refine, refine_nearby};
+use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton};
 use crate::word::Word;
 
 /// Periods after which an early stop is first considered; then every sixth as many more.
@@ -54,8 +55,11 @@ pub struct Measured {
     pub word: Option<Word>,
     /// The last strobe state; one of the cycle's where the cell stopped early on the way to it.
     pub strobe: State,
-    /// Forcing periods integrated; what Newton's method needs beside them is not counted.
+    /// Forcing periods integrated.
     pub periods_run: u32,
+    /// Forcing periods integrated beside them: by Newton's method, with four tangent vectors, and
+    /// to read the cycle that it found.
+    pub periods_beside: u32,
 }
 
 impl Measured {
@@ -77,6 +81,8 @@ pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measured
         cycle: None,
         approaches: false,
         counts: vec![[0.0; 2]],
+        repelling: Repelling::default(),
+        newton: Newton::default(),
     };
     watch.run(start).unwrap_or_else(|stop| watch.stopped(stop))
 }
@@ -101,6 +107,8 @@ struct Watch<'a> {
     approaches: bool,
     /// Impacts and meshing time so far at every strobe.
     counts: Vec<[f64; 2]>,
+    repelling: Repelling,
+    newton: Newton,
 }
 
 impl<'a> Watch<'a> {
@@ -187,6 +195,7 @@ impl<'a> Watch<'a> {
             word: Some(Word::default()),
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,
+            periods_beside: self.newton.periods(),
         }
     }
 
@@ -212,12 +221,23 @@ impl<'a> Watch<'a> {
         }
         for candidate in candidates(window, &metric, max_period) {
             let state = self.strobes[self.strobes.len() - 1];
+            let apart = contraction(window, candidate.period as usize, &metric);
             for map in self.analysis.maps(candidate.period) {
+                let passes = |apart| self.repelling.account_for(map, &state, apart, &metric);
+                if !is_last && apart.is_none_or(passes) {
+                    continue;
+                }
                 let is_near = |y: &State| metric.distance(&state, y) < AIM * NEAR;
-                let found = if is_last { refine(seed, map) } else { refine_nearby(seed, map, is_near) };
+                let newton = &mut self.newton;
+                let found =
+                    if is_last { newton.refine(seed, map) } else { newton.refine_nearby(seed, map, is_near) };
+                let Some(cycle) = found else { continue };
                 // One that repels does so at any of its periods.
-                let Some(cycle) = found.filter(|cycle| cycle.spectral_radius() < 1.0) else { continue };
-                let Some(cycle) = self.analysis.smallest(seed, cycle, &metric) else { continue };
+                if cycle.spectral_radius() >= 1.0 {
+                    self.repelling.note(map, &cycle);
+                    continue;
+                }
+                let Some(cycle) = self.analysis.smallest(newton, seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
                 if cycle.spectral_radius() < 1.0 && distance < NEAR {
                     // The next look will tell whether it is being approached.
@@ -300,6 +320,8 @@ impl<'a> Watch<'a> {
             word: Some(orbit.word),
             strobe,
             periods_run: self.strobes.len() as u32 - 1,
+            // Once around before it is read.
+            periods_beside: self.newton.periods() + 2 * orbit.cycle_periods,
         }
     }
 
@@ -332,6 +354,7 @@ impl<'a> Watch<'a> {
             word: None,
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,
+            periods_beside: self.newton.periods(),
         }
     }
 
@@ -354,6 +377,7 @@ impl<'a> Watch<'a> {
             word: None,
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,
+            periods_beside: self.newton.periods(),
         }
     }
 }

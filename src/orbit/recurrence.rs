@@ -48,29 +48,29 @@ pub(super) fn lingering(strobes: &[State], metric: &Metric, max_period: u32) -> 
     let n = strobes.len();
     let is_near = |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < NEAR;
     let lasted = |lag: usize| (lag..n).rev().take_while(|&i| is_near(i, lag)).count();
-    (1..=(max_period as usize).min(n / 2)).map(lasted).max().unwrap_or(0)
+    (1..=(max_period as usize).min(n / 2)).fold(0, |most, lag| {
+        // Multiples of a lag linger about as long: where the longest ended, most end as well.
+        if lag + most < n && is_near(n - 1 - most, lag) { most.max(lasted(lag)) } else { most }
+    })
 }
 
 /// Lags up to `max_period` at which the last states recur, the most promising first: the
 /// smallest lag among those that come about as close as any.
 pub(super) fn candidates(strobes: &[State], metric: &Metric, max_period: u32) -> Vec<Candidate> {
     let n = strobes.len();
-    let mut list: Vec<Candidate> = (1..=max_period as usize)
-        .take_while(|lag| 2 * lag <= n)
-        .filter_map(|lag| {
-            let mut distances = (n - lag..n).map(|i| metric.distance(&strobes[i], &strobes[i - lag]));
-            // Most lags end here after a few strobes.
-            let distance = distances.try_fold(0.0f64, |most, d| (d < NEAR).then(|| most.max(d)))?;
-            Some(Candidate { period: lag as u32, distance })
-        })
-        .collect();
-    // A lag that recurs ten times as well as all shorter ones is worth its own look.
-    let mut best = f64::INFINITY;
-    list.retain(|candidate| {
-        let better = candidate.distance < 0.1 * best;
-        best = best.min(candidate.distance);
-        better
-    });
+    let mut best = NEAR;
+    let mut list = Vec::new();
+    for lag in (1..=max_period as usize).take_while(|lag| 2 * lag <= n) {
+        let mut distances = (n - lag..n).map(|i| metric.distance(&strobes[i], &strobes[i - lag]));
+        // Most lags end here after a few strobes: no better than the best.
+        let found = distances.try_fold(0.0f64, |most, d| (d < best).then(|| most.max(d)));
+        let Some(distance) = found else { continue };
+        // One that recurs ten times as well as all shorter ones is worth its own look.
+        if list.is_empty() || distance < 0.1 * best {
+            list.push(Candidate { period: lag as u32, distance });
+        }
+        best = distance;
+    }
     list.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     list
 }

@@ -1,5 +1,5 @@
-//! Refinement: coarse blocks first, then only those whose corners differ or that touch one
-//! whose corners do, down to single cells; then an audit of what was not integrated.
+//! Refinement: coarse blocks first, then only those that a border crosses, down to single cells;
+//! then an audit of what was not integrated.
 
 use std::collections::{HashMap, HashSet};
 
@@ -10,6 +10,14 @@ use super::label::{Label, word_of};
 use crate::plan::{Needs, Plan};
 use crate::record::{Record, valid};
 use crate::scene::Refine;
+
+/// Blocks narrower than this are not halved for touching one that a border crosses: the cells on
+/// their common edge show whether it goes on here.
+const NARROW: usize = 4;
+
+/// Rounds in which nothing is done but to follow borders. Longer ones are few, and a round takes as
+/// long as its slowest cell.
+const FOLLOWED: u32 = 16;
 
 /// The state of an adaptive map between rounds.
 pub(super) struct Adaptive {
@@ -25,6 +33,10 @@ pub(super) struct Adaptive {
     closed: Vec<Block>,
     /// How often blocks have been halved since the coarse grid.
     halvings: u32,
+    /// Halvings that take a coarse block down to single cells.
+    levels: u32,
+    /// Rounds that followed borders since then, or since the last audit.
+    followed: u32,
     /// Cells of the audit under way.
     audited: Vec<u32>,
     audits: Vec<Audit>,
@@ -61,6 +73,8 @@ impl Adaptive {
             open: coarse(counts, refine.minimum_grid as usize),
             closed: Vec::new(),
             halvings: 0,
+            followed: 0,
+            levels: refine.minimum_grid.next_power_of_two().ilog2(),
             audited: Vec::new(),
             audits: Vec::new(),
             stage: Stage::Halving,
@@ -88,10 +102,14 @@ impl Adaptive {
                     self.judge_audit(records);
                     self.unknown_corners()
                 }
-                _ if self.open.is_empty() => self.leave_stage(),
                 _ => {
-                    self.halve();
-                    self.unknown_corners()
+                    self.reopen();
+                    if self.open.is_empty() {
+                        self.leave_stage()
+                    } else {
+                        self.halve();
+                        self.unknown_corners()
+                    }
                 }
             };
             if !cells.is_empty() {
@@ -119,27 +137,44 @@ impl Adaptive {
         self.audited.clone()
     }
 
-    /// Blocks that differ, or touch one of the same size that does, are halved; others are
-    /// closed.
+    /// Whether blocks have been halved as often as the scene allows.
+    fn is_spent(&self) -> bool {
+        self.refine.rounds.is_some_and(|most| self.halvings >= most)
+    }
+
+    /// Opens closed blocks again in which a neighbour's halving has found a border.
+    fn reopen(&mut self) {
+        self.followed += u32::from(self.open.is_empty());
+        if !self.is_spent() && self.followed <= FOLLOWED {
+            let closed = std::mem::take(&mut self.closed);
+            let (crossed, closed) = closed.into_iter().partition(|block| self.is_crossed(block));
+            self.closed = closed;
+            self.open.extend::<Vec<_>>(crossed);
+        }
+    }
+
+    /// Blocks that a border crosses, or that touch one, are halved; others are closed.
     fn halve(&mut self) {
         let open = std::mem::take(&mut self.open);
-        let is_last =
-            self.stage == Stage::Halving && self.refine.rounds.is_some_and(|most| self.halvings >= most);
+        let is_spent = self.stage == Stage::Halving && self.is_spent();
         self.halvings += 1;
-        let mut touched = vec![false; if is_last { 0 } else { self.labels.len() }];
-        if !is_last {
+        let mut touched = vec![false; if is_spent { 0 } else { self.labels.len() }];
+        if !is_spent {
             for block in open.iter().filter(|block| self.has_border(block)) {
                 block.cells().for_each(|at| touched[self.id(at)] = true);
             }
         }
+        // Every block has become cells by now, but for those along a border that is followed: it
+        // would take one round for each.
+        let follows = self.halvings > self.levels;
         for block in open.into_iter().filter(Block::has_inside) {
-            let labels = self.corner_labels(&block);
-            let differs = labels.iter().any(|label| *label != labels[0]);
             let is_touched = || block.corners().iter().any(|&at| touched[self.id(at)]);
-            if !is_last && (differs || is_touched()) {
-                self.open.extend(block.halves());
-            } else {
+            if is_spent || !(self.is_crossed(&block) || (block.width() >= NARROW && is_touched())) {
                 self.closed.push(block);
+            } else if follows {
+                self.open.extend(block.single_cells());
+            } else {
+                self.open.extend(block.halves());
             }
         }
     }
@@ -148,6 +183,7 @@ impl Adaptive {
     /// all blocks are halved that are filled with what is wrong too often: mostly chaos with its
     /// windows, which the plain regions around need not pay for.
     fn judge_audit(&mut self, records: &[Record]) {
+        self.followed = 0;
         let closed = std::mem::take(&mut self.closed);
         let Verdict { wrong, bad } = self.count_wrong(&closed, records);
         let mut halves = false;
@@ -209,6 +245,12 @@ impl Adaptive {
 
     fn corner_labels(&self, block: &Block) -> [Label; 4] {
         block.corners().map(|at| self.label(at))
+    }
+
+    /// Whether any two cells of a block are known to differ.
+    fn is_crossed(&self, block: &Block) -> bool {
+        let first = self.label(block.corners()[0]);
+        block.cells().map(|at| self.label(at)).any(|label| label.is_known() && label != first)
     }
 
     /// Whether the corners of a block differ in more than the word.

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix4, Vector4};
 
+use super::unit_circle::lies_within_unit_circle;
 use super::{Cycle, Image, StrobeMap, multipliers};
 use crate::flow::Flow;
 use crate::model::{GearPair, State};
@@ -44,69 +45,105 @@ const CONVERGED: f64 = 1e-13;
 ///
 /// Nothing is said about stability: plain Newton likes unstable orbits as much.
 pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
-    let image = map.apply(seed, seed.state()).ok()?;
-    search(seed, map, image, PATIENT, |_| true)
+    Newton::default().refine(seed, map)
 }
 
-/// The same for a motion that will be looked at again: gives up where no orbit that attracts
-/// seems to be near, since the motion will come nearer to one that does.
-pub(crate) fn refine_nearby(
-    seed: &Trajectory<'_>,
-    map: StrobeMap,
-    is_near: impl Fn(&State) -> bool,
-) -> Option<Cycle> {
-    let image = map.apply(seed, seed.state()).ok()?;
-    if expands(&image)? {
-        return None;
+/// Newton's method, and what it has taken so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Newton {
+    half_periods: u32,
+}
+
+impl Newton {
+    /// Forcing periods integrated with four tangent vectors, rounded up.
+    pub(crate) fn periods(&self) -> u32 {
+        self.half_periods.div_ceil(2)
     }
-    search(seed, map, image, HASTY, is_near)
+
+    /// [`refine`].
+    pub(crate) fn refine(&mut self, seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
+        let image = self.apply(map, seed, seed.state())?;
+        self.search(seed, map, image, PATIENT, |_| true)
+    }
+
+    /// The same for a motion that will be looked at again: gives up where no orbit that attracts
+    /// seems to be near, since the motion will come nearer to one that does.
+    pub(crate) fn refine_nearby(
+        &mut self,
+        seed: &Trajectory<'_>,
+        map: StrobeMap,
+        is_near: impl Fn(&State) -> bool,
+    ) -> Option<Cycle> {
+        let image = self.apply(map, seed, seed.state())?;
+        if expands(&image)? { None } else { self.search(seed, map, image, HASTY, is_near) }
+    }
+
+    /// A map's image, if the trajectory can be continued.
+    pub(crate) fn apply(&mut self, map: StrobeMap, seed: &Trajectory<'_>, y: State) -> Option<Image> {
+        self.half_periods += map.half_periods();
+        map.apply(seed, y).ok()
+    }
+
+    /// Newton's method from the state of `seed` with its `image`, as long as its steps aim at states
+    /// that are near.
+    fn search(
+        &mut self,
+        seed: &Trajectory<'_>,
+        map: StrobeMap,
+        mut image: Image,
+        patience: Patience,
+        is_near: impl Fn(&State) -> bool,
+    ) -> Option<Cycle> {
+        let mut y = Vector4::from(seed.state());
+        let mut residual = Vector4::from(image.state) - y;
+        for _ in 0..patience.steps {
+            let size = size_of(seed, &y);
+            if residual.amax() <= CONVERGED * size {
+                break;
+            }
+            let step = newton_step(&image.derivative(), &residual)?;
+            if !is_near(&(y + step).into()) {
+                return None;
+            }
+            match self.damped(seed, map, &y, &residual, &step, patience.trials) {
+                Some((next, next_image)) => {
+                    residual = Vector4::from(next_image.state) - next;
+                    (y, image) = (next, next_image);
+                }
+                // No step reduces the residual: rounding has been reached, or a dead end.
+                None => break,
+            }
+        }
+        let size = size_of(seed, &y);
+        if residual.amax() <= 1e3 * CONVERGED * size { cycle(map, y.into(), &image) } else { None }
+    }
+
+    fn damped(
+        &mut self,
+        seed: &Trajectory<'_>,
+        map: StrobeMap,
+        y: &Vector4<f64>,
+        residual: &Vector4<f64>,
+        step: &Vector4<f64>,
+        trials: u32,
+    ) -> Option<(Vector4<f64>, Image)> {
+        let mut share = 1.0;
+        for _ in 0..trials {
+            let next = y + step * share;
+            if let Some(image) = self.apply(map, seed, next.into())
+                && (Vector4::from(image.state) - next).amax() < residual.amax()
+            {
+                return Some((next, image));
+            }
+            share *= 0.5;
+        }
+        None
+    }
 }
 
 /// Whether the derivative has a multiplier above [`LARGEST_MULTIPLIER`]; none if that cannot be told.
 fn expands(image: &Image) -> Option<bool> {
-    // A power's trace is at most four times the largest multiplier's power.
-    let mut power = image.derivative() / LARGEST_MULTIPLIER;
-    for _ in 0..3 {
-        if power.trace().abs() > 4.0 {
-            return Some(true);
-        }
-        power *= power;
-    }
-    let [re, im] = *multipliers(&image.scaled)?.first()?;
-    Some(re.hypot(im).ln() + image.log_scale > LARGEST_MULTIPLIER.ln())
-}
-
-/// Newton's method from the state of `seed` with its `image`, as long as its steps aim at states
-/// that are near.
-fn search(
-    seed: &Trajectory<'_>,
-    map: StrobeMap,
-    mut image: Image,
-    patience: Patience,
-    is_near: impl Fn(&State) -> bool,
-) -> Option<Cycle> {
-    let mut y = Vector4::from(seed.state());
-    let mut residual = Vector4::from(image.state) - y;
-    for _ in 0..patience.steps {
-        let size = size_of(seed, &y);
-        if residual.amax() <= CONVERGED * size {
-            break;
-        }
-        let step = newton_step(&image.derivative(), &residual)?;
-        if !is_near(&(y + step).into()) {
-            return None;
-        }
-        match damped(seed, map, &y, &residual, &step, patience.trials) {
-            Some((next, next_image)) => {
-                residual = Vector4::from(next_image.state) - next;
-                (y, image) = (next, next_image);
-            }
-            // No step reduces the residual: rounding has been reached, or a dead end.
-            None => break,
-        }
-    }
-    let size = size_of(seed, &y);
-    if residual.amax() <= 1e3 * CONVERGED * size { cycle(map, y.into(), &image) } else { None }
+    lies_within_unit_circle(&(image.derivative() / LARGEST_MULTIPLIER)).map(|within| !within)
 }
 
 /// What residuals are measured by: the state, or the walls' distance where it is small.
@@ -129,27 +166,6 @@ fn newton_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<Vec
     let svd = matrix.try_svd(true, true, f64::EPSILON, SVD_CAP)?;
     let cutoff = SINGULAR_CUTOFF * svd.singular_values.max();
     svd.solve(&-residual, cutoff).ok()
-}
-
-fn damped(
-    seed: &Trajectory<'_>,
-    map: StrobeMap,
-    y: &Vector4<f64>,
-    residual: &Vector4<f64>,
-    step: &Vector4<f64>,
-    trials: u32,
-) -> Option<(Vector4<f64>, Image)> {
-    let mut share = 1.0;
-    for _ in 0..trials {
-        let next = y + step * share;
-        if let Ok(image) = map.apply(seed, next.into())
-            && (Vector4::from(image.state) - next).amax() < residual.amax()
-        {
-            return Some((next, image));
-        }
-        share *= 0.5;
-    }
-    None
 }
 
 fn cycle(map: StrobeMap, state: State, image: &Image) -> Option<Cycle> {
@@ -229,16 +245,18 @@ mod tests {
             let flow = Flow::new(&pair.oscillator().unwrap());
             let seed = seed_of(&flow, &pair, 40);
             let patient = refine(&seed, StrobeMap::Periods(1)).unwrap();
-            let hasty = refine_nearby(&seed, StrobeMap::Periods(1), |_| true).unwrap();
+            let hasty = Newton::default().refine_nearby(&seed, StrobeMap::Periods(1), |_| true).unwrap();
             assert!(patient.spectral_radius() < 1.0, "e = {e}");
             for (a, b) in patient.state.into_iter().zip(hasty.state) {
                 assert!((a - b).abs() < 1e-11, "e = {e}: {:?}, {:?}", patient.state, hasty.state);
             }
-            assert!(refine_nearby(&seed, StrobeMap::Periods(1), |_| false).is_none(), "e = {e}");
+            let mut newton = Newton::default();
+            assert!(newton.refine_nearby(&seed, StrobeMap::Periods(1), |_| false).is_none(), "e = {e}");
+            assert_eq!(newton.periods(), 1, "e = {e}");
         }
     }
 
-    /// Traces never call expanding what is not: as the multipliers have it, all along chaos.
+    /// As the multipliers have it, all along chaos.
     #[test]
     fn expansion_is_that_of_the_multipliers() {
         let pair = GearPair { omega: 2.8172, ..GearPair::paper(0.7224) };

@@ -2,6 +2,8 @@
 
 use super::Subject;
 use super::answer::{Answer, Bars};
+use nalgebra::{Matrix4, Vector4};
+
 use crate::flow::Flow;
 use crate::gpu::Precision;
 use crate::model::{GearPair, Law, State};
@@ -112,14 +114,19 @@ impl<'a> Case<'a> {
 
     /// Answers within the budget for random starts that are the same within rounding.
     pub(super) fn scattered(&self, count: usize) -> impl Iterator<Item = Answer> + '_ {
+        let starts = self.scattered_starts(count);
+        starts.map(move |start| Answer::from(&measure(&self.flow, self.law, start, &self.budget)))
+    }
+
+    /// Random starts that are the same within rounding.
+    pub(super) fn scattered_starts(&self, count: usize) -> impl Iterator<Item = State> + '_ {
         let mut random = Random::new(u64::from(self.record.periods_run));
         let moved: State = std::array::from_fn(|i| self.nudged_start(i)[i]);
         (0..count).map(move |_| {
-            let start = std::array::from_fn(|i| {
+            std::array::from_fn(|i| {
                 let reach = moved[i] - self.start[i];
                 self.start[i] + reach * (2.0 * random.unit() - 1.0)
-            });
-            Answer::from(&measure(&self.flow, self.law, start, &self.budget))
+            })
         })
     }
 
@@ -154,6 +161,15 @@ impl<'a> Case<'a> {
         self.apart(&before, &ahead.state())
     }
 
+    /// Where the strobe map, linearised about a motion, has its cycle: `y + (1 - M)^-1 (P(y) - y)`.
+    pub(super) fn limit(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<State> {
+        let y = Vector4::from(trajectory.state());
+        let image = StrobeMap::Periods(period).apply(trajectory, y.into()).ok()?;
+        let residual = Vector4::from(image.state) - y;
+        let step = (Matrix4::identity() - image.derivative()).lu().solve(&residual)?;
+        Some((y + step).into()).filter(|limit: &State| limit.iter().all(|x| x.is_finite()))
+    }
+
     /// The distance of two states relative to the size of the first and to the walls.
     pub(super) fn apart(&self, a: &State, b: &State) -> f64 {
         let [position, velocity] = self.units(a);
@@ -180,17 +196,20 @@ impl<'a> Case<'a> {
         for _ in 0..period {
             cycle.advance_period(&mut ()).ok()?;
         }
-        let (impacts, meshing) = (cycle.work().impacts, cycle.meshing_time());
+        let (before, meshing) = (cycle.work().impacts, cycle.meshing_time());
         let mut met: Vec<Happening> = Vec::new();
         for _ in 0..period {
             cycle.advance_period(&mut met).ok()?;
         }
+        let impacts = cycle.work().impacts - before;
         let symbols: Vec<u8> = met.iter().filter_map(|happening| happening.symbol).collect();
         Some(Answer {
             class: Class::Periodic { period },
             exponent: Some([(largest.ln() + image.log_scale) / span, 0.0]),
-            impacts_per_period: Some((cycle.work().impacts - impacts) as f64 / f64::from(period)),
+            impacts_per_period: Some(impacts as f64 / f64::from(period)),
             mesh_fraction: Some((cycle.meshing_time() - meshing) / span),
+            // Every impact has a twin on a cycle that is its own mirror image.
+            symmetric: if impacts % 2 == 1 { Some(false) } else { self.truth.symmetric },
             word: Some(Word::cyclic(&symbols)),
             ..self.truth.clone()
         })

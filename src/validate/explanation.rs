@@ -6,10 +6,13 @@
 
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION};
+use super::lane_growth::weak_chaos;
 use super::limits::{
-    at_rest, flip, held, is_shaken, is_spent, late, longer, scattered, undecided_chaos, within_scatter,
+    self, flip, held, is_shaken, is_spent, late, longer, scattered, undecided_chaos, within_scatter,
 };
+use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
+use super::unsettled::unsettled;
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
 use crate::model::State;
@@ -26,6 +29,12 @@ pub(super) const ELSEWHERE: f64 = 1e-2;
 
 /// Share of a state error that rounding at the start must make on the reference itself.
 const SENSITIVE: f64 = 0.1;
+
+/// Starts within rounding from which a motion may meet its caps: chaos decides which does.
+const SCATTERED_STARTS: usize = 100;
+
+/// And motions that are rounded at every step.
+const ROUNDED_RUNS: u64 = 8;
 
 /// Why a cell's record is not what the reference says within the same budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -119,7 +128,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 15] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 18] = [
         engine_cap,
         longer,
         other_attractor,
@@ -127,6 +136,7 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         resolution,
         unsettled,
         same_cycle,
+        weak_chaos,
         undecided_chaos,
         late,
         bifurcation,
@@ -134,9 +144,14 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         grazing,
         held,
         within_scatter,
+        rounded_cycle,
+        at_rest,
         scattered,
     ];
-    CHECKS.iter().find_map(|check| check(case))
+    CHECKS
+        .iter()
+        .enumerate()
+        .find_map(|(i, check)| check(case).inspect(|e| eprintln!("CHECK {i} {e:?} {:?}", case.truth)))
 }
 
 fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
@@ -153,20 +168,30 @@ fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
             })
         }
         Status::CapEvents => {
-            let mut trajectory = Trajectory::new(&case.flow, case.law, case.start);
-            let mut most = 0;
-            for _ in 0..=case.record.periods_run {
-                let before = trajectory.work().events;
-                if trajectory.advance_period(&mut ()).is_err() {
-                    break;
-                }
-                most = most.max(trajectory.work().events - before);
-            }
-            most > u64::from(caps.events_per_period)
+            let starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
+            starts.chain(case.scattered_starts(SCATTERED_STARTS)).any(|start| needs_more(case, start, &caps))
+                || (0..ROUNDED_RUNS).any(|run| rounding::needs_more(case, run, &caps) == Some(true))
         }
         _ => false,
     };
     beyond.then_some(Explanation::EngineCap)
+}
+
+/// Whether the reference from a start has more events in some period up to the record's last than lanes
+/// may have.
+fn needs_more(case: &Case<'_>, start: State, caps: &LaneSettings) -> bool {
+    let mut trajectory = Trajectory::new(&case.flow, case.law, start);
+    for _ in 0..=case.record.periods_run {
+        let before = trajectory.work().events;
+        let ended = trajectory.advance_period(&mut ());
+        if trajectory.work().events - before > u64::from(caps.events_per_period) {
+            return true;
+        }
+        if ended.is_err() {
+            return false;
+        }
+    }
+    false
 }
 
 fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
@@ -211,25 +236,6 @@ fn within_rounding(case: &Case<'_>) -> Option<Explanation> {
     case.nudged().any(|answer| case.is_the_records(&answer)).then_some(because)
 }
 
-/// The same class and period, read off a motion that is still on its way.
-fn unsettled(case: &Case<'_>) -> Option<Explanation> {
-    let Class::Periodic { period } = classify(case.record) else { return None };
-    if case.truth.class != classify(case.record) {
-        return None;
-    }
-    let before = case.record.periods_run.saturating_sub(period);
-    // Averages are read one cycle after the multipliers.
-    let earlier = before.saturating_sub(period);
-    let places = [
-        case.after(case.start, before).ok(),
-        case.after(case.start, earlier).ok(),
-        case.after(strobe(case)?, 0).ok(),
-    ];
-    let same = |answer: Answer| case.is_the_records(&answer);
-    let read = |place: &Trajectory<'_>| case.read_as_is(place, period).is_some_and(same);
-    places.iter().flatten().any(read).then_some(Explanation::Unsettled)
-}
-
 /// Lanes do not tell the cycle from one of a shorter period.
 fn resolution(case: &Case<'_>) -> Option<Explanation> {
     let (Class::Periodic { period }, Class::Periodic { period: theirs }) =
@@ -242,7 +248,8 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     let hides = divides && case.unrest(&stands, period) < LANE_RESOLUTION;
     // Or rounding keeps the lane off its cycle in a pattern of its own.
     let multiplies = period > theirs && period.is_multiple_of(theirs);
-    let is_kept_off = (at_rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
+    let is_kept_off =
+        (limits::at_rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
     let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)?;
     (hides || scatters).then_some(Explanation::BelowResolution)
 }

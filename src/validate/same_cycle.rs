@@ -103,12 +103,7 @@ fn exponent(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u3
     if contains(&about) {
         return Some(Explanation::Unsettled);
     }
-    let moved: Vec<f64> = case
-        .nudged_pairs(rounding(case.precision))
-        .map(|pair| Answer::from(&analyse(&pair, stands.state(), &case.budget.settings)))
-        .filter(|other| other.class == truth.class && other.word == truth.word)
-        .filter_map(read)
-        .collect();
+    let moved: Vec<f64> = moved_cycles(case, stands, truth).into_iter().filter_map(read).collect();
     if contains(&moved) {
         return Some(Explanation::Border);
     }
@@ -123,11 +118,23 @@ fn mesh_fraction(
     period: u32,
 ) -> Option<Explanation> {
     let ours = case.record.mesh_fraction;
-    let about: Vec<f64> =
-        readings(case, stands, truth, period).into_iter().filter_map(|answer| answer.mesh_fraction).collect();
-    let hides =
-        about.iter().any(|&fraction| fraction <= ours) && about.iter().any(|&fraction| fraction >= ours);
-    hides.then_some(Explanation::Unsettled)
+    let contains = |answers: Vec<Answer>| {
+        let fractions: Vec<f64> = answers.into_iter().filter_map(|answer| answer.mesh_fraction).collect();
+        fractions.iter().any(|&fraction| fraction <= ours)
+            && fractions.iter().any(|&fraction| fraction >= ours)
+    };
+    if contains(readings(case, stands, truth, period)) {
+        return Some(Explanation::Unsettled);
+    }
+    contains(moved_cycles(case, stands, truth)).then_some(Explanation::Border)
+}
+
+/// The same cycle with parameters moved within rounding: a lane's constants are rounded, too.
+fn moved_cycles(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Vec<Answer> {
+    case.nudged_pairs(rounding(case.precision))
+        .map(|pair| Answer::from(&analyse(&pair, stands.state(), &case.budget.settings)))
+        .filter(|other| other.class == truth.class && other.word == truth.word)
+        .collect()
 }
 
 /// The cycle as it is read where the lane was, and as far about that as the cycle itself may be.
@@ -135,11 +142,12 @@ fn readings(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u3
     let from = stands.state();
     let span = f64::from(period) * case.flow.period;
     let multiplier = truth.exponent.map_or(0.0, |[exponent, _]| (exponent * span).exp());
-    // States `d` apart that shrink by a factor per cycle are `d / (1 - factor)` from their limit.
-    let reach = case.unrest(stands, period) / (1.0 - multiplier).max(f64::MIN_POSITIVE);
-    if reach > ELSEWHERE {
-        return Vec::new();
-    }
+    // States `d` apart that shrink by a factor per cycle are `d / (1 - factor)` from their limit, less if
+    // they alternate about it.
+    let shrinking = case.unrest(stands, period) / (1.0 - multiplier).max(f64::MIN_POSITIVE);
+    let by_derivative = case.limit(stands, period).map(|limit| case.apart(&from, &limit));
+    let reaches = [Some(shrinking), by_derivative].into_iter().flatten();
+    let Some(reach) = reaches.filter(|&reach| reach <= ELSEWHERE).reduce(f64::max) else { return Vec::new() };
     let units = case.units(&from);
     let mut random = Random::new(u64::from(period));
     let mut places = vec![from];

@@ -1,0 +1,98 @@
+//! Is a recurrence worth Newton's method?
+//!
+//! It costs four tangent vectors over several cycles, and chaos recurs all the time: it passes
+//! cycles that repel. What passes one gives itself away. It leaves: a strobe state is farther from
+//! that of one cycle ago than that one was from its predecessor. And it comes by again: the cycle
+//! has been found before. Either way nothing is lost for motion that does settle, since its
+//! recurrences shrink while the distance to any other cycle stays.
+
+use super::recurrence::Metric;
+use crate::model::State;
+use crate::stability::{Cycle, StrobeMap};
+
+/// Recurrences this close need not shrink: rounding is near.
+const ROUNDED: f64 = 1e-7;
+
+/// A cycle within so many times the recurrence's distance accounts for it: multipliers that differ
+/// from 1 by a quarter make recurrences of a quarter of the distance.
+const ACCOUNTS: f64 = 4.0;
+
+/// How far the last state is from that of `lag` periods ago, if it is nearer than that one was to
+/// its own predecessor. None as well before there are two lags to compare.
+pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Option<f64> {
+    let last = strobes.len() - 1;
+    let [first, second] = [last.checked_sub(2 * lag)?, last - lag].map(|n| &strobes[n]);
+    let (now, before) = (metric.distance(second, &strobes[last]), metric.distance(first, second));
+    (now <= before || now <= ROUNDED).then_some(now)
+}
+
+/// Cycles that repel, as they were found.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Repelling(Vec<(StrobeMap, State)>);
+
+impl Repelling {
+    /// Takes note of a cycle that `map` was found to have.
+    pub(super) fn note(&mut self, map: StrobeMap, cycle: &Cycle) {
+        self.0.push((map, cycle.state));
+    }
+
+    /// Whether one of them accounts for a state that recurs at this distance under `map`.
+    pub(super) fn account_for(&self, map: StrobeMap, state: &State, distance: f64, metric: &Metric) -> bool {
+        let is_near = |y: &State| metric.distance(state, y) < ACCOUNTS * distance;
+        self.0.iter().any(|(of, y)| *of == map && is_near(y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::Flow;
+    use crate::model::GearPair;
+
+    /// A multiplier's powers about the origin.
+    fn powers(multiplier: f64, start: f64) -> Vec<State> {
+        (0..20).map(|n| [start * multiplier.powi(n), 0.0, 0.0, 0.0]).collect()
+    }
+
+    fn metric() -> Metric {
+        Metric::of(&[[0.0; 4]], &Flow::new(&GearPair::paper(0.5).oscillator().unwrap()))
+    }
+
+    #[test]
+    fn what_settles_contracts_and_what_leaves_does_not() {
+        for (multiplier, contracts) in
+            [(0.5, true), (-0.9, true), (0.999, true), (1.001, false), (-1.2, false)]
+        {
+            for lag in [1, 2, 6] {
+                let found = contraction(&powers(multiplier, 1e-3), lag, &metric());
+                assert_eq!(found.is_some(), contracts, "{multiplier} at lag {lag}");
+            }
+        }
+        assert!(contraction(&powers(1.001, 1e-9), 1, &metric()).is_some(), "rounding");
+        assert!(contraction(&powers(0.5, 1e-3), 10, &metric()).is_none(), "too short to tell");
+    }
+
+    #[test]
+    fn a_cycle_accounts_for_what_passes_it_and_not_for_what_settles_elsewhere() {
+        let (map, mut known) = (StrobeMap::Periods(1), Repelling::default());
+        let pair = GearPair::paper(0.5);
+        let flow = Flow::new(&pair.oscillator().unwrap());
+        let seed = crate::reference::Trajectory::new(&flow, pair.law(), [0.0; 4]);
+        let mut cycle = crate::stability::refine(&seed, map).unwrap();
+        cycle.state = [0.0; 4];
+        known.note(map, &cycle);
+        let passes = |multiplier: f64| {
+            let strobes = powers(multiplier, 1e-3);
+            let (last, before) = (strobes[19], strobes[18]);
+            known.account_for(map, &last, metric().distance(&last, &before), &metric())
+        };
+        assert!(passes(1.5) && passes(-1.3) && passes(0.7));
+        assert!(!passes(1.1), "it hardly moves: there may be another");
+        let settles = |n: i32| {
+            let at = |n: i32| [0.01 * (1.0 + 0.6f64.powi(n)), 0.0, 0.0, 0.0];
+            known.account_for(map, &at(n), metric().distance(&at(n), &at(n - 1)), &metric())
+        };
+        assert!(!settles(8) && !settles(20));
+        assert!(!known.account_for(StrobeMap::Periods(2), &[0.0; 4], 1.0, &metric()), "another map");
+    }
+}

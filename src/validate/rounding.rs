@@ -1,0 +1,121 @@
+//! What rounding at every step of a lane does to a motion, beyond what rounding at its start does.
+
+use super::answer::{Answer, Field};
+use super::case::{Case, LANE_RESOLUTION, rounding};
+use super::explanation::{Explanation, strobe};
+use super::rounded::{Rounded, read_cycle};
+use crate::classify::{classify, status};
+use crate::gpu::{Constants, LaneSettings};
+use crate::orbit::{Class, Status};
+use crate::reference::Trajectory;
+
+/// Looks at a period of a motion at rest.
+const LOOKS: u32 = 64;
+
+/// Motions that are rounded, each in its own way.
+const RUNS: u64 = 32;
+
+/// The record's cycle is the reference's, read where every step rounds: one reading has its word and
+/// impacts, and its exponent and averages lie between those that are read.
+pub(super) fn rounded_cycle(case: &Case<'_>) -> Option<Explanation> {
+    if case.truth.class != classify(case.record) {
+        return None;
+    }
+    let stands = case.after(strobe(case)?, 0).ok()?;
+    is_read_rounded(case, &stands, &case.truth)?.then_some(Explanation::BelowResolution)
+}
+
+/// Whether the record's cycle is the one that `truth` describes, read from where a motion stands where
+/// every step rounds.
+pub(super) fn is_read_rounded(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Option<bool> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    if !case.is_lane {
+        return None;
+    }
+    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let read = |run: u64| {
+        let mut before = Rounded::new(stands.clone(), &constants, case.precision, run);
+        (0..period).try_for_each(|_| before.advance_period(&mut ())).ok()?;
+        read_cycle(case, &constants, before.trajectory(), period, !run)
+    };
+    let claims = |answer: &Answer| {
+        let exponent = Some([case.record.lyapunov, 0.0]);
+        let mesh_fraction = Some(case.record.mesh_fraction);
+        case.is_the_records(&Answer { exponent, mesh_fraction, ..answer.clone() })
+    };
+    let same: Vec<Answer> = (0..RUNS).filter_map(read).filter(claims).collect();
+    let lies_between = |ours: f64, of: fn(&Answer) -> Option<f64>| {
+        let known: Vec<f64> = same.iter().chain([truth]).filter_map(of).collect();
+        known.iter().any(|&theirs| theirs <= ours) && known.iter().any(|&theirs| theirs >= ours)
+    };
+    let compared = truth.compare(case.record, &case.bars);
+    let agrees = |field: Field| compared.iter().all(|(of, differs)| *of != field || differs.is_none());
+    let exponent = |answer: &Answer| answer.exponent.map(|[value, _]| value);
+    Some(
+        !same.is_empty()
+            && (agrees(Field::Exponent) || lies_between(case.record.lyapunov, exponent))
+            && (agrees(Field::Mesh)
+                || lies_between(case.record.mesh_fraction, |answer| answer.mesh_fraction)),
+    )
+}
+
+/// Units of position and velocity by which lanes measure: of all strobes up to the record's last.
+pub(super) fn whole_units(case: &Case<'_>) -> [f64; 2] {
+    let mut motion = Trajectory::<0>::new(&case.flow, case.law, case.start);
+    let mut units = case.units(&case.start);
+    for _ in 0..case.record.periods_run {
+        if motion.advance_period(&mut ()).is_err() {
+            break;
+        }
+        let here = case.units(&motion.state());
+        units = [units[0].max(here[0]), units[1].max(here[1])];
+    }
+    units
+}
+
+/// The motion rests on a wall: what it still does in a period, its gap and the rate of that too, is less
+/// than a lane's numbers hold. Whatever is said of its events is rounding, be it that there are too many.
+pub(super) fn at_rest(case: &Case<'_>) -> Option<Explanation> {
+    let is_cap = status(case.record) == Status::CapEvents;
+    let is_open =
+        classify(case.record) == (Class::Periodic { period: 1 }) && case.truth.class == Class::Undecided;
+    if !case.is_lane || !(is_cap || is_open) {
+        return None;
+    }
+    let there = strobe(case)?;
+    let mut motion = case.after(case.start, case.record.periods_run + 1).ok()?;
+    let before = motion.state();
+    let [position, velocity] = case.units(&before);
+    let least = rounding(case.precision);
+    for look in 1..=LOOKS {
+        motion.advance_to(case.flow.period * f64::from(look) / f64::from(LOOKS), &mut ()).ok()?;
+        let now = case.flow.to_gap(motion.state());
+        let wall = [0, 1]
+            .map(|side| (now[0] - case.flow.walls[side]).abs())
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        if wall > least * position || now[1].abs() > least * velocity {
+            return None;
+        }
+    }
+    (case.apart(&before, &there) < LANE_RESOLUTION).then_some(Explanation::BelowResolution)
+}
+
+/// Whether a motion of the cell that is rounded as a lane is has more events in some period up to the
+/// record's last than lanes may have.
+pub(super) fn needs_more(case: &Case<'_>, seed: u64, caps: &LaneSettings) -> Option<bool> {
+    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let start: Trajectory<'_> = Trajectory::new(&case.flow, case.law, case.start);
+    let mut rounded = Rounded::new(start, &constants, case.precision, seed);
+    for _ in 0..=case.record.periods_run {
+        let before = rounded.trajectory().work().events;
+        let ended = rounded.advance_period(&mut ());
+        if rounded.trajectory().work().events - before > u64::from(caps.events_per_period) {
+            return Some(true);
+        }
+        if ended.is_err() {
+            return Some(false);
+        }
+    }
+    Some(false)
+}

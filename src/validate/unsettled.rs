@@ -1,0 +1,71 @@
+//! Cycles that a lane read before the motion had settled on them.
+
+use super::case::{Case, LANE_RESOLUTION};
+use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
+use super::limits::whole_budget;
+use super::rounding::{is_read_rounded, whole_units};
+use crate::classify::classify;
+use crate::model::State;
+use crate::orbit::Class;
+use crate::reference::Trajectory;
+
+/// Forcing periods in which a motion that is about to rest is seen to stay.
+const STAYING_PERIODS: u32 = 1024;
+
+/// The record's cycle, read off a motion that is still on its way to it: the reference, read where the
+/// lane read, gives the record's answer.
+///
+/// If the reference itself decides nothing, the motion has to stay there, or to be there as far as the
+/// last period of the budget could tell.
+pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
+    let Class::Periodic { period } = classify(case.record) else { return None };
+    let is_open = case.truth.class == Class::Undecided;
+    if case.truth.class != classify(case.record) && !is_open {
+        return None;
+    }
+    let stands = case.after(strobe(case)?, 0).ok()?;
+    let before = case.record.periods_run.saturating_sub(period);
+    // Averages are read one cycle after the multipliers.
+    let earlier = before.saturating_sub(period);
+    // Motions at rest in different places are different motions.
+    let is_own = |own: Trajectory<'_>| apart(case, &own.state(), &stands.state()) < ELSEWHERE;
+    let is_on_the_way = !is_open || case.after(case.start, case.record.periods_run).is_ok_and(is_own);
+    let passed = if is_on_the_way { vec![before, earlier] } else { Vec::new() };
+    let passed: Vec<_> =
+        passed.into_iter().filter_map(|periods| case.after(case.start, periods).ok()).collect();
+    let mut places = passed.iter().chain([&stands]);
+    let is_the_records = |place: &Trajectory<'_>| {
+        case.read_as_is(place, period).is_some_and(|answer| case.is_the_records(&answer))
+    };
+    let is_rounded = || is_read_rounded(case, &stands, &case.read_as_is(&stands, period)?);
+    let is_read = places.any(is_the_records) || (is_open && is_rounded() == Some(true));
+    if !is_read {
+        return None;
+    }
+    let is_there =
+        !is_open || (is_least(case)? && (stays(case, &stands, period) || arrives(case, &stands, period)));
+    is_there.then_some(Explanation::Unsettled)
+}
+
+/// Whether the reference, from where the record says that the motion was at last, comes to rest on a cycle of
+/// `period` close by: one that neither attracts nor repels, as that of a free body, is never decided.
+fn stays(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
+    let mut ahead = stands.clone();
+    let rests = (0..STAYING_PERIODS).all(|_| ahead.advance_period(&mut ()).is_ok());
+    let [here, there] = [stands.state(), ahead.state()];
+    rests && case.unrest(&ahead, period) < LANE_RESOLUTION && apart(case, &here, &there) < ELSEWHERE
+}
+
+/// Whether the budget is spent, and the motion as near to its cycle as lanes then ask for (`ABOUT` in the
+/// shaders), by its derivative.
+fn arrives(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
+    let is_spent = case.record.periods_run + period >= whole_budget(case);
+    let limit = case.limit(stands, period);
+    is_spent && limit.is_some_and(|limit| apart(case, &stands.state(), &limit) < ELSEWHERE)
+}
+
+/// The distance of two states relative to all of the motion, as lanes measure it.
+fn apart(case: &Case<'_>, a: &State, b: &State) -> f64 {
+    let units = whole_units(case);
+    (0..4).map(|i| (a[i] - b[i]).abs() / units[i % 2]).fold(0.0, f64::max)
+}
