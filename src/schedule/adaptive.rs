@@ -144,7 +144,7 @@ impl Adaptive {
 
     /// Opens closed blocks again in which a neighbour's halving has found a border.
     fn reopen(&mut self) {
-        self.followed += u32::from(self.open.is_empty());
+        self.followed += u32::from(!self.open.iter().any(Block::has_inside));
         if !self.is_spent() && self.followed <= FOLLOWED {
             let closed = std::mem::take(&mut self.closed);
             let (crossed, closed) = closed.into_iter().partition(|block| self.is_crossed(block));
