@@ -148,10 +148,7 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         at_rest,
         scattered,
     ];
-    CHECKS
-        .iter()
-        .enumerate()
-        .find_map(|(i, check)| check(case).inspect(|e| eprintln!("CHECK {i} {e:?} {:?}", case.truth)))
+    CHECKS.iter().find_map(|check| check(case))
 }
 
 fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
