@@ -22,7 +22,7 @@ const STRAYED: u32 = 1u;
 // Notes a strobe if it lies one candidate cycle after the last. All cycles of a trail have the
 // same number of events.
 fn follow(q: array<Real, 4>) {
-    if !EXPONENT || settings.early_stop == 0u || tally.tries > 0u || tallies[lane].strayed >= STRAYED {
+    if !EXPONENT || settings.early_stop == 0u {
         return;
     }
     let pitch = max(tally.candidate, 1u);
@@ -39,22 +39,12 @@ fn follow(q: array<Real, 4>) {
     tallies[lane].trail_each = events;
     tallies[lane].trail_at = tally.period;
     tallies[lane].trail_events = tally.events;
-    let last = place(TRAIL - 1u);
-    for (var k = 0u; k < 4u; k++) {
-        motions[lane].trail[last + k] = q[k];
+    for (var k = 0u; k < 12u; k++) {
+        motions[lane].trail[k] = motions[lane].trail[k + 4u];
     }
-}
-
-// Where the `n`-th of the last strobes on the trail lies, the oldest first: each takes the place of the
-// one before the last four.
-fn place(n: u32) -> u32 {
-    return 4u * ((tallies[lane].trail_at / tallies[lane].trail_pitch + n + 1u) % TRAIL);
-}
-
-// The strobe there.
-fn on_trail(n: u32) -> array<Real, 4> {
-    let k = place(n);
-    return array<Real, 4>(motions[lane].trail[k], motions[lane].trail[k + 1u], motions[lane].trail[k + 2u], motions[lane].trail[k + 3u]);
+    for (var k = 0u; k < 4u; k++) {
+        motions[lane].trail[12u + k] = q[k];
+    }
 }
 
 // Whether there is a trail with cycles of so many periods, to the present strobe.
@@ -73,7 +63,9 @@ fn looks() -> bool {
         || tally.tries > 0u || tallies[lane].strayed >= STRAYED || !has_trail(1u) {
         return false;
     }
-    if octaves(distance_between(on_trail(TRAIL - 2u), on_trail(TRAIL - 1u))) < LOOK {
+    let t = motions[lane].trail;
+    let step = distance_between(array<Real, 4>(t[8], t[9], t[10], t[11]), array<Real, 4>(t[12], t[13], t[14], t[15]));
+    if octaves(step) < LOOK {
         return false;
     }
     tally.candidate = 1u;
@@ -151,7 +143,8 @@ fn is_approached(cycle: array<Real, 4>, linear: Real) -> bool {
 fn deviation(n: u32, cycle: array<Real, 4>) -> array<Real, 4> {
     var q = first_read();
     if n < TRAIL {
-        q = on_trail(n);
+        let k = 4u * n;
+        q = array<Real, 4>(motions[lane].trail[k], motions[lane].trail[k + 1u], motions[lane].trail[k + 2u], motions[lane].trail[k + 3u]);
     }
     return array<Real, 4>(q[0] - cycle[0], q[1] - cycle[1], q[2] - cycle[2], q[3] - cycle[3]);
 }
