@@ -18,8 +18,8 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     } else if motion.q[0] < walls[1] {
         begin_beyond(SIDE_LEFT);
     }
-    motions[lane] = Motion(motion, array<Real, 16>(), array<Real, 16>());
-    tallies[lane] = Tally(tally, array<u32, 16>(), array<u32, 16>(), array<u32, 7>(), 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+    motions[lane] = Motion(motion, array<Real, 16>());
+    tallies[lane] = Tally(tally, array<u32, 16>(), array<u32, 16>(), array<u32, 7>());
 }
 
 // A start beyond a wall is meshing.

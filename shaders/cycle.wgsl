@@ -57,21 +57,6 @@ fn spectral_growth() -> Real {
     return growth;
 }
 
-// After every dispatch: lanes that have read a cycle wait for this. Apart from the sweep, whose lanes would
-// go through all of it in step, and which compiles the faster.
-@compute @workgroup_size(WORKGROUP)
-fn judge_cycles(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.y * settings.row + id.x;
-    if i >= queue.count || tallies[queued(i)].now.stage != STAGE_READ {
-        return;
-    }
-    take_up(queued(i));
-    walls = flows[cell.flow_index].walls;
-    judge_cycle();
-    keep_tangent();
-    put_down();
-}
-
 // Without exponents recurrence alone must do. A lane that has read a cycle which does not
 // attract, or which it has not come close to as its multiplier tells now, goes on while it has
 // periods left: chaos lingers at unstable cycles, and where a pair of cycles has just vanished.
@@ -89,23 +74,16 @@ fn judge_cycle() {
     motion.cycle_growth = spectral_growth();
     note_branch();
     let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
-    let is_far = tallies[lane].is_far == 1u;
-    let to = fixed_point();
-    let is_seen = !is_far || (attracts && sees_cycle(to));
-    if !is_seen && tally.refinements == 0u {
-        look_on();
-        return;
-    }
     // Beside a graze the map has no derivative that tells where the cycle is.
     let is_smooth = tally.grazes == 0u || tally.refinements > 0u;
     // And where rounding is amplified it throws the lane off: such cycles are waited for.
     let helps = is_smooth && tally.vain < VAIN;
-    if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine(to) {
+    if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
         tally.stage = STAGE_READING;
         return;
     }
     let is_here = is_on_cycle() || (is_last && (tally.settled != 0u || away() < ABOUT));
-    let is_cycle = attracts && is_own() && is_here && is_seen;
+    let is_cycle = attracts && is_own() && is_here;
     if is_cycle && (!is_multiple() || is_refuted()) {
         tally.cycle = tally.candidate;
         return;
@@ -113,17 +91,14 @@ fn judge_cycle() {
     if is_cycle && reads_divisor() {
         return;
     }
-    if is_far {
-        tallies[lane].is_far = 0u;
-        tallies[lane].strayed += 1u;
-    } else if attracts && is_own() && tally.refinements > 0u {
+    if attracts && is_own() && tally.refinements > 0u {
         tally.vain += 1u;
     }
     give_up();
     if is_last {
         return;
     }
-    if attracts || is_far {
+    if attracts {
         look_again();
     } else {
         search_on();

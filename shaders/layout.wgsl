@@ -93,8 +93,6 @@ struct Settings {
     max_period: u32,
     // 1: lanes end once they are decided.
     early_stop: u32,
-    // Standard errors by which the exponent must exceed zero before the budget is spent: bits of an f32.
-    chaos_errors: u32,
 }
 
 // What a lane carries between dispatches: the motion. While it runs, numbers lie in
@@ -130,8 +128,6 @@ struct Motion {
     now: MotionNow,
     // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
     tangents: array<Real, 16>,
-    // The last four strobes that are one candidate cycle apart.
-    trail: array<Real, 16>,
 }
 
 // What a lane carries between dispatches: the counting.
@@ -219,16 +215,6 @@ struct Tally {
     last_distances: array<u32, 16>,
     // The word's symbols, ten to a number.
     word: array<u32, 7>,
-    // Strobes on the trail, how many periods apart, when the last was noted, events so far then,
-    // and those of each cycle on it.
-    trail_length: u32,
-    trail_pitch: u32,
-    trail_at: u32,
-    trail_events: u32,
-    trail_each: u32,
-    // 1 while Newton's method is asked from afar, and how often that has led nowhere.
-    is_far: u32,
-    strayed: u32,
 }
 
 // What travels back of a lane: the numbers.

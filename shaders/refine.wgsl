@@ -9,7 +9,7 @@ const REACH: f32 = 1e-2;
 // The monodromy matrix has been read along one candidate cycle from the anchor to the present
 // strobe. Moves the lane to where the linearised strobe map has its fixed point, to read on from
 // there; false where that brings it no closer or is no part of the motion.
-fn refine(to: array<Real, 4>) -> bool {
+fn refine() -> bool {
     if tally.refinements == 0u {
         motion.home = strobe_state();
         tally.home_mode = tally.mode;
@@ -20,11 +20,12 @@ fn refine(to: array<Real, 4>) -> bool {
     if stalls || is_over || tally.mode >= MODE_DIP || tally.order > 0u {
         return false;
     }
+    let to = fixed_point();
     var q = to;
     if tally.mode != MODE_FREE {
         q[0] -= walls[side_of(tally.mode)];
     }
-    if !(is_within(q[0]) && distance_between(to, motion.home) < Real(select(REACH, 2.0 * FAR_REACH, tallies[lane].is_far == 1u))) {
+    if !(is_within(q[0]) && distance_between(to, motion.home) < Real(REACH)) {
         return false;
     }
     motion.q = q;

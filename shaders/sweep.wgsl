@@ -98,6 +98,9 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
             }
         }
     }
+    if tally.stage == STAGE_READ {
+        judge_cycle();
+    }
     keep_tangent();
     put_down();
 }

@@ -107,8 +107,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     position_scale,
                     rate_scale,
                     cycle_growth,
-                    tangents,
-                    trail
+                    tangents
                 ]
             );
             same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);
@@ -152,8 +151,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     exponent_from,
                     exponent_block,
                     max_period,
-                    early_stop,
-                    chaos_errors
+                    early_stop
                 ]
             );
             same_layout!(
@@ -211,14 +209,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     refuted,
                     distances,
                     last_distances,
-                    word,
-                    trail_length,
-                    trail_pitch,
-                    trail_at,
-                    trail_events,
-                    trail_each,
-                    is_far,
-                    strayed
+                    word
                 ]
             );
         }

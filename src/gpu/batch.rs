@@ -192,7 +192,6 @@ fn uniform(lanes: usize, row: u32, settings: &LaneSettings) -> Settings {
         exponent_block: averaging.block,
         max_period: settings.max_period.min(LONGEST_PERIOD),
         early_stop: u32::from(early_stop),
-        chaos_errors: settings.chaos_errors.to_bits(),
     }
 }
 

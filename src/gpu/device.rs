@@ -30,8 +30,6 @@ pub(super) struct EntryPoint {
 pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 5, 6, 7, 9] };
 /// Integrates.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
-/// Judges the cycles that have been read.
-pub(super) const JUDGE: EntryPoint = EntryPoint { name: "judge_cycles", storage: &[1, 5, 6, 7, 8] };
 /// Compacts the queue, one after the other.
 pub(super) const COMPACT: [EntryPoint; 4] = [
     EntryPoint { name: "count_left", storage: &[7, 8, 12] },
@@ -46,7 +44,6 @@ pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: 
 pub(super) struct Pipelines {
     pub(super) begin: wgpu::ComputePipeline,
     pub(super) sweep: wgpu::ComputePipeline,
-    pub(super) judge: wgpu::ComputePipeline,
     pub(super) compact: [wgpu::ComputePipeline; 4],
     pub(super) conclude: wgpu::ComputePipeline,
 }
@@ -244,7 +241,6 @@ pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipe
     let pipelines = Pipelines {
         begin: pipeline(gpu, &module, BEGIN),
         sweep: pipeline(gpu, &module, SWEEP),
-        judge: pipeline(gpu, &module, JUDGE),
         compact: COMPACT.map(|entry_point| pipeline(gpu, &module, entry_point)),
         conclude: pipeline(gpu, &module, CONCLUDE),
     };

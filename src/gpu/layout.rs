@@ -119,8 +119,6 @@ pub struct Settings {
     pub max_period: u32,
     /// 1: lanes end once they are decided.
     pub early_stop: u32,
-    /// Standard errors by which the exponent must exceed zero before the budget is spent: the bits of an `f32`.
-    pub chaos_errors: u32,
 }
 
 /// The motion of a lane between dispatches.
@@ -156,8 +154,6 @@ pub struct Motion {
     pub cycle_growth: f64,
     /// Tangent vectors in lane units.
     pub tangents: [f64; 16],
-    /// The last four strobes that are one candidate cycle apart.
-    pub trail: [f64; 16],
 }
 
 /// The counting of a lane between dispatches.
@@ -264,20 +260,6 @@ pub struct Tally {
     pub last_distances: [u32; 16],
     /// Symbols of the cycle, ten to a number.
     pub word: [u32; 7],
-    /// Strobes on the trail.
-    pub trail_length: u32,
-    /// Periods from one to the next.
-    pub trail_pitch: u32,
-    /// When the last was noted.
-    pub trail_at: u32,
-    /// Events so far, then.
-    pub trail_events: u32,
-    /// Events of each cycle on the trail.
-    pub trail_each: u32,
-    /// 1 while Newton's method is asked from afar.
-    pub is_far: u32,
-    /// How often that has led nowhere.
-    pub strayed: u32,
 }
 
 /// What travels back of a lane: the numbers.

@@ -7,7 +7,7 @@
 
 use web_time::{Duration, Instant};
 
-use super::device::{COMPACT, EntryPoint, JUDGE, Pipelines, SWEEP};
+use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
 use super::stage::Clock;
 use super::transfer::{landing, read};
 use super::{Gpu, GpuError};
@@ -65,7 +65,6 @@ impl Rounds<'_> {
         gpu.queue.write_buffer(self.queue, 0, bytemuck::cast_slice(&everyone));
         let looks = [landing(gpu, "look", LOOK), landing(gpu, "look", LOOK)];
         let sweep = bind(gpu, &pipelines.sweep, SWEEP, self.buffers);
-        let judge = bind(gpu, &pipelines.judge, JUDGE, self.buffers);
         let compact: Vec<_> = COMPACT
             .into_iter()
             .zip(&pipelines.compact)
@@ -88,9 +87,8 @@ impl Rounds<'_> {
             encoder.copy_buffer_to_buffer(self.queue, 0, look, 0, 4);
             let groups = self.grid(left);
             for nth in 1..=DISPATCHES {
-                dispatch(&mut encoder, &pipelines.sweep, &sweep, groups, None);
                 let writes = clock.and_then(|clock| clock.writes(slot, false, nth == DISPATCHES));
-                dispatch(&mut encoder, &pipelines.judge, &judge, groups, writes);
+                dispatch(&mut encoder, &pipelines.sweep, &sweep, groups, writes);
             }
             if let Some(clock) = clock {
                 clock.copy(&mut encoder, slot, look, TIMES);
