@@ -15,8 +15,8 @@ use crate::scene::Refine;
 /// their common edge show whether it goes on here.
 const NARROW: usize = 4;
 
-/// Rounds in which nothing is done but to follow borders. Longer ones are few, and a round takes as
-/// long as its slowest cell.
+/// Most rounds in which nothing is done but to follow borders: those that need more are few, and a round
+/// takes as long as its slowest cell.
 const FOLLOWED: u32 = 16;
 
 /// The state of an adaptive map between rounds.
@@ -35,7 +35,7 @@ pub(super) struct Adaptive {
     halvings: u32,
     /// Halvings that take a coarse block down to single cells.
     levels: u32,
-    /// Rounds that followed borders since then, or since the last audit.
+    /// Rounds since the last audit in which nothing was done but to follow borders.
     followed: u32,
     /// Cells of the audit under way.
     audited: Vec<u32>,
