@@ -8,7 +8,7 @@ use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION};
 use super::lane_growth::weak_chaos;
 use super::limits::{
-    self, flip, held, is_shaken, is_spent, late, longer, scattered, undecided_chaos, within_scatter,
+    flip, held, is_shaken, is_spent, late, longer, rest, scattered, undecided_chaos, within_scatter,
 };
 use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
@@ -245,8 +245,7 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     let hides = divides && case.unrest(&stands, period) < LANE_RESOLUTION;
     // Or rounding keeps the lane off its cycle in a pattern of its own.
     let multiplies = period > theirs && period.is_multiple_of(theirs);
-    let is_kept_off =
-        (limits::at_rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
+    let is_kept_off = (rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
     let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)?;
     (hides || scatters).then_some(Explanation::BelowResolution)
 }

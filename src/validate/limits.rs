@@ -89,7 +89,7 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
             let settles = || case.at_leisure(from).class == case.truth.class;
             // Or it is as close as rounding, which the cycle amplifies, lets it come.
             let trembles = || {
-                let is_kept_off = case.is_lane && case.unrest(&stands, period) > at_rest(case.precision);
+                let is_kept_off = case.is_lane && case.unrest(&stands, period) > rest(case.precision);
                 is_kept_off && is_shaken(case, &stands, period) == Some(true)
             };
             // Or rounding hides from it that the cycle attracts.
@@ -222,7 +222,7 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
 
 /// A motion this close to where it was a cycle ago rests on it as nearly as lanes can that amplify no
 /// rounding (`NOISE` in the shaders for f32, `RESOLVED` for f64).
-pub(super) fn at_rest(precision: Precision) -> f64 {
+pub(super) fn rest(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 4e-6,
         Precision::F64 => 1e-12,
