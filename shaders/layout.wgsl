@@ -74,6 +74,8 @@ struct Settings {
     longest: u32,
     // The first period at which chaos may be called early.
     chaos_from: u32,
+    // Standard errors by which the exponent must exceed zero then.
+    chaos_errors: f32,
     // Loop trips that one dispatch may spend on a lane.
     trips: u32,
     // Passes (scan steps and careful steps) allowed in one period.

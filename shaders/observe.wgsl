@@ -8,7 +8,7 @@ const NEAR: u32 = 24u;
 // comes within 2^-12 of a cycle by chance.
 const SETTLED: f32 = 56.0;
 // 2^-7 where Newton's method shows what the limit is.
-const REFINABLE: f32 = 28.0;
+const REFINABLE: f32 = 16.0;
 // Slower approaches than this, per period, are not waited for, only for a recurrence as close as
 // if they were as fast.
 const SLOWEST: f32 = 0.008;
@@ -19,7 +19,7 @@ const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
 // Lags of any window, at least: they are a quarter of the time that has passed, or a few cycles.
-const LEAST_WINDOW: u32 = 4u;
+const LEAST_WINDOW: u32 = 3u;
 // Windows need not be longer than so many cycles that contract.
 const LAGS_PER_CYCLE: u32 = 4u;
 
@@ -67,8 +67,7 @@ fn begin_period() {
 // Periods over which averages are taken, at least, before chaos is called early.
 const LEAST_COUNTED: u32 = 32u;
 
-// Standard errors by which the exponent must exceed zero: before the budget is spent, and after.
-const EARLY_CHAOS_ERRORS: Real = 6.0;
+// Standard errors by which the exponent must exceed zero once the budget is spent.
 const CHAOS_ERRORS: Real = 3.0;
 // And those that cast doubt on a cycle that has not settled.
 const DOUBT: Real = 1.0;
@@ -89,7 +88,7 @@ fn is_chaos() -> bool {
     if tally.period < tally.counted_from + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
-    let errors = select(EARLY_CHAOS_ERRORS, CHAOS_ERRORS, tally.period >= settings.periods);
+    let errors = select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods);
     return grows(errors) && outgrows(errors) && !departs(errors);
 }
 

@@ -152,7 +152,7 @@ pub struct LaneSettings {
     /// Longest period looked for, at most 64; 0 looks for none.
     pub max_period: u32,
     /// Whether lanes end once they are decided: a cycle confirmed and read, contact-free for
-    /// good, or chaotic by six standard errors from `chaos_from` on.
+    /// good, or chaotic by `chaos_errors` from `chaos_from` on.
     pub early_stop: bool,
     /// Periods beyond the budget for lanes that are undecided by then; with early stops alone.
     pub undecided_periods: u32,
@@ -171,6 +171,8 @@ pub struct LaneSettings {
     pub exponent_from: u32,
     /// The first period at which chaos may be called, with early stops.
     pub chaos_from: u32,
+    /// Standard errors by which the exponent must exceed zero then.
+    pub chaos_errors: f32,
     /// Free steps per period at least; none for as many as the motion needs. More gain nothing:
     /// roundings add up like a random walk, and a short flight between impacts that spans
     /// several steps is known to the rounding of the gap, no longer to its own.
@@ -203,6 +205,7 @@ impl Default for LaneSettings {
             chatter: true,
             exponent_from: 100,
             chaos_from: 198,
+            chaos_errors: 6.0,
             steps_per_period: None,
             batch: None,
             trips: 4000,

@@ -142,6 +142,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     periods,
                     longest,
                     chaos_from,
+                    chaos_errors,
                     trips,
                     passes_per_period,
                     events_per_period,

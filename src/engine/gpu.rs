@@ -153,6 +153,7 @@ fn lane_settings(plan: &Plan) -> LaneSettings {
         chatter: (0..plan.law_count() as u32).any(|law| plan.law(law).mesh_speed <= FOLLOWED_MESH_SPEED),
         exponent_from: budget.exponent_from(),
         chaos_from: budget.chaos_from(),
+        chaos_errors: budget.chaos_errors() as f32,
         steps_per_period: match plan.steps_per_period() {
             Steps::Auto => None,
             Steps::PerPeriod(steps) => Some(steps),

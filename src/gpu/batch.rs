@@ -182,6 +182,7 @@ fn uniform(lanes: usize, row: u32, settings: &LaneSettings) -> Settings {
         periods,
         longest: periods.saturating_add(more),
         chaos_from: settings.chaos_from,
+        chaos_errors: settings.chaos_errors,
         trips: settings.trips,
         passes_per_period: settings.passes_per_period,
         events_per_period: settings.events_per_period,

@@ -99,6 +99,8 @@ pub struct Settings {
     pub longest: u32,
     /// The first period at which chaos may be called early.
     pub chaos_from: u32,
+    /// Standard errors by which the exponent must exceed zero then.
+    pub chaos_errors: f32,
     /// Loop trips that one dispatch may spend on a lane.
     pub trips: u32,
     /// Passes allowed in one period.

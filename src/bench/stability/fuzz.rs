@@ -167,6 +167,7 @@ pub(super) fn lane_settings() -> LaneSettings {
         max_period: SETTINGS.max_period,
         exponent_from: budget.exponent_from(),
         chaos_from: budget.chaos_from(),
+        chaos_errors: budget.chaos_errors() as f32,
         ..LaneSettings::default()
     }
 }
