@@ -2,8 +2,6 @@
 
 // A lane has settled once it is this close to its cycle, relative to the motion.
 const ON_CYCLE: f32 = 1e-4;
-// And at the end of its budget, if it came no closer, this close.
-const ABOUT: f32 = 0.01;
 // A lane that rests on a cycle which repels is moved by so many times what counts as rest.
 const KICK: f32 = 8.0;
 // Newton's method is not asked again after it led nowhere so often.
@@ -21,23 +19,71 @@ fn octaves_of(x: Real) -> Real {
     return Real(whole) + (2.0 / LN_2) * s * series;
 }
 
+fn largest_entry(m: array<Real, 16>) -> Real {
+    var size: Real = 0.0;
+    for (var k = 0u; k < 16u; k++) {
+        size = max(size, abs(m[k]));
+    }
+    return size;
+}
+
+// A matrix with the eigenvalues of `m / size`: one step of the QR iteration, by rotations. What makes `m`
+// large beside its eigenvalues comes to lie above the diagonal. Squares of `m` itself would lose them:
+// where 46 beside 0.15 was the largest entry, a fifth of the radius in f32.
+fn nearly_triangular(m: array<Real, 16>, inverse: Real) -> array<Real, 16> {
+    var r = m;
+    for (var k = 0u; k < 16u; k++) {
+        r[k] *= inverse;
+    }
+    var turns: array<vec2<Real>, 16>;
+    for (var j = 0u; j < 3u; j++) {
+        for (var i = j + 1u; i < 4u; i++) {
+            let a = r[5u * j];
+            let b = r[4u * j + i];
+            let size = sqrt(a * a + b * b);
+            let turn = select(vec2<Real>(1.0, 0.0), vec2<Real>(a, b) / max(size, Real(1e-30)), size > 1e-30);
+            for (var k = 0u; k < 4u; k++) {
+                let upper = r[4u * k + j];
+                let lower = r[4u * k + i];
+                r[4u * k + j] = turn.x * upper + turn.y * lower;
+                r[4u * k + i] = turn.x * lower - turn.y * upper;
+            }
+            turns[4u * j + i] = turn;
+        }
+    }
+    for (var j = 0u; j < 3u; j++) {
+        for (var i = j + 1u; i < 4u; i++) {
+            let turn = turns[4u * j + i];
+            for (var k = 0u; k < 4u; k++) {
+                let left = r[4u * j + k];
+                let right = r[4u * i + k];
+                r[4u * j + k] = turn.x * left + turn.y * right;
+                r[4u * i + k] = turn.x * right - turn.y * left;
+            }
+        }
+    }
+    return r;
+}
+
 // The binary logarithm of the spectral radius of the monodromy matrix, whose columns the
 // tangent vectors are: they started as the unit vectors. With `n = 2^SQUARINGS` the modulus of
 // the largest multiplier is `|M^n|^(1/n)` up to a factor of `kappa^(1/n)`, kappa the condition
 // of its eigenvectors.
 fn spectral_growth() -> Real {
     var m = motions[lane].tangents;
-    var growth: Real = 0.0;
+    let whole = largest_entry(m);
+    if !(whole < 1e30) {
+        // Beyond what can be told, and no number any more.
+        return 100.0;
+    }
+    if !(whole > 1e-30) {
+        return -100.0;
+    }
+    m = nearly_triangular(m, 1.0 / whole);
+    var growth = octaves_of(whole);
     var weight: Real = 1.0;
     for (var n = 0u; n <= SQUARINGS; n++) {
-        var size: Real = 0.0;
-        for (var k = 0u; k < 16u; k++) {
-            size = max(size, abs(m[k]));
-        }
-        if !(size < 1e30) {
-            // Beyond what can be told, and no number any more.
-            return 100.0;
-        }
+        let size = largest_entry(m);
         if !(size > 1e-30) {
             // Superstable, as far as can be told.
             return -100.0;
@@ -73,17 +119,18 @@ fn judge_cycle() {
     }
     motion.cycle_growth = spectral_growth();
     note_branch();
+    let to = fixed_point();
+    tally.off = octaves(distance_between(strobe_state(), to));
     let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
     // Beside a graze the map has no derivative that tells where the cycle is.
     let is_smooth = tally.grazes == 0u || tally.refinements > 0u;
     // And where rounding is amplified it throws the lane off: such cycles are waited for.
     let helps = is_smooth && tally.vain < VAIN;
-    if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine() {
+    if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine(to) {
         tally.stage = STAGE_READING;
         return;
     }
-    let is_here = is_on_cycle() || (is_last && (tally.settled != 0u || away() < ABOUT));
-    let is_cycle = attracts && is_own() && is_here;
+    let is_cycle = attracts && is_own() && is_on_cycle(keeps_domain(to), is_last);
     if is_cycle && (!is_multiple() || is_refuted()) {
         tally.cycle = tally.candidate;
         return;
@@ -183,10 +230,12 @@ fn noise() -> f32 {
     return f32(ULP * gain) * f32(16u + 2u * tally.events);
 }
 
-// How far the lane is from its cycle at most, relative to the motion.
+// How far the lane is from its cycle at most, relative to the motion: by how it recurs, and by the
+// derivative. A spiral comes near its last strobe before it comes near its cycle.
 fn away() -> f32 {
     // Rounding may hold a lane still before it is there.
-    return limit_of(max(exp2(-f32(tally.apart) / OCTAVE), NOISE));
+    let by_recurrence = limit_of(max(exp2(-f32(tally.apart) / OCTAVE), NOISE));
+    return select(by_recurrence, max(by_recurrence, exp2(-f32(tally.off) / OCTAVE)), EXPONENT);
 }
 
 // And if rounding is taken at its worst.
@@ -211,8 +260,23 @@ fn is_surely_unsymmetric() -> bool {
     return exp2(-f32(tally.mirror) / OCTAVE) > 4.0 * max(blur(), ON_CYCLE);
 }
 
-// Near, or as near as rounding lets it.
-fn is_on_cycle() -> bool {
-    let is_blurred = tally.vain >= VAIN && tally.settled != 0u && exp2(-f32(tally.apart) / OCTAVE) < min(noise(), ON_CYCLE);
-    return is_near_cycle() || tally.apart >= AT_REST || is_blurred;
+// Whether it is nearer to it than lanes resolve, wherever the lane is about it.
+fn is_surely_symmetric() -> bool {
+    return is_near_cycle() && exp2(-f32(tally.mirror) / OCTAVE) + 4.0 * away() < MIRROR;
+}
+
+// Whether it moves no more, and not because it moves too slowly to show.
+fn is_at_rest() -> bool {
+    let is_there = !EXPONENT || exp2(-f32(tally.off) / OCTAVE) < max(ON_CYCLE, limit_of(noise()));
+    return tally.apart >= AT_REST && is_there;
+}
+
+// Near, or as near as rounding lets it. What lies in another domain than the lane, as its derivative has
+// it, is no cycle that it comes to; and beside a graze only rest will do.
+fn is_on_cycle(is_within_domain: bool, is_last: bool) -> bool {
+    let is_blurred = (tally.vain >= VAIN || is_last) && tally.settled != 0u && exp2(-f32(tally.apart) / OCTAVE) < min(noise(), ON_CYCLE);
+    // Whether it goes on with the same events is seen where Newton's method leads it, if there is time.
+    let is_confirmed = !is_last || settings.early_stop == 0u || tally.refinements > 0u || away() <= REFINED;
+    let is_near = is_near_cycle() && is_within_domain && tally.grazes == 0u && is_confirmed;
+    return is_near || is_at_rest() || is_blurred;
 }

@@ -169,8 +169,12 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 2.0 * dt;
             continue;
         }
-        if first + second == CROSSING {
-            let which = second == CROSSING;
+        // Two that come as close together as steps are halved: the one before the other.
+        let both = first == CROSSING && second == CROSSING && dt <= SHORTEST && orders.x + orders.y == 0u;
+        if first + second == CROSSING || both {
+            let falls = vec2<Real>(left.first.x - right.first.x, left.second.x - right.second.x);
+            let is_earlier = left.second.x * falls.x < left.first.x * falls.y;
+            let which = second == CROSSING && (is_earlier || !both);
             let at_start = select(left.first.x, left.second.x, which);
             let at_end = select(right.first.x, right.second.x, which);
             let order = select(orders.x, orders.y, which);

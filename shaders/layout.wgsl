@@ -208,6 +208,8 @@ struct TallyNow {
     vain: u32,
     asked: u32,
     refuted: u32,
+    // How far its cycle is from the lane by the derivative, in quarter octaves below 1.
+    off: u32,
 }
 
 struct Tally {

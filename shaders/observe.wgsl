@@ -33,6 +33,7 @@ fn begin_period() {
     tally.events_in_period = 0u;
     if tally.stage == STAGE_READING {
         tally.to_read -= 1u;
+        widen_scales(strobe_state());
         let read = tally.candidate - tally.to_read;
         let apart = octaves(distance_between(strobe_state(), motion.anchor));
         if tally.to_read == 0u {
@@ -102,7 +103,9 @@ fn grows(errors: Real) -> bool {
 }
 
 // Neutral motion grows, too: tangents of a free body, of a torus or of an undamped swing in
-// proportion to time, at a double root to its square. Chaos has to outgrow that.
+// proportion to time, at a double root to its square. Chaos has to outgrow that, and what rounding makes
+// of it: a shear `1 s; d 1` with d = ULP where there should be none grows by sqrt(s ULP), s of one
+// event being 1 at most.
 const NEUTRAL_ORDER: f32 = 2.0;
 
 fn outgrows(errors: Real) -> bool {
@@ -110,7 +113,9 @@ fn outgrows(errors: Real) -> bool {
     let periods = tally.blocks * settings.exponent_block;
     let began = max(settings.exponent_from, 1u);
     let neutral = NEUTRAL_ORDER * log(f32(began + periods) / f32(began));
-    return (growth.x - errors * growth.y) * Real(periods) > Real(neutral);
+    let events_per_period = Real(tally.events) / Real(max(tally.period - tally.counted_from, 1u));
+    let rounding = sqrt(events_per_period * events_per_period * ULP);
+    return (growth.x - errors * growth.y - rounding) * Real(periods) > Real(neutral);
 }
 
 // Whether the motion lingers at some cycle and its growth may be that of leaving it.
@@ -186,6 +191,7 @@ fn begin_reading() {
     tally.divisor = 0u;
     tally.divisor_apart = 0u;
     motion.anchor = strobe_state();
+    narrow_scales(motion.anchor);
     if EXPONENT {
         tally.tangent_count = 4u;
         motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
@@ -204,8 +210,7 @@ fn strobe_state() -> array<Real, 4> {
 // Looks at a strobe; true once a period is confirmed.
 fn recurs() -> bool {
     let q = strobe_state();
-    motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
-    motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
+    widen_scales(q);
     if tally.window == 0u {
         begin_window(q, widest());
         return false;
@@ -229,6 +234,22 @@ fn recurs() -> bool {
     let lags = select(widest(), min(enough, widest()), is_fast && tally.tries == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
+}
+
+// Units of distances: the largest strobe.
+fn widen_scales(q: array<Real, 4>) {
+    motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
+    motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
+}
+
+// What a motion was before it came to its cycle is no unit of the cycle. A strobe may catch it at its
+// turning point, or midway between two.
+fn narrow_scales(q: array<Real, 4>) {
+    let angle = flows[cell.flow_index].domains[0].angle;
+    let position = max(abs(q[0]), abs(q[2]));
+    let rate = max(abs(q[1]), abs(q[3]));
+    motion.position_scale = min(motion.position_scale, max(position, rate / angle));
+    motion.rate_scale = min(motion.rate_scale, max(rate, angle * position));
 }
 
 fn widest() -> u32 {
@@ -366,7 +387,7 @@ fn compare_mirror() {
 }
 
 // A cycle this close to its mirror image, 2^-12 of the motion, is symmetric.
-const MIRROR: u32 = 48u;
+const MIRROR: f32 = 2.44e-4;
 
 // One flight ends on `side`: its symbol. The first flight of all comes from no wall.
 fn note_symbol(side: u32) {

@@ -71,7 +71,7 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     // cycle that is its own mirror image.
     if SYMMETRY && shapes[cell.flow_index].mirror == 1u {
         let has_twins = tally.impacts % 2u == 0u;
-        let is_symmetric = tally.has_read == 0u || (is_near_cycle() && tally.mirror >= MIRROR && has_twins);
+        let is_symmetric = tally.has_read == 0u || (is_surely_symmetric() && has_twins);
         if is_symmetric || !has_twins || is_surely_unsymmetric() {
             (*finding).valid |= VALID_SYMMETRIC;
             (*finding).symmetric = select(0u, 1u, is_symmetric);

@@ -7,9 +7,9 @@ const REFINEMENTS: u32 = 5u;
 const REACH: f32 = 2e-2;
 
 // The monodromy matrix has been read along one candidate cycle from the anchor to the present
-// strobe. Moves the lane to where the linearised strobe map has its fixed point, to read on from
+// strobe. Moves the lane `to` where the linearised strobe map has its fixed point, to read on from
 // there; false where that brings it no closer or is no part of the motion.
-fn refine() -> bool {
+fn refine(to: array<Real, 4>) -> bool {
     if tally.refinements == 0u {
         motion.home = strobe_state();
         tally.home_mode = tally.mode;
@@ -20,15 +20,13 @@ fn refine() -> bool {
     if stalls || is_over || tally.mode >= MODE_DIP || tally.order > 0u {
         return false;
     }
-    let to = fixed_point();
-    var q = to;
-    if tally.mode != MODE_FREE {
-        q[0] -= walls[side_of(tally.mode)];
-    }
-    if !(is_within(q[0]) && distance_between(to, motion.home) < Real(REACH)) {
+    if !(keeps_domain(to) && distance_between(to, motion.home) < Real(REACH)) {
         return false;
     }
-    motion.q = q;
+    motion.q = to;
+    if tally.mode != MODE_FREE {
+        motion.q[0] -= walls[side_of(tally.mode)];
+    }
     motion.bound = 0.0;
     tally.refinements += 1u;
     tally.apart_before = tally.apart;
@@ -57,12 +55,13 @@ fn is_own() -> bool {
     return branch() == tally.branch && (tally.grazes == 0u || tally.refinements == 0u);
 }
 
-// Whether the gap may be there in the present domain, at a phase that is no event's.
-fn is_within(gap: Real) -> bool {
+// Whether the gap may be there in the present domain, at a phase that is no event's. Dips have no bounds.
+fn keeps_domain(to: array<Real, 4>) -> bool {
     if tally.mode == MODE_FREE {
-        return gap < walls[0] && gap > walls[1];
+        return to[0] < walls[0] && to[0] > walls[1];
     }
-    return sign_of(side_of(tally.mode)) * gap > 0.0;
+    let side = side_of(tally.mode);
+    return tally.mode >= MODE_DIP || sign_of(side) * (to[0] - walls[side]) > 0.0;
 }
 
 // Back to where the lane came from.

@@ -15,6 +15,7 @@ mod case;
 mod explanation;
 mod lane_growth;
 mod limits;
+mod reading;
 mod rounded;
 mod rounding;
 mod same_cycle;

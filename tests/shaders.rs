@@ -208,6 +208,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     vain,
                     asked,
                     refuted,
+                    off,
                     distances,
                     last_distances,
                     word

@@ -3,68 +3,15 @@
 //!
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
+mod short_cells;
+
 use rattlemap::classify::classify;
-use rattlemap::engine::{self, Engine};
-use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
-use rattlemap::model::{GearPair, State};
+use rattlemap::gpu::Precision;
 use rattlemap::orbit::{Class, Status};
 use rattlemap::plan::Plan;
 use rattlemap::record::Record;
-use rattlemap::scene::{Purpose, Scene};
-use rattlemap::schedule::Schedule;
-use rattlemap::validate::{Explanation, Pick, Sample, StateSource, Stratum, Subject, replay};
-
-/// A pair by its parameters in the order of [`GearPair::PARAMETERS`], and its start.
-struct Cell([f64; 13], State);
-
-impl Cell {
-    /// A plan of 64 periods whose first cell this is.
-    fn plan(&self) -> Plan {
-        const SWEPT: [&str; 2] = ["omega", "mesh_speed"];
-        let named = || GearPair::PARAMETERS.iter().map(|parameter| parameter.name).zip(self.0);
-        let fixed: String = named()
-            .filter(|(name, _)| !SWEPT.contains(name))
-            .map(|(name, value)| format!("{name} = {value:?}\n"))
-            .collect();
-        let axes: String = SWEPT
-            .iter()
-            .map(|swept| named().find(|(name, _)| name == swept).unwrap())
-            .map(|(name, min)| {
-                format!(
-                    "[[axis]]\nparameter = '{name}'\nmin = {min:?}\nmax = {:?}\ncount = 2\n",
-                    2.0 * min + 1.0
-                )
-            })
-            .collect();
-        let text = format!(
-            "[parameters]\n{fixed}{axes}[integration]\ntransient_periods = 32\nobserved_periods = 32\n\
-             max_period = 16\n[start]\npolicy = 'state'\nstate = {:?}\n[outputs]\n\
-             quantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n",
-            self.1
-        );
-        Plan::new(&Scene::parse(&text, "cell", &[], Purpose::Map).unwrap())
-    }
-}
-
-/// What lanes say of the first cell of a plan.
-fn lane(plan: &Plan, precision: Precision) -> Record {
-    let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
-    let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, device)).unwrap()));
-    let batch = Schedule::new(plan).batch(plan, 0, plan.cell_count());
-    let records = pollster::block_on(engine.run(&batch)).unwrap();
-    batch.cells.iter().zip(records).find(|(cell, _)| cell.id == 0).unwrap().1
-}
-
-/// Why a record differs from the reference: an explanation, or none; an error if it does not differ.
-fn explanation(plan: &Plan, record: Record, precision: Precision) -> Result<Option<Explanation>, ()> {
-    let mut records = vec![Record::default(); plan.cell_count()];
-    records[0] = record;
-    let subject = Subject { plan, records: &records, precision, is_lane: true };
-    let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
-    let sample = Sample { seed: 0, picks, strata: Vec::new() };
-    let validation = replay(&subject, &sample, StateSource::None(String::new()), &|_| ());
-    validation.mismatches.first().map(|mismatch| mismatch.explanation).ok_or(())
-}
+use rattlemap::validate::Explanation;
+use short_cells::{Cell, explanation, lane};
 
 /// Changes a record.
 type Spoil = fn(&mut Record);
@@ -328,4 +275,104 @@ fn rounding_at_every_step_moves_averages_so_far_and_no_farther() {
         ("period", |record| record.period = 2),
     ];
     stays_unexplained(&plan, record, Precision::F32, &planted);
+}
+
+/// The same, over so many steps that the turning of cos and sin drifts.
+const DRIFTING: [Cell; 2] = [
+    Cell(
+        [
+            0.08823531625324646,
+            0.12941349877452898,
+            0.464288828952097,
+            0.0,
+            675.5378853817336,
+            0.0,
+            0.31562895088481074,
+            5612.198359022663,
+            8027.684263746821,
+            1.6568954539515373,
+            0.006695239363000086,
+            0.24090160207268607,
+            0.0010698161672906808,
+        ],
+        [0.0; 4],
+    ),
+    Cell(
+        [
+            0.2047675157021311,
+            0.0635173497611614,
+            0.2997898683527236,
+            0.0,
+            5311.903590523875,
+            3.5541769698826697,
+            0.40893421641857497,
+            490.7530689598123,
+            -4937.6036611205745,
+            1.3344483289535414,
+            0.00794227976231415,
+            0.32344024881232336,
+            0.04616037941123117,
+        ],
+        [0.0; 4],
+    ),
+];
+
+#[test]
+fn a_phase_that_drifts_moves_averages_so_far_and_no_farther() {
+    for cell in &DRIFTING {
+        let plan = cell.plan();
+        let record = lane(&plan, Precision::F32);
+        let why = explanation(&plan, record, Precision::F32);
+        assert!(matches!(why, Err(()) | Ok(Some(Explanation::BelowResolution))), "{why:?}: {record:?}");
+        let planted: [(&str, Spoil); 5] = [
+            ("meshing", |record| record.mesh_fraction += 5e-4),
+            ("less of it", |record| record.mesh_fraction -= 5e-4),
+            ("exponent", |record| record.lyapunov *= 1.1),
+            ("impacts", |record| record.impacts_per_period += 2.0),
+            ("period", |record| record.period = 2),
+        ];
+        stays_unexplained(&plan, record, Precision::F32, &planted);
+        // In double precision nothing drifts so far.
+        let less: Spoil = |record| record.mesh_fraction -= 6e-5;
+        stays_unexplained(&plan, lane(&plan, Precision::F64), Precision::F64, &[("meshing", less)]);
+    }
+}
+
+/// One whose strobes alternate by a hundred-thousandth in single precision, which calls it period 2.
+const ALTERNATING: Cell = Cell(
+    [
+        0.5056531814412567,
+        0.562462919954447,
+        0.0,
+        0.00341805887958341,
+        1166.1764952212475,
+        330.4672072109734,
+        0.2755939805167101,
+        2.834887861553148,
+        -446.71728329162977,
+        0.5087343515952822,
+        0.00025696758033011316,
+        0.0,
+        7.015472375038137e-5,
+    ],
+    [-4.629693576984496e-5, -0.0005572948104036579, -3.3559287565770934e-5, -0.000274661662267506],
+);
+
+#[test]
+fn a_multiple_of_a_period_is_rounding_or_a_fault() {
+    let plan = ALTERNATING.plan();
+    let record = lane(&plan, Precision::F32);
+    let why = explanation(&plan, record, Precision::F32);
+    assert!(matches!(why, Err(()) | Ok(Some(Explanation::BelowResolution))), "{why:?}: {record:?}");
+    let planted: [(&str, Spoil); 4] = [
+        ("another period", |record| record.period = 3),
+        ("exponent", |record| record.lyapunov *= 1.3),
+        ("impacts", |record| record.impacts_per_period += 1.0),
+        ("meshing", |record| record.mesh_fraction -= 1e-3),
+    ];
+    stays_unexplained(&plan, record, Precision::F32, &planted);
+    let record = lane(&plan, Precision::F64);
+    assert_eq!(classify(&record), Class::Periodic { period: 1 }, "{record:?}");
+    let twice: Spoil = |record| record.period = 2;
+    stays_unexplained(&plan, record, Precision::F64, &[("period", twice)]);
 }

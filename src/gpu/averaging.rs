@@ -49,11 +49,19 @@ impl Averaging {
     }
 
     /// Whether growth of so much per period, over `periods` of them, is more than neutral motion has
-    /// (`outgrows` in the shaders): that of a double root, the square of time.
-    pub(crate) fn outgrows(&self, growth: f64, periods: usize) -> bool {
+    /// (`outgrows` in the shaders): that of a double root, the square of time, and what rounding by
+    /// `unit_roundoff` at every event makes of it.
+    pub(crate) fn outgrows(
+        &self,
+        growth: f64,
+        periods: usize,
+        events_per_period: f64,
+        unit_roundoff: f64,
+    ) -> bool {
         let counted = periods as u32 / self.block * self.block;
         let began = f64::from(self.exponent_from.max(1));
-        growth * f64::from(counted) > NEUTRAL_ORDER * ((began + f64::from(counted)) / began).ln()
+        let neutral = NEUTRAL_ORDER * ((began + f64::from(counted)) / began).ln();
+        (growth - events_per_period * unit_roundoff.sqrt()) * f64::from(counted) > neutral
     }
 }
 
@@ -92,9 +100,12 @@ mod tests {
         let averaging = Averaging::new(64, 32);
         let mean = |order: f64| order * 2f64.ln() / 32.0;
         for (order, is_more) in [(1.0, false), (1.99, false), (2.01, true)] {
-            assert_eq!(averaging.outgrows(mean(order), 32), is_more, "{order}");
+            assert_eq!(averaging.outgrows(mean(order), 32, 0.0, 1e-8), is_more, "{order}");
         }
+        // A thousand events that round by 1e-8 may do as much.
+        assert!(!averaging.outgrows(mean(2.01) + 0.099, 32, 1000.0, 1e-8));
+        assert!(averaging.outgrows(mean(2.01) + 0.1, 32, 1000.0, 1e-8));
         // The last block is not complete.
-        assert!(!averaging.outgrows(mean(2.01), 31));
+        assert!(!averaging.outgrows(mean(2.01), 31, 0.0, 1e-8));
     }
 }

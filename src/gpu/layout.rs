@@ -256,6 +256,8 @@ pub struct Tally {
     pub asked: u32,
     /// The divisor whose cycle then was found not to attract.
     pub refuted: u32,
+    /// How far its cycle is from the lane by the derivative, in quarter octaves below 1.
+    pub off: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.

@@ -235,7 +235,9 @@ impl Analysis<'_> {
                     return Some(cycle);
                 }
                 let image = newton.apply(map, seed, cycle.state)?;
-                if metric.distance(&image.state, &cycle.state) < ON_CYCLE
+                // What rounding leaves of the residual, the map amplifies.
+                let close = ON_CYCLE * image.derivative().norm().max(1.0);
+                if metric.distance(&image.state, &cycle.state) < close
                     && let Some(shorter) = newton.refine(&seed.at(cycle.state, []), map)
                 {
                     return Some(shorter);

@@ -2,17 +2,17 @@
 
 use super::Subject;
 use super::answer::{Answer, Bars};
+use super::explanation::ELSEWHERE;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::flow::Flow;
 use crate::gpu::Precision;
 use crate::model::{GearPair, Law, State};
-use crate::orbit::{Budget, Class, Measured, analyse_flow, measure};
+use crate::orbit::{Budget, Measured, analyse_flow, measure};
 use crate::random::Random;
 use crate::record::Record;
-use crate::reference::{Happening, Stop, Trajectory};
-use crate::stability::{StrobeMap, multipliers};
-use crate::word::Word;
+use crate::reference::{Stop, Trajectory};
+use crate::stability::StrobeMap;
 
 /// Parameters and starts moved by this much, relatively, are the same within rounding of a
 /// lane. Some roundings of a precision: errors gather over the steps of a period.
@@ -149,6 +149,15 @@ impl<'a> Case<'a> {
         Ok(trajectory)
     }
 
+    /// The reference on a record's last strobe, in the domain of its own motion if that has come by there: a
+    /// state alone does not tell how deep the dip at the start of meshing is, which may cross the whole gap.
+    pub(super) fn standing(&self, on: State) -> Result<Trajectory<'_>, Stop> {
+        match self.after(self.start, self.record.periods_run) {
+            Ok(own) if self.apart(&on, &own.state()) < ELSEWHERE => Ok(own.at(on, [])),
+            _ => self.after(on, 0),
+        }
+    }
+
     /// How far `period` more periods take a motion from where it is, relative to its size.
     pub(super) fn unrest(&self, trajectory: &Trajectory<'_>, period: u32) -> f64 {
         let before = trajectory.state();
@@ -183,35 +192,5 @@ impl<'a> Case<'a> {
         let reach = 0.5 * (self.flow.walls[0] - self.flow.walls[1]);
         let position = y[0].abs().max(y[2].abs()).max(reach);
         [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
-    }
-
-    /// What one cycle of `period` looks like from where a motion is, settled or not: read as
-    /// lanes read it, without Newton.
-    pub(super) fn read_as_is(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<Answer> {
-        let image = StrobeMap::Periods(period).apply(trajectory, trajectory.state()).ok()?;
-        let largest = multipliers(&image.scaled)?.first().map(|[re, im]| re.hypot(*im))?;
-        let span = f64::from(period) * self.flow.period;
-        // Once around, so that the first flight has its symbol.
-        let mut cycle = trajectory.clone();
-        for _ in 0..period {
-            cycle.advance_period(&mut ()).ok()?;
-        }
-        let (before, meshing) = (cycle.work().impacts, cycle.meshing_time());
-        let mut met: Vec<Happening> = Vec::new();
-        for _ in 0..period {
-            cycle.advance_period(&mut met).ok()?;
-        }
-        let impacts = cycle.work().impacts - before;
-        let symbols: Vec<u8> = met.iter().filter_map(|happening| happening.symbol).collect();
-        Some(Answer {
-            class: Class::Periodic { period },
-            exponent: Some([(largest.ln() + image.log_scale) / span, 0.0]),
-            impacts_per_period: Some(impacts as f64 / f64::from(period)),
-            mesh_fraction: Some((cycle.meshing_time() - meshing) / span),
-            // Every impact has a twin on a cycle that is its own mirror image.
-            symmetric: if impacts % 2 == 1 { Some(false) } else { self.truth.symmetric },
-            word: Some(Word::cyclic(&symbols)),
-            ..self.truth.clone()
-        })
     }
 }

@@ -197,7 +197,7 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
     // A cycle that is read before it has settled has averages of its own.
     let read = || match classify(case.record) {
         Class::Periodic { period } if answer.class == classify(case.record) => {
-            case.read_as_is(&case.after(from, 0).ok()?, period)
+            case.read_as_is(&case.standing(from).ok()?, period)
         }
         _ => None,
     };
@@ -218,7 +218,7 @@ fn unresolved(case: &Case<'_>, from: State, answer: &Answer) -> Option<bool> {
     else {
         return None;
     };
-    let stands = case.after(from, 0).ok()?;
+    let stands = case.standing(from).ok()?;
     let divides = period < theirs && theirs.is_multiple_of(period);
     if !divides || case.unrest(&stands, period) > LANE_RESOLUTION {
         return None;
@@ -240,13 +240,16 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     else {
         return None;
     };
-    let stands = case.after(strobe(case)?, 0).ok()?;
+    let stands = case.standing(strobe(case)?).ok()?;
     let divides = period < theirs && theirs.is_multiple_of(period);
     let hides = divides && case.unrest(&stands, period) < LANE_RESOLUTION;
     // Or rounding keeps the lane off its cycle in a pattern of its own.
     let multiplies = period > theirs && period.is_multiple_of(theirs);
     let is_kept_off = (rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
-    let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)?;
+    let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)? && {
+        let read = case.read_as_is(&stands, period)?;
+        case.is_the_records(&read) || rounding::is_read_rounded(case, &stands, period, &read)?
+    };
     (hides || scatters).then_some(Explanation::BelowResolution)
 }
 
@@ -263,7 +266,7 @@ fn grazing(case: &Case<'_>) -> Option<Explanation> {
 
 /// Whether the motion comes back after the record's period; a record without one claims none.
 fn recurs(case: &Case<'_>) -> Option<bool> {
-    let stands = case.after(strobe(case)?, 0).ok()?;
+    let stands = case.standing(strobe(case)?).ok()?;
     match classify(case.record) {
         Class::Periodic { period } => {
             // What a motion passes through at a bifurcation is its cycle, or twice or half of it.
@@ -281,7 +284,7 @@ fn recurs(case: &Case<'_>) -> Option<bool> {
 /// Whether no part of the record's period recurs: a multiple of a period always does.
 pub(super) fn is_least(case: &Case<'_>) -> Option<bool> {
     let Class::Periodic { period } = classify(case.record) else { return Some(true) };
-    let stands = case.after(strobe(case)?, 0).ok()?;
+    let stands = case.standing(strobe(case)?).ok()?;
     let mut parts = (1..period).filter(|&part| period.is_multiple_of(part));
     Some(parts.all(|part| case.unrest(&stands, part) > LANE_RESOLUTION))
 }

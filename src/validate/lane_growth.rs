@@ -9,6 +9,7 @@ use super::answer::Answer;
 use super::case::Case;
 use super::explanation::Explanation;
 use super::rounded::{Rounded, counts};
+use super::states::unit_roundoff;
 use crate::classify::classify;
 use crate::gpu::{Averaging, Constants};
 use crate::model::State;
@@ -58,8 +59,8 @@ trait Watched {
     /// The tangent vector, and the logarithm of the factor that was taken out of it.
     fn tangent(&self) -> (State, f64);
     fn set_tangent(&mut self, u: State);
-    /// Impacts and meshing time so far.
-    fn counts(&self) -> [f64; 2];
+    /// Impacts, meshing time and events so far.
+    fn counts(&self) -> [f64; 3];
 }
 
 impl Watched for Trajectory<'_, 1> {
@@ -75,8 +76,9 @@ impl Watched for Trajectory<'_, 1> {
         self.set_tangents([u]);
     }
 
-    fn counts(&self) -> [f64; 2] {
-        counts(self)
+    fn counts(&self) -> [f64; 3] {
+        let [impacts, meshing_time] = counts(self);
+        [impacts, meshing_time, self.work().events as f64]
     }
 }
 
@@ -94,8 +96,9 @@ impl Watched for Rounded<'_, '_, 1> {
         self.set_tangents([u]);
     }
 
-    fn counts(&self) -> [f64; 2] {
-        counts(self.trajectory())
+    fn counts(&self) -> [f64; 3] {
+        let [impacts, meshing_time] = counts(self.trajectory());
+        [impacts, meshing_time, self.trajectory().work().events as f64]
     }
 }
 
@@ -148,7 +151,7 @@ impl<'c, 'a> AsLane<'c, 'a> {
     fn average(&self, motion: &mut impl Watched) -> Option<Answer> {
         let Averaging { growth_from, exponent_from, .. } = self.averaging;
         let mut growth = Vec::new();
-        let mut before = [0.0; 2];
+        let mut before = [0.0; 3];
         for period in growth_from + 1..=self.case.record.periods_run {
             if period == exponent_from + 1 {
                 before = motion.counts();
@@ -159,10 +162,11 @@ impl<'c, 'a> AsLane<'c, 'a> {
             }
         }
         let [mean, error] = self.averaging.estimate(&growth)?;
-        let grows =
-            mean > CHAOS_ERRORS * error && self.averaging.outgrows(mean - CHAOS_ERRORS * error, growth.len());
+        let after = motion.counts();
+        let [impacts, meshing, events] = [0, 1, 2].map(|i| (after[i] - before[i]) / growth.len() as f64);
+        let (surely, rounding) = (mean - CHAOS_ERRORS * error, unit_roundoff(self.case.precision));
+        let grows = surely > 0.0 && self.averaging.outgrows(surely, growth.len(), events, rounding);
         let period = self.case.flow.period;
-        let [impacts, meshing] = [0, 1].map(|i| (motion.counts()[i] - before[i]) / growth.len() as f64);
         Some(Answer {
             class: if grows { Class::Chaotic } else { Class::Undecided },
             exponent: Some([mean / period, error / period]),

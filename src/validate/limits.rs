@@ -3,6 +3,7 @@
 use super::answer::Answer;
 use super::case::{Case, rounding};
 use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
+use super::rounding::moved_by_rounding;
 use super::same_cycle::{may_repel, within_reach};
 use crate::classify::classify;
 use crate::gpu::Precision;
@@ -65,7 +66,7 @@ pub(super) fn longer(case: &Case<'_>) -> Option<Explanation> {
 /// side that decided is right in the end, the other was still on its way.
 pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
     let (ours, from) = (classify(case.record), strobe(case)?);
-    let stands = case.after(from, 0).ok()?;
+    let stands = case.standing(from).ok()?;
     match (ours, case.truth.class) {
         (Class::Chaotic, Class::Periodic { period }) => {
             let early = 2 * case.record.periods_run < whole_budget(case);
@@ -139,7 +140,7 @@ pub(super) fn flip(case: &Case<'_>) -> Option<Explanation> {
         return None;
     }
     let from = strobe(case)?;
-    let stands = case.after(from, 0).ok()?;
+    let stands = case.standing(from).ok()?;
     let image = StrobeMap::Periods(period).apply(&stands, from).ok()?;
     let [re, im] = *multipliers(&image.derivative())?.first()?;
     let flips = im == 0.0 && re > -1.0 && re < NEAR_FLIP;
@@ -148,22 +149,25 @@ pub(super) fn flip(case: &Case<'_>) -> Option<Explanation> {
 }
 
 /// Whether rounding, amplified by a cycle that attracts, is as large as the motion's distance
-/// from where it was a cycle ago: the sum of what is left of the roundings of all cycles before.
+/// from where it was a cycle ago: the sum of what is left of the roundings of all cycles before. One of
+/// them is that of every event, or what rounding at every step is seen to do.
 pub(super) fn is_shaken(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> Option<bool> {
     let image = StrobeMap::Periods(period).apply(stands, stands.state()).ok()?;
     let [re, im] = *multipliers(&image.derivative())?.first()?;
     let radius = re.hypot(im);
-    let gain = image.derivative().singular_values().max() / (1.0 - radius);
-    // Every event rounds.
     let events = 1.0 + case.truth.impacts_per_period.unwrap_or(0.0) * f64::from(period);
-    Some(radius < 1.0 && case.unrest(stands, period) <= rounding(case.precision) * events * gain)
+    let of_events = rounding(case.precision) * events * image.derivative().singular_values().max();
+    let left = case.unrest(stands, period) * (1.0 - radius);
+    Some(
+        radius < 1.0 && (left <= of_events || left <= moved_by_rounding(case, stands, &image.state, period)?),
+    )
 }
 
 /// The lane rests on a cycle that repels, and rounding of its tangents hides that.
 pub(super) fn held(case: &Case<'_>) -> Option<Explanation> {
     let Class::Periodic { period } = classify(case.record) else { return None };
     let from = strobe(case)?;
-    let stands = case.after(from, 0).ok()?;
+    let stands = case.standing(from).ok()?;
     if !case.is_lane || case.unrest(&stands, period) > UNSETTLED {
         return None;
     }
@@ -192,9 +196,9 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
         (Class::Undecided, Class::Periodic { period }) if is_spent(case) => period,
         _ => return None,
     };
-    let scatter = case.unrest(&case.after(from, 0).ok()?, period);
+    let scatter = case.unrest(&case.standing(from).ok()?, period);
     // What rounding cannot do to the lane is no scatter.
-    if !case.is_lane || !is_shaken(case, &case.after(from, 0).ok()?, period)? {
+    if !case.is_lane || !is_shaken(case, &case.standing(from).ok()?, period)? {
         return None;
     }
     let answer = |pair: GearPair| Answer::from(&analyse(&pair, from, &case.budget.settings));

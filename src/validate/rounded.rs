@@ -1,17 +1,14 @@
 //! The reference, rounded at every step as a lane is.
 
-use nalgebra::Matrix4;
-
 use super::answer::Answer;
 use super::case::Case;
+use super::reading::{Met, log_radius};
 use super::states::unit_roundoff;
 use crate::gpu::{Constants, Precision};
 use crate::model::{Side, State};
-use crate::orbit::Class;
 use crate::random::Random;
-use crate::reference::{Happening, Observer, Stop, Trajectory};
-use crate::stability::{UNIT, multipliers};
-use crate::word::Word;
+use crate::reference::{Observer, Stop, Trajectory};
+use crate::stability::UNIT;
 
 /// A motion whose state and tangent vectors, in lane units, are moved at each of a lane's steps by up
 /// to a unit roundoff of what is added up there, evenly distributed:
@@ -21,16 +18,23 @@ use crate::word::Word;
 /// ```
 ///
 /// with the lane's own propagator `1 + m`: every product and every sum is rounded once. An event rounds as
-/// a step does, and the roundings of one step add up like a random walk.
+/// a step does, and the roundings of one step add up like a random walk. The propagator's own numbers are
+/// rounded, too, in the same way at every step, and `cos` and `sin` are turned from step to step since the
+/// last event: `(fl(m) - m) p` and what they drift by are added besides.
 pub(super) struct Rounded<'f, 'c, const N: usize> {
     trajectory: Trajectory<'f, N>,
     constants: &'c Constants,
+    precision: Precision,
+    /// Whether the state is rounded, not the tangent vectors alone.
+    state: bool,
     unit: f64,
     random: Random,
     /// Logarithm of the factor that was taken out of the tangent vectors.
     log_scale: f64,
     /// Events until the last rounding.
     events: u64,
+    /// `cos` and `sin` of the forcing phase as the lane has them.
+    phasor: [f64; 2],
 }
 
 impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
@@ -43,7 +47,22 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
     ) -> Self {
         let random = Random::new((seed << 32) + u64::from(constants.steps));
         let (unit, events) = (unit_roundoff(precision), trajectory.work().events);
-        Rounded { trajectory, constants, unit, random, log_scale: 0.0, events }
+        Rounded {
+            trajectory,
+            constants,
+            precision,
+            state: true,
+            unit,
+            random,
+            log_scale: 0.0,
+            events,
+            phasor: [1.0, 0.0],
+        }
+    }
+
+    /// The same with the tangent vectors alone rounded.
+    pub(super) fn of_tangents(self) -> Self {
+        Rounded { state: false, ..self }
     }
 
     /// One forcing period.
@@ -80,28 +99,50 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
         let (sin, cos) = (std::f64::consts::TAU * phase).sin_cos();
         // Rates per step of the domain.
         let scales = [1.0, domain.share, 1.0, domain.share];
+        let is_single = self.precision == Precision::F32;
+        let rounded = |x: f64| if is_single { f64::from(x as f32) } else { x };
+        let error = |x: f64| rounded(x) - x;
+        let events = self.trajectory.work().events;
+        self.phasor = if events > self.events || phase == 0.0 {
+            [cos, sin].map(rounded)
+        } else {
+            // Three shears, as lanes do it.
+            let [half, sine] = [domain.turn_half, domain.turn_sin].map(rounded);
+            let sheared = rounded(self.phasor[0] - rounded(half * self.phasor[1]));
+            let turned = rounded(self.phasor[1] + rounded(sine * sheared));
+            [rounded(sheared - rounded(half * turned)), turned]
+        };
+        let drift = [self.phasor[0] - cos, self.phasor[1] - sin];
+        // What is added up for an entry, in sizes, and what the propagator's own rounding adds.
         let added = |q: &[f64; 4], forced: [f64; 3], i: usize| {
             let row = &domain.step[7 * i..7 * i + 7];
-            let of_state: f64 = (0..4).map(|j| (row[j] * scales[j] * q[j]).abs()).sum();
-            let of_force: f64 = (0..3).map(|j| (row[4 + j] * forced[j]).abs()).sum();
-            q[i].abs() + (of_state + of_force) / scales[i]
+            let times: [f64; 7] =
+                std::array::from_fn(|j| if j < 4 { scales[j] * q[j] } else { forced[j - 4] });
+            let sizes: f64 = (0..7).map(|j| (row[j] * times[j]).abs()).sum();
+            let drifted = forced[2] * (row[4] * drift[0] + row[5] * drift[1]);
+            let errors = drifted + (0..7).map(|j| error(row[j]) * times[j]).sum::<f64>();
+            (q[i].abs() + sizes / scales[i], errors / scales[i])
         };
-        let events = self.trajectory.work().events;
         let unit = self.unit * (1.0 + (events - self.events) as f64).sqrt();
         self.events = events;
         let random = &mut self.random;
         let mut even = || unit * (2.0 * random.unit() - 1.0);
-        let mut q = self.constants.to_lane(self.trajectory.state());
-        q[0] -= wall;
-        let shares = std::array::from_fn(|i| {
-            let by = even() * added(&q, [cos, sin, 1.0], i);
-            if q[i] == 0.0 { 0.0 } else { by / q[i] }
-        });
-        self.trajectory.shake(shares);
+        if self.state {
+            let mut q = self.constants.to_lane(self.trajectory.state());
+            q[0] -= wall;
+            self.trajectory.shake(std::array::from_fn(|i| {
+                let (sizes, errors) = added(&q, [cos, sin, 1.0], i);
+                let by = even() * sizes + errors;
+                if q[i] == 0.0 { 0.0 } else { by / q[i] }
+            }));
+        }
         let tangents = self.trajectory.tangents().map(|u| self.constants.to_lane(u));
         self.log_scale += self.trajectory.log_scale();
         self.trajectory.set_tangents(tangents.map(|u| {
-            self.constants.to_state(std::array::from_fn(|i| u[i] + even() * added(&u, [0.0; 3], i)))
+            self.constants.to_state(std::array::from_fn(|i| {
+                let (sizes, errors) = added(&u, [0.0; 3], i);
+                u[i] + even() * sizes + errors
+            }))
         }));
     }
 
@@ -135,24 +176,10 @@ pub(super) fn read_cycle(
     period: u32,
     seed: u64,
 ) -> Option<Answer> {
-    let span = f64::from(period) * case.flow.period;
     let mut rounded = Rounded::new(stands.carrying(UNIT), constants, case.precision, seed);
-    let before = counts(rounded.trajectory());
-    let mut met: Vec<Happening> = Vec::new();
-    (0..period).try_for_each(|_| rounded.advance_period(&mut met)).ok()?;
+    let mut events = Vec::new();
+    (0..period).try_for_each(|_| rounded.advance_period(&mut events)).ok()?;
     let (tangents, log_scale) = rounded.tangents();
-    let [re, im] = *multipliers(&Matrix4::from_fn(|i, j| tangents[j][i]))?.first()?;
-    let after = counts(rounded.trajectory());
-    let symbols: Vec<u8> = met.iter().filter_map(|happening| happening.symbol).collect();
-    let impacts = after[0] - before[0];
-    Some(Answer {
-        class: Class::Periodic { period },
-        exponent: Some([(re.hypot(im).ln() + log_scale) / span, 0.0]),
-        impacts_per_period: Some(impacts / f64::from(period)),
-        mesh_fraction: Some((after[1] - before[1]) / span),
-        // Every impact has a twin on a cycle that is its own mirror image.
-        symmetric: if impacts % 2.0 == 1.0 { Some(false) } else { case.truth.symmetric },
-        word: Some(Word::cyclic(&symbols)),
-        ..case.truth.clone()
-    })
+    let met = Met { period, counts: [counts(stands), counts(rounded.trajectory())], events };
+    Some(met.answer(case, log_radius(tangents)? + log_scale))
 }

@@ -6,14 +6,18 @@ use super::explanation::{Explanation, strobe};
 use super::rounded::{Rounded, read_cycle};
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings};
+use crate::model::State;
 use crate::orbit::{Class, Status};
 use crate::reference::Trajectory;
 
 /// Looks at a period of a motion at rest.
 const LOOKS: u32 = 64;
 
-/// Motions that are rounded, each in its own way.
-const RUNS: u64 = 32;
+/// Motions that are rounded, each in its own way: of a hundred thousand cells some meet what is rare.
+const RUNS: u64 = 1000;
+
+/// And so many where the size of what rounding does is asked for.
+const FEW_RUNS: u64 = 8;
 
 /// The record's cycle is the reference's, read where every step rounds: one reading has its word and
 /// impacts, and its exponent and averages lie between those that are read.
@@ -21,13 +25,22 @@ pub(super) fn rounded_cycle(case: &Case<'_>) -> Option<Explanation> {
     if case.truth.class != classify(case.record) {
         return None;
     }
-    let stands = case.after(strobe(case)?, 0).ok()?;
-    is_read_rounded(case, &stands, &case.truth)?.then_some(Explanation::BelowResolution)
+    let stands = case.standing(strobe(case)?).ok()?;
+    let Class::Periodic { period } = case.truth.class else { return None };
+    is_read_rounded(case, &stands, period, &case.truth)?.then_some(Explanation::BelowResolution)
 }
 
-/// Whether the record's cycle is the one that `truth` describes, read from where a motion stands where
-/// every step rounds.
-pub(super) fn is_read_rounded(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Option<bool> {
+/// A number of an answer.
+type Value = fn(&Answer) -> Option<f64>;
+
+/// Whether the record's cycle is the one that `truth` describes, read `lead` periods after where a motion
+/// stands where every step rounds.
+pub(super) fn is_read_rounded(
+    case: &Case<'_>,
+    stands: &Trajectory<'_>,
+    lead: u32,
+    truth: &Answer,
+) -> Option<bool> {
     let Class::Periodic { period } = classify(case.record) else { return None };
     if !case.is_lane {
         return None;
@@ -35,7 +48,7 @@ pub(super) fn is_read_rounded(case: &Case<'_>, stands: &Trajectory<'_>, truth: &
     let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
     let read = |run: u64| {
         let mut before = Rounded::new(stands.clone(), &constants, case.precision, run);
-        (0..period).try_for_each(|_| before.advance_period(&mut ())).ok()?;
+        (0..lead).try_for_each(|_| before.advance_period(&mut ())).ok()?;
         read_cycle(case, &constants, before.trajectory(), period, !run)
     };
     let claims = |answer: &Answer| {
@@ -43,20 +56,41 @@ pub(super) fn is_read_rounded(case: &Case<'_>, stands: &Trajectory<'_>, truth: &
         let mesh_fraction = Some(case.record.mesh_fraction);
         case.is_the_records(&Answer { exponent, mesh_fraction, ..answer.clone() })
     };
-    let same: Vec<Answer> = (0..RUNS).filter_map(read).filter(claims).collect();
-    let lies_between = |ours: f64, of: fn(&Answer) -> Option<f64>| {
-        let known: Vec<f64> = same.iter().chain([truth]).filter_map(of).collect();
-        known.iter().any(|&theirs| theirs <= ours) && known.iter().any(|&theirs| theirs >= ours)
-    };
     let compared = truth.compare(case.record, &case.bars);
     let agrees = |field: Field| compared.iter().all(|(of, differs)| *of != field || differs.is_none());
-    let exponent = |answer: &Answer| answer.exponent.map(|[value, _]| value);
-    Some(
-        !same.is_empty()
-            && (agrees(Field::Exponent) || lies_between(case.record.lyapunov, exponent))
-            && (agrees(Field::Mesh)
-                || lies_between(case.record.mesh_fraction, |answer| answer.mesh_fraction)),
-    )
+    let values: [(bool, f64, Value); 2] = [
+        (agrees(Field::Exponent), case.record.lyapunov, |answer| answer.exponent.map(|[value, _]| value)),
+        (agrees(Field::Mesh), case.record.mesh_fraction, |answer| answer.mesh_fraction),
+    ];
+    // Whether something at most as large was read, and something at least as large.
+    let mut lies_above =
+        values.map(|(agrees, ours, of)| agrees || of(truth).is_some_and(|value| value <= ours));
+    let mut lies_below =
+        values.map(|(agrees, ours, of)| agrees || of(truth).is_some_and(|value| value >= ours));
+    Some((0..RUNS).filter_map(read).filter(claims).any(|answer| {
+        for (i, (_, ours, of)) in values.into_iter().enumerate() {
+            lies_above[i] |= of(&answer).is_some_and(|value| value <= ours);
+            lies_below[i] |= of(&answer).is_some_and(|value| value >= ours);
+        }
+        lies_above == [true; 2] && lies_below == [true; 2]
+    }))
+}
+
+/// How far rounding at every step takes a motion from its `image` after `period` periods, relative to its
+/// size.
+pub(super) fn moved_by_rounding(
+    case: &Case<'_>,
+    stands: &Trajectory<'_>,
+    image: &State,
+    period: u32,
+) -> Option<f64> {
+    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let moved = |run| {
+        let mut motion = Rounded::new(stands.clone(), &constants, case.precision, run);
+        (0..period).try_for_each(|_| motion.advance_period(&mut ())).ok()?;
+        Some(case.apart(image, &motion.trajectory().state()))
+    };
+    Some((0..FEW_RUNS).filter_map(moved).fold(0.0, f64::max))
 }
 
 /// Units of position and velocity by which lanes measure: of all strobes up to the record's last.

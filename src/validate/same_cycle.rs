@@ -1,11 +1,11 @@
 //! Both sides describe one cycle: may what differs in it be rounding, or the distance at which a
 //! lane read it?
 
-use nalgebra::Matrix4;
-
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
 use super::explanation::{ELSEWHERE, Explanation, strobe};
+use super::reading::log_radius;
+use super::rounded::Rounded;
 use super::states::{ROUNDINGS_PER_STEP, unit_roundoff};
 use crate::classify::classify;
 use crate::gpu::Constants;
@@ -13,7 +13,7 @@ use crate::model::State;
 use crate::orbit::{Class, analyse};
 use crate::random::Random;
 use crate::reference::Trajectory;
-use crate::stability::{UNIT, multipliers};
+use crate::stability::UNIT;
 
 /// Periods in which a confirmed cycle is reached well enough to see its symmetry.
 const SETTLING_PERIODS: u32 = 400;
@@ -35,7 +35,7 @@ pub(super) fn within_reach(case: &Case<'_>, from: State, truth: &Answer) -> Opti
     if truth.class != classify(case.record) {
         return None;
     }
-    let stands = case.after(from, 0).ok()?;
+    let stands = case.standing(from).ok()?;
     let mut claimed = truth.clone();
     let mut because = None;
     let differences = truth.compare(case.record, &case.bars).into_iter().filter_map(|(_, differs)| differs);
@@ -191,11 +191,17 @@ fn rounded_exponents(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> O
                 std::array::from_fn(|i| u[i] + error * size * unit[i] * (2.0 * random.unit() - 1.0))
             }));
         }
-        let tangents = cycle.tangents();
-        let [re, im] = *multipliers(&Matrix4::from_fn(|i, j| tangents[j][i]))?.first()?;
-        Some((re.hypot(im).ln() + log_scale) / span)
+        Some((log_radius(cycle.tangents())? + log_scale) / span)
     };
-    Some((0..TRIALS).filter_map(exponent).collect())
+    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let at_every_step = |run| {
+        let mut cycle = Rounded::new(stands.carrying(UNIT), &constants, case.precision, run).of_tangents();
+        (0..period).try_for_each(|_| cycle.advance_period(&mut ())).ok()?;
+        let (tangents, log_scale) = cycle.tangents();
+        Some((log_radius(tangents)? + log_scale) / span)
+    };
+    let few = (0..TRIALS).filter_map(exponent);
+    Some(few.chain((0..TRIALS as u64).filter_map(at_every_step)).collect())
 }
 
 /// Whether rounding of the tangents leaves open if the cycle that the motion is near attracts.

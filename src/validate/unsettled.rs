@@ -2,12 +2,14 @@
 
 use super::case::{Case, LANE_RESOLUTION};
 use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
-use super::limits::whole_budget;
 use super::rounding::{is_read_rounded, whole_units};
 use crate::classify::classify;
 use crate::model::State;
 use crate::orbit::Class;
 use crate::reference::Trajectory;
+
+/// Newton's steps that a lane may take (`REFINEMENTS` in the shaders).
+const NEWTON_STEPS: u32 = 5;
 
 /// Forcing periods in which a motion that is about to rest is seen to stay.
 const STAYING_PERIODS: u32 = 1024;
@@ -23,27 +25,24 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     if case.truth.class != classify(case.record) && !is_open {
         return None;
     }
-    let stands = case.after(strobe(case)?, 0).ok()?;
-    let before = case.record.periods_run.saturating_sub(period);
-    // Averages are read one cycle after the multipliers.
-    let earlier = before.saturating_sub(period);
+    let stands = case.standing(strobe(case)?).ok()?;
     // Motions at rest in different places are different motions.
     let is_own = |own: Trajectory<'_>| apart(case, &own.state(), &stands.state()) < ELSEWHERE;
     let is_on_the_way = !is_open || case.after(case.start, case.record.periods_run).is_ok_and(is_own);
-    let passed = if is_on_the_way { vec![before, earlier] } else { Vec::new() };
-    let passed: Vec<_> =
-        passed.into_iter().filter_map(|periods| case.after(case.start, periods).ok()).collect();
-    let mut places = passed.iter().chain([&stands]);
-    let is_the_records = |place: &Trajectory<'_>| {
-        case.read_as_is(place, period).is_some_and(|answer| case.is_the_records(&answer))
+    let as_lanes =
+        (0..=NEWTON_STEPS).filter(|_| is_on_the_way).filter_map(|n| case.read_like_a_lane(period, n));
+    let mut readings = as_lanes.chain(case.read_as_is(&stands, period));
+    let is_rounded = || {
+        let before = case.after(case.start, case.record.periods_run.checked_sub(period)?).ok()?;
+        let own = is_on_the_way && is_read_rounded(case, &before, 0, &case.read_like_a_lane(period, 0)?)?;
+        Some(own || is_read_rounded(case, &stands, period, &case.read_as_is(&stands, period)?)?)
     };
-    let is_rounded = || is_read_rounded(case, &stands, &case.read_as_is(&stands, period)?);
-    let is_read = places.any(is_the_records) || (is_open && is_rounded() == Some(true));
+    let is_read =
+        readings.any(|answer| case.is_the_records(&answer)) || (is_open && is_rounded() == Some(true));
     if !is_read {
         return None;
     }
-    let is_there =
-        !is_open || (is_least(case)? && (stays(case, &stands, period) || arrives(case, &stands, period)));
+    let is_there = !is_open || (is_least(case)? && stays(case, &stands, period));
     is_there.then_some(Explanation::Unsettled)
 }
 
@@ -54,14 +53,6 @@ fn stays(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
     let rests = (0..STAYING_PERIODS).all(|_| ahead.advance_period(&mut ()).is_ok());
     let [here, there] = [stands.state(), ahead.state()];
     rests && case.unrest(&ahead, period) < LANE_RESOLUTION && apart(case, &here, &there) < ELSEWHERE
-}
-
-/// Whether the budget is spent, and the motion as near to its cycle as lanes then ask for (`ABOUT` in the
-/// shaders), by its derivative.
-fn arrives(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
-    let is_spent = case.record.periods_run + period >= whole_budget(case);
-    let limit = case.limit(stands, period);
-    is_spent && limit.is_some_and(|limit| apart(case, &stands.state(), &limit) < ELSEWHERE)
 }
 
 /// The distance of two states relative to all of the motion, as lanes measure it.

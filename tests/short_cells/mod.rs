@@ -1,0 +1,66 @@
+//! Random cells of 64 periods, and what lanes say of them.
+
+use rattlemap::engine::{self, Engine};
+use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
+use rattlemap::model::{GearPair, State};
+use rattlemap::plan::Plan;
+use rattlemap::record::Record;
+use rattlemap::scene::{Purpose, Scene};
+use rattlemap::schedule::Schedule;
+use rattlemap::validate::{Explanation, Pick, Sample, StateSource, Stratum, Subject, replay};
+
+/// A pair by its parameters in the order of [`GearPair::PARAMETERS`], and its start.
+pub(crate) struct Cell(pub(crate) [f64; 13], pub(crate) State);
+
+impl Cell {
+    /// A plan of 64 periods whose first cell this is.
+    pub(crate) fn plan(&self) -> Plan {
+        const SWEPT: [&str; 2] = ["omega", "mesh_speed"];
+        let named = || GearPair::PARAMETERS.iter().map(|parameter| parameter.name).zip(self.0);
+        let fixed: String = named()
+            .filter(|(name, _)| !SWEPT.contains(name))
+            .map(|(name, value)| format!("{name} = {value:?}\n"))
+            .collect();
+        let axes: String = SWEPT
+            .iter()
+            .map(|swept| named().find(|(name, _)| name == swept).unwrap())
+            .map(|(name, min)| {
+                format!(
+                    "[[axis]]\nparameter = '{name}'\nmin = {min:?}\nmax = {:?}\ncount = 2\n",
+                    2.0 * min + 1.0
+                )
+            })
+            .collect();
+        let text = format!(
+            "[parameters]\n{fixed}{axes}[integration]\ntransient_periods = 32\nobserved_periods = 32\n\
+             max_period = 16\n[start]\npolicy = 'state'\nstate = {:?}\n[outputs]\n\
+             quantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n",
+            self.1
+        );
+        Plan::new(&Scene::parse(&text, "cell", &[], Purpose::Map).unwrap())
+    }
+}
+
+/// What lanes say of the first cell of a plan.
+pub(crate) fn lane(plan: &Plan, precision: Precision) -> Record {
+    let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+    let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, device)).unwrap()));
+    let batch = Schedule::new(plan).batch(plan, 0, plan.cell_count());
+    let records = pollster::block_on(engine.run(&batch)).unwrap();
+    batch.cells.iter().zip(records).find(|(cell, _)| cell.id == 0).unwrap().1
+}
+
+/// Why a record differs from the reference: an explanation, or none; an error if it does not differ.
+pub(crate) fn explanation(
+    plan: &Plan,
+    record: Record,
+    precision: Precision,
+) -> Result<Option<Explanation>, ()> {
+    let mut records = vec![Record::default(); plan.cell_count()];
+    records[0] = record;
+    let subject = Subject { plan, records: &records, precision, is_lane: true };
+    let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
+    let sample = Sample { seed: 0, picks, strata: Vec::new() };
+    let validation = replay(&subject, &sample, StateSource::None(String::new()), &|_| ());
+    validation.mismatches.first().map(|mismatch| mismatch.explanation).ok_or(())
+}
