@@ -7,7 +7,7 @@ const NEAR: u32 = 24u;
 // A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
 // comes within 2^-12 of a cycle by chance.
 const SETTLED: f32 = 56.0;
-// 2^-7 where Newton's method shows what the limit is.
+// 2^-4 where Newton's method shows what the limit is; `REACH` judges what it finds.
 const REFINABLE: f32 = 16.0;
 // Slower approaches than this, per period, are not waited for, only for a recurrence as close as
 // if they were as fast.
@@ -18,8 +18,8 @@ const SLOW: u32 = 48u;
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Lags of any window, at least: they are a quarter of the time that has passed, or a few cycles.
-const LEAST_WINDOW: u32 = 3u;
+// Lags of any window, at least: they are a fifth of the time that has passed, or a few cycles.
+const LEAST_WINDOW: u32 = 2u;
 // Windows need not be longer than so many cycles that contract.
 const LAGS_PER_CYCLE: u32 = 4u;
 
@@ -253,7 +253,7 @@ fn narrow_scales(q: array<Real, 4>) {
 }
 
 fn widest() -> u32 {
-    return clamp(tally.period / 4u, LEAST_WINDOW, settings.max_period);
+    return clamp(tally.period / 5u, LEAST_WINDOW, settings.max_period);
 }
 
 // The lag that recurs best; a longer one must be better by a factor of four.
