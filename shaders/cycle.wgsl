@@ -220,14 +220,19 @@ fn noise() -> f32 {
     if !EXPONENT {
         return NOISE;
     }
+    return f32(ULP * gain()) * f32(16u + 2u * tally.events);
+}
+
+// What the cycle that was read amplifies, at most, relative to the motion.
+fn gain() -> Real {
     let scales = array<Real, 4>(motion.position_scale, motion.rate_scale, motion.position_scale, motion.rate_scale);
-    var gain: Real = 1.0;
+    var most: Real = 1.0;
     for (var k = 0u; k < 16u; k++) {
         trips += 1u;
         let unit = scales[k / 4u] / max(scales[k % 4u], Real(1e-30));
-        gain = max(gain, abs(motions[lane].tangents[k]) * unit);
+        most = max(most, abs(motions[lane].tangents[k]) * unit);
     }
-    return f32(ULP * gain) * f32(16u + 2u * tally.events);
+    return most;
 }
 
 // How far the lane is from its cycle at most, relative to the motion: by how it recurs, and by the
@@ -255,9 +260,10 @@ fn is_near_cycle() -> bool {
 }
 
 // Whether the cycle is farther from its mirror image than the lane can be from the cycle: twice
-// that far for the state and as much for the image it is compared with.
+// that far for the state, and for the image it is compared with what the cycle makes of that.
 fn is_surely_unsymmetric() -> bool {
-    return exp2(-f32(tally.mirror) / OCTAVE) > 4.0 * max(blur(), ON_CYCLE);
+    let amplified = select(1.0, f32(gain()), EXPONENT);
+    return exp2(-f32(tally.mirror) / OCTAVE) > 2.0 * (1.0 + amplified) * max(blur(), ON_CYCLE);
 }
 
 // Whether it is nearer to it than lanes resolve, wherever the lane is about it.

@@ -158,16 +158,17 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// How far `period` more periods take a motion from where it is, relative to its size.
-    pub(super) fn unrest(&self, trajectory: &Trajectory<'_>, period: u32) -> f64 {
-        let before = trajectory.state();
+    /// Where a motion is after `period` more periods.
+    pub(super) fn after_cycle(&self, trajectory: &Trajectory<'_>, period: u32) -> Option<State> {
         let mut ahead = trajectory.clone();
-        for _ in 0..period {
-            if ahead.advance_period(&mut ()).is_err() {
-                return f64::INFINITY;
-            }
-        }
-        self.apart(&before, &ahead.state())
+        (0..period).try_for_each(|_| ahead.advance_period(&mut ())).ok()?;
+        Some(ahead.state())
+    }
+
+    /// How far that is from where it is, relative to its size.
+    pub(super) fn unrest(&self, trajectory: &Trajectory<'_>, period: u32) -> f64 {
+        let image = self.after_cycle(trajectory, period);
+        image.map_or(f64::INFINITY, |image| self.apart(&trajectory.state(), &image))
     }
 
     /// Where the strobe map, linearised about a motion, has its cycle: `y + (1 - M)^-1 (P(y) - y)`.

@@ -245,7 +245,13 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
     let hides = divides && case.unrest(&stands, period) < LANE_RESOLUTION;
     // Or rounding keeps the lane off its cycle in a pattern of its own.
     let multiplies = period > theirs && period.is_multiple_of(theirs);
-    let is_kept_off = (rest(case.precision)..LANE_RESOLUTION).contains(&case.unrest(&stands, theirs));
+    let unrest = case.unrest(&stands, theirs);
+    let is_shaken_off = || {
+        let image = case.after_cycle(&stands, theirs)?;
+        Some(rounding::moved_by_rounding(case, &stands, &image, theirs)? >= rest(case.precision))
+    };
+    let is_kept_off =
+        unrest < LANE_RESOLUTION && (unrest >= rest(case.precision) || (multiplies && is_shaken_off()?));
     let scatters = multiplies && is_kept_off && is_shaken(case, &stands, theirs)? && {
         let read = case.read_as_is(&stands, period)?;
         case.is_the_records(&read) || rounding::is_read_rounded(case, &stands, period, &read)?

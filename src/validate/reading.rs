@@ -61,7 +61,7 @@ impl Case<'_> {
     }
 
     /// The same of a motion that has come from somewhere: all of it the first time around.
-    fn read_along(&self, motion: &Trajectory<'_>, period: u32) -> Option<Answer> {
+    pub(super) fn read_along(&self, motion: &Trajectory<'_>, period: u32) -> Option<Answer> {
         let mut cycle = motion.carrying(UNIT);
         let mut events = Vec::new();
         (0..period).try_for_each(|_| cycle.advance_period(&mut events)).ok()?;

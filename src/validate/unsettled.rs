@@ -11,6 +11,9 @@ use crate::reference::Trajectory;
 /// Newton's steps that a lane may take (`REFINEMENTS` in the shaders).
 const NEWTON_STEPS: u32 = 5;
 
+/// And how often it may set out in vain (`VAIN`).
+const NEWTON_TRIES: u32 = 2;
+
 /// Forcing periods in which a motion that is about to rest is seen to stay.
 const STAYING_PERIODS: u32 = 1024;
 
@@ -33,8 +36,7 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
         (0..=NEWTON_STEPS).filter(|_| is_on_the_way).filter_map(|n| case.read_like_a_lane(period, n));
     let mut readings = as_lanes.chain(case.read_as_is(&stands, period));
     let is_rounded = || {
-        let before = case.after(case.start, case.record.periods_run.checked_sub(period)?).ok()?;
-        let own = is_on_the_way && is_read_rounded(case, &before, 0, &case.read_like_a_lane(period, 0)?)?;
+        let own = is_on_the_way && is_read_on_the_way(case, period);
         Some(own || is_read_rounded(case, &stands, period, &case.read_as_is(&stands, period)?)?)
     };
     let is_read =
@@ -44,6 +46,18 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     }
     let is_there = !is_open || (is_least(case)? && stays(case, &stands, period));
     is_there.then_some(Explanation::Unsettled)
+}
+
+/// Whether the reference, somewhere on its way, reads the record's cycle, exactly or where every step rounds:
+/// Newton's method takes periods from a lane, and where it leads nowhere the lane goes on from where it was.
+fn is_read_on_the_way(case: &Case<'_>, period: u32) -> bool {
+    let Some(last) = case.record.periods_run.checked_sub(period) else { return false };
+    (0..=(NEWTON_STEPS + 1) * NEWTON_TRIES * period).any(|back| {
+        let from = last.checked_sub(back).and_then(|periods| case.after(case.start, periods).ok());
+        let read = from.as_ref().and_then(|from| case.read_along(from, period));
+        let (Some(from), Some(read)) = (from, read) else { return false };
+        case.is_the_records(&read) || is_read_rounded(case, &from, 0, &read) == Some(true)
+    })
 }
 
 /// Whether the reference, from where the record says that the motion was at last, comes to rest on a cycle of
