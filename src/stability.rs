@@ -13,7 +13,7 @@ mod unit_circle;
 
 pub use exponent::Exponent;
 pub(crate) use exponent::FRESH_TANGENT;
-pub(crate) use newton::Newton;
+pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 pub use newton::{pitchfork, refine};
 
 use nalgebra::linalg::Schur;
@@ -108,6 +108,12 @@ impl StrobeMap {
             StrobeMap::Periods(p) => 2 * p,
             StrobeMap::MirroredHalves(p) => p,
         }
+    }
+
+    /// Whether every fixed point of `other` is one of this map: all are powers of the mirrored half
+    /// period.
+    pub(crate) fn iterates(self, other: StrobeMap) -> bool {
+        self.half_periods().is_multiple_of(other.half_periods())
     }
 
     /// Forcing periods in a cycle.

@@ -7,7 +7,7 @@
 use super::CHAOS_ERRORS;
 use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, status_of};
 use super::approach::{LINEAR_CYCLES, is_linear};
-use super::prospects::{Repelling, contraction};
+use super::prospects::{Searched, contraction, departs};
 use super::recurrence::{Metric, NEAR, candidates, lingering};
 use super::{Budget, Orbit, Status};
 use crate::flow::Flow;
@@ -81,7 +81,7 @@ pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measured
         cycle: None,
         approaches: false,
         counts: vec![[0.0; 2]],
-        repelling: Repelling::default(),
+        searched: Searched::default(),
         newton: Newton::default(),
     };
     watch.run(start).unwrap_or_else(|stop| watch.stopped(stop))
@@ -107,7 +107,7 @@ struct Watch<'a> {
     approaches: bool,
     /// Impacts and meshing time so far at every strobe.
     counts: Vec<[f64; 2]>,
-    repelling: Repelling,
+    searched: Searched,
     newton: Newton,
 }
 
@@ -221,9 +221,12 @@ impl<'a> Watch<'a> {
         }
         for candidate in candidates(window, &metric, max_period) {
             let state = self.strobes[self.strobes.len() - 1];
+            if !is_last && departs(&self.exponent, candidate.period) {
+                continue;
+            }
             let apart = contraction(window, candidate.period as usize, &metric);
             for map in self.analysis.maps(candidate.period) {
-                let passes = |apart| self.repelling.account_for(map, &state, apart, &metric);
+                let passes = |apart| self.searched.account_for(map, &state, apart, &metric);
                 if !is_last && apart.is_none_or(passes) {
                     continue;
                 }
@@ -231,10 +234,13 @@ impl<'a> Watch<'a> {
                 let newton = &mut self.newton;
                 let found =
                     if is_last { newton.refine(seed, map) } else { newton.refine_nearby(seed, map, is_near) };
-                let Some(cycle) = found else { continue };
+                let Some(cycle) = found else {
+                    self.searched.note_vain(map, state);
+                    continue;
+                };
                 // One that repels does so at any of its periods.
                 if cycle.spectral_radius() >= 1.0 {
-                    self.repelling.note(map, &cycle);
+                    self.searched.note(map, &cycle);
                     continue;
                 }
                 let Some(cycle) = self.analysis.smallest(newton, seed, cycle, &metric) else { continue };

@@ -2,13 +2,14 @@
 //!
 //! It costs four tangent vectors over several cycles, and chaos recurs all the time: it passes
 //! cycles that repel. What passes one gives itself away. It leaves: a strobe state is farther from
-//! that of one cycle ago than that one was from its predecessor. And it comes by again: the cycle
-//! has been found before. Either way nothing is lost for motion that does settle, since its
-//! recurrences shrink while the distance to any other cycle stays.
+//! that of one cycle ago than that one was from its predecessor, or a tangent vector has grown. And
+//! it comes by again: the cycle has been found before, or a search from there has led nowhere.
+//! Nothing is lost for motion that does settle, since its recurrences shrink while the distance to
+//! any other cycle, and to where it was at an earlier search, stays.
 
 use super::recurrence::Metric;
 use crate::model::State;
-use crate::stability::{Cycle, StrobeMap};
+use crate::stability::{Cycle, Exponent, LARGEST_MULTIPLIER, StrobeMap};
 
 /// Recurrences this close need not shrink: rounding is near.
 const ROUNDED: f64 = 1e-7;
@@ -16,6 +17,9 @@ const ROUNDED: f64 = 1e-7;
 /// A cycle within so many times the recurrence's distance accounts for it: multipliers that differ
 /// from 1 by a quarter make recurrences of a quarter of the distance.
 const ACCOUNTS: f64 = 4.0;
+
+/// Cycles over which a tangent vector is seen to grow.
+const CYCLES: usize = 2;
 
 /// How far the last state is from that of `lag` periods ago, if it is nearer than that one was to
 /// its own predecessor. None as well before there are two lags to compare.
@@ -26,20 +30,40 @@ pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Opt
     (now <= before || now <= ROUNDED).then_some(now)
 }
 
-/// Cycles that repel, as they were found.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Repelling(Vec<(StrobeMap, State)>);
+/// Whether a tangent vector that has turned its way has grown, over the last two cycles, by more than
+/// any would near a cycle that may attract.
+pub(super) fn departs(exponent: &Exponent, period: u32) -> bool {
+    let growth = exponent.lately(CYCLES * period as usize);
+    growth.is_some_and(|growth| growth > CYCLES as f64 * LARGEST_MULTIPLIER.ln())
+}
 
-impl Repelling {
-    /// Takes note of a cycle that `map` was found to have.
+/// What earlier searches have shown.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Searched {
+    /// Cycles that repel.
+    repelling: Vec<(StrobeMap, State)>,
+    /// States from which a search has led nowhere.
+    vain: Vec<(StrobeMap, State)>,
+}
+
+impl Searched {
+    /// Takes note of a cycle that repels, which `map` was found to have.
     pub(super) fn note(&mut self, map: StrobeMap, cycle: &Cycle) {
-        self.0.push((map, cycle.state));
+        self.repelling.push((map, cycle.state));
     }
 
-    /// Whether one of them accounts for a state that recurs at this distance under `map`.
+    /// Takes note of a state from which no cycle of `map` was found.
+    pub(super) fn note_vain(&mut self, map: StrobeMap, state: State) {
+        self.vain.push((map, state));
+    }
+
+    /// Whether a state that recurs at this distance under `map` does so beside a cycle that repels,
+    /// or where a search has been in vain.
     pub(super) fn account_for(&self, map: StrobeMap, state: &State, distance: f64, metric: &Metric) -> bool {
         let is_near = |y: &State| metric.distance(state, y) < ACCOUNTS * distance;
-        self.0.iter().any(|(of, y)| *of == map && is_near(y))
+        // What recurs after some periods does so after their multiples.
+        self.repelling.iter().any(|(of, y)| map.iterates(*of) && is_near(y))
+            || self.vain.iter().any(|(of, y)| *of == map && is_near(y))
     }
 }
 
@@ -74,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_cycle_accounts_for_what_passes_it_and_not_for_what_settles_elsewhere() {
-        let (map, mut known) = (StrobeMap::Periods(1), Repelling::default());
+        let (map, mut known) = (StrobeMap::Periods(1), Searched::default());
         let pair = GearPair::paper(0.5);
         let flow = Flow::new(&pair.oscillator().unwrap());
         let seed = crate::reference::Trajectory::new(&flow, pair.law(), [0.0; 4]);
@@ -93,6 +117,34 @@ mod tests {
             known.account_for(map, &at(n), metric().distance(&at(n), &at(n - 1)), &metric())
         };
         assert!(!settles(8) && !settles(20));
-        assert!(!known.account_for(StrobeMap::Periods(2), &[0.0; 4], 1.0, &metric()), "another map");
+        let accounts = |known: &Searched, map| known.account_for(map, &[0.0; 4], 1.0, &metric());
+        assert!(accounts(&known, StrobeMap::Periods(2)), "twice around");
+        assert!(!accounts(&known, StrobeMap::MirroredHalves(3)), "it need not be symmetric");
+        // A search in vain says nothing of longer cycles.
+        let mut known = Searched::default();
+        known.note_vain(map, [0.0; 4]);
+        assert!(accounts(&known, map) && !accounts(&known, StrobeMap::Periods(2)));
+    }
+
+    #[test]
+    fn a_tangent_that_grows_departs() {
+        let growing = |factor: f64| {
+            let mut exponent = Exponent::default();
+            let pair = GearPair::paper(0.5);
+            let flow = Flow::new(&pair.oscillator().unwrap());
+            let mut carrier =
+                crate::reference::Trajectory::new(&flow, pair.law(), [0.0; 4]).carrying([[0.5; 4]]);
+            for _ in 0..6 {
+                let [u] = carrier.tangents();
+                carrier.set_tangents([u.map(|x| factor * x)]);
+                exponent.renormalise(&mut carrier);
+            }
+            exponent
+        };
+        for (factor, period, expected) in
+            [(1.9, 1, false), (2.1, 1, true), (1.2, 3, false), (1.3, 3, true), (9.0, 4, false)]
+        {
+            assert_eq!(departs(&growing(factor), period), expected, "{factor} in each of {period} periods");
+        }
     }
 }

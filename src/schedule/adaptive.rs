@@ -1,11 +1,12 @@
 //! Refinement: coarse blocks first, then only those that a border crosses, down to single cells;
 //! then an audit of what was not integrated.
 
+use std::cell::LazyCell;
 use std::collections::{HashMap, HashSet};
 
 use super::audit::{Audit, sample};
 use super::blocks::{Block, coarse};
-use super::fill::filled;
+use super::fill::Filling;
 use super::label::{Label, word_of};
 use crate::plan::{Needs, Plan};
 use crate::record::{Record, valid};
@@ -208,14 +209,15 @@ impl Adaptive {
         let mut audit = self.audits.pop().unwrap_or_default();
         let mut by_kind: HashMap<u32, [usize; 2]> = HashMap::new();
         for block in closed {
-            let corners = block.corners().map(|at| &records[self.id(at)]);
+            let filling =
+                LazyCell::new(|| Filling::new(block, block.corners().map(|at| &records[self.id(at)])));
             for at in block.cells() {
                 let id = self.id(at);
                 // A cell on a common border is judged once.
                 if !std::mem::take(&mut is_audited[id]) {
                     continue;
                 }
-                let fill = filled(block, corners, at);
+                let fill = filling.record(at);
                 let label = Label::of(&fill, &self.needs);
                 wrong[id] = label != self.labels[id];
                 audit.wrong += usize::from(wrong[id]);
@@ -274,11 +276,12 @@ impl Adaptive {
         let mut count = 0;
         for block in &self.closed {
             let corners = block.corners().map(|at| records[self.id(at)]);
+            let filling = Filling::new(block, corners.each_ref());
             for at in block.cells() {
                 let id = self.id(at);
                 // A cell on a common border is filled by the first of its blocks.
                 if !self.labels[id].is_known() && records[id] == Record::default() {
-                    records[id] = filled(block, corners.each_ref(), at);
+                    records[id] = filling.record(at);
                     count += 1;
                 }
             }

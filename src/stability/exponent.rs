@@ -29,6 +29,12 @@ impl Exponent {
             .set_tangents(tangents.map(|u| if length > 0.0 { u.map(|x| x / length) } else { FRESH_TANGENT }));
     }
 
+    /// Growth over the last `periods`, as a logarithm; none before there are as many.
+    pub(crate) fn lately(&self, periods: usize) -> Option<f64> {
+        let from = self.growth.len().checked_sub(periods)?;
+        Some(self.growth[from..].iter().sum())
+    }
+
     /// Forgets what was collected: the vector needs a while to turn to its direction.
     pub fn forget(&mut self) {
         self.growth.clear();

@@ -25,7 +25,7 @@ const PATIENT: Patience = Patience { steps: 40, trials: 12 };
 const HASTY: Patience = Patience { steps: 12, trials: 3 };
 
 /// Where the map expands by more than this, no orbit close by attracts.
-const LARGEST_MULTIPLIER: f64 = 2.0;
+pub(crate) const LARGEST_MULTIPLIER: f64 = 2.0;
 
 /// Singular values of `P' - I` below this, relative to the largest, are cut off: the
 /// direction along which a family of orbits runs near a saddle-node or pitchfork.
