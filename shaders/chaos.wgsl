@@ -1,0 +1,78 @@
+// Chaos: growth of the tangent vector that is sure, and no departure from a cycle.
+
+// Periods over which averages are taken, at least, before chaos is called early.
+const LEAST_COUNTED: u32 = 32u;
+
+// Standard errors by which the exponent must exceed zero once the budget is spent.
+const CHAOS_ERRORS: Real = 3.0;
+// And those that cast doubt on a cycle that has not settled.
+const DOUBT: Real = 1.0;
+
+// Growth of a tangent vector, natural logarithms, that no departure from an unstable cycle can
+// have lasted through: beyond the ratio of the largest to the smallest distance.
+const DEPARTURE: Real = 40.0;
+
+// A standard error of fewer blocks is none; short budgets would be called chaos by two.
+const FEWEST_BLOCKS: u32 = 6u;
+
+// Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
+fn is_chaos() -> bool {
+    if tally.block_periods > 0u || tally.blocks < FEWEST_BLOCKS || tally.streak >= STREAK || tally.period < settings.chaos_from {
+        return false;
+    }
+    // Averages that a cycle read in vain has interrupted begin anew.
+    if tally.period < tally.counted_from + LEAST_COUNTED && tally.period < settings.periods {
+        return false;
+    }
+    let errors = select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods);
+    return grows(errors) && outgrows(errors) && !departs(errors);
+}
+
+// Whether the exponent exceeds zero by so many standard errors.
+fn grows(errors: Real) -> bool {
+    if !EXPONENT || tally.blocks < 2u {
+        return false;
+    }
+    let growth = mean_growth();
+    return growth.x > errors * growth.y;
+}
+
+// Neutral motion grows, too: tangents of a free body, of a torus or of an undamped swing in
+// proportion to time, at a double root to its square. Chaos has to outgrow that, and what rounding makes
+// of it: a shear `1 s; d 1` with d = ULP where there should be none grows by sqrt(s ULP), s of one
+// event being 1 at most.
+const NEUTRAL_ORDER: f32 = 2.0;
+
+fn outgrows(errors: Real) -> bool {
+    let growth = mean_growth();
+    let periods = tally.blocks * settings.exponent_block;
+    let began = max(settings.exponent_from, 1u);
+    let neutral = NEUTRAL_ORDER * log(f32(began + periods) / f32(began));
+    let events_per_period = Real(tally.events) / Real(max(tally.period - tally.counted_from, 1u));
+    let rounding = sqrt(events_per_period * events_per_period * ULP);
+    return (growth.x - errors * growth.y - rounding) * Real(periods) > Real(neutral);
+}
+
+// Whether the motion lingers at some cycle and its growth may be that of leaving it.
+fn departs(errors: Real) -> bool {
+    // A lane that has just been sent on lingered. A single lag comes near by chance, its
+    // multiples with it do not.
+    var lingers = tally.known_lags == 0u;
+    var rests = false;
+    for (var lag = 1u; 2u * lag <= tally.known_lags && !rests; lag++) {
+        var nearest = 255u;
+        for (var multiple = lag; multiple <= tally.known_lags && nearest >= NEAR; multiple += lag) {
+            trips += 1u;
+            nearest = min(nearest, last_distance_at(multiple));
+        }
+        lingers = lingers || nearest >= NEAR;
+        rests = nearest >= RESOLVED;
+    }
+    // What rests at a cycle is held there by rounding: its growth is no chaos.
+    if rests {
+        return true;
+    }
+    let growth = mean_growth();
+    let periods = Real(tally.blocks * settings.exponent_block);
+    return lingers && (growth.x - errors * growth.y) * periods < DEPARTURE;
+}

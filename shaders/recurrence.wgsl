@@ -1,0 +1,206 @@
+// Recurrence: does the lane come back to where it was, and ever nearer?
+
+// Distances are kept as quarter octaves below 1: 4 means half.
+const OCTAVE: f32 = 4.0;
+// Recurrences farther apart than 2^-6 of the motion are none.
+const NEAR: u32 = 24u;
+// A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
+// comes within 2^-12 of a cycle by chance.
+const SETTLED: f32 = 56.0;
+// 2^-4 where Newton's method shows what the limit is; `REACH` judges what it finds.
+const REFINABLE: f32 = 16.0;
+// Slower approaches than this, per period, are not waited for, only for a recurrence as close as
+// if they were as fast.
+const SLOWEST: f32 = 0.008;
+// Recurrences this close, 2^-12 of the motion, need not shrink, only not grow.
+const SLOW: u32 = 48u;
+// A distance must have shrunk by this much (a factor of 0.7) since the last window.
+const SHRUNK: u32 = 2u;
+// Windows over which a candidate must have contracted.
+const STREAK: u32 = 2u;
+// Lags of any window, at least: they are a fifth of the time that has passed, or a few cycles.
+const LEAST_WINDOW: u32 = 2u;
+// Windows need not be longer than so many cycles that contract.
+const LAGS_PER_CYCLE: u32 = 4u;
+
+// Looks at a strobe; true once a period is confirmed.
+fn recurs() -> bool {
+    let q = strobe_state();
+    widen_scales(q);
+    if tally.window == 0u {
+        begin_window(q, widest());
+        return false;
+    }
+    let lag = tally.period - tally.anchor_period;
+    let apart = octaves(distance_between(q, motion.anchor));
+    tallies[lane].distances[(lag - 1u) / 4u] |= apart << (8u * ((lag - 1u) % 4u));
+    if lag < tally.window {
+        return false;
+    }
+    let found = contracting_lag();
+    let is_fast = found > 0u && shrinks(found);
+    let settled = judge_lag(found);
+    tally.known_lags = tally.window;
+    tallies[lane].last_distances = tallies[lane].distances;
+    // The next anchor lies at the same place of the cycle: only there do distances compare. The
+    // points of a cycle may be so close that a shorter lag seems to recur.
+    let cycle = max(closest_lag(), 1u);
+    // A short lag that contracts is seen as well in short windows.
+    let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
+    let lags = select(widest(), min(enough, widest()), is_fast && tally.tries == 0u);
+    begin_window(q, max(lags - lags % cycle, 1u));
+    return settled;
+}
+
+// Units of distances: the largest strobe.
+fn widen_scales(q: array<Real, 4>) {
+    motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
+    motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
+}
+
+// What a motion was before it came to its cycle is no unit of the cycle. A strobe may catch it at its
+// turning point, or midway between two.
+fn narrow_scales(q: array<Real, 4>) {
+    let angle = flows[cell.flow_index].domains[0].angle;
+    let position = max(abs(q[0]), abs(q[2]));
+    let rate = max(abs(q[1]), abs(q[3]));
+    motion.position_scale = min(motion.position_scale, max(position, rate / angle));
+    motion.rate_scale = min(motion.rate_scale, max(rate, angle * position));
+}
+
+fn widest() -> u32 {
+    return clamp(tally.period / 5u, LEAST_WINDOW, settings.max_period);
+}
+
+// The lag that recurs best; a longer one must be better by a factor of four.
+fn closest_lag() -> u32 {
+    return closest_of(tally.known_lags);
+}
+
+fn closest_of(lags: u32) -> u32 {
+    var best = 0u;
+    var distance = NEAR;
+    for (var lag = 1u; lag <= lags; lag++) {
+        trips += 1u;
+        if distance_at(lag) >= distance {
+            best = lag;
+            distance = distance_at(lag) + 8u;
+        }
+    }
+    return best;
+}
+
+// The distance of two strobes, relative to the motion. Where strobes catch it at its turning point, their
+// rates are all rounding.
+fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
+    let least = flows[cell.flow_index].domains[0].angle * motion.position_scale;
+    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(motion.position_scale, Real(1e-30));
+    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / max(max(motion.rate_scale, least), Real(1e-30));
+    return max(p, r);
+}
+
+fn begin_window(q: array<Real, 4>, lags: u32) {
+    motion.anchor = q;
+    tally.anchor_period = tally.period;
+    tally.window = min(lags, settings.max_period);
+    tallies[lane].distances = array<u32, 16>();
+}
+
+// A distance in quarter octaves below 1, at most 255.
+fn octaves(distance: Real) -> u32 {
+    let d = f32(distance);
+    if d <= 1e-19 {
+        return 255u;
+    }
+    return u32(clamp(-OCTAVE * log2(d), 0.0, 255.0));
+}
+
+fn distance_at(lag: u32) -> u32 {
+    return (tallies[lane].distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+}
+
+fn last_distance_at(lag: u32) -> u32 {
+    return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
+}
+
+// The smallest lag that recurs at all its multiples and contracts, or has reached rounding.
+// Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
+fn contracting_lag() -> u32 {
+    // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
+    let best = closest_of(tally.window);
+    for (var lag = 1u; lag <= min(tally.window, tally.known_lags); lag++) {
+        trips += 1u;
+        let now = distance_at(lag);
+        let before = last_distance_at(lag);
+        let contracts = shrinks(lag) || (now >= SLOW && now >= before && lag == best);
+        if now < NEAR || !contracts {
+            continue;
+        }
+        var kept = true;
+        for (var multiple = 2u * lag; multiple <= tally.window; multiple += lag) {
+            trips += 1u;
+            kept = kept && distance_at(multiple) >= NEAR;
+        }
+        if kept {
+            return lag;
+        }
+    }
+    return 0u;
+}
+
+// Whether the distance at a lag has shrunk since the last window, or is rounding.
+fn shrinks(lag: u32) -> bool {
+    let now = distance_at(lag);
+    return now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
+}
+
+// Whether the limit is near enough: strobes `d` apart that shrink by `mu` per period are
+// `d / (1 - mu)` away from it. A slow approach must come closer.
+fn has_settled(lag: u32) -> bool {
+    let now = distance_at(lag);
+    let shrunk = f32(now) - f32(last_distance_at(lag));
+    if now >= RESOLVED {
+        return true;
+    }
+    // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), 1e-6, 1.0);
+    return f32(now) >= SETTLED - OCTAVE * log2(away);
+}
+
+// Whether Newton's method may show what the limit is.
+fn is_refinable(lag: u32) -> bool {
+    let now = f32(distance_at(lag));
+    let shrunk = now - f32(last_distance_at(lag));
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), SLOWEST, 1.0);
+    return EXPONENT && tally.vain < VAIN && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
+}
+
+// Natural logarithm of a quarter octave.
+const QUARTER_OCTAVE: f32 = 0.1733;
+
+// Keeps the books on the candidate; true once it is settled.
+fn judge_lag(found: u32) -> bool {
+    tally.settled = 0u;
+    if found == 0u {
+        tally.candidate = 0u;
+        tally.streak = 0u;
+        return false;
+    }
+    tally.streak = select(1u, tally.streak + 1u, found == tally.candidate);
+    tally.candidate = found;
+    // Weak chaos contracts by chance, the oftener it is looked at: ask for more of it.
+    let windows = STREAK + tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
+    let has_contracted = tally.streak >= windows;
+    tally.settled = select(0u, 1u, has_contracted && has_settled(found));
+    return has_contracted && (tally.settled != 0u || is_refinable(found));
+}
+
+// Half a period after the middle of a cycle of odd period: how far is the state from the mirror
+// image of the cycle's start?
+fn compare_mirror() {
+    let a = motion.anchor;
+    tally.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
+}
+
+// A cycle this close to its mirror image, 2^-12 of the motion, is symmetric.
+const MIRROR: f32 = 2.44e-4;
