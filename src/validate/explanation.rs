@@ -261,7 +261,17 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
 
 fn bifurcation(case: &Case<'_>) -> Option<Explanation> {
     let [exponent, _] = case.truth.exponent?;
-    (exponent.abs() * case.flow.period < NEAR_BIFURCATION && recurs(case)?).then_some(Explanation::Border)
+    let is_near = exponent.abs() * case.flow.period < NEAR_BIFURCATION;
+    (is_near && recurs(case)? && has_its_averages(case)?).then_some(Explanation::Border)
+}
+
+/// Whether impacts and meshing are those that are read where the record says that its motion was.
+pub(super) fn has_its_averages(case: &Case<'_>) -> Option<bool> {
+    let Class::Periodic { period } = classify(case.record) else { return Some(true) };
+    let read = case.read_as_is(&case.standing(strobe(case)?).ok()?, period)?;
+    let compared = read.compare(case.record, &case.bars);
+    let is_average = |field: &Field| [Field::Impacts, Field::Mesh].contains(field);
+    Some(compared.iter().all(|(field, differs)| !is_average(field) || differs.is_none()))
 }
 
 /// The reference meets the graze: what the record says of itself is no evidence.

@@ -2,7 +2,7 @@
 
 use super::answer::Answer;
 use super::case::{Case, rounding};
-use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
+use super::explanation::{ELSEWHERE, Explanation, has_its_averages, is_least, strobe};
 use super::rounding::moved_by_rounding;
 use super::same_cycle::{may_repel, within_reach};
 use crate::classify::classify;
@@ -221,7 +221,7 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
         && lies_between(case.record.mesh_fraction, |answer| answer.mesh_fraction);
     let is_border = answers.iter().any(|answer| case.is_the_records(answer))
         || (is_between && answers.iter().any(claims));
-    is_border.then_some(Explanation::Border)
+    (is_border && has_its_averages(case)?).then_some(Explanation::Border)
 }
 
 /// A motion this close to where it was a cycle ago rests on it as nearly as lanes can that amplify no
