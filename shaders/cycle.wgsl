@@ -266,9 +266,9 @@ fn is_surely_unsymmetric() -> bool {
     return exp2(-f32(tally.mirror) / OCTAVE) > 2.0 * (1.0 + amplified) * max(blur(), ON_CYCLE);
 }
 
-// Whether it is nearer to it than lanes resolve, wherever the lane is about it.
+// Whether it is nearer to it than lanes resolve, wherever about it the state and its image are.
 fn is_surely_symmetric() -> bool {
-    return is_near_cycle() && exp2(-f32(tally.mirror) / OCTAVE) + 4.0 * away() < MIRROR;
+    return is_near_cycle() && exp2(-f32(tally.mirror) / OCTAVE) + 2.0 * away() < MIRROR;
 }
 
 // Whether it moves no more, and not because it moves too slowly to show.
