@@ -147,7 +147,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         }
         trips += 1u;
         var b = a + width;
-        if b >= len - 0.5 * SHORTEST {
+        if b >= len - 0.5 * min(width, SHORTEST) {
             b = len;
         }
         let dt = b - a;
@@ -169,8 +169,18 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 2.0 * dt;
             continue;
         }
+        // Between the ends of a stretch either may dip by an eighth of its bend: as long as that shows, it may
+        // be an event, however short.
+        var is_shortest = dt <= SHORTEST;
+        if is_shortest && dt > BRIEFEST {
+            let bend = dt * dt * vec2<Real>(
+                max(abs(left.first.z), abs(right.first.z)),
+                max(abs(left.second.z), abs(right.second.z)),
+            );
+            is_shortest = !((first != CLEAR && bend.x > 8.0 * eps.x) || (second != CLEAR && bend.y > 8.0 * eps.y));
+        }
         // Two that come as close together as steps are halved: the one before the other.
-        let both = first == CROSSING && second == CROSSING && dt <= SHORTEST && orders.x + orders.y == 0u;
+        let both = first == CROSSING && second == CROSSING && is_shortest && orders.x + orders.y == 0u;
         if first + second == CROSSING || both {
             let falls = vec2<Real>(left.first.x - right.first.x, left.second.x - right.second.x);
             let is_earlier = left.second.x * falls.x < left.first.x * falls.y;
@@ -187,13 +197,13 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             }
             let found = root(which, a, b, order, guess);
             // Where the slope drowns in the remainder there may be three roots for one.
-            if dt * abs(found.y) > STEEP * select(eps.x, eps.y, which) || dt <= SHORTEST {
+            if dt * abs(found.y) > STEEP * select(eps.x, eps.y, which) || is_shortest {
                 return Find(true, which, found.x);
             }
             width = 0.5 * dt;
             continue;
         }
-        if dt > SHORTEST {
+        if !is_shortest {
             width = 0.5 * dt;
             continue;
         }

@@ -9,8 +9,10 @@ const SHORT_FACTORIAL: Real = 720.0;
 const SHORT: Real = 0.198;
 // Half a unit in the last place of 1.
 const ULP: Real = 6e-8;
-// Steps are not halved below this: what touches a wall there does so within rounding.
+// Steps are not halved below this: what touches a wall there does so within rounding, unless it is seen
+// to go through; then not below this.
 const SHORTEST: Real = 0.001;
+const BRIEFEST: Real = 1e-6;
 // States beyond this are taken for a loss of finiteness.
 const HUGE: Real = 1e15;
 // Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
