@@ -10,17 +10,21 @@ use crate::random::Random;
 use crate::reference::{Observer, Stop, Trajectory};
 use crate::stability::UNIT;
 
-/// A motion whose state and tangent vectors, in lane units, are moved at each of a lane's steps by up
-/// to a unit roundoff of what is added up there, evenly distributed:
+/// A step of less than this is part of one: it ends or begins at an event.
+const WHOLE: f64 = 1.0 - 1e-9;
+
+/// A motion whose state and tangent vectors, in lane units, are moved at each of a lane's steps and at
+/// every event by up to a unit roundoff of what was added up on the way there, evenly distributed:
 ///
 /// ```text
-/// |d q_i| <= u (|q_i| + sum_j |m_ij p_j|),   p = (z, w, x2, v2, cos, sin, 1),
+/// |d q_i| <= u (|q_i| + sum_j |m_ij s_ij p_j|),   p = (z, w, x2, v2, cos, sin, 1),
 /// ```
 ///
-/// with the lane's own propagator `1 + m`: every product and every sum is rounded once. An event rounds as
-/// a step does, and the roundings of one step add up like a random walk. The propagator's own numbers are
-/// rounded, too, in the same way at every step, and `cos` and `sin` are turned from step to step since the
-/// last event: `(fl(m) - m) p` and what they drift by are added besides.
+/// with the lane's own propagator `1 + m` and `s` the share of a step that has passed, its square where
+/// an acceleration moves a displacement: every product and every sum is rounded once. The propagator's own
+/// numbers are rounded, too, in the same way at every step, those of accelerations on the way to an event,
+/// and `cos` and `sin`, taken from a table and turned to an event, go on from there step by step:
+/// `(fl(m) - m) p` and what they drift by are added besides.
 pub(super) struct Rounded<'f, 'c, const N: usize> {
     trajectory: Trajectory<'f, N>,
     constants: &'c Constants,
@@ -31,8 +35,6 @@ pub(super) struct Rounded<'f, 'c, const N: usize> {
     random: Random,
     /// Logarithm of the factor that was taken out of the tangent vectors.
     log_scale: f64,
-    /// Events until the last rounding.
-    events: u64,
     /// `cos` and `sin` of the forcing phase as the lane has them.
     phasor: [f64; 2],
 }
@@ -46,16 +48,14 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
         seed: u64,
     ) -> Self {
         let random = Random::new((seed << 32) + u64::from(constants.steps));
-        let (unit, events) = (unit_roundoff(precision), trajectory.work().events);
         Rounded {
             trajectory,
             constants,
             precision,
             state: true,
-            unit,
+            unit: unit_roundoff(precision),
             random,
             log_scale: 0.0,
-            events,
             phasor: [1.0, 0.0],
         }
     }
@@ -68,19 +68,19 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
     /// One forcing period.
     pub(super) fn advance_period(&mut self, met: &mut impl Observer) -> Result<(), Stop> {
         let period = self.trajectory.flow().period;
-        let steps = f64::from(self.constants.steps);
-        let mut step = 0.0;
-        loop {
-            // As a lane does: in steps of the domain that governs the motion.
-            step += self.constants.flow.domains[self.domain()].share;
-            if step >= steps {
-                break;
-            }
-            self.trajectory.advance_to(period * (step / steps), met)?;
-            self.round(step / steps);
+        let mut then = 0.0;
+        while then < period {
+            // As a lane does: from the last event in steps of the domain that governs the motion.
+            let domain = self.domain();
+            let step = self.constants.flow.h * self.constants.flow.domains[domain].share;
+            let until = if then + (2.0 - WHOLE) * step < period { then + step } else { period };
+            self.trajectory.advance_to_event(until, met)?;
+            let now = self.trajectory.time_in_period();
+            self.round(domain, now, (now - then) / step);
+            then = now;
         }
         self.trajectory.advance_period(met)?;
-        self.round(0.0);
+        self.phasor = [1.0, 0.0];
         Ok(())
     }
 
@@ -92,19 +92,27 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
         }
     }
 
-    /// Rounds at a phase, in turns.
-    fn round(&mut self, phase: f64) {
-        let domain = &self.constants.flow.domains[self.domain()];
-        let wall = [0.0, self.constants.flow.walls[0], self.constants.flow.walls[1]][self.domain()];
-        let (sin, cos) = (std::f64::consts::TAU * phase).sin_cos();
+    /// Rounds at a time since phase 0, after a share of a domain's step.
+    fn round(&mut self, domain: usize, now: f64, passed: f64) {
+        let flow = &self.constants.flow;
+        let wall = |domain: usize| [0.0, flow.walls[0], flow.walls[1]][domain];
+        let (from_wall, to_wall) = (wall(domain), wall(self.domain()));
+        let domain = &flow.domains[domain];
         // Rates per step of the domain.
         let scales = [1.0, domain.share, 1.0, domain.share];
         let is_single = self.precision == Precision::F32;
         let rounded = |x: f64| if is_single { f64::from(x as f32) } else { x };
         let error = |x: f64| rounded(x) - x;
-        let events = self.trajectory.work().events;
-        self.phasor = if events > self.events || phase == 0.0 {
-            [cos, sin].map(rounded)
+        let unit = self.unit;
+        let random = &mut self.random;
+        let mut even = || unit * (2.0 * random.unit() - 1.0);
+        let steps = now / flow.h;
+        let (sin, cos) = (steps * flow.domains[0].angle).sin_cos();
+        self.phasor = if passed < WHOLE {
+            // The table, and an angle addition.
+            let (turn_sin, turn_cos) = (steps.fract() * flow.domains[0].angle).sin_cos();
+            let sizes = |x: f64, other: f64| (2.0 - turn_cos) * x.abs() + (turn_sin * other).abs();
+            [rounded(cos + even() * sizes(cos, sin)), rounded(sin + even() * sizes(sin, cos))]
         } else {
             // Three shears, as lanes do it.
             let [half, sine] = [domain.turn_half, domain.turn_sin].map(rounded);
@@ -116,23 +124,33 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
         // What is added up for an entry, in sizes, and what the propagator's own rounding adds.
         let added = |q: &[f64; 4], forced: [f64; 3], i: usize| {
             let row = &domain.step[7 * i..7 * i + 7];
+            // Accelerations move a displacement by the square of the time.
+            let share = |j: usize| if i % 2 == 1 || j == i + 1 { passed } else { passed * passed };
             let times: [f64; 7] =
-                std::array::from_fn(|j| if j < 4 { scales[j] * q[j] } else { forced[j - 4] });
+                std::array::from_fn(|j| share(j) * if j < 4 { scales[j] * q[j] } else { forced[j - 4] });
             let sizes: f64 = (0..7).map(|j| (row[j] * times[j]).abs()).sum();
-            let drifted = forced[2] * (row[4] * drift[0] + row[5] * drift[1]);
-            let errors = drifted + (0..7).map(|j| error(row[j]) * times[j]).sum::<f64>();
-            (q[i].abs() + sizes / scales[i], errors / scales[i])
+            let drifted = forced[2] * (share(4) * row[4] * drift[0] + share(5) * row[5] * drift[1]);
+            let own = if passed < WHOLE {
+                // A careful pass has its numbers from the accelerations.
+                let pull = if i < 2 { &domain.gap_row } else { &domain.x_row };
+                let along = [q[0], scales[1] * q[1], q[2], scales[3] * q[3], forced[0], forced[2]];
+                let acceleration: f64 = pull.iter().zip(along).map(|(x, of)| error(*x) * of).sum();
+                acceleration * if i % 2 == 1 { passed } else { 0.5 * passed * passed }
+            } else {
+                (0..7).map(|j| error(row[j]) * times[j]).sum()
+            };
+            let errors = drifted + own;
+            (sizes / scales[i], errors / scales[i])
         };
-        let unit = self.unit * (1.0 + (events - self.events) as f64).sqrt();
-        self.events = events;
-        let random = &mut self.random;
-        let mut even = || unit * (2.0 * random.unit() - 1.0);
         if self.state {
             let mut q = self.constants.to_lane(self.trajectory.state());
-            q[0] -= wall;
+            let mut along = q;
+            along[0] -= from_wall;
+            // What it is once the next domain measures the gap.
+            q[0] -= to_wall;
             self.trajectory.shake(std::array::from_fn(|i| {
-                let (sizes, errors) = added(&q, [cos, sin, 1.0], i);
-                let by = even() * sizes + errors;
+                let (sizes, errors) = added(&along, [cos, sin, 1.0], i);
+                let by = even() * (q[i].abs() + sizes) + errors;
                 if q[i] == 0.0 { 0.0 } else { by / q[i] }
             }));
         }
@@ -141,7 +159,7 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
         self.trajectory.set_tangents(tangents.map(|u| {
             self.constants.to_state(std::array::from_fn(|i| {
                 let (sizes, errors) = added(&u, [0.0; 3], i);
-                u[i] + even() * sizes + errors
+                u[i] + even() * (u[i].abs() + sizes) + errors
             }))
         }));
     }

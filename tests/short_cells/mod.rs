@@ -1,4 +1,4 @@
-//! Random cells of 64 periods, and what lanes say of them.
+//! Random cells of 64 periods, and what lanes say of them. The cells are rows of tests/data/short_cells.csv.
 
 use rattlemap::engine::{self, Engine};
 use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
@@ -9,8 +9,33 @@ use rattlemap::scene::{Purpose, Scene};
 use rattlemap::schedule::Schedule;
 use rattlemap::validate::{Explanation, Pick, Sample, StateSource, Stratum, Subject, replay};
 
+const TABLE: &str = include_str!("../data/short_cells.csv");
+
 /// A pair by its parameters in the order of [`GearPair::PARAMETERS`], and its start.
 pub(crate) struct Cell(pub(crate) [f64; 13], pub(crate) State);
+
+/// The cells of a group, `count` of them.
+#[track_caller]
+pub(crate) fn cells(group: &str, count: usize) -> Vec<Cell> {
+    let mut lines = TABLE.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    assert!(GearPair::PARAMETERS.iter().map(|parameter| parameter.name).eq(names[1..14].iter().copied()));
+    let of_group = lines.filter_map(|line| line.split_once(',').filter(|(name, _)| *name == group));
+    let cells: Vec<Cell> = of_group
+        .map(|(_, row)| {
+            let numbers: Vec<f64> = row.split(',').map(|number| number.parse().unwrap()).collect();
+            Cell(numbers[..13].try_into().unwrap(), numbers[13..].try_into().unwrap())
+        })
+        .collect();
+    assert_eq!(cells.len(), count, "{group}");
+    cells
+}
+
+/// The one cell of a group.
+#[track_caller]
+pub(crate) fn cell(group: &str) -> Cell {
+    cells(group, 1).remove(0)
+}
 
 impl Cell {
     /// A plan of 64 periods whose first cell this is.
