@@ -45,7 +45,7 @@ pub enum Explanation {
     /// The reference does not decide within the budget, but gives the record's answer when it
     /// may take longer; or the record says `undecided`, and the motion settles too late or
     /// grows too little for it to say more, or rounding, which the cycle amplifies, keeps a lane
-    /// from seeing it settle.
+    /// from seeing it settle, be it that the reference is still in chaos that ends on that cycle.
     UndecidedInBudget,
     /// The reference, started on the record's own strobe state, has the record's class,
     /// period, word, exponent and averages: another attractor of the same cell.

@@ -85,17 +85,7 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
             let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;
             let began = case.record.periods_run.saturating_sub(confirming);
             let late = wanders_within_rounding(case, began, period, UNSETTLED);
-            // The lane's last state is off the cycle, and the reference goes on from there to it.
-            let is_off = || case.unrest(&stands, period) > UNSETTLED;
-            let settles = || case.at_leisure(from).class == case.truth.class;
-            // Or it is as close as rounding, which the cycle amplifies, lets it come.
-            let trembles = || {
-                let is_kept_off = case.is_lane && case.unrest(&stands, period) > rest(case.precision);
-                is_kept_off && is_shaken(case, &stands, period) == Some(true)
-            };
-            // Or rounding hides from it that the cycle attracts.
-            let doubts = || case.is_lane && may_repel(case, &stands, &case.truth) == Some(true);
-            (late || (is_off() || trembles() || doubts()) && settles())
+            (late || is_left_open(case, &stands, &case.truth, period))
                 .then_some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Chaotic) => {
@@ -105,10 +95,35 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
             let is_weak = ours <= CHAOS_ERRORS * case.record.lyapunov_error;
             let lags = case.budget.settings.max_period / 2;
             let lingers = || (1..=lags).any(|lag| case.unrest(&stands, lag) < LINGERING);
-            (known && (is_weak || lingers())).then_some(Explanation::UndecidedInBudget)
+            let is_over = || has_left_chaos(case, &stands) == Some(true);
+            (known && (is_weak || lingers()) || is_over()).then_some(Explanation::UndecidedInBudget)
         }
         _ => None,
     }
+}
+
+/// Whether the reference goes on from where the lane was at last to the cycle that `truth` describes, and
+/// the lane could not see it settle there.
+fn is_left_open(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u32) -> bool {
+    // It is off the cycle.
+    let is_off = || case.unrest(stands, period) > UNSETTLED;
+    // Or as close as rounding, which the cycle amplifies, lets it come.
+    let trembles = || {
+        let is_kept_off = case.is_lane && case.unrest(stands, period) > rest(case.precision);
+        is_kept_off && is_shaken(case, stands, period) == Some(true)
+    };
+    // Or rounding hides from it that the cycle attracts.
+    let doubts = || case.is_lane && may_repel(case, stands, truth) == Some(true);
+    let settles = || case.at_leisure(stands.state()).class == truth.class;
+    (is_off() || trembles() || doubts()) && settles()
+}
+
+/// The reference's own chaos is a transient: in the end it is on a cycle, near which the lane was left open.
+fn has_left_chaos(case: &Case<'_>, stands: &Trajectory<'_>) -> Option<bool> {
+    let settled = case.at_leisure(case.start);
+    let Class::Periodic { period } = settled.class else { return None };
+    let is_near = case.unrest(stands, period) < ELSEWHERE;
+    Some(is_near && is_left_open(case, stands, &settled, period))
 }
 
 /// Periods that a cell may take whatever becomes of it.
