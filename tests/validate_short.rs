@@ -207,7 +207,7 @@ fn rounding_at_events_moves_averages_so_far_and_no_farther() {
         assert!(matches!(why, Err(()) | Ok(Some(Explanation::BelowResolution))), "{why:?}: {record:?}");
         let planted: [(&str, Spoil); 4] = [
             ("meshing", |record| record.mesh_fraction += 0.01),
-            ("exponent", |record| record.lyapunov = 3.0 * record.lyapunov + 1.0),
+            ("exponent", |record| record.lyapunov = 2.0),
             ("impacts", |record| record.impacts_per_period += 2.0),
             ("period", |record| record.period = 2),
         ];
