@@ -4,9 +4,9 @@
 //! coarse grid first, then round after round what lies in blocks whose corners differ (in
 //! class, period, and symmetry or word where they are asked for), or that touch such a block,
 //! down to single cells. The rest is filled from the corners around it. An audit then
-//! integrates a random sample of the filled cells. If it finds too many of them wrong, all
-//! blocks are halved and the audit is repeated; if not, only the blocks with wrong cells are
-//! refined on.
+//! integrates a random sample of the filled cells. If it finds too many of them wrong, and more
+//! than chance may put there, blocks filled with what is wrong are halved and the audit is
+//! repeated; if not, only the blocks with wrong cells are refined on.
 //!
 //! Where cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells is
 //! a round, and starts from the last states of the row before. Several starts per cell are
@@ -59,7 +59,7 @@ pub struct Refined {
     /// Rounds of integration, audits included.
     pub rounds: usize,
     /// Audits in order; the last one found no more wrong cells than the scene allows, unless
-    /// nothing was left to refine.
+    /// nothing was left to refine or blocks have been halved as often as they may.
     pub audits: Vec<Audit>,
 }
 
@@ -259,6 +259,31 @@ mod tests {
         assert_eq!(wrong(&records, 241, one), 0, "{refined:?}");
     }
 
+    /// Single cells strewn over the map, fewer than it allows: where the first sample happens to hold
+    /// too many of them, a larger one tells.
+    #[test]
+    fn an_audit_that_may_be_chance_goes_on() {
+        let plan = plan([301, 301], "minimum_grid = 8\nmax_error = 0.003");
+        let (mut prolonged, mut passed) = (0, 0);
+        for salt in 0..40u64 {
+            let strewn = |i: usize, j: usize| {
+                let id = (j * 301 + i) as u64 + (salt << 32);
+                let is_odd = crate::random::Random::new(id).unit() < 0.0022;
+                if is_odd { 5 } else { 1 }
+            };
+            let (_, refined) = run(&plan, strewn);
+            let first = refined.audits[0];
+            let is_prolonged = first.sampled > crate::scene::AUDIT as usize;
+            prolonged += u32::from(is_prolonged);
+            passed += u32::from(is_prolonged && refined.audits.len() == 1);
+            assert!(first.sampled <= 16 * crate::scene::AUDIT as usize && first.rate() > 0.0, "{refined:?}");
+        }
+        assert!((2..20).contains(&prolonged) && 2 * passed >= prolonged, "{passed} of {prolonged}");
+        // What is no chance is mended at once.
+        let (_, refined) = run(&plan, |i, j| if (2..7).contains(&(i % 16)) && j % 16 > 8 { 5 } else { 1 });
+        assert_eq!(refined.audits[0].sampled, crate::scene::AUDIT as usize, "{refined:?}");
+    }
+
     /// A plain region does not pay for what is wrong elsewhere.
     #[test]
     fn only_what_is_wrong_too_often_is_refined_further() {
@@ -285,6 +310,10 @@ mod tests {
         let (records, refined) = run(&plan, half);
         assert!(wrong(&records, 129, half) > 0);
         assert!(refined.rounds <= 4, "{refined:?}");
+        // Also where that leaves more wrong than the map allows.
+        let plan = self::plan([129, 129], "minimum_grid = 16\nrounds = 2\nmax_error = 1e-3\naudit = 500");
+        let (_, refined) = run(&plan, half);
+        assert!(refined.audits.len() == 1 && refined.audits[0].rate() > 1e-3, "{refined:?}");
     }
 
     #[test]

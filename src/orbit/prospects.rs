@@ -22,12 +22,17 @@ const ACCOUNTS: f64 = 4.0;
 const CYCLES: usize = 2;
 
 /// How far the last state is from that of `lag` periods ago, if it is nearer than that one was to
-/// its own predecessor. None as well before there are two lags to compare.
+/// its own predecessor; with a lag of several periods, where a search is dear, that one has to have
+/// come nearer as well. None as well before there are two lags to compare.
 pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Option<f64> {
     let last = strobes.len() - 1;
-    let [first, second] = [last.checked_sub(2 * lag)?, last - lag].map(|n| &strobes[n]);
-    let (now, before) = (metric.distance(second, &strobes[last]), metric.distance(first, second));
-    (now <= before || now <= ROUNDED).then_some(now)
+    let apart = |back: usize| {
+        let n = last.checked_sub((back + 1) * lag)?;
+        Some(metric.distance(&strobes[n], &strobes[n + lag]))
+    };
+    let (now, before) = (apart(0)?, apart(1)?);
+    let is_steady = || lag == 1 || apart(2).is_none_or(|earlier| before <= earlier);
+    (now <= before && is_steady() || now <= ROUNDED).then_some(now)
 }
 
 /// Whether a tangent vector that has turned its way has grown, over the last two cycles, by more than

@@ -2,7 +2,7 @@
 //! then an audit of what was not integrated.
 
 use std::cell::LazyCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
 use super::audit::{Audit, sample};
 use super::blocks::{Block, coarse};
@@ -40,6 +40,8 @@ pub(super) struct Adaptive {
     followed: u32,
     /// Cells of the audit under way.
     audited: Vec<u32>,
+    /// Samples drawn so far, each by a seed of its own.
+    samples: u64,
     audits: Vec<Audit>,
     stage: Stage,
 }
@@ -59,7 +61,7 @@ enum Stage {
 struct Verdict {
     /// Whether a cell was filled wrongly, by id.
     wrong: Vec<bool>,
-    /// Kinds that are wrong too often; none if the audit is passed.
+    /// Kinds that are wrong most often; none if the audit is passed.
     bad: HashSet<u32>,
 }
 
@@ -77,6 +79,7 @@ impl Adaptive {
             followed: 0,
             levels: refine.minimum_grid.next_power_of_two().ilog2(),
             audited: Vec::new(),
+            samples: 0,
             audits: Vec::new(),
             stage: Stage::Halving,
         }
@@ -99,10 +102,7 @@ impl Adaptive {
         }
         while self.stage != Stage::Done {
             let cells = match self.stage {
-                Stage::Auditing => {
-                    self.judge_audit(records);
-                    self.unknown_corners()
-                }
+                Stage::Auditing => self.judge_audit(records),
                 _ => {
                     self.reopen();
                     if self.open.is_empty() {
@@ -120,22 +120,26 @@ impl Adaptive {
         Vec::new()
     }
 
-    /// No block is open any more: audits once, and again after every halving of all blocks.
+    /// No block is open any more: audits once, and again after every audit that is failed.
     fn leave_stage(&mut self) -> Vec<u32> {
         if self.stage == Stage::Mending {
             self.stage = Stage::Done;
             return Vec::new();
         }
-        let candidates: Vec<u32> =
-            (0..).zip(&self.labels).filter(|(_, label)| !label.is_known()).map(|(id, _)| id).collect();
-        let filled = candidates.len();
-        let seed = 1 + self.audits.len() as u64;
-        self.audited = sample(candidates, self.refine.audited(filled), seed);
+        let filled = self.labels.iter().filter(|label| !label.is_known()).count();
+        self.audited = self.sample(self.refine.audited(filled));
         self.stage = if self.audited.is_empty() { Stage::Done } else { Stage::Auditing };
         if !self.audited.is_empty() {
             self.audits.push(Audit { filled, sampled: self.audited.len(), ..Audit::default() });
         }
         self.audited.clone()
+    }
+
+    /// Some of the cells that nothing is known of, at random.
+    fn sample(&mut self, count: usize) -> Vec<u32> {
+        let unknown = (0..).zip(&self.labels).filter(|(_, label)| !label.is_known());
+        self.samples += 1;
+        sample(unknown.map(|(id, _)| id).collect(), count, self.samples)
     }
 
     /// Whether blocks have been halved as often as the scene allows.
@@ -181,34 +185,45 @@ impl Adaptive {
     }
 
     /// After an audit blocks with wrong cells are cut right there. If there are too many of them,
-    /// all blocks are halved that are filled with what is wrong too often: mostly chaos with its
-    /// windows, which the plain regions around need not pay for.
-    fn judge_audit(&mut self, records: &[Record]) {
+    /// all blocks are halved that are filled with what is wrong most often: mostly chaos with its
+    /// windows, which the plain regions around need not pay for. If that may be chance, more cells are
+    /// audited first. Returns the cells to integrate next.
+    fn judge_audit(&mut self, records: &[Record]) -> Vec<u32> {
+        let Verdict { wrong, bad } = self.count_wrong(records);
+        let more = self
+            .audits
+            .last()
+            .map_or(0, |audit| audit.more(self.refine.audited(audit.filled), self.refine.max_error));
+        if more > 0 {
+            let cells = self.sample(more);
+            self.audited.extend(&cells);
+            return cells;
+        }
         self.followed = 0;
+        self.audited.clear();
         let closed = std::mem::take(&mut self.closed);
-        let Verdict { wrong, bad } = self.count_wrong(&closed, records);
-        let mut halves = false;
         for block in closed {
             let first_wrong = block.cells().find(|&at| wrong[self.id(at)]);
             let is_bad = block.has_inside() && bad.contains(&self.corner_labels(&block)[0].kind);
-            halves |= is_bad;
             match first_wrong {
                 Some(at) => self.open.extend(block.cut(at)),
                 None if is_bad => self.open.extend(block.halves()),
                 None => self.closed.push(block),
             }
         }
-        self.stage = if halves { Stage::Halving } else { Stage::Mending };
+        self.stage = if bad.is_empty() || self.is_spent() { Stage::Mending } else { Stage::Halving };
+        self.unknown_corners()
     }
 
-    /// Compares what was filled into the audited cells of the `closed` blocks with their records.
-    fn count_wrong(&mut self, closed: &[Block], records: &[Record]) -> Verdict {
+    /// Compares what was filled into the audited cells with their records.
+    fn count_wrong(&mut self, records: &[Record]) -> Verdict {
         let mut wrong = vec![false; self.labels.len()];
         let mut is_audited = vec![false; self.labels.len()];
-        self.audited.drain(..).for_each(|id| is_audited[id as usize] = true);
-        let mut audit = self.audits.pop().unwrap_or_default();
-        let mut by_kind: HashMap<u32, [usize; 2]> = HashMap::new();
-        for block in closed {
+        self.audited.iter().for_each(|&id| is_audited[id as usize] = true);
+        let filled = self.audits.pop().map_or(0, |audit| audit.filled);
+        let mut audit = Audit { filled, sampled: self.audited.len(), ..Audit::default() };
+        let mut by_kind: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
+        for block in &self.closed {
             let filling =
                 LazyCell::new(|| Filling::new(block, block.corners().map(|at| &records[self.id(at)])));
             for at in block.cells() {
@@ -231,10 +246,7 @@ impl Adaptive {
             }
         }
         self.audits.push(audit);
-        let max_error = self.refine.max_error;
-        let is_bad = |[sampled, amiss]: [usize; 2]| amiss as f64 > max_error * sampled as f64;
-        by_kind.retain(|_, counts| audit.rate() > max_error && is_bad(*counts));
-        Verdict { wrong, bad: by_kind.into_keys().collect() }
+        Verdict { wrong, bad: worst(&by_kind, (self.refine.max_error * audit.sampled as f64) as usize) }
     }
 
     fn id(&self, [i, j]: [usize; 2]) -> usize {
@@ -288,4 +300,19 @@ impl Adaptive {
         }
         count
     }
+}
+
+/// The kinds of which the largest part is wrong, as many as it takes until no more than `allowed` wrong
+/// cells are of other kinds. Of every kind it is known how many cells were sampled and were wrong.
+fn worst(by_kind: &BTreeMap<u32, [usize; 2]>, allowed: usize) -> HashSet<u32> {
+    let mut kinds: Vec<_> = by_kind.iter().collect();
+    // Compares amiss / sampled, without a division.
+    kinds.sort_by(|(_, [n, a]), (_, [m, b])| (b * n).cmp(&(a * m)));
+    let mut left: usize = kinds.iter().map(|(_, [_, amiss])| amiss).sum();
+    let is_needed = |(_, [_, amiss]): &(&u32, &[usize; 2])| {
+        let is_needed = left > allowed;
+        left -= amiss;
+        is_needed
+    };
+    kinds.into_iter().take_while(is_needed).map(|(kind, _)| *kind).collect()
 }
