@@ -6,10 +6,14 @@
 mod short_cells;
 
 use rattlemap::classify::classify;
+use rattlemap::engine::{Cpu, Engine};
 use rattlemap::gpu::Precision;
-use rattlemap::orbit::{Class, Status};
+use rattlemap::model::GearPair;
+use rattlemap::orbit::{Class, Settings, Status, analyse};
 use rattlemap::plan::Plan;
-use rattlemap::record::Record;
+use rattlemap::record::{Record, valid};
+use rattlemap::scene::{Purpose, Scene};
+use rattlemap::schedule::Schedule;
 use rattlemap::validate::Explanation;
 use short_cells::{Cell, cell, cells, explanation, lane};
 
@@ -212,5 +216,38 @@ fn rounding_at_events_moves_averages_so_far_and_no_farther() {
             ("period", |record| record.period = 2),
         ];
         stays_unexplained(&plan, record, Precision::F32, &planted);
+    }
+}
+
+/// The reference calls a motion chaos that ends on a cycle in time; a lane that is there by its last period
+/// may be left open on it, and nowhere else.
+#[test]
+fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
+    for (e, omega) in [(0.6088, 3.4487), (0.8789, 5.6876)] {
+        let text = format!(
+            "[[axis]]\nparameter = 'e'\nmin = {e}\nmax = 1.0\ncount = 2\n\
+             [[axis]]\nparameter = 'omega'\nmin = {omega}\nmax = 20.0\ncount = 2\n\
+             [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n"
+        );
+        let plan = Plan::new(&Scene::parse(&text, "cell", &[], Purpose::Map).unwrap());
+        let batch = Schedule::new(&plan).batch(&plan, 0, 1);
+        let chaos = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&batch)).unwrap()[0];
+        assert_eq!(classify(&chaos), Class::Chaotic, "{chaos:?}");
+        let pair = GearPair { omega, ..GearPair::paper(e) };
+        let ends = analyse(&pair, [0.0; 4], &Settings { transient_periods: 4000, ..Settings::default() });
+        assert!(matches!(ends.class, Class::Periodic { .. }), "{ends:?}");
+        let open = |strobe| Record {
+            strobe,
+            status: Status::Slow.code(),
+            periods_run: 528,
+            valid: valid::STROBE | valid::PERIOD,
+            ..Record::default()
+        };
+        let why = |record| explanation(&plan, record, Precision::F32);
+        let near = open(ends.strobe.map(|x| x * (1.0 + 1e-4)));
+        assert_eq!(why(near), Ok(Some(Explanation::UndecidedInBudget)), "{:?}", ends.class);
+        for strobe in [chaos.strobe, ends.strobe.map(|x| 1.5 * x), [0.0; 4]] {
+            assert_eq!(why(open(strobe)), Ok(None), "{strobe:?}");
+        }
     }
 }

@@ -19,22 +19,15 @@ const RUNS: u64 = 1000;
 /// And so many where the size of what rounding does is asked for.
 const FEW_RUNS: u64 = 8;
 
-/// The record's cycle is the reference's, or the one that it reaches from the record's strobe, read where
-/// every step rounds: one reading has its word and impacts, and its exponent and averages lie between those
-/// that are read.
+/// The record's cycle is the reference's, read where every step rounds: one reading has its word and
+/// impacts, and its exponent and averages lie between those that are read.
 pub(super) fn rounded_cycle(case: &Case<'_>) -> Option<Explanation> {
-    let from = strobe(case)?;
-    let ours = classify(case.record);
-    let Class::Periodic { period } = ours else { return None };
-    let is_ours = |truth: &Answer| truth.class == ours;
-    let stands = case.standing(from).ok()?;
-    let is_read = if is_ours(&case.truth) {
-        is_read_rounded(case, &stands, period, &case.truth)?
-    } else {
-        let there = case.at_leisure(from);
-        is_ours(&there) && is_read_rounded(case, &stands, period, &there)?
-    };
-    is_read.then_some(Explanation::BelowResolution)
+    if case.truth.class != classify(case.record) {
+        return None;
+    }
+    let stands = case.standing(strobe(case)?).ok()?;
+    let Class::Periodic { period } = case.truth.class else { return None };
+    is_read_rounded(case, &stands, period, &case.truth)?.then_some(Explanation::BelowResolution)
 }
 
 /// A number of an answer.
