@@ -14,7 +14,7 @@ const HASTY_TANGENT_PERIODS: u32 = 18;
 
 /// With early stops chaos is called before the budget is spent if the exponent exceeds zero by
 /// this many standard errors (five, where an exponent is shown, save 3 % of the periods, and call a
-/// transient chaos in one cell of 40,000 more) ...
+/// transient chaos in one cell of 20,000 more) ...
 const EARLY_CHAOS_ERRORS: f64 = 6.0;
 const HASTY_CHAOS_ERRORS: f64 = 5.0;
 
