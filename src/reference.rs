@@ -206,22 +206,17 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.check_finite()
     }
 
-    /// The same, but no farther than the next event; whether there was one.
-    pub(crate) fn advance_to_event(
-        &mut self,
-        until: f64,
-        observer: &mut impl Observer,
-    ) -> Result<bool, Stop> {
+    /// The same, but no farther than the next event.
+    pub(crate) fn advance_to_event(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         self.goal = until;
-        let before = self.work.events;
+        let events = self.work.events;
         if let Some(side) = self.pending.take() {
             self.contact(side, observer);
         }
-        while self.clock.time() < until && self.work.events == before {
+        while self.clock.time() < until && self.work.events == events {
             self.step(until, observer)?;
         }
-        self.check_finite()?;
-        Ok(self.work.events > before)
+        self.check_finite()
     }
 
     fn check_finite(&self) -> Result<(), Stop> {

@@ -59,7 +59,7 @@ pub struct Refined {
     /// Rounds of integration, audits included.
     pub rounds: usize,
     /// Audits in order; the last one found no more wrong cells than the scene allows, unless
-    /// nothing was left to refine or blocks have been halved as often as they may.
+    /// nothing was left to refine or blocks had been halved as often as they may.
     pub audits: Vec<Audit>,
 }
 
@@ -314,6 +314,8 @@ mod tests {
         let plan = self::plan([129, 129], "minimum_grid = 16\nrounds = 2\nmax_error = 1e-3\naudit = 500");
         let (_, refined) = run(&plan, half);
         assert!(refined.audits.len() == 1 && refined.audits[0].rate() > 1e-3, "{refined:?}");
+        // What is wrong in the audit is mended, and nothing else.
+        assert!(refined.integrated < 1000, "{refined:?}");
     }
 
     #[test]

@@ -7,13 +7,16 @@ mod short_cells;
 
 use rattlemap::classify::classify;
 use rattlemap::engine::{Cpu, Engine};
+use rattlemap::flow::Flow;
 use rattlemap::gpu::Precision;
 use rattlemap::model::GearPair;
 use rattlemap::orbit::{Class, Settings, Status, analyse};
 use rattlemap::plan::Plan;
 use rattlemap::record::{Record, valid};
+use rattlemap::reference::Trajectory;
 use rattlemap::scene::{Purpose, Scene};
 use rattlemap::schedule::Schedule;
+use rattlemap::stability::{StrobeMap, refine};
 use rattlemap::validate::Explanation;
 use short_cells::{Cell, cell, cells, explanation, lane};
 
@@ -235,7 +238,7 @@ fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
         assert_eq!(classify(&chaos), Class::Chaotic, "{chaos:?}");
         let pair = GearPair { omega, ..GearPair::paper(e) };
         let ends = analyse(&pair, [0.0; 4], &Settings { transient_periods: 4000, ..Settings::default() });
-        assert!(matches!(ends.class, Class::Periodic { .. }), "{ends:?}");
+        let Class::Periodic { period } = ends.class else { panic!("{ends:?}") };
         let open = |strobe| Record {
             strobe,
             status: Status::Slow.code(),
@@ -246,7 +249,15 @@ fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
         let why = |record| explanation(&plan, record, Precision::F32);
         let near = open(ends.strobe.map(|x| x * (1.0 + 1e-4)));
         assert_eq!(why(near), Ok(Some(Explanation::UndecidedInBudget)), "{:?}", ends.class);
-        for strobe in [chaos.strobe, ends.strobe.map(|x| 1.5 * x), [0.0; 4]] {
+        // A cycle of the same period that repels, which chaos passes.
+        let flow = Flow::new(&pair.oscillator().unwrap());
+        let mut passing: Trajectory<'_> = Trajectory::new(&flow, pair.law(), chaos.strobe);
+        let repelling = (0..200).find_map(|_| {
+            passing.advance_period(&mut ()).unwrap();
+            refine(&passing, StrobeMap::Periods(period)).filter(|cycle| cycle.spectral_radius() > 1.5)
+        });
+        let beside = repelling.expect("a cycle that repels").state.map(|x| x * (1.0 + 2e-4));
+        for strobe in [chaos.strobe, beside, ends.strobe.map(|x| 1.5 * x), [0.0; 4]] {
             assert_eq!(why(open(strobe)), Ok(None), "{strobe:?}");
         }
     }

@@ -221,7 +221,7 @@ impl<'a> Watch<'a> {
         }
         for candidate in candidates(window, &metric, max_period) {
             let state = self.strobes[self.strobes.len() - 1];
-            if departs(&self.exponent, candidate.period) {
+            if departs(&self.exponent, candidate.period, is_last) {
                 continue;
             }
             let apart = contraction(window, candidate.period as usize, &metric);

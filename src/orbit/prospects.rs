@@ -18,12 +18,16 @@ const ROUNDED: f64 = 1e-7;
 /// from 1 by a quarter make recurrences of a quarter of the distance.
 const ACCOUNTS: f64 = 4.0;
 
-/// Cycles over which a tangent vector is seen to grow.
+/// Cycles over which a tangent vector is seen to grow, where the motion will be looked at again ...
 const CYCLES: usize = 2;
+
+/// ... and where it will not. About a cycle that attracts a vector may stretch by the ratio of the axes that
+/// it turns along, velocities to displacements, but not more than once: by less than `2^8`.
+const LAST_CYCLES: usize = 8;
 
 /// How far the last state is from that of `lag` periods ago, if it is nearer than that one was to
 /// its own predecessor; with a lag of several periods, where a search is dear, that one has to have
-/// come nearer as well. None as well before there are two lags to compare.
+/// come nearer as well, if there are three lags. None as well before there are two.
 pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Option<f64> {
     let last = strobes.len() - 1;
     let apart = |back: usize| {
@@ -35,11 +39,12 @@ pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Opt
     (now <= before && is_steady() || now <= ROUNDED).then_some(now)
 }
 
-/// Whether a tangent vector that has turned its way has grown, over the last two cycles, by more than
-/// any would near a cycle that may attract.
-pub(super) fn departs(exponent: &Exponent, period: u32) -> bool {
-    let growth = exponent.lately(CYCLES * period as usize);
-    growth.is_some_and(|growth| growth > CYCLES as f64 * LARGEST_MULTIPLIER.ln())
+/// Whether a tangent vector that has turned its way has grown, over the last two cycles or, if this is
+/// the last look, the last eight, by more than any would near a cycle that may attract.
+pub(super) fn departs(exponent: &Exponent, period: u32, is_last: bool) -> bool {
+    let cycles = if is_last { LAST_CYCLES } else { CYCLES };
+    let growth = exponent.lately(cycles * period as usize);
+    growth.is_some_and(|growth| growth > cycles as f64 * LARGEST_MULTIPLIER.ln())
 }
 
 /// What earlier searches have shown.
@@ -99,6 +104,13 @@ mod tests {
         }
         assert!(contraction(&powers(1.001, 1e-9), 1, &metric()).is_some(), "rounding");
         assert!(contraction(&powers(0.5, 1e-3), 10, &metric()).is_none(), "too short to tell");
+        // Apart by 1, 4, 2: nearer than before, but not for long.
+        let at = |x: f64| [1e-3 * x, 0.0, 0.0, 0.0];
+        let recent = [0.0, 1.0, 5.0, 7.0].map(at);
+        assert!(contraction(&recent, 1, &metric()).is_some());
+        let slower = [0.0, 0.0, 1.0, 1.0, 5.0, 5.0, 7.0, 7.0].map(at);
+        assert!(contraction(&slower, 2, &metric()).is_none());
+        assert!(contraction(&slower[2..], 2, &metric()).is_some(), "two lags are all there is");
     }
 
     #[test]
@@ -149,7 +161,33 @@ mod tests {
         for (factor, period, expected) in
             [(1.9, 1, false), (2.1, 1, true), (1.2, 3, false), (1.3, 3, true), (9.0, 4, false)]
         {
-            assert_eq!(departs(&growing(factor), period), expected, "{factor} in each of {period} periods");
+            let found = departs(&growing(factor), period, false);
+            assert_eq!(found, expected, "{factor} in each of {period} periods");
         }
+    }
+
+    /// Displacement and velocity take turns: what is a short vector now is a long one a quarter turn later.
+    #[test]
+    fn a_tangent_that_turns_does_not_depart_for_good() {
+        let pair = GearPair::paper(0.5);
+        let flow = Flow::new(&pair.oscillator().unwrap());
+        let fresh = crate::reference::Trajectory::new(&flow, pair.law(), [0.0; 4]);
+        let (radius, ratio) = (0.9, 100.0);
+        let (mut seems, mut count) = (0, 0);
+        for angle in [0.3, 0.7, 1.1, 1.5] {
+            let (sin, cos) = f64::sin_cos(angle);
+            let mut carrier = fresh.carrying([[0.6, 0.8, 0.0, 0.0]]);
+            let mut exponent = Exponent::default();
+            for n in 0..60 {
+                let [[x, v, ..]] = carrier.tangents();
+                let turned = [cos * x + sin * v / ratio, cos * v - sin * x * ratio, 0.0, 0.0];
+                carrier.set_tangents([turned.map(|y| radius * y)]);
+                exponent.renormalise(&mut carrier);
+                assert!(n < 8 || !departs(&exponent, 1, true), "after {n} turns by {angle}");
+                seems += u32::from(departs(&exponent, 1, false));
+                count += 1;
+            }
+        }
+        assert!(10 * seems > count / 4, "a search may be put off so: {seems} of {count} times");
     }
 }

@@ -54,13 +54,13 @@ impl From<&Integration> for orbit::Settings {
 pub struct Refine {
     /// Every this many cells along an axis one is integrated in any case.
     pub minimum_grid: u32,
-    /// Times that blocks are halved at most before the audit; none for as many as it takes to
-    /// come down to single cells.
+    /// Times that blocks are halved at most; none for as many as it takes to come down to single cells.
+    /// Where the audit finds a wrong cell its block is cut down all the same.
     pub rounds: Option<u32>,
     /// Fraction of the filled cells that may be wrong, as the audit measures it.
     pub max_error: f64,
-    /// Filled cells that one audit integrates; none for [`AUDIT`], or a quarter of the filled ones
-    /// if that is less.
+    /// Filled cells that one audit integrates at first, up to sixteen times as many where the result may be
+    /// chance; none for [`AUDIT`], or a quarter of the filled ones if that is less.
     pub audit: Option<u32>,
     /// Whether a change of the word alone is a border, where the scene asks for words. At low
     /// frequencies words change from one cell to the next but few, while class, period and

@@ -190,11 +190,9 @@ impl Adaptive {
     /// audited first. Returns the cells to integrate next.
     fn judge_audit(&mut self, records: &[Record]) -> Vec<u32> {
         let Verdict { wrong, bad } = self.count_wrong(records);
-        let more = self
-            .audits
-            .last()
-            .map_or(0, |audit| audit.more(self.refine.audited(audit.filled), self.refine.max_error));
-        if more > 0 {
+        let asks = |audit: &Audit| audit.more(self.refine.audited(audit.filled), self.refine.max_error);
+        let more = self.audits.last().map_or(0, asks);
+        if more > 0 && !self.is_spent() {
             let cells = self.sample(more);
             self.audited.extend(&cells);
             return cells;
@@ -204,7 +202,8 @@ impl Adaptive {
         let closed = std::mem::take(&mut self.closed);
         for block in closed {
             let first_wrong = block.cells().find(|&at| wrong[self.id(at)]);
-            let is_bad = block.has_inside() && bad.contains(&self.corner_labels(&block)[0].kind);
+            let is_bad =
+                !self.is_spent() && block.has_inside() && bad.contains(&self.corner_labels(&block)[0].kind);
             match first_wrong {
                 Some(at) => self.open.extend(block.cut(at)),
                 None if is_bad => self.open.extend(block.halves()),

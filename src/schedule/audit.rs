@@ -27,7 +27,8 @@ const TWO_SIDED_99: f64 = 2.575829;
 
 /// An audit that finds too many wrong cells, but no more than chance may put into its sample, goes on to
 /// this many times the sample: of maps with 0.26 % wrong one in forty is refined for bad luck where
-/// 0.3 % are allowed, not one in four; of those with 0.5 % wrong 15 % pass, not 13.
+/// 0.3 % are allowed, not one in four; of those with 0.4 % wrong 38 % pass, not 31, and of those with 0.5 %
+/// 15, not 13.
 const PROLONGED: usize = 16;
 
 impl Audit {
@@ -37,7 +38,8 @@ impl Audit {
     }
 
     /// Its 95 % interval: Wilson's score interval (J. Am. Stat. Assoc. 22, 1927), which is
-    /// sound for small counts, too.
+    /// sound for small counts, too. That the sample's size depends on what was found is left out: an audit
+    /// that went on may cover 92 %.
     pub fn interval(&self) -> [f64; 2] {
         self.score_interval(TWO_SIDED_95)
     }

@@ -16,6 +16,9 @@ use crate::stability::{StrobeMap, multipliers};
 /// A motion this far from where it was a cycle ago has not settled.
 const UNSETTLED: f64 = 1e-4;
 
+/// Periods in which motion leaves what repels it, however closely it passes.
+const STAYING_PERIODS: u32 = 400;
+
 /// A motion this close to where it was some periods ago may be lingering at a cycle.
 const LINGERING: f64 = 0.03;
 
@@ -118,11 +121,13 @@ fn is_left_open(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period
     (is_off() || trembles() || doubts()) && settles()
 }
 
-/// The reference's own chaos is a transient: in the end it is on a cycle, near which the lane was left open.
+/// The reference's own chaos is a transient: in the end it is on a cycle, and the lane was left open near one
+/// of that period where the motion stays, which a cycle that repels would not let it.
 fn has_left_chaos(case: &Case<'_>, stands: &Trajectory<'_>) -> Option<bool> {
     let settled = case.at_leisure(case.start);
     let Class::Periodic { period } = settled.class else { return None };
-    let is_near = case.unrest(stands, period) < ELSEWHERE;
+    let stays = |cycles| case.unrest(stands, cycles * period) < ELSEWHERE;
+    let is_near = stays(1) && stays(STAYING_PERIODS.div_ceil(period));
     Some(is_near && is_left_open(case, stands, &settled, period))
 }
 
