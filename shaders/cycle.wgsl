@@ -138,14 +138,17 @@ fn judge_cycle() {
     if is_cycle && reads_divisor() {
         return;
     }
-    if attracts && is_own() && tally.refinements > 0u {
+    // Where Newton's method has left the branch of the motion, a lane that goes back to where it set out
+    // would set out once more, for ever.
+    let is_lost = tally.refinements > 0u && !is_own();
+    if attracts && !is_lost && tally.refinements > 0u {
         tally.vain += 1u;
     }
     give_up();
     if is_last {
         return;
     }
-    if attracts {
+    if attracts && !is_lost {
         look_again();
     } else {
         search_on();
