@@ -136,6 +136,21 @@ fn too_many_events_are_rounding_or_chaos_or_a_fault() {
         record.strobe = [0.0, -0.19, 0.0, -0.15];
     };
     stays_unexplained(&plan, record, Precision::F64, &[("too early", early)]);
+    // Elastic impacts on a wall that the load presses to: six thousand in a period, and slower ones, of which
+    // there are more, if the strobe cuts a flight that is shallower than the gap rounds by.
+    let plan = cell("elastic").plan();
+    let record = lane(&plan, Precision::F32);
+    let why = explanation(&plan, record, Precision::F32);
+    if record.status == Status::CapEvents.code() {
+        assert_eq!(why, Ok(Some(Explanation::EngineCap)));
+    }
+    // One at rest, whose teeth meet once or twice in a period: a lane once met ten thousand times there.
+    let stuck: Spoil = |record| {
+        (record.status, record.period, record.periods_run) = (Status::CapEvents.code(), 0, 59);
+        record.strobe = [1.7857179045677185e-5, -0.01238123487995892, -0.014012660831212997, -0.01238123487995892];
+    };
+    let plan = cell("balanced").plan();
+    stays_unexplained(&plan, lane(&plan, Precision::F32), Precision::F32, &[("stuck", stuck)]);
     // The paper's chaos has some ten events in a period.
     let pair = [2.0, 1.0, 0.6, 0.6, 30.0, 20.0, 1.0, 1000.0, 50.0, 5.6, 0.5, 0.65, 0.01];
     let plan = Cell(pair, [0.0; 4]).plan();

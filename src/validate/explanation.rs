@@ -33,8 +33,9 @@ const SENSITIVE: f64 = 0.1;
 /// Starts within rounding from which a motion may meet its caps: chaos decides which does.
 const SCATTERED_STARTS: usize = 100;
 
-/// And motions that are rounded at every step.
-const ROUNDED_RUNS: u64 = 8;
+/// And motions that are rounded at every step: where the strobe cuts a flight is chance, and few cuts slow
+/// elastic impacts down so far that there are too many.
+const ROUNDED_RUNS: u64 = 1000;
 
 /// Why a cell's record is not what the reference says within the same budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
