@@ -96,6 +96,17 @@ fn a_gap_at_rest_is_let_go_once() {
     }
 }
 
+/// Supports and teeth so damped that a mode decays by all of the damping: a step of a radian of half of it left
+/// 4e-6 of that mode to the terms that single precision leaves out.
+#[test]
+fn damped_modes_are_summed_to_rounding() {
+    for cell in cells("damped", 2) {
+        let plan = cell.plan();
+        let record = lane(&plan, Precision::F32);
+        assert_eq!(explanation(&plan, record, Precision::F32), Err(()), "{record:?}");
+    }
+}
+
 /// Neutral motions with 900 elastic impacts in a period.
 #[test]
 fn rounding_at_many_impacts_is_no_chaos() {
