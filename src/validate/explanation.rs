@@ -6,7 +6,7 @@
 
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION};
-use super::lane_growth::weak_chaos;
+use super::lane_growth::{rare_chaos, weak_chaos};
 use super::limits::{
     flip, held, is_shaken, is_spent, late, longer, rest, scattered, undecided_chaos, within_scatter,
 };
@@ -129,7 +129,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 18] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 19] = [
         engine_cap,
         longer,
         other_attractor,
@@ -148,6 +148,7 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rounded_cycle,
         at_rest,
         scattered,
+        rare_chaos,
     ];
     CHECKS.iter().find_map(|check| check(case))
 }
@@ -205,11 +206,23 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
     let same = case.is_the_records(&answer)
         || read().is_some_and(|answer| case.is_the_records(&answer))
         || within_reach(case, from, &answer).is_some()
-        || unresolved(case, from, &answer) == Some(true);
+        || unresolved(case, from, &answer) == Some(true)
+        || read_rounded(case, from, &answer) == Some(true);
     same.then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
     })
+}
+
+/// Whether it is the record's cycle, read where every step rounds.
+fn read_rounded(case: &Case<'_>, from: State, answer: &Answer) -> Option<bool> {
+    let Class::Periodic { period } = answer.class else { return None };
+    let stands = case.standing(from).ok()?;
+    let is_another = answer.class == classify(case.record) && answer.word != case.truth.word;
+    if !is_another || case.unrest(&stands, period) > ELSEWHERE {
+        return None;
+    }
+    rounding::is_read_rounded(case, &stands, period, answer)
 }
 
 /// Whether the cycle has a multiple of the record's period, and lanes cannot tell it from the record's.
@@ -261,8 +274,9 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn bifurcation(case: &Case<'_>) -> Option<Explanation> {
-    let [exponent, _] = case.truth.exponent?;
-    let is_near = exponent.abs() * case.flow.period < NEAR_BIFURCATION;
+    let [exponent, error] = case.truth.exponent?;
+    // Of a motion that is on no cycle yet the average may be zero by chance.
+    let is_near = (exponent.abs() + error) * case.flow.period < NEAR_BIFURCATION;
     (is_near && recurs(case)? && has_its_averages(case)?).then_some(Explanation::Border)
 }
 
