@@ -33,9 +33,10 @@ const SENSITIVE: f64 = 0.1;
 /// Starts within rounding from which a motion may meet its caps: chaos decides which does.
 const SCATTERED_STARTS: usize = 100;
 
-/// And motions that are rounded at every step: where the strobe cuts a flight is chance, and few cuts slow
-/// elastic impacts down so far that there are too many.
-const ROUNDED_RUNS: u64 = 1000;
+/// And motions that are rounded at every step; more of them where nothing else gives the record's answer: where
+/// the strobe cuts a flight is chance, and few cuts slow elastic impacts down so far that there are too many.
+const ROUNDED_RUNS: u64 = 8;
+const MOST_RUNS: u64 = 1000;
 
 /// Why a cell's record is not what the reference says within the same budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -129,7 +130,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 19] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 20] = [
         engine_cap,
         longer,
         other_attractor,
@@ -149,6 +150,7 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         at_rest,
         scattered,
         rare_chaos,
+        rare_cap,
     ];
     CHECKS.iter().find_map(|check| check(case))
 }
@@ -174,6 +176,14 @@ fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
         _ => false,
     };
     beyond.then_some(Explanation::EngineCap)
+}
+
+/// The same of many more motions that are rounded at every step.
+fn rare_cap(case: &Case<'_>) -> Option<Explanation> {
+    let caps = LaneSettings::default();
+    let is_beyond = |run| rounding::needs_more(case, run, &caps) == Some(true);
+    let ended = case.is_lane && status(case.record) == Status::CapEvents;
+    (ended && (ROUNDED_RUNS..MOST_RUNS).any(is_beyond)).then_some(Explanation::EngineCap)
 }
 
 /// Whether the reference from a start has more events in some period up to the record's last than lanes
