@@ -245,7 +245,8 @@ fn careful() -> bool {
         pressing_bound =
             derivative_bound(5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
     }
-    if tally.order == 2u && gap_terms[2] == 0.0 {
+    if tally.order == 2u && abs(gap_terms[2]) <= 0.5 * balance(here.gap_row, share, motion.q) {
+        gap_terms[2] = 0.0;
         tally.order = 3u;
     }
     let mark = next_mark();

@@ -11,7 +11,7 @@
 
 mod averaging;
 mod batch;
-mod constants;
+pub(crate) mod constants;
 mod device;
 mod guard;
 pub mod layout;

@@ -14,6 +14,7 @@ mod answer;
 mod case;
 mod explanation;
 mod lane_growth;
+mod lane_model;
 mod limits;
 mod reading;
 mod rounded;

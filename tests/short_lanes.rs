@@ -84,6 +84,29 @@ fn a_wall_is_met_however_short_the_stretch_beyond_it() {
     }
 }
 
+/// A plastic gap at rest on a wall whose load is about to change sign: two sums of what balances, of which one
+/// lets it go and the other presses it back, ten thousand times in a hundredth of a step.
+#[test]
+fn a_gap_at_rest_is_let_go_once() {
+    let plan = cell("balanced").plan();
+    for precision in Precision::ALL {
+        let record = lane(&plan, precision);
+        assert_eq!(classify(&record), Class::Undecided, "{precision:?}: {record:?}");
+        assert_eq!(explanation(&plan, record, precision), Err(()), "{precision:?}: {record:?}");
+    }
+}
+
+/// Supports and teeth so damped that a mode decays by all of the damping: a step of a radian of half of it left
+/// 4e-6 of that mode to the terms that single precision leaves out.
+#[test]
+fn damped_modes_are_summed_to_rounding() {
+    for cell in cells("damped", 2) {
+        let plan = cell.plan();
+        let record = lane(&plan, Precision::F32);
+        assert_eq!(explanation(&plan, record, Precision::F32), Err(()), "{record:?}");
+    }
+}
+
 /// Neutral motions with 900 elastic impacts in a period.
 #[test]
 fn rounding_at_many_impacts_is_no_chaos() {

@@ -84,6 +84,30 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// The same motion from here on as that of another oscillator, hardly different: what is on a wall stays on it.
+    pub(crate) fn onto<'g>(&self, flow: &'g Flow, law: Law) -> Trajectory<'g, N> {
+        let fresh: Trajectory<'g, N> = Trajectory::with_tangents(flow, law, self.state(), self.tangents());
+        let mut q = self.q;
+        if let Some((side, _)) = self.from_wall {
+            q[0] = flow.wall(side);
+        }
+        Trajectory {
+            mode: self.mode,
+            origin: self.origin,
+            from_wall: self.from_wall,
+            pending: self.pending,
+            q,
+            phasor: self.phasor,
+            clock: self.clock,
+            period: self.period,
+            log_scale: self.log_scale,
+            meshing_time: self.meshing_time,
+            near_grazing: self.near_grazing,
+            work: self.work,
+            ..fresh
+        }
+    }
+
     /// A trajectory from another state at phase 0, in the domain that this one is in.
     ///
     /// A state alone does not say whether a gap just short of a wall is free or in the dip

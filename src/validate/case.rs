@@ -5,10 +5,11 @@ use super::answer::{Answer, Bars};
 use super::explanation::ELSEWHERE;
 use nalgebra::{Matrix4, Vector4};
 
+use crate::classify::classify;
 use crate::flow::Flow;
 use crate::gpu::Precision;
-use crate::model::{GearPair, Law, State};
-use crate::orbit::{Budget, Measured, analyse_flow, measure};
+use crate::model::{GearPair, Law, Side, State};
+use crate::orbit::{Budget, Class, Measured, analyse_flow, measure};
 use crate::random::Random;
 use crate::record::Record;
 use crate::reference::{Stop, Trajectory};
@@ -154,8 +155,21 @@ impl<'a> Case<'a> {
     pub(super) fn standing(&self, on: State) -> Result<Trajectory<'_>, Stop> {
         match self.after(self.start, self.record.periods_run) {
             Ok(own) if self.apart(&on, &own.state()) < ELSEWHERE => Ok(own.at(on, [])),
-            _ => self.after(on, 0),
+            _ => self.in_dip(on).map_or_else(|| self.after(on, 0), Ok),
         }
+    }
+
+    /// The same in the dip at the start of meshing, if it is there that it comes back after the record's period.
+    fn in_dip(&self, on: State) -> Option<Trajectory<'_>> {
+        let Class::Periodic { period } = classify(self.record) else { return None };
+        // It is no faster than it began.
+        if self.flow.to_gap(on)[1].abs() > self.law.mesh_speed {
+            return None;
+        }
+        let starts = [None, Some(Side::Right), Some(Side::Left)]
+            .map(|side| Trajectory::meshing_from(&self.flow, self.law, on, side));
+        let [free, dips @ ..] = starts.map(|start| (self.unrest(&start, period), start));
+        dips.into_iter().find(|(unrest, _)| *unrest < ELSEWHERE && free.0 > ELSEWHERE).map(|(_, start)| start)
     }
 
     /// Where a motion is after `period` more periods.

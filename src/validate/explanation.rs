@@ -6,7 +6,7 @@
 
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION};
-use super::lane_growth::weak_chaos;
+use super::lane_growth::{rare_chaos, weak_chaos};
 use super::limits::{
     flip, held, is_shaken, is_spent, late, longer, rest, scattered, undecided_chaos, within_scatter,
 };
@@ -33,8 +33,10 @@ const SENSITIVE: f64 = 0.1;
 /// Starts within rounding from which a motion may meet its caps: chaos decides which does.
 const SCATTERED_STARTS: usize = 100;
 
-/// And motions that are rounded at every step.
+/// And motions that are rounded at every step; more of them where nothing else gives the record's answer: where
+/// the strobe cuts a flight is chance, and few cuts slow elastic impacts down so far that there are too many.
 const ROUNDED_RUNS: u64 = 8;
+const MOST_RUNS: u64 = 1000;
 
 /// Why a cell's record is not what the reference says within the same budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -128,7 +130,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 18] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 20] = [
         engine_cap,
         longer,
         other_attractor,
@@ -147,6 +149,8 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rounded_cycle,
         at_rest,
         scattered,
+        rare_chaos,
+        rare_cap,
     ];
     CHECKS.iter().find_map(|check| check(case))
 }
@@ -172,6 +176,14 @@ fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
         _ => false,
     };
     beyond.then_some(Explanation::EngineCap)
+}
+
+/// The same of many more motions that are rounded at every step.
+fn rare_cap(case: &Case<'_>) -> Option<Explanation> {
+    let caps = LaneSettings::default();
+    let is_beyond = |run| rounding::needs_more(case, run, &caps) == Some(true);
+    let ended = case.is_lane && status(case.record) == Status::CapEvents;
+    (ended && (ROUNDED_RUNS..MOST_RUNS).any(is_beyond)).then_some(Explanation::EngineCap)
 }
 
 /// Whether the reference from a start has more events in some period up to the record's last than lanes
@@ -204,11 +216,23 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
     let same = case.is_the_records(&answer)
         || read().is_some_and(|answer| case.is_the_records(&answer))
         || within_reach(case, from, &answer).is_some()
-        || unresolved(case, from, &answer) == Some(true);
+        || unresolved(case, from, &answer) == Some(true)
+        || read_rounded(case, from, &answer) == Some(true);
     same.then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
     })
+}
+
+/// Whether it is the record's cycle, read where every step rounds.
+fn read_rounded(case: &Case<'_>, from: State, answer: &Answer) -> Option<bool> {
+    let Class::Periodic { period } = answer.class else { return None };
+    let stands = case.standing(from).ok()?;
+    let is_another = answer.class == classify(case.record) && answer.word != case.truth.word;
+    if !is_another || case.unrest(&stands, period) > ELSEWHERE {
+        return None;
+    }
+    rounding::is_read_rounded(case, &stands, period, answer)
 }
 
 /// Whether the cycle has a multiple of the record's period, and lanes cannot tell it from the record's.
@@ -260,8 +284,9 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn bifurcation(case: &Case<'_>) -> Option<Explanation> {
-    let [exponent, _] = case.truth.exponent?;
-    let is_near = exponent.abs() * case.flow.period < NEAR_BIFURCATION;
+    let [exponent, error] = case.truth.exponent?;
+    // Of a motion that is on no cycle yet the average may be zero by chance.
+    let is_near = (exponent.abs() + error) * case.flow.period < NEAR_BIFURCATION;
     (is_near && recurs(case)? && has_its_averages(case)?).then_some(Explanation::Border)
 }
 

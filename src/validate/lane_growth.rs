@@ -8,10 +8,11 @@
 use super::answer::Answer;
 use super::case::Case;
 use super::explanation::Explanation;
+use super::lane_model::LaneModel;
 use super::rounded::{Rounded, counts};
 use super::states::unit_roundoff;
 use crate::classify::classify;
-use crate::gpu::{Averaging, Constants};
+use crate::gpu::Averaging;
 use crate::model::State;
 use crate::orbit::{CHAOS_ERRORS, Class};
 use crate::reference::{Stop, Trajectory};
@@ -23,16 +24,16 @@ const FRESH: [f64; 4] = [0.5; 4];
 const STARTS: usize = 64;
 const RUNS: u64 = 16;
 
+/// And where nothing else gives the record's answer: one or two of a hundred may do as a lane did.
+const MOST_RUNS: u64 = 1000;
+
 /// The record says chaotic where the reference, averaged in its own way, decides nothing.
 ///
 /// The reference's own motion, averaged as a lane would, gives the record's answer: neither had
 /// the periods to tell what is chaos in the end. Or one that starts within rounding does, or one
 /// that is rounded at every step: then what it met on the way was decided by rounding.
 pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
-    if !case.is_lane || (classify(case.record), case.truth.class) != (Class::Chaotic, Class::Undecided) {
-        return None;
-    }
-    let lane = AsLane::new(case)?;
+    let lane = AsLane::of_weak_chaos(case)?;
     let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
     if same(lane.answer(case.start)) {
         return Some(Explanation::UndecidedInBudget);
@@ -42,6 +43,14 @@ pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
         return Some(Explanation::Chaos);
     }
     (0..RUNS).map(|run| lane.rounded(run)).any(same).then_some(Explanation::BelowResolution)
+}
+
+/// The same of many more motions that are rounded at every step.
+pub(super) fn rare_chaos(case: &Case<'_>) -> Option<Explanation> {
+    let lane = AsLane::of_weak_chaos(case)?;
+    let same = |answer: Answer| is_the_records(case, &answer);
+    let mut runs = (RUNS..MOST_RUNS).filter_map(|run| lane.rounded(run));
+    runs.any(same).then_some(Explanation::BelowResolution)
 }
 
 /// Whether an average of few blocks is the record's, its standard error too.
@@ -82,7 +91,7 @@ impl Watched for Trajectory<'_, 1> {
     }
 }
 
-impl Watched for Rounded<'_, '_, 1> {
+impl Watched for Rounded<'_, 1> {
     fn advance(&mut self) -> Result<(), Stop> {
         self.advance_period(&mut ())
     }
@@ -97,7 +106,7 @@ impl Watched for Rounded<'_, '_, 1> {
     }
 
     fn counts(&self) -> [f64; 3] {
-        let [impacts, meshing_time] = counts(self.trajectory());
+        let [impacts, meshing_time] = Rounded::counts(self);
         [impacts, meshing_time, self.trajectory().work().events as f64]
     }
 }
@@ -108,28 +117,34 @@ const UNSURE: f64 = 3.0;
 /// What is the same for all motions of a cell.
 struct AsLane<'c, 'a> {
     case: &'c Case<'a>,
-    constants: Constants,
+    model: LaneModel,
     averaging: Averaging,
 }
 
 impl<'c, 'a> AsLane<'c, 'a> {
     fn new(case: &'c Case<'a>) -> Option<Self> {
-        let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+        let model = LaneModel::new(case)?;
         let averaging = Averaging::new(case.budget.periods(), case.budget.exponent_from());
-        Some(AsLane { case, constants, averaging })
+        Some(AsLane { case, model, averaging })
+    }
+
+    /// That of a record which is chaotic where the reference decides nothing.
+    fn of_weak_chaos(case: &'c Case<'a>) -> Option<Self> {
+        let classes = (classify(case.record), case.truth.class);
+        if case.is_lane && classes == (Class::Chaotic, Class::Undecided) { AsLane::new(case) } else { None }
     }
 
     /// The reference from `start`.
     fn answer(&self, start: State) -> Option<Answer> {
         let bare = self.case.after(start, self.averaging.growth_from).ok()?;
-        self.average(&mut bare.carrying([self.constants.to_state(FRESH)]))
+        self.average(&mut bare.carrying([self.model.constants.to_state(FRESH)]))
     }
 
     /// The same, rounded at every step of a lane as `seed` decides.
     fn rounded(&self, seed: u64) -> Option<Answer> {
-        let start = Trajectory::new(&self.case.flow, self.case.law, self.case.start);
-        let fresh = start.carrying([self.constants.to_state(FRESH)]);
-        let mut rounded = Rounded::new(fresh, &self.constants, self.case.precision, seed);
+        let start = Trajectory::new(&self.model.flow, self.model.law, self.model.start(self.case.start));
+        let fresh = start.carrying([self.model.constants.to_state(FRESH)]);
+        let mut rounded = Rounded::new(&fresh, &self.model, seed);
         for _ in 0..self.averaging.growth_from {
             rounded.advance_period(&mut ()).ok()?;
         }
@@ -140,10 +155,10 @@ impl<'c, 'a> AsLane<'c, 'a> {
     fn growth(&self, motion: &mut impl Watched) -> Result<f64, Stop> {
         motion.advance()?;
         let (u, log_scale) = motion.tangent();
-        let u = self.constants.to_lane(u);
+        let u = self.model.constants.to_lane(u);
         let length = u.iter().map(|x| x * x).sum::<f64>().sqrt();
         let next = if length > 0.0 { u.map(|x| x / length) } else { FRESH };
-        motion.set_tangent(self.constants.to_state(next));
+        motion.set_tangent(self.model.constants.to_state(next));
         Ok(length.max(f64::MIN_POSITIVE).ln() + log_scale)
     }
 

@@ -21,8 +21,8 @@ pub(super) struct Met {
 }
 
 impl Met {
-    /// The cycle, whose largest multiplier has this logarithm.
-    pub(super) fn answer(&self, case: &Case<'_>, log_radius: f64) -> Answer {
+    /// The cycle, whose largest multiplier has this logarithm and which is otherwise as `truth` says.
+    pub(super) fn answer(&self, case: &Case<'_>, truth: &Answer, log_radius: f64) -> Answer {
         let span = f64::from(self.period) * case.flow.period;
         let [impacts, meshing_time] = [0, 1].map(|i| self.counts[1][i] - self.counts[0][i]);
         let is_unsymmetric = impacts % 2.0 == 1.0 || self.period.is_multiple_of(2);
@@ -33,9 +33,9 @@ impl Met {
             impacts_per_period: Some(impacts / f64::from(self.period)),
             mesh_fraction: Some(meshing_time / span),
             // A cycle that is its own mirror image has an odd period, and every impact a twin.
-            symmetric: if is_unsymmetric { Some(false) } else { case.truth.symmetric },
+            symmetric: if is_unsymmetric { Some(false) } else { truth.symmetric },
             word: Some(Word::cyclic(&symbols)),
-            ..case.truth.clone()
+            ..truth.clone()
         }
     }
 }
@@ -57,7 +57,7 @@ impl Case<'_> {
         let (before, mut events) = (counts(&cycle), Vec::new());
         (0..period).try_for_each(|_| cycle.advance_period(&mut events)).ok()?;
         let met = Met { period, counts: [before, counts(&cycle)], events };
-        Some(met.answer(self, re.hypot(im).ln() + image.log_scale))
+        Some(met.answer(self, &self.truth, re.hypot(im).ln() + image.log_scale))
     }
 
     /// The same of a motion that has come from somewhere: all of it the first time around.
@@ -66,7 +66,7 @@ impl Case<'_> {
         let mut events = Vec::new();
         (0..period).try_for_each(|_| cycle.advance_period(&mut events)).ok()?;
         let met = Met { period, counts: [counts(motion), counts(&cycle)], events };
-        Some(met.answer(self, log_radius(cycle.tangents())? + cycle.log_scale()))
+        Some(met.answer(self, &self.truth, log_radius(cycle.tangents())? + cycle.log_scale()))
     }
 
     /// The cycle of `period` as a lane would have read it that took so many of Newton's steps: they, too, set

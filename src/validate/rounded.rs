@@ -2,62 +2,93 @@
 
 use super::answer::Answer;
 use super::case::Case;
+use super::lane_model::{LaneModel, in_precision};
 use super::reading::{Met, log_radius};
 use super::states::unit_roundoff;
-use crate::gpu::{Constants, Precision};
+use crate::flow::{DomainKind, Gap};
 use crate::model::{Side, State};
 use crate::random::Random;
-use crate::reference::{Observer, Stop, Trajectory};
+use crate::record::valid;
+use crate::reference::{EventKind, Happening, Observer, Stop, Trajectory};
 use crate::stability::UNIT;
 
 /// A step of less than this is part of one: it ends or begins at an event.
 const WHOLE: f64 = 1.0 - 1e-9;
 
-/// A motion whose state and tangent vectors, in lane units, are moved at each of a lane's steps and at
-/// every event by up to a unit roundoff of what was added up on the way there, evenly distributed:
+/// A motion of the oscillator that a lane's numbers describe ([`LaneModel`]), whose state and tangent vectors,
+/// in lane units, are moved at each of a lane's steps and at every event by up to a unit roundoff of what was
+/// added up on the way there, evenly distributed:
 ///
 /// ```text
 /// |d q_i| <= u (|q_i| + sum_j |m_ij s_ij p_j|),   p = (z, w, x2, v2, cos, sin, 1),
 /// ```
 ///
 /// with the lane's own propagator `1 + m` and `s` the share of a step that has passed, its square where
-/// an acceleration moves a displacement: every product and every sum is rounded once. The propagator's own
-/// numbers are rounded, too, in the same way at every step, those of accelerations on the way to an event,
-/// and `cos` and `sin`, taken from a table and turned to an event, go on from there step by step:
-/// `(fl(m) - m) p` and what they drift by are added besides.
-pub(super) struct Rounded<'f, 'c, const N: usize> {
-    trajectory: Trajectory<'f, N>,
-    constants: &'c Constants,
-    precision: Precision,
+/// an acceleration moves a displacement: every product and every sum is rounded once. What the rounded `m` of
+/// whole steps is more than the flow's own moves the motion besides, in the same way at every step, and so do
+/// `cos` and `sin`, which are taken from a table and turned to an event, and go on from there step by step.
+pub(super) struct Rounded<'m, const N: usize> {
+    trajectory: Trajectory<'m, N>,
+    model: &'m LaneModel,
     /// Whether the state is rounded, not the tangent vectors alone.
     state: bool,
     unit: f64,
     random: Random,
+    /// Tangent vectors round in their own way, so that a motion is the same with and without them.
+    of_tangents: Random,
+    /// More impacts than this end the motion: nobody wants to know how it goes on.
+    most_impacts: u64,
+    /// Time spent meshing beyond what the trajectory knows of.
+    meshing_time: f64,
     /// Logarithm of the factor that was taken out of the tangent vectors.
     log_scale: f64,
     /// `cos` and `sin` of the forcing phase as the lane has them.
     phasor: [f64; 2],
+    /// And as they are.
+    exact: [f64; 2],
 }
 
-impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
+/// Tells of events, and keeps the last.
+struct Last<'o, O>(&'o mut O, Option<Happening>);
+
+impl<O: Observer> Observer for Last<'_, O> {
+    fn event(&mut self, happening: &Happening) {
+        self.0.event(happening);
+        self.1 = Some(*happening);
+    }
+}
+
+/// What a stretch of motion begins with, in lane units, the gap measured as the domain does.
+struct Begun<const N: usize> {
+    domain: usize,
+    q: [f64; 4],
+    phasor: [f64; 2],
+    drift: [f64; 2],
+    tangents: [[f64; 4]; N],
+}
+
+impl<'m, const N: usize> Rounded<'m, N> {
     /// Goes on from a trajectory at phase 0; `seed` decides every rounding.
-    pub(super) fn new(
-        trajectory: Trajectory<'f, N>,
-        constants: &'c Constants,
-        precision: Precision,
-        seed: u64,
-    ) -> Self {
-        let random = Random::new((seed << 32) + u64::from(constants.steps));
+    pub(super) fn new(trajectory: &Trajectory<'_, N>, model: &'m LaneModel, seed: u64) -> Self {
+        let seed = (seed << 32) + u64::from(model.constants.steps);
         Rounded {
-            trajectory,
-            constants,
-            precision,
+            trajectory: trajectory.onto(&model.flow, model.law),
+            model,
             state: true,
-            unit: unit_roundoff(precision),
-            random,
+            unit: unit_roundoff(model.precision),
+            random: Random::new(seed),
+            of_tangents: Random::new(!seed),
+            most_impacts: u64::MAX,
+            meshing_time: 0.0,
             log_scale: 0.0,
             phasor: [1.0, 0.0],
+            exact: [1.0, 0.0],
         }
+    }
+
+    /// The same, but not beyond so many impacts.
+    pub(super) fn at_most(self, impacts: u64) -> Self {
+        Rounded { most_impacts: impacts, ..self }
     }
 
     /// The same with the tangent vectors alone rounded.
@@ -68,19 +99,28 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
     /// One forcing period.
     pub(super) fn advance_period(&mut self, met: &mut impl Observer) -> Result<(), Stop> {
         let period = self.trajectory.flow().period;
+        let lane = &self.model.constants.flow;
         let mut then = 0.0;
         while then < period {
             // As a lane does: from the last event in steps of the domain that governs the motion.
-            let domain = self.domain();
-            let step = self.constants.flow.h * self.constants.flow.domains[domain].share;
+            let begun = self.begin();
+            let step = lane.h * lane.domains[begun.domain].share;
             let until = if then + (2.0 - WHOLE) * step < period { then + step } else { period };
-            self.trajectory.advance_to_event(until, met)?;
+            let mut met = Last(&mut *met, None);
+            self.trajectory.advance_to_event(until, &mut met)?;
+            let last = met.1;
+            if self.trajectory.work().impacts > self.most_impacts {
+                return Err(Stop::CapEvents);
+            }
             let now = self.trajectory.time_in_period();
-            self.round(domain, now, (now - then) / step);
+            self.round(&begun, now, (now - then) / step);
+            if let Some(event) = last {
+                self.round_event(&event, step);
+            }
             then = now;
         }
         self.trajectory.advance_period(met)?;
-        self.phasor = [1.0, 0.0];
+        (self.phasor, self.exact) = ([1.0, 0.0], [1.0, 0.0]);
         Ok(())
     }
 
@@ -92,76 +132,159 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
         }
     }
 
+    fn wall(&self, domain: usize) -> f64 {
+        let [right, left] = self.model.flow.walls;
+        [0.0, right, left][domain]
+    }
+
+    fn begin(&self) -> Begun<N> {
+        let domain = self.domain();
+        let constants = &self.model.constants;
+        let mut q = constants.to_lane(self.trajectory.state());
+        q[0] -= self.wall(domain);
+        let phasor = self.exact;
+        let drift = [self.phasor[0] - phasor[0], self.phasor[1] - phasor[1]];
+        let tangents =
+            if N > 0 { self.trajectory.tangents().map(|u| constants.to_lane(u)) } else { [[0.0; 4]; N] };
+        Begun { domain, q, phasor, drift, tangents }
+    }
+
     /// Rounds at a time since phase 0, after a share of a domain's step.
-    fn round(&mut self, domain: usize, now: f64, passed: f64) {
-        let flow = &self.constants.flow;
-        let wall = |domain: usize| [0.0, flow.walls[0], flow.walls[1]][domain];
-        let (from_wall, to_wall) = (wall(domain), wall(self.domain()));
-        let domain = &flow.domains[domain];
+    fn round(&mut self, begun: &Begun<N>, now: f64, passed: f64) {
+        let LaneModel { constants, precision, excess, .. } = self.model;
+        let (from_wall, to_wall) = (self.wall(begun.domain), self.wall(self.domain()));
+        let (domain, excess) = (&constants.flow.domains[begun.domain], &excess[begun.domain]);
         // Rates per step of the domain.
         let scales = [1.0, domain.share, 1.0, domain.share];
-        let is_single = self.precision == Precision::F32;
-        let rounded = |x: f64| if is_single { f64::from(x as f32) } else { x };
-        let error = |x: f64| rounded(x) - x;
+        let rounded = |x: f64| in_precision(*precision, x);
         let unit = self.unit;
-        let random = &mut self.random;
+        let (random, of_tangents) = (&mut self.random, &mut self.of_tangents);
         let mut even = || unit * (2.0 * random.unit() - 1.0);
-        let steps = now / flow.h;
-        let (sin, cos) = (steps * flow.domains[0].angle).sin_cos();
-        self.phasor = if passed < WHOLE {
-            // The table, and an angle addition.
-            let (turn_sin, turn_cos) = (steps.fract() * flow.domains[0].angle).sin_cos();
-            let sizes = |x: f64, other: f64| (2.0 - turn_cos) * x.abs() + (turn_sin * other).abs();
-            [rounded(cos + even() * sizes(cos, sin)), rounded(sin + even() * sizes(sin, cos))]
-        } else {
+        let is_whole = passed >= WHOLE;
+        let (steps, free) = (now / constants.flow.h, &constants.flow.domains[0]);
+        let (sin, cos) = (steps * free.angle).sin_cos();
+        self.exact = [cos, sin];
+        self.phasor = if is_whole {
             // Three shears, as lanes do it.
             let [half, sine] = [domain.turn_half, domain.turn_sin].map(rounded);
             let sheared = rounded(self.phasor[0] - rounded(half * self.phasor[1]));
             let turned = rounded(self.phasor[1] + rounded(sine * sheared));
             [rounded(sheared - rounded(half * turned)), turned]
+        } else {
+            // The table, and an angle addition.
+            let (turn_sin, turn_cos) = (steps.fract() * free.angle).sin_cos();
+            let sizes = |x: f64, other: f64| (2.0 - turn_cos) * x.abs() + (turn_sin * other).abs();
+            [rounded(cos + even() * sizes(cos, sin)), rounded(sin + even() * sizes(sin, cos))]
         };
-        let drift = [self.phasor[0] - cos, self.phasor[1] - sin];
-        // What is added up for an entry, in sizes, and what the propagator's own rounding adds.
-        let added = |q: &[f64; 4], forced: [f64; 3], i: usize| {
+        let drift = if is_whole { begun.drift } else { [self.phasor[0] - cos, self.phasor[1] - sin] };
+        // Accelerations move a displacement by the square of the time.
+        let share = |i: usize, j: usize| if i % 2 == 1 || j == i + 1 { passed } else { passed * passed };
+        // What is added up for an entry, in sizes, and what the lane's numbers add to it.
+        let sizes = |q: &[f64; 4], forced: [f64; 3], i: usize| {
             let row = &domain.step[7 * i..7 * i + 7];
-            // Accelerations move a displacement by the square of the time.
-            let share = |j: usize| if i % 2 == 1 || j == i + 1 { passed } else { passed * passed };
-            let times: [f64; 7] =
-                std::array::from_fn(|j| share(j) * if j < 4 { scales[j] * q[j] } else { forced[j - 4] });
-            let sizes: f64 = (0..7).map(|j| (row[j] * times[j]).abs()).sum();
-            let drifted = forced[2] * (share(4) * row[4] * drift[0] + share(5) * row[5] * drift[1]);
-            let own = if passed < WHOLE {
-                // A careful pass has its numbers from the accelerations.
-                let pull = if i < 2 { &domain.gap_row } else { &domain.x_row };
-                let along = [q[0], scales[1] * q[1], q[2], scales[3] * q[3], forced[0], forced[2]];
-                let acceleration: f64 = pull.iter().zip(along).map(|(x, of)| error(*x) * of).sum();
-                acceleration * if i % 2 == 1 { passed } else { 0.5 * passed * passed }
-            } else {
-                (0..7).map(|j| error(row[j]) * times[j]).sum()
-            };
-            let errors = drifted + own;
-            (sizes / scales[i], errors / scales[i])
+            let sizes =
+                (0..7).map(|j| row[j] * share(i, j) * if j < 4 { scales[j] * q[j] } else { forced[j - 4] });
+            sizes.map(f64::abs).sum::<f64>() / scales[i]
+        };
+        let beyond = |q: &[f64; 4], forced: [f64; 3], i: usize| {
+            let row = &domain.step[7 * i..7 * i + 7];
+            let drifted = forced[2] * (share(i, 4) * row[4] * drift[0] + share(i, 5) * row[5] * drift[1]);
+            let excess = |j: usize| excess[7 * i + j] * if j < 4 { scales[j] * q[j] } else { forced[j - 4] };
+            let own = if is_whole { (0..7).map(excess).sum() } else { 0.0 };
+            (drifted + own) / scales[i]
         };
         if self.state {
-            let mut q = self.constants.to_lane(self.trajectory.state());
+            let mut q = constants.to_lane(self.trajectory.state());
             let mut along = q;
             along[0] -= from_wall;
             // What it is once the next domain measures the gap.
             q[0] -= to_wall;
+            let [cos_then, sin_then] = begun.phasor;
             self.trajectory.shake(std::array::from_fn(|i| {
-                let (sizes, errors) = added(&along, [cos, sin, 1.0], i);
-                let by = even() * (q[i].abs() + sizes) + errors;
+                let sizes = q[i].abs() + sizes(&along, [cos, sin, 1.0], i);
+                let by = even() * sizes + beyond(&begun.q, [cos_then, sin_then, 1.0], i);
                 if q[i] == 0.0 { 0.0 } else { by / q[i] }
             }));
         }
-        let tangents = self.trajectory.tangents().map(|u| self.constants.to_lane(u));
+        if N == 0 {
+            return;
+        }
+        let mut even = || unit * (2.0 * of_tangents.unit() - 1.0);
+        let tangents = self.trajectory.tangents().map(|u| constants.to_lane(u));
         self.log_scale += self.trajectory.log_scale();
-        self.trajectory.set_tangents(tangents.map(|u| {
-            self.constants.to_state(std::array::from_fn(|i| {
-                let (sizes, errors) = added(&u, [0.0; 3], i);
-                u[i] + even() * (u[i].abs() + sizes) + errors
+        self.trajectory.set_tangents(std::array::from_fn(|n| {
+            let u = tangents[n];
+            constants.to_state(std::array::from_fn(|i| {
+                let sizes = u[i].abs() + sizes(&u, [0.0; 3], i);
+                u[i] + even() * sizes + beyond(&begun.tangents[n], [0.0; 3], i)
             }))
         }));
+    }
+
+    /// What accelerations at an event round by: they tell when pressing ceases inside a dip, which is the later the
+    /// less it changes then, and how tangent vectors jump.
+    fn round_event(&mut self, event: &Happening, step: f64) {
+        let Happening { side, before, after, .. } = *event;
+        let flow = &self.model.flow;
+        let meshing = DomainKind::Meshing(side);
+        let [from, to] = match event.kind {
+            EventKind::Impact => [DomainKind::Free; 2],
+            EventKind::MeshStart => [DomainKind::Free, meshing],
+            EventKind::MeshEnd => [meshing, DomainKind::Free],
+        };
+        let (unit, phasor) = (self.unit, self.exact);
+        let even = |random: &mut Random| unit * (2.0 * random.unit() - 1.0);
+        let [of_gap, of_x] = self.sizes(from, &before);
+        let is_dip = event.kind == EventKind::MeshEnd && before[0] != flow.wall(side);
+        if is_dip && self.state {
+            let [_, rate, _] = flow.domain(from).acceleration_rates(&before, &phasor);
+            let late = (even(&mut self.random) * of_gap / rate.abs()).clamp(-step, step);
+            let fields = [from, to].map(|kind| flow.domain(kind).field(&before, &phasor));
+            let q = flow.to_gap(self.trajectory.state());
+            let share =
+                |i: usize| if q[i] == 0.0 { 0.0 } else { late * (fields[0][i] - fields[1][i]) / q[i] };
+            self.trajectory.shake([0.0, share(1), 0.0, share(3)]);
+            self.meshing_time += late;
+        }
+        if N == 0 || is_dip || after[1] == 0.0 {
+            return;
+        }
+        let kept = after[1] / before[1];
+        let [of_gap_after, of_x_after] = self.sizes(to, &after);
+        let errors = [
+            0.0,
+            of_gap_after + kept.abs() * of_gap,
+            after[3].abs() + before[3].abs(),
+            of_x_after + of_x + flow.kick.abs() * (1.0 - kept) * of_gap,
+        ];
+        self.log_scale += self.trajectory.log_scale();
+        let random = &mut self.of_tangents;
+        self.trajectory.set_tangents(self.trajectory.tangents().map(|u| {
+            let u = flow.to_gap(u);
+            let along = u[0] / after[1];
+            flow.to_state(std::array::from_fn(|i| u[i] + even(random) * errors[i] * along))
+        }));
+    }
+
+    /// What is added up for the accelerations of the gap and of `x2`.
+    fn sizes(&self, kind: DomainKind, q: &Gap) -> [f64; 2] {
+        let domain = match kind {
+            DomainKind::Free => 0,
+            DomainKind::Meshing(Side::Right) => 1,
+            DomainKind::Meshing(Side::Left) => 2,
+        };
+        let lane = &self.model.constants.flow;
+        let of = &lane.domains[domain];
+        let h = lane.h * of.share;
+        let along = [q[0] - self.wall(domain), h * q[1], q[2], h * q[3], self.exact[0], 1.0];
+        [of.gap_row, of.x_row]
+            .map(|row| row.iter().zip(along).map(|(x, of)| (x * of).abs()).sum::<f64>() / (h * h))
+    }
+
+    /// Impacts and meshing time so far.
+    pub(super) fn counts(&self) -> [f64; 2] {
+        let [impacts, meshing_time] = counts(&self.trajectory);
+        [impacts, meshing_time + self.meshing_time]
     }
 
     /// Tangent vectors, but for the exponential of the logarithm that is returned with them.
@@ -176,7 +299,7 @@ impl<'f, 'c, const N: usize> Rounded<'f, 'c, N> {
     }
 
     /// The trajectory as it stands.
-    pub(super) fn trajectory(&self) -> &Trajectory<'f, N> {
+    pub(super) fn trajectory(&self) -> &Trajectory<'m, N> {
         &self.trajectory
     }
 }
@@ -186,18 +309,36 @@ pub(super) fn counts<const N: usize>(trajectory: &Trajectory<'_, N>) -> [f64; 2]
     [trajectory.work().impacts as f64, trajectory.meshing_time()]
 }
 
-/// A cycle of `period` as a lane would read it from where a motion stands.
+/// A cycle of `period` as a lane would read it from where a motion stands, but for its exponent; none if it
+/// has more impacts than the record says.
 pub(super) fn read_cycle(
     case: &Case<'_>,
-    constants: &Constants,
+    model: &LaneModel,
+    stands: &Trajectory<'_>,
+    (period, truth): (u32, &Answer),
+    seed: u64,
+) -> Option<Answer> {
+    let mut most = u64::MAX;
+    if case.record.valid & valid::IMPACTS != 0 {
+        let impacts = case.record.impacts_per_period * f64::from(period);
+        most = stands.work().impacts + impacts.round() as u64;
+    }
+    let mut rounded = Rounded::new(stands, model, seed).at_most(most);
+    let mut events = Vec::new();
+    (0..period).try_for_each(|_| rounded.advance_period(&mut events)).ok()?;
+    let met = Met { period, counts: [counts(stands), rounded.counts()], events };
+    Some(Answer { exponent: None, ..met.answer(case, truth, 0.0) })
+}
+
+/// And its exponent.
+pub(super) fn read_exponent(
+    model: &LaneModel,
     stands: &Trajectory<'_>,
     period: u32,
     seed: u64,
-) -> Option<Answer> {
-    let mut rounded = Rounded::new(stands.carrying(UNIT), constants, case.precision, seed);
-    let mut events = Vec::new();
-    (0..period).try_for_each(|_| rounded.advance_period(&mut events)).ok()?;
+) -> Option<f64> {
+    let mut rounded = Rounded::new(&stands.carrying(UNIT), model, seed);
+    (0..period).try_for_each(|_| rounded.advance_period(&mut ())).ok()?;
     let (tangents, log_scale) = rounded.tangents();
-    let met = Met { period, counts: [counts(stands), counts(rounded.trajectory())], events };
-    Some(met.answer(case, log_radius(tangents)? + log_scale))
+    Some((log_radius(tangents)? + log_scale) / (f64::from(period) * model.flow.period))
 }

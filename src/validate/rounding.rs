@@ -2,10 +2,11 @@
 
 use super::answer::{Answer, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
-use super::explanation::{Explanation, strobe};
-use super::rounded::{Rounded, read_cycle};
+use super::explanation::{ELSEWHERE, Explanation, strobe};
+use super::lane_model::LaneModel;
+use super::rounded::{Rounded, read_cycle, read_exponent};
 use crate::classify::{classify, status};
-use crate::gpu::{Constants, LaneSettings};
+use crate::gpu::LaneSettings;
 use crate::model::State;
 use crate::orbit::{Class, Status};
 use crate::reference::Trajectory;
@@ -27,11 +28,11 @@ pub(super) fn rounded_cycle(case: &Case<'_>) -> Option<Explanation> {
     }
     let stands = case.standing(strobe(case)?).ok()?;
     let Class::Periodic { period } = case.truth.class else { return None };
+    if case.unrest(&stands, period) > ELSEWHERE {
+        return None;
+    }
     is_read_rounded(case, &stands, period, &case.truth)?.then_some(Explanation::BelowResolution)
 }
-
-/// A number of an answer.
-type Value = fn(&Answer) -> Option<f64>;
 
 /// Whether the record's cycle is the one that `truth` describes, read `lead` periods after where a motion
 /// stands where every step rounds.
@@ -45,35 +46,67 @@ pub(super) fn is_read_rounded(
     if !case.is_lane {
         return None;
     }
-    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
-    let read = |run: u64| {
-        let mut before = Rounded::new(stands.clone(), &constants, case.precision, run);
-        (0..lead).try_for_each(|_| before.advance_period(&mut ())).ok()?;
-        read_cycle(case, &constants, before.trajectory(), period, !run)
-    };
-    let claims = |answer: &Answer| {
-        let exponent = Some([case.record.lyapunov, 0.0]);
-        let mesh_fraction = Some(case.record.mesh_fraction);
-        case.is_the_records(&Answer { exponent, mesh_fraction, ..answer.clone() })
-    };
+    let model = LaneModel::new(case)?;
     let compared = truth.compare(case.record, &case.bars);
     let agrees = |field: Field| compared.iter().all(|(of, differs)| *of != field || differs.is_none());
-    let values: [(bool, f64, Value); 2] = [
-        (agrees(Field::Exponent), case.record.lyapunov, |answer| answer.exponent.map(|[value, _]| value)),
-        (agrees(Field::Mesh), case.record.mesh_fraction, |answer| answer.mesh_fraction),
-    ];
-    // Whether something at most as large was read, and something at least as large.
-    let mut lies_above =
-        values.map(|(agrees, ours, of)| agrees || of(truth).is_some_and(|value| value <= ours));
-    let mut lies_below =
-        values.map(|(agrees, ours, of)| agrees || of(truth).is_some_and(|value| value >= ours));
-    Some((0..RUNS).filter_map(read).filter(claims).any(|answer| {
-        for (i, (_, ours, of)) in values.into_iter().enumerate() {
-            lies_above[i] |= of(&answer).is_some_and(|value| value <= ours);
-            lies_below[i] |= of(&answer).is_some_and(|value| value >= ours);
+    let mut exponent =
+        Between::new(agrees(Field::Exponent), case.record.lyapunov, truth.exponent.map(|[value, _]| value));
+    let mut mesh = Between::new(agrees(Field::Mesh), case.record.mesh_fraction, truth.mesh_fraction);
+    for run in 0..RUNS {
+        let mut before = Rounded::new(stands, &model, run);
+        if (0..lead).try_for_each(|_| before.advance_period(&mut ())).is_err() {
+            continue;
         }
-        lies_above == [true; 2] && lies_below == [true; 2]
-    }))
+        let before = before.trajectory();
+        let Some(answer) = read_cycle(case, &model, before, (period, truth), !run) else { continue };
+        let claimed = Answer {
+            exponent: Some([case.record.lyapunov, 0.0]),
+            mesh_fraction: Some(case.record.mesh_fraction),
+            ..answer.clone()
+        };
+        if !case.is_the_records(&claimed) {
+            continue;
+        }
+        // Four tangent vectors are most of the work.
+        let read = if exponent.is_open() {
+            read_exponent(&model, before, period, !run)
+        } else {
+            Some(case.record.lyapunov)
+        };
+        // Neutral as it may be, a cycle has multipliers.
+        let Some(value) = read else { continue };
+        exponent.meets(value);
+        answer.mesh_fraction.into_iter().for_each(|value| mesh.meets(value));
+        if !exponent.is_open() && !mesh.is_open() {
+            return Some(true);
+        }
+    }
+    Some(false)
+}
+
+/// Whether a number of the record lies between those that are read.
+struct Between {
+    ours: f64,
+    lies_above: bool,
+    lies_below: bool,
+}
+
+impl Between {
+    /// It does if it is what was first read, within the bars.
+    fn new(agrees: bool, ours: f64, first: Option<f64>) -> Between {
+        let mut between = Between { ours, lies_above: agrees, lies_below: agrees };
+        first.into_iter().for_each(|value| between.meets(value));
+        between
+    }
+
+    fn meets(&mut self, value: f64) {
+        self.lies_above |= value <= self.ours;
+        self.lies_below |= value >= self.ours;
+    }
+
+    fn is_open(&self) -> bool {
+        !(self.lies_above && self.lies_below)
+    }
 }
 
 /// How far rounding at every step takes a motion from its `image` after `period` periods, relative to its
@@ -84,9 +117,9 @@ pub(super) fn moved_by_rounding(
     image: &State,
     period: u32,
 ) -> Option<f64> {
-    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let model = LaneModel::new(case)?;
     let moved = |run| {
-        let mut motion = Rounded::new(stands.clone(), &constants, case.precision, run);
+        let mut motion = Rounded::new(stands, &model, run);
         (0..period).try_for_each(|_| motion.advance_period(&mut ())).ok()?;
         Some(case.apart(image, &motion.trajectory().state()))
     };
@@ -138,9 +171,9 @@ pub(super) fn at_rest(case: &Case<'_>) -> Option<Explanation> {
 /// Whether a motion of the cell that is rounded as a lane is has more events in some period up to the
 /// record's last than lanes may have.
 pub(super) fn needs_more(case: &Case<'_>, seed: u64, caps: &LaneSettings) -> Option<bool> {
-    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
-    let start: Trajectory<'_> = Trajectory::new(&case.flow, case.law, case.start);
-    let mut rounded = Rounded::new(start, &constants, case.precision, seed);
+    let model = LaneModel::new(case)?;
+    let start: Trajectory<'_> = Trajectory::new(&model.flow, model.law, model.start(case.start));
+    let mut rounded = Rounded::new(&start, &model, seed);
     for _ in 0..=case.record.periods_run {
         let before = rounded.trajectory().work().events;
         let ended = rounded.advance_period(&mut ());

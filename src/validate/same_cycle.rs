@@ -4,6 +4,7 @@
 use super::answer::{Answer, Difference, Field};
 use super::case::{Case, LANE_RESOLUTION, rounding};
 use super::explanation::{ELSEWHERE, Explanation, strobe};
+use super::lane_model::LaneModel;
 use super::reading::log_radius;
 use super::rounded::Rounded;
 use super::states::{ROUNDINGS_PER_STEP, unit_roundoff};
@@ -193,9 +194,9 @@ fn rounded_exponents(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> O
         }
         Some((log_radius(cycle.tangents())? + log_scale) / span)
     };
-    let constants = Constants::new(&case.pair.oscillator().ok()?, None)?;
+    let model = LaneModel::of_tangents(case)?;
     let at_every_step = |run| {
-        let mut cycle = Rounded::new(stands.carrying(UNIT), &constants, case.precision, run).of_tangents();
+        let mut cycle = Rounded::new(&stands.carrying(UNIT), &model, run).of_tangents();
         (0..period).try_for_each(|_| cycle.advance_period(&mut ())).ok()?;
         let (tangents, log_scale) = cycle.tangents();
         Some((log_radius(tangents)? + log_scale) / span)

@@ -64,7 +64,7 @@ fn is_read_on_the_way(case: &Case<'_>, period: u32) -> bool {
 /// `period` close by: one that neither attracts nor repels, as that of a free body, is never decided.
 fn stays(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -> bool {
     let mut ahead = stands.clone();
-    let rests = (0..STAYING_PERIODS).all(|_| ahead.advance_period(&mut ()).is_ok());
+    let rests = (0..STAYING_PERIODS.next_multiple_of(period)).all(|_| ahead.advance_period(&mut ()).is_ok());
     let [here, there] = [stands.state(), ahead.state()];
     rests && case.unrest(&ahead, period) < LANE_RESOLUTION && apart(case, &here, &there) < ELSEWHERE
 }

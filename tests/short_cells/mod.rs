@@ -1,5 +1,7 @@
 //! Random cells of 64 periods, and what lanes say of them. The cells are rows of tests/data/short_cells.csv.
 
+use std::sync::Mutex;
+
 use rattlemap::engine::{self, Engine};
 use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
 use rattlemap::model::{GearPair, State};
@@ -66,12 +68,25 @@ impl Cell {
     }
 }
 
+/// Devices that nobody uses: to compile their shaders takes longer than to run most lanes.
+static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
+
+fn device(precision: Precision) -> Gpu {
+    let mut idle = IDLE.lock().unwrap();
+    let found = idle.iter().position(|gpu| gpu.precision() == precision).map(|i| idle.swap_remove(i));
+    drop(idle);
+    found.unwrap_or_else(|| pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap())
+}
+
 /// What lanes say of the first cell of a plan.
 pub(crate) fn lane(plan: &Plan, precision: Precision) -> Record {
-    let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+    let device = device(precision);
     let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, device)).unwrap()));
     let batch = Schedule::new(plan).batch(plan, 0, plan.cell_count());
     let records = pollster::block_on(engine.run(&batch)).unwrap();
+    if let Engine::Gpu(gpu) = engine {
+        IDLE.lock().unwrap().push(gpu.into_device());
+    }
     batch.cells.iter().zip(records).find(|(cell, _)| cell.id == 0).unwrap().1
 }
 
