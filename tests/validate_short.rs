@@ -227,6 +227,7 @@ fn a_multiple_of_a_period_is_rounding_or_a_fault() {
 /// way to every event decides.
 #[test]
 fn rounding_at_events_moves_averages_so_far_and_no_farther() {
+    let mut decided = 0;
     for cell in cells("turned", 2) {
         let plan = cell.plan();
         let record = lane(&plan, Precision::F32);
@@ -235,6 +236,7 @@ fn rounding_at_events_moves_averages_so_far_and_no_farther() {
             assert_eq!(why, Ok(Some(Explanation::UndecidedInBudget)), "{record:?}");
             continue;
         }
+        decided += 1;
         assert!(matches!(why, Err(()) | Ok(Some(Explanation::BelowResolution))), "{why:?}: {record:?}");
         let planted: [(&str, Spoil); 4] = [
             ("meshing", |record| record.mesh_fraction += 0.01),
@@ -244,6 +246,7 @@ fn rounding_at_events_moves_averages_so_far_and_no_farther() {
         ];
         stays_unexplained(&plan, record, Precision::F32, &planted);
     }
+    assert!(decided > 0);
 }
 
 /// What is amplified for 30 periods are a lane's own numbers, the share of an impulse above all, the same at every

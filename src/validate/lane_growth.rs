@@ -106,7 +106,7 @@ impl Watched for Rounded<'_, 1> {
     }
 
     fn counts(&self) -> [f64; 3] {
-        let [impacts, meshing_time] = Rounded::counts(self);
+        let [impacts, meshing_time] = counts(self.trajectory());
         [impacts, meshing_time, self.trajectory().work().events as f64]
     }
 }

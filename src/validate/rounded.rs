@@ -5,11 +5,10 @@ use super::case::Case;
 use super::lane_model::{LaneModel, in_precision};
 use super::reading::{Met, log_radius};
 use super::states::unit_roundoff;
-use crate::flow::{DomainKind, Gap};
 use crate::model::{Side, State};
 use crate::random::Random;
 use crate::record::valid;
-use crate::reference::{EventKind, Happening, Observer, Stop, Trajectory};
+use crate::reference::{Observer, Stop, Trajectory};
 use crate::stability::UNIT;
 
 /// A step of less than this is part of one: it ends or begins at an event.
@@ -38,24 +37,12 @@ pub(super) struct Rounded<'m, const N: usize> {
     of_tangents: Random,
     /// More impacts than this end the motion: nobody wants to know how it goes on.
     most_impacts: u64,
-    /// Time spent meshing beyond what the trajectory knows of.
-    meshing_time: f64,
     /// Logarithm of the factor that was taken out of the tangent vectors.
     log_scale: f64,
     /// `cos` and `sin` of the forcing phase as the lane has them.
     phasor: [f64; 2],
     /// And as they are.
     exact: [f64; 2],
-}
-
-/// Tells of events, and keeps the last.
-struct Last<'o, O>(&'o mut O, Option<Happening>);
-
-impl<O: Observer> Observer for Last<'_, O> {
-    fn event(&mut self, happening: &Happening) {
-        self.0.event(happening);
-        self.1 = Some(*happening);
-    }
 }
 
 /// What a stretch of motion begins with, in lane units, the gap measured as the domain does.
@@ -79,7 +66,6 @@ impl<'m, const N: usize> Rounded<'m, N> {
             random: Random::new(seed),
             of_tangents: Random::new(!seed),
             most_impacts: u64::MAX,
-            meshing_time: 0.0,
             log_scale: 0.0,
             phasor: [1.0, 0.0],
             exact: [1.0, 0.0],
@@ -106,17 +92,12 @@ impl<'m, const N: usize> Rounded<'m, N> {
             let begun = self.begin();
             let step = lane.h * lane.domains[begun.domain].share;
             let until = if then + (2.0 - WHOLE) * step < period { then + step } else { period };
-            let mut met = Last(&mut *met, None);
-            self.trajectory.advance_to_event(until, &mut met)?;
-            let last = met.1;
+            self.trajectory.advance_to_event(until, met)?;
             if self.trajectory.work().impacts > self.most_impacts {
                 return Err(Stop::CapEvents);
             }
             let now = self.trajectory.time_in_period();
             self.round(&begun, now, (now - then) / step);
-            if let Some(event) = last {
-                self.round_event(&event, step);
-            }
             then = now;
         }
         self.trajectory.advance_period(met)?;
@@ -221,72 +202,6 @@ impl<'m, const N: usize> Rounded<'m, N> {
         }));
     }
 
-    /// What accelerations at an event round by: they tell when pressing ceases inside a dip, which is the later the
-    /// less it changes then, and how tangent vectors jump.
-    fn round_event(&mut self, event: &Happening, step: f64) {
-        let Happening { side, before, after, .. } = *event;
-        let flow = &self.model.flow;
-        let meshing = DomainKind::Meshing(side);
-        let [from, to] = match event.kind {
-            EventKind::Impact => [DomainKind::Free; 2],
-            EventKind::MeshStart => [DomainKind::Free, meshing],
-            EventKind::MeshEnd => [meshing, DomainKind::Free],
-        };
-        let (unit, phasor) = (self.unit, self.exact);
-        let even = |random: &mut Random| unit * (2.0 * random.unit() - 1.0);
-        let [of_gap, of_x] = self.sizes(from, &before);
-        let is_dip = event.kind == EventKind::MeshEnd && before[0] != flow.wall(side);
-        if is_dip && self.state {
-            let [_, rate, _] = flow.domain(from).acceleration_rates(&before, &phasor);
-            let late = (even(&mut self.random) * of_gap / rate.abs()).clamp(-step, step);
-            let fields = [from, to].map(|kind| flow.domain(kind).field(&before, &phasor));
-            let q = flow.to_gap(self.trajectory.state());
-            let share =
-                |i: usize| if q[i] == 0.0 { 0.0 } else { late * (fields[0][i] - fields[1][i]) / q[i] };
-            self.trajectory.shake([0.0, share(1), 0.0, share(3)]);
-            self.meshing_time += late;
-        }
-        if N == 0 || is_dip || after[1] == 0.0 {
-            return;
-        }
-        let kept = after[1] / before[1];
-        let [of_gap_after, of_x_after] = self.sizes(to, &after);
-        let errors = [
-            0.0,
-            of_gap_after + kept.abs() * of_gap,
-            after[3].abs() + before[3].abs(),
-            of_x_after + of_x + flow.kick.abs() * (1.0 - kept) * of_gap,
-        ];
-        self.log_scale += self.trajectory.log_scale();
-        let random = &mut self.of_tangents;
-        self.trajectory.set_tangents(self.trajectory.tangents().map(|u| {
-            let u = flow.to_gap(u);
-            let along = u[0] / after[1];
-            flow.to_state(std::array::from_fn(|i| u[i] + even(random) * errors[i] * along))
-        }));
-    }
-
-    /// What is added up for the accelerations of the gap and of `x2`.
-    fn sizes(&self, kind: DomainKind, q: &Gap) -> [f64; 2] {
-        let domain = match kind {
-            DomainKind::Free => 0,
-            DomainKind::Meshing(Side::Right) => 1,
-            DomainKind::Meshing(Side::Left) => 2,
-        };
-        let lane = &self.model.constants.flow;
-        let of = &lane.domains[domain];
-        let h = lane.h * of.share;
-        let along = [q[0] - self.wall(domain), h * q[1], q[2], h * q[3], self.exact[0], 1.0];
-        [of.gap_row, of.x_row]
-            .map(|row| row.iter().zip(along).map(|(x, of)| (x * of).abs()).sum::<f64>() / (h * h))
-    }
-
-    /// Impacts and meshing time so far.
-    pub(super) fn counts(&self) -> [f64; 2] {
-        let [impacts, meshing_time] = counts(&self.trajectory);
-        [impacts, meshing_time + self.meshing_time]
-    }
-
     /// Tangent vectors, but for the exponential of the logarithm that is returned with them.
     pub(super) fn tangents(&self) -> ([State; N], f64) {
         (self.trajectory.tangents(), self.log_scale)
@@ -326,7 +241,7 @@ pub(super) fn read_cycle(
     let mut rounded = Rounded::new(stands, model, seed).at_most(most);
     let mut events = Vec::new();
     (0..period).try_for_each(|_| rounded.advance_period(&mut events)).ok()?;
-    let met = Met { period, counts: [counts(stands), rounded.counts()], events };
+    let met = Met { period, counts: [counts(stands), counts(rounded.trajectory())], events };
     Some(Answer { exponent: None, ..met.answer(case, truth, 0.0) })
 }
 
