@@ -10,6 +10,7 @@ use rattlemap::gpu::Precision;
 use rattlemap::orbit::{Class, Measured, measure};
 use rattlemap::plan::Plan;
 use rattlemap::record::valid;
+use rattlemap::validate::Explanation;
 use short_cells::{Cell, cell, cells, explanation, lane};
 
 /// The first cell of a plan on the reference.
@@ -97,14 +98,19 @@ fn a_gap_at_rest_is_let_go_once() {
 }
 
 /// Supports and teeth so damped that a mode decays by all of the damping: a step of a radian of half of it left
-/// 4e-6 of that mode to the terms that single precision leaves out.
+/// 4e-6 of that mode to the terms that single precision leaves out. The first has 484 impacts in a period, which
+/// scatter its exponent by rounding alone; a series cut short moved it beyond that.
 #[test]
 fn damped_modes_are_summed_to_rounding() {
-    for cell in cells("damped", 2) {
+    let told = |cell: &Cell| {
         let plan = cell.plan();
         let record = lane(&plan, Precision::F32);
-        assert_eq!(explanation(&plan, record, Precision::F32), Err(()), "{record:?}");
-    }
+        (explanation(&plan, record, Precision::F32), record)
+    };
+    let cells = cells("damped", 2);
+    let [scattered, exact] = [&cells[0], &cells[1]].map(told);
+    assert!(matches!(scattered.0, Err(()) | Ok(Some(Explanation::BelowResolution))), "{scattered:?}");
+    assert_eq!(exact.0, Err(()), "{:?}", exact.1);
 }
 
 /// Neutral motions with 900 elastic impacts in a period.
