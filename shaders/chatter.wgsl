@@ -1,8 +1,14 @@
 // Chatter: ever slower impacts while the load presses. Short flights are followed by a
 // recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
 
-// A threshold below this, relative to the walls' distance, is none.
-const NO_THRESHOLD: Real = 1e-10;
+// A threshold below 1e-10 of half the walls' distance times the rate of free motion is none, as on the reference. That
+// rate is 1.6e-4 (`CLOSING_ANGLE` of the host) over `closing`.
+const NO_THRESHOLD: Real = 8e-15;
+
+// Whether impacts that the load presses back have no end.
+fn is_endless() -> bool {
+    return law.restitution < 1.0 && law.mesh_speed * h * closing <= NO_THRESHOLD * (walls[0] - walls[1]);
+}
 
 // Closes an infinite series of impacts by its limit, once it is so short that what the
 // formula leaves out is nothing: the gap comes to rest on the wall and meshing starts.
@@ -12,10 +18,10 @@ const NO_THRESHOLD: Real = 1e-10;
 // `T (1 - J T / (3 G) - gamma T / 6)`, `T = 2 u / (G (1 - e))`, up to the third order.
 // Meanwhile the other coordinate moves as it does with the gap closed.
 fn close_chatter(side: u32, u: Real) {
-    let e = law.restitution;
-    if e >= 1.0 || law.mesh_speed * h > NO_THRESHOLD * (walls[0] - walls[1]) {
+    if !is_endless() {
         return;
     }
+    let e = law.restitution;
     let sign = sign_of(side);
     let rate = motion.q[3] + kick * motion.q[1];
     let closed = array<Real, 4>(motion.q[0], 0.0, motion.q[2], rate);
@@ -60,10 +66,8 @@ fn begins_chatter(side: u32, u: Real) -> bool {
 
 // The leaving speed at which a series ends in meshing, or by its limit where it has no end.
 fn least_leaving(pressing: Real) -> Real {
-    let e = law.restitution;
-    let is_endless = e < 1.0 && law.mesh_speed * h <= NO_THRESHOLD * (walls[0] - walls[1]);
     // A hundredth more than `close_chatter` asks for, so that it is met before.
-    return select(law.mesh_speed * h, 0.505 * closing * (1.0 - e) * pressing, is_endless);
+    return select(law.mesh_speed * h, 0.505 * closing * (1.0 - law.restitution) * pressing, is_endless());
 }
 
 // Flights that are followed in one go.

@@ -97,6 +97,17 @@ fn a_gap_at_rest_is_let_go_once() {
     }
 }
 
+/// A meshing speed that is next to none in units of a lane's step, but not in those of the motion: 240 impacts a
+/// period, of which a lane that went by its step closed 83 by the limit of an infinite series.
+#[test]
+fn what_is_no_meshing_speed_does_not_depend_on_the_step() {
+    let plan = cell("slow").plan();
+    for precision in Precision::ALL {
+        let record = lane(&plan, precision);
+        assert!((record.impacts_per_period - 240.5).abs() < 1e-9, "{precision:?}: {record:?}");
+    }
+}
+
 /// Supports and teeth so damped that a mode decays by all of the damping: a step of a radian of half of it left
 /// 4e-6 of that mode to the terms that single precision leaves out. The first has 484 impacts in a period, which
 /// scatter its exponent by rounding alone; a series cut short moved it beyond that.
