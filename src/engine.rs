@@ -1,13 +1,15 @@
 //! Who computes: one seam between what is asked and what measures it.
 //!
-//! An [`Engine`] takes batches of a plan's cells and returns one record per cell, in the
-//! batch's order. A record depends on its cell, its start and the plan alone: not on the batch, its
-//! size, the neighbours, or the number of threads.
+//! An [`Engine`] takes up cells of a plan at any time and returns one record for each, in whatever order they
+//! end. A record depends on its cell, its start and the plan alone: not on what else is under way, the
+//! neighbours, or the number of threads.
 
 mod cpu;
 mod fake;
 mod flows;
 mod gpu;
+
+use std::collections::HashMap;
 
 use thiserror::Error;
 
@@ -17,7 +19,7 @@ pub use fake::Fake;
 pub(crate) use flows::Flows;
 pub use gpu::Gpu;
 
-use crate::plan::Batch;
+use crate::plan::{Batch, Cell};
 use crate::record::Record;
 
 /// Why a batch was not computed.
@@ -104,15 +106,46 @@ impl Engine<'_> {
         }
     }
 
-    /// Computes a batch: one record per cell, in the batch's order.
+    /// Takes up cells; their records come from [`Engine::advance`].
+    ///
+    /// # Errors
+    /// [`EngineError`], with none of these cells taken up.
+    pub async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
+        match self {
+            Engine::Cpu(cpu) => cpu.begin(cells),
+            Engine::Gpu(gpu) => gpu.begin(cells).await?,
+            Engine::Fake(fake) => fake.begin(cells)?,
+        }
+        Ok(())
+    }
+
+    /// Computes until many of the cells under way have ended, or all: their records, by id. None if no cell is
+    /// under way.
+    ///
+    /// # Errors
+    /// [`EngineError`], after which nothing is under way.
+    pub async fn advance(&mut self) -> Result<Vec<(u32, Record)>, EngineError> {
+        match self {
+            Engine::Cpu(cpu) => Ok(cpu.advance()),
+            Engine::Gpu(gpu) => gpu.advance().await,
+            Engine::Fake(fake) => fake.advance(),
+        }
+    }
+
+    /// Computes a batch: one record per cell, in the batch's order. Nothing else may be under way.
     ///
     /// # Errors
     /// [`EngineError`], with nothing of the batch computed.
     pub async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
-        match self {
-            Engine::Cpu(cpu) => Ok(cpu.run(batch)),
-            Engine::Gpu(gpu) => gpu.run(batch).await,
-            Engine::Fake(fake) => fake.run(batch),
+        self.begin(&batch.cells).await?;
+        let mut records = HashMap::new();
+        loop {
+            let ended = self.advance().await?;
+            if ended.is_empty() {
+                break;
+            }
+            records.extend(ended);
         }
+        Ok(batch.cells.iter().map(|cell| records[&cell.id]).collect())
     }
 }

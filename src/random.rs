@@ -1,6 +1,7 @@
 //! Random numbers that are the same everywhere: SplitMix64 (Steele, Lea, Flood 2014).
 
 /// A stream of numbers that its seed decides.
+#[derive(Clone)]
 pub(crate) struct Random(u64);
 
 impl Random {
@@ -18,7 +19,7 @@ impl Random {
     }
 
     /// A number below `bound`, which is not zero. Unevenness is below `bound / 2^64`.
-    fn below(&mut self, bound: usize) -> usize {
+    pub(crate) fn below(&mut self, bound: usize) -> usize {
         ((u128::from(self.next()) * bound as u128) >> 64) as usize
     }
 

@@ -1,52 +1,51 @@
 //! Which cells are integrated, in which order, and which need not be. Pure.
 //!
 //! Without `[refine]` every cell is, in Morton order. With it the map is adaptive: cells of a
-//! coarse grid first, then round after round what lies in blocks whose corners differ (in
-//! class, period, and symmetry or word where they are asked for), or that touch such a block,
+//! coarse grid first, then what lies in blocks in which cells are known to differ (in
+//! class, period, and symmetry or word where they are asked for), or that touch one whose corners do,
 //! down to single cells. The rest is filled from the corners around it. An audit then
 //! integrates a random sample of the filled cells. If it finds too many of them wrong, and more
 //! than chance may put there, blocks filled with what is wrong are halved and the audit is
 //! repeated; if not, only the blocks with wrong cells are refined on.
 //!
-//! Where cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells is
-//! a round, and starts from the last states of the row before. Several starts per cell are
+//! Where cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells
+//! starts from the last states of the row before. Several starts per cell are
 //! further runs over all cells, one start after the other: what runs side by side starts alike.
 //!
 //! The order of the cells follows from the records of the cells before. So a run that was
-//! interrupted goes on by replaying its records.
+//! interrupted goes on by replaying its records. Cells are begun before their turn, as soon as it is known
+//! that their turn will come: nobody waits for the slowest cell but what depends on it.
 
 mod adaptive;
 mod audit;
 mod blocks;
+mod course;
 mod fill;
 mod follow;
 mod label;
+mod tiling;
 
 pub use audit::Audit;
 
-use adaptive::Adaptive;
-use follow::Follow;
+use course::Course;
 
 use crate::plan::{Batch, Cell, Plan};
 use crate::record::Record;
 
-/// The order of work on a map.
+/// The order of work on a map, and what may be begun before its turn.
+///
+/// Records are kept in the order of [`Schedule::sequence`], which follows from the records kept before. Cells are begun
+/// in the order of [`Schedule::next`], which follows from the records that have come so far, kept or not. Both end
+/// with the same cells.
 pub struct Schedule {
-    sequence: Vec<u32>,
-    /// Where the last round begins.
-    round: usize,
-    rounds: usize,
-    rule: Rule,
-}
-
-/// What decides about the next round.
-enum Rule {
-    /// There is one round.
-    Whole,
-    /// Rows that follow each other.
-    Follow(Follow),
-    /// Blocks that differ.
-    Adaptive(Box<Adaptive>),
+    kept: Course,
+    /// The same in the order in which records come.
+    ahead: Course,
+    /// Places of it that were handed out, and how many had been before the last time.
+    begun: usize,
+    begun_before: usize,
+    /// By run: whether its record has come.
+    has_come: Vec<bool>,
 }
 
 /// What became of an adaptive map.
@@ -56,7 +55,7 @@ pub struct Refined {
     pub integrated: usize,
     /// Cells that were filled.
     pub filled: usize,
-    /// Rounds of integration, audits included.
+    /// The longest chain of cells each of which was asked for by the record of the one before, audits included.
     pub rounds: usize,
     /// Audits in order; the last one found no more wrong cells than the scene allows, unless
     /// nothing was left to refine or blocks had been halved as often as they may.
@@ -66,82 +65,78 @@ pub struct Refined {
 impl Schedule {
     /// The schedule of a plan.
     pub fn new(plan: &Plan) -> Schedule {
-        let (sequence, rule) = match plan.refine() {
-            Some(refine) => {
-                let adaptive = Adaptive::new(plan, refine);
-                (adaptive.first(), Rule::Adaptive(Box::new(adaptive)))
-            }
-            None if plan.policy().follows() => {
-                let follow = Follow::new(plan);
-                (follow.row(), Rule::Follow(follow))
-            }
-            None => (every_run(plan), Rule::Whole),
-        };
-        Schedule { sequence, round: 0, rounds: 1, rule }
+        let kept = Course::new(plan);
+        Schedule { ahead: kept.clone(), kept, begun: 0, begun_before: 0, has_come: vec![false; plan.run_count()] }
     }
 
-    /// Ids of the cells to integrate, as far as they are known by now.
+    /// Ids of the cells to integrate, as far as they are known by the records that were kept.
     pub fn sequence(&self) -> &[u32] {
-        &self.sequence
+        self.kept.sequence()
     }
 
-    /// Adds the next round, once every cell of the sequence has its record (by id). False if
+    /// Up to `count` cells to begin next; none while what comes next depends on cells under way, or if
     /// the map is finished.
-    pub fn extend(&mut self, records: &[Record]) -> bool {
-        let next = match &mut self.rule {
-            Rule::Whole => return false,
-            Rule::Follow(follow) => follow.next(records),
-            Rule::Adaptive(adaptive) => adaptive.next(&self.sequence[self.round..], records),
-        };
-        self.round = self.sequence.len();
-        self.sequence.extend(&next);
-        self.rounds += usize::from(!next.is_empty());
-        !next.is_empty()
+    pub fn next(&mut self, plan: &Plan, count: usize) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        self.begun_before = self.begun;
+        while cells.len() < count && self.begun < self.ahead.sequence().len() {
+            if !self.has_come[self.ahead.sequence()[self.begun] as usize] {
+                cells.push(self.ahead.cell(plan, self.begun));
+            }
+            self.begun += 1;
+        }
+        cells
+    }
+
+    /// Takes back what [`Schedule::next`] handed out last, which could not be begun.
+    pub fn take_back(&mut self) {
+        self.begun = self.begun_before;
+    }
+
+    /// Takes up the record of a cell that was begun; `records` are those of all runs, this one included.
+    pub fn come(&mut self, id: u32, records: &[Record]) {
+        self.has_come[id as usize] = true;
+        self.ahead.take(id, records);
+    }
+
+    /// The places from `from` on whose records have come.
+    pub fn ready(&self, from: usize) -> std::ops::Range<usize> {
+        let has_come = |&&id: &&u32| self.has_come[id as usize];
+        from..from + self.sequence()[from..].iter().take_while(has_come).count()
+    }
+
+    /// Takes up the records of the places before `end` as kept: the sequence goes on from there.
+    pub fn keep(&mut self, end: usize, records: &[Record]) {
+        while self.kept.taken() < end {
+            let id = self.kept.sequence()[self.kept.taken()];
+            self.kept.take(id, records);
+        }
+    }
+
+    /// Whether every cell has been kept.
+    pub fn is_finished(&self) -> bool {
+        self.kept.taken() == self.kept.sequence().len()
     }
 
     /// Runs that there will be, as far as is known by now.
     pub fn expected(&self) -> usize {
-        match &self.rule {
-            Rule::Follow(follow) => follow.cell_count(),
-            Rule::Whole | Rule::Adaptive(_) => self.sequence.len(),
-        }
+        self.kept.expected()
     }
 
     /// The batch of up to `count` cells of the sequence from place `from` on.
     ///
     /// # Panics
-    /// Where cells follow their neighbours, if `from` lies before the last round.
+    /// Where cells follow their neighbours, if `from` lies before the last row.
     pub fn batch(&self, plan: &Plan, from: usize, count: usize) -> Batch {
-        let places = from..from.saturating_add(count).min(self.sequence.len());
-        let cell = |place: usize| {
-            let cell = plan.cell(self.sequence[place]);
-            match &self.rule {
-                Rule::Follow(follow) => Cell { start: follow.start(place - self.round), ..cell },
-                Rule::Whole | Rule::Adaptive(_) => cell,
-            }
-        };
-        let cells = places.clone().map(cell).collect();
+        let places = from..from.saturating_add(count).min(self.sequence().len());
+        let cells = places.clone().map(|place| self.kept.cell(plan, place)).collect();
         Batch { places, cells }
     }
 
     /// Fills what was not integrated and says how it went; none where every cell was.
     pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
-        let Rule::Adaptive(adaptive) = &self.rule else { return None };
-        let filled = adaptive.fill(records);
-        Some(Refined {
-            integrated: self.sequence.len(),
-            filled,
-            rounds: self.rounds,
-            audits: adaptive.audits().to_vec(),
-        })
+        self.kept.finish(records)
     }
-}
-
-/// All cells in the plan's order, for every start.
-fn every_run(plan: &Plan) -> Vec<u32> {
-    let cells = plan.cell_count() as u32;
-    let of = |nth: u32| plan.order().iter().map(move |id| nth * cells + id);
-    (0..plan.start_count() as u32).flat_map(of).collect()
 }
 
 #[cfg(test)]
@@ -161,22 +156,33 @@ mod tests {
 
     /// Runs a schedule on a picture: a period for every cell.
     fn run(plan: &Plan, period: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
+        run_in(plan, |waiting| waiting.drain(..).collect(), period)
+    }
+
+    /// The same where `come` says which of the cells under way come next.
+    fn run_in(
+        plan: &Plan,
+        mut come: impl FnMut(&mut Vec<u32>) -> Vec<u32>,
+        period: impl Fn(usize, usize) -> u32,
+    ) -> (Vec<Record>, Refined) {
         let mut schedule = Schedule::new(plan);
         let mut records = vec![Record::default(); plan.cell_count()];
+        let mut waiting = Vec::new();
         let mut place = 0;
-        loop {
-            for &id in &schedule.sequence()[place..] {
+        while !schedule.is_finished() {
+            waiting.extend(schedule.next(plan, usize::MAX).iter().map(|cell| cell.id));
+            for id in come(&mut waiting) {
                 let [i, j] = plan.indices(id);
                 assert_eq!(records[id as usize].periods_run, 0, "cell {id} was asked for twice");
                 let valid = valid::PERIOD;
                 records[id as usize] =
                     Record { period: period(i, j), valid, periods_run: 7, ..Record::default() };
+                schedule.come(id, &records);
             }
-            place = schedule.sequence().len();
-            if !schedule.extend(&records) {
-                break;
-            }
+            place = schedule.ready(place).end;
+            schedule.keep(place, &records);
         }
+        assert!(waiting.is_empty() && schedule.next(plan, 1).is_empty(), "cells were begun that nobody asks for");
         let refined = schedule.finish(&mut records).unwrap();
         assert_eq!(refined.integrated + refined.filled, plan.cell_count());
         assert!(records.iter().all(|r| (r.periods_run == 0) == (r.valid & valid::FILLED != 0)));
@@ -316,6 +322,35 @@ mod tests {
         assert!(refined.audits.len() == 1 && refined.audits[0].rate() > 1e-3, "{refined:?}");
         // What is wrong in the audit is mended, and nothing else.
         assert!(refined.integrated < 1000, "{refined:?}");
+    }
+
+    /// Discs, bands and strewn cells, audits that fail and that go on: in whatever order records come, the same
+    /// cells are integrated, and the audits find the same.
+    #[test]
+    fn what_is_integrated_does_not_depend_on_the_order_in_which_records_come() {
+        let picture = |i: usize, j: usize| {
+            let strewn = crate::random::Random::new((j * 203 + i) as u64).unit() < 0.01;
+            let band = (j as f64 - 60.0 - 20.0 * (i as f64 / 17.0).sin()).abs() < 1.5;
+            let disc = (i as f64 - 150.0).hypot(j as f64 - 110.0) < 31.0;
+            1 + u32::from(strewn && disc) + 2 * u32::from(band) + 4 * u32::from(disc)
+        };
+        for refine in ["minimum_grid = 16\nmax_error = 0.003", "minimum_grid = 8\nrounds = 2\naudit = 100"] {
+            let plan = plan([203, 170], refine);
+            let (records, refined) = run(&plan, picture);
+            assert!(refined.audits.iter().any(|audit| audit.wrong > 0), "{refined:?}");
+            for seed in 0..20 {
+                let mut random = crate::random::Random::new(seed);
+                // Any one of those that wait, the last ones, or all but the first.
+                let come = |waiting: &mut Vec<u32>| match seed % 3 {
+                    0 => vec![waiting.swap_remove(random.below(waiting.len()))],
+                    1 => waiting.split_off(waiting.len() - (waiting.len() / 3).max(1)),
+                    _ => waiting.split_off(usize::from(waiting.len() > 1)),
+                };
+                let (others, other) = run_in(&plan, come, picture);
+                assert_eq!(refined, other, "{seed}");
+                assert!(records == others, "{seed}");
+            }
+        }
     }
 
     #[test]

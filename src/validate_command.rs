@@ -133,7 +133,7 @@ fn read_records(
         }
         other => other.into(),
     })?;
-    if done < schedule.sequence().len() || schedule.extend(&records) {
+    if !schedule.is_finished() {
         let cells = schedule.expected();
         return Err(anyhow!("{} holds {done} of {cells} {}; {again}", path.display(), unit(plan)));
     }

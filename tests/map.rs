@@ -170,7 +170,7 @@ fn sweep(plan: &Plan, fake: Fake, from: usize) -> (Result<bool, SweepError>, Vec
 fn a_lost_engine_leaves_what_was_done_and_the_next_goes_on() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, kept) = sweep(&plan, Fake { batches_left: Some(2), ..Fake::new(by_id) }, 0);
+    let (end, kept) = sweep(&plan, Fake::lost_after(2, by_id), 0);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::Lost { .. }))), "{end:?}");
     assert!(!kept.is_empty() && kept.len() < plan.cell_count());
     let (end, rest) = sweep(&plan, Fake::new(by_id), kept.len());
@@ -182,10 +182,42 @@ fn a_lost_engine_leaves_what_was_done_and_the_next_goes_on() {
 fn batches_shrink_to_the_memory_there_is() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, kept) = sweep(&plan, Fake { memory_cells: 3, ..Fake::new(by_id) }, 0);
+    let (end, kept) = sweep(&plan, Fake::with_memory(3, by_id), 0);
     assert!(end.unwrap());
     assert_eq!(kept, plan.order());
-    let (end, kept) = sweep(&plan, Fake { memory_cells: 0, ..Fake::new(by_id) }, 0);
+    let (end, kept) = sweep(&plan, Fake::with_memory(0, by_id), 0);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::OutOfMemory { cells: 1, .. }))), "{end:?}");
     assert!(kept.is_empty());
+}
+
+/// Cells whose neighbours take a hundred times as long: nobody waits for them, and all are kept in their order.
+#[test]
+fn slow_cells_hold_up_nobody_and_records_keep_their_order() {
+    let adaptive = ["refine.minimum_grid=8", "refine.max_error=0.05", "refine.audit=50"];
+    for sets in [&[][..], &adaptive] {
+        let scene = scene(41, sets);
+        let plan = Plan::new(&scene);
+        let disc = |cell: &Cell| {
+            let [i, j] = [cell.id % 41, cell.id / 41];
+            let period = 1 + u32::from(i * i + j * j < 400);
+            Record { period, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
+        };
+        let run = |fake: Fake| {
+            let (mut schedule, mut kept) = (Schedule::new(&plan), Vec::new());
+            let mut records = vec![Record::default(); plan.cell_count()];
+            let keep = |batch: &Batch, _: &[Record], _| {
+                assert_eq!(batch.places.start, kept.len());
+                kept.extend(batch.cells.iter().map(|cell| cell.id));
+                Ok(ControlFlow::Continue(()))
+            };
+            let engine = &mut Engine::Fake(fake);
+            assert!(pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, 0, keep)).unwrap());
+            let refined = schedule.finish(&mut records);
+            (kept, records, refined)
+        };
+        let (kept, records, refined) = run(Fake::new(disc));
+        let slow = run(Fake::slow(|cell| if cell.id % 7 == 3 { 100 } else { 1 + cell.id % 2 }, disc));
+        assert_eq!((kept, refined), (slow.0, slow.2));
+        assert!(records == slow.1);
+    }
 }

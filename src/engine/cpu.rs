@@ -5,28 +5,34 @@ use rayon::prelude::*;
 use super::flows::Flows;
 use crate::flow::Flow;
 use crate::orbit::{Measured, measure};
-use crate::plan::{Batch, Cell, Needs, Plan};
+use crate::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 
 /// The event-driven reference.
 pub struct Cpu<'p> {
     plan: &'p Plan,
     flows: Flows<'p>,
+    under_way: Vec<Cell>,
 }
 
 impl<'p> Cpu<'p> {
     /// An engine for the cells of a plan.
     pub fn new(plan: &'p Plan) -> Cpu<'p> {
-        Cpu { plan, flows: Flows::new(plan) }
+        Cpu { plan, flows: Flows::new(plan), under_way: Vec::new() }
     }
 
     pub(super) fn least_batch(&self) -> usize {
         64 * rayon::current_num_threads()
     }
 
-    pub(super) fn run(&self, batch: &Batch) -> Vec<Record> {
+    pub(super) fn begin(&mut self, cells: &[Cell]) {
+        self.under_way.extend(cells);
+    }
+
+    pub(super) fn advance(&mut self) -> Vec<(u32, Record)> {
+        let cells = std::mem::take(&mut self.under_way);
         // Cells differ a thousandfold in cost: no task holds more than one.
-        batch.cells.par_iter().with_max_len(1).map(|cell| self.cell(cell)).collect()
+        cells.par_iter().with_max_len(1).map(|cell| (cell.id, self.cell(cell))).collect()
     }
 
     fn cell(&self, cell: &Cell) -> Record {

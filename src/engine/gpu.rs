@@ -21,6 +21,7 @@ pub struct Gpu<'p> {
     tables: Option<Tables>,
     /// Free steps taken so far.
     steps: u64,
+    under_way: Vec<Cell>,
 }
 
 impl<'p> Gpu<'p> {
@@ -30,7 +31,7 @@ impl<'p> Gpu<'p> {
     /// [`EngineError`] if the device takes no constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let settings = lane_settings(plan);
-        let mut engine = Gpu { plan, device, settings, tables: None, steps: 0 };
+        let mut engine = Gpu { plan, device, settings, tables: None, steps: 0, under_way: Vec::new() };
         if plan.keeps_flows() {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
@@ -65,7 +66,18 @@ impl<'p> Gpu<'p> {
         self.steps
     }
 
-    pub(super) async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
+    pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
+        self.under_way.extend(cells);
+        Ok(())
+    }
+
+    pub(super) async fn advance(&mut self) -> Result<Vec<(u32, Record)>, EngineError> {
+        let cells = std::mem::take(&mut self.under_way);
+        let records = self.run(&Batch { places: 0..cells.len(), cells: cells.clone() }).await?;
+        Ok(cells.iter().map(|cell| cell.id).zip(records).collect())
+    }
+
+    async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
         let failed = |engine: &Gpu<'_>, error| engine.error(error, batch.cells.len());
         if let Some(tables) = self.tables.take() {
             let lanes: Vec<Lane> = batch.cells.iter().map(|cell| lane(cell, cell.flow, cell.law)).collect();

@@ -1,14 +1,17 @@
 //! Refinement: coarse blocks first, then only those that a border crosses, down to single cells;
 //! then an audit of what was not integrated.
+//!
+//! Which cells are integrated does not depend on the order in which records come: a block is halved for what is
+//! known to differ, and that stays so, whatever else will be known. So no block waits for the others.
 
-use std::cell::LazyCell;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
-use super::audit::{Audit, sample};
-use super::blocks::{Block, coarse};
+use super::audit::Audit;
 use super::fill::Filling;
 use super::label::{Label, word_of};
+use super::tiling::{Tile, Tiling};
 use crate::plan::{Needs, Plan};
+use crate::random::Random;
 use crate::record::{Record, valid};
 use crate::scene::Refine;
 
@@ -16,11 +19,11 @@ use crate::scene::Refine;
 /// their common edge show whether it goes on here.
 const NARROW: usize = 4;
 
-/// Most rounds in which nothing is done but to follow borders: those that need more are few, and a round
-/// takes as long as its slowest cell.
-const FOLLOWED: u32 = 16;
+/// Levels that are told apart where blocks touch.
+const LEVELS: u32 = u16::BITS;
 
-/// The state of an adaptive map between rounds.
+/// The state of an adaptive map.
+#[derive(Clone)]
 pub(super) struct Adaptive {
     counts: [usize; 2],
     refine: Refine,
@@ -28,22 +31,38 @@ pub(super) struct Adaptive {
     needs: Needs,
     /// By cell id; unknown where nothing was integrated.
     labels: Vec<Label>,
-    /// Blocks whose corners are known or are being integrated, still to be judged.
-    open: Vec<Block>,
-    /// Blocks that are filled.
-    closed: Vec<Block>,
-    /// How often blocks have been halved since the coarse grid.
-    halvings: u32,
-    /// Halvings that take a coarse block down to single cells.
-    levels: u32,
-    /// Rounds since the last audit in which nothing was done but to follow borders.
-    followed: u32,
+    /// By cell id.
+    is_asked: Vec<bool>,
+    /// Cells that were not asked for.
+    unasked: usize,
+    tiling: Tiling,
+    /// What is known of each block.
+    sights: Vec<Sight>,
+    /// Levels of blocks with differing corners that a cell belongs to, a bit for each.
+    touched: Vec<u16>,
+    /// Blocks that are to be halved.
+    pending: Vec<Tile>,
+    /// The most that a coarse block has been halved.
+    deepest: u32,
     /// Cells of the audit under way.
     audited: Vec<u32>,
-    /// Samples drawn so far, each by a seed of its own.
-    samples: u64,
+    /// Where samples are drawn from.
+    random: Random,
     audits: Vec<Audit>,
     stage: Stage,
+}
+
+/// What is known of a block.
+#[derive(Clone, Copy, Default)]
+struct Sight {
+    /// Of the first cell that was known.
+    label: Label,
+    /// Of the first corner that was known.
+    kind: u32,
+    /// Whether corners are known to differ in more than the word.
+    has_border: bool,
+    /// Whether it is halved however often its coarse block has been.
+    is_free: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -52,246 +71,296 @@ enum Stage {
     Halving,
     /// The sample is being integrated.
     Auditing,
-    /// The audit is passed; blocks around wrong cells are cut down.
+    /// The audit is passed; blocks around wrong cells are halved.
     Mending,
     Done,
 }
 
 /// What an audit showed.
 struct Verdict {
-    /// Whether a cell was filled wrongly, by id.
-    wrong: Vec<bool>,
+    /// Cells that were filled wrongly.
+    wrong: Vec<u32>,
     /// Kinds that are wrong most often; none if the audit is passed.
     bad: HashSet<u32>,
 }
 
 impl Adaptive {
-    pub(super) fn new(plan: &Plan, refine: Refine) -> Adaptive {
+    /// Nothing is known; `asks` gets the cells of the coarse grid, neighbours one after the other.
+    pub(super) fn new(plan: &Plan, refine: Refine, asks: &mut Vec<u32>) -> Adaptive {
         let counts = plan.axes().each_ref().map(|axis| axis.count());
-        Adaptive {
+        let tiling = Tiling::new(counts, refine.minimum_grid as usize);
+        let cells = plan.cell_count();
+        let mut adaptive = Adaptive {
             counts,
             refine,
             needs: Needs { word: plan.needs().word && refine.word, ..*plan.needs() },
-            labels: vec![Label::default(); plan.cell_count()],
-            open: coarse(counts, refine.minimum_grid as usize),
-            closed: Vec::new(),
-            halvings: 0,
-            followed: 0,
-            levels: refine.minimum_grid.next_power_of_two().ilog2(),
+            labels: vec![Label::default(); cells],
+            is_asked: vec![false; cells],
+            unasked: cells,
+            sights: vec![Sight::default(); tiling.tiles().len()],
+            tiling,
+            touched: vec![0; cells],
+            pending: Vec::new(),
+            deepest: 0,
             audited: Vec::new(),
-            samples: 0,
+            random: Random::new(1),
             audits: Vec::new(),
             stage: Stage::Halving,
+        };
+        for tile in adaptive.tiling.tiles() {
+            adaptive.ask_corners(tile, asks);
         }
+        asks.sort_by_cached_key(|&id| crate::plan::morton_key(adaptive.at(id)));
+        adaptive
     }
 
     pub(super) fn audits(&self) -> &[Audit] {
         &self.audits
     }
 
-    /// The cells of the coarse grid.
-    pub(super) fn first(&self) -> Vec<u32> {
-        self.unknown_corners()
+    /// Takes up the record of a cell that was asked for; `asks` gets the cells that are needed for that.
+    pub(super) fn take(&mut self, id: u32, record: &Record, asks: &mut Vec<u32>) {
+        let label = Label::of(record, &self.needs);
+        self.labels[id as usize] = label;
+        if self.stage != Stage::Auditing {
+            self.show(self.at(id), label);
+            self.halve(asks);
+        }
     }
 
-    /// The next cells to integrate, now that those of the last call have their records; none
-    /// if the map is finished.
-    pub(super) fn next(&mut self, last: &[u32], records: &[Record]) -> Vec<u32> {
-        for &id in last {
-            self.labels[id as usize] = Label::of(&records[id as usize], &self.needs);
-        }
-        while self.stage != Stage::Done {
-            let cells = match self.stage {
-                Stage::Auditing => self.judge_audit(records),
-                _ => {
-                    self.reopen();
-                    if self.open.is_empty() {
-                        self.leave_stage()
-                    } else {
-                        self.halve();
-                        self.unknown_corners()
-                    }
-                }
-            };
-            if !cells.is_empty() {
-                return cells;
+    /// Goes on once every cell that was asked for has been taken up: audits once, and again after every audit
+    /// that is failed. `asks` gets the next cells, none if the map is finished.
+    pub(super) fn settle(&mut self, records: &[Record], asks: &mut Vec<u32>) {
+        let before = asks.len();
+        while asks.len() == before && self.stage != Stage::Done {
+            match self.stage {
+                Stage::Halving => self.begin_audit(asks),
+                Stage::Auditing => self.judge_audit(records, asks),
+                Stage::Mending | Stage::Done => self.stage = Stage::Done,
             }
         }
-        Vec::new()
     }
 
-    /// No block is open any more: audits once, and again after every audit that is failed.
-    fn leave_stage(&mut self) -> Vec<u32> {
-        if self.stage == Stage::Mending {
-            self.stage = Stage::Done;
-            return Vec::new();
+    /// Tells all blocks that a cell belongs to what it is.
+    fn show(&mut self, at: [usize; 2], label: Label) {
+        for tile in self.tiling.covering(at) {
+            self.show_to(tile, at, label);
+            // A block may have been halved before all of its corners were known.
+            let with_corner = |&tile: &Tile| self.tiling.block(tile).has_corner(at);
+            let corner_of: Vec<Tile> = self.tiling.lineage(tile).take_while(with_corner).collect();
+            corner_of.into_iter().for_each(|tile| self.show_corner(tile, label));
         }
-        let filled = self.labels.iter().filter(|label| !label.is_known()).count();
-        self.audited = self.sample(self.refine.audited(filled));
-        self.stage = if self.audited.is_empty() { Stage::Done } else { Stage::Auditing };
-        if !self.audited.is_empty() {
-            self.audits.push(Audit { filled, sampled: self.audited.len(), ..Audit::default() });
-        }
-        self.audited.clone()
     }
 
-    /// Some of the cells that nothing is known of, at random.
-    fn sample(&mut self, count: usize) -> Vec<u32> {
-        let unknown = (0..).zip(&self.labels).filter(|(_, label)| !label.is_known());
-        self.samples += 1;
-        sample(unknown.map(|(id, _)| id).collect(), count, self.samples)
+    fn show_to(&mut self, tile: Tile, at: [usize; 2], label: Label) {
+        let sight = &mut self.sights[tile];
+        if !sight.label.is_known() {
+            sight.label = label;
+        } else if sight.label != label {
+            self.pending.push(tile);
+        }
+        debug_assert!(self.tiling.covering(at).any(|leaf| leaf == tile));
+    }
+
+    fn show_corner(&mut self, tile: Tile, label: Label) {
+        let sight = &mut self.sights[tile];
+        if sight.kind == 0 {
+            sight.kind = label.kind;
+        } else if sight.kind != label.kind && !sight.has_border {
+            sight.has_border = true;
+            self.touch(tile);
+        }
+    }
+
+    /// Blocks of the same level that touch one with differing corners are halved with it.
+    fn touch(&mut self, tile: Tile) {
+        let (level, block) = (self.tiling.level(tile), self.tiling.block(tile));
+        for at in block.cells() {
+            let id = self.id(at);
+            self.touched[id] |= bit(level);
+        }
+        let on_edge = |[i, j]: &[usize; 2]| block.i.contains(i) || block.j.contains(j);
+        for at in block.cells().filter(on_edge) {
+            for beside in self.tiling.covering(at) {
+                if self.tiling.level(beside) == level && self.is_touched(beside) {
+                    self.pending.push(beside);
+                }
+            }
+        }
+    }
+
+    /// Whether a corner belongs to a block of the same level with differing corners.
+    fn is_touched(&self, tile: Tile) -> bool {
+        let (level, block) = (self.tiling.level(tile), self.tiling.block(tile));
+        let is_touched = |&at: &[usize; 2]| self.touched[self.id(at)] & bit(level) != 0;
+        block.width() >= NARROW && block.corners().iter().any(is_touched)
+    }
+
+    /// Halves what is to be halved, and what that shows.
+    fn halve(&mut self, asks: &mut Vec<u32>) {
+        while let Some(tile) = self.pending.pop() {
+            if !self.may_halve(tile) {
+                continue;
+            }
+            let is_free = self.sights[tile].is_free;
+            let parts = self.tiling.halve(tile);
+            self.deepest = self.deepest.max(self.tiling.level(parts.start));
+            for part in parts {
+                self.sights.push(Sight { is_free, ..Sight::default() });
+                self.ask_corners(part, asks);
+                let block = self.tiling.block(part);
+                for at in block.cells() {
+                    let label = self.label(at);
+                    if label.is_known() {
+                        self.show_to(part, at, label);
+                        if block.has_corner(at) {
+                            self.show_corner(part, label);
+                        }
+                    }
+                }
+                if self.is_touched(part) {
+                    self.pending.push(part);
+                }
+            }
+        }
+    }
+
+    fn may_halve(&self, tile: Tile) -> bool {
+        let is_allowed = || {
+            let level = self.tiling.level(tile);
+            self.sights[tile].is_free || self.refine.rounds.is_none_or(|most| level < most)
+        };
+        self.tiling.is_leaf(tile) && self.tiling.block(tile).has_inside() && is_allowed()
     }
 
     /// Whether blocks have been halved as often as the scene allows.
     fn is_spent(&self) -> bool {
-        self.refine.rounds.is_some_and(|most| self.halvings >= most)
+        self.refine.rounds.is_some_and(|most| self.deepest >= most)
     }
 
-    /// Opens closed blocks again in which a neighbour's halving has found a border.
-    fn reopen(&mut self) {
-        self.followed += u32::from(!self.open.iter().any(Block::has_inside));
-        if !self.is_spent() && self.followed <= FOLLOWED {
-            let closed = std::mem::take(&mut self.closed);
-            let (crossed, closed) = closed.into_iter().partition(|block| self.is_crossed(block));
-            self.closed = closed;
-            self.open.extend::<Vec<_>>(crossed);
+    fn ask_corners(&mut self, tile: Tile, asks: &mut Vec<u32>) {
+        for at in self.tiling.block(tile).corners() {
+            let id = self.id(at);
+            self.ask(id, asks);
         }
     }
 
-    /// Blocks that a border crosses, or that touch one, are halved; others are closed.
-    fn halve(&mut self) {
-        let open = std::mem::take(&mut self.open);
-        let is_spent = self.stage == Stage::Halving && self.is_spent();
-        self.halvings += 1;
-        let mut touched = vec![false; if is_spent { 0 } else { self.labels.len() }];
-        if !is_spent {
-            for block in open.iter().filter(|block| self.has_border(block)) {
-                block.cells().for_each(|at| touched[self.id(at)] = true);
-            }
+    /// Asks for a cell, once; whether it was the first time.
+    fn ask(&mut self, id: usize, asks: &mut Vec<u32>) -> bool {
+        let is_new = !std::mem::replace(&mut self.is_asked[id], true);
+        if is_new {
+            self.unasked -= 1;
+            asks.push(id as u32);
         }
-        // Every block has become cells by now, but for those along a border that is followed: it
-        // would take one round for each.
-        let follows = self.halvings > self.levels;
-        for block in open.into_iter().filter(Block::has_inside) {
-            let is_touched = || block.corners().iter().any(|&at| touched[self.id(at)]);
-            if is_spent || !(self.is_crossed(&block) || (block.width() >= NARROW && is_touched())) {
-                self.closed.push(block);
-            } else if follows {
-                self.open.extend(block.single_cells());
-            } else {
-                self.open.extend(block.halves());
-            }
+        is_new
+    }
+
+    fn begin_audit(&mut self, asks: &mut Vec<u32>) {
+        let filled = self.unasked;
+        let sampled = self.sample(self.refine.audited(filled), asks);
+        self.stage = if sampled == 0 { Stage::Done } else { Stage::Auditing };
+        if sampled > 0 {
+            self.audits.push(Audit { filled, sampled, ..Audit::default() });
         }
     }
 
-    /// After an audit blocks with wrong cells are cut right there. If there are too many of them,
+    /// Asks for so many of the cells that nothing is known of, at random.
+    fn sample(&mut self, count: usize, asks: &mut Vec<u32>) -> usize {
+        let count = count.min(self.unasked);
+        let from = asks.len();
+        while asks.len() < from + count {
+            let id = self.random.below(self.labels.len());
+            self.ask(id, asks);
+        }
+        self.audited.extend(&asks[from..]);
+        count
+    }
+
+    /// After an audit blocks with wrong cells are halved down to them. If there are too many of them,
     /// all blocks are halved that are filled with what is wrong most often: mostly chaos with its
     /// windows, which the plain regions around need not pay for. If that may be chance, more cells are
-    /// audited first. Returns the cells to integrate next.
-    fn judge_audit(&mut self, records: &[Record]) -> Vec<u32> {
+    /// audited first.
+    fn judge_audit(&mut self, records: &[Record], asks: &mut Vec<u32>) {
         let Verdict { wrong, bad } = self.count_wrong(records);
-        let asks = |audit: &Audit| audit.more(self.refine.audited(audit.filled), self.refine.max_error);
-        let more = self.audits.last().map_or(0, asks);
+        let asks_more = |audit: &Audit| audit.more(self.refine.audited(audit.filled), self.refine.max_error);
+        let more = self.audits.last().map_or(0, asks_more);
         if more > 0 && !self.is_spent() {
-            let cells = self.sample(more);
-            self.audited.extend(&cells);
-            return cells;
+            self.sample(more, asks);
+            return;
         }
-        self.followed = 0;
-        self.audited.clear();
-        let closed = std::mem::take(&mut self.closed);
-        for block in closed {
-            let first_wrong = block.cells().find(|&at| wrong[self.id(at)]);
-            let is_bad =
-                !self.is_spent() && block.has_inside() && bad.contains(&self.corner_labels(&block)[0].kind);
-            match first_wrong {
-                Some(at) => self.open.extend(block.cut(at)),
-                None if is_bad => self.open.extend(block.halves()),
-                None => self.closed.push(block),
-            }
+        let is_over = bad.is_empty() || self.is_spent();
+        self.stage = if is_over { Stage::Mending } else { Stage::Halving };
+        if !is_over {
+            let is_bad = |&tile: &Tile| bad.contains(&self.sights[tile].kind) && self.may_halve(tile);
+            self.pending = self.tiling.tiles().filter(is_bad).collect();
         }
-        self.stage = if bad.is_empty() || self.is_spent() { Stage::Mending } else { Stage::Halving };
-        self.unknown_corners()
+        for id in wrong {
+            let tile = self.tiling.owner(self.at(id));
+            self.sights[tile].is_free = true;
+            self.pending.push(tile);
+        }
+        for id in std::mem::take(&mut self.audited) {
+            self.show(self.at(id), self.labels[id as usize]);
+        }
+        self.halve(asks);
     }
 
     /// Compares what was filled into the audited cells with their records.
     fn count_wrong(&mut self, records: &[Record]) -> Verdict {
-        let mut wrong = vec![false; self.labels.len()];
-        let mut is_audited = vec![false; self.labels.len()];
-        self.audited.iter().for_each(|&id| is_audited[id as usize] = true);
+        let mut wrong = Vec::new();
         let filled = self.audits.pop().map_or(0, |audit| audit.filled);
         let mut audit = Audit { filled, sampled: self.audited.len(), ..Audit::default() };
         let mut by_kind: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
-        for block in &self.closed {
-            let filling =
-                LazyCell::new(|| Filling::new(block, block.corners().map(|at| &records[self.id(at)])));
-            for at in block.cells() {
-                let id = self.id(at);
-                // A cell on a common border is judged once.
-                if !std::mem::take(&mut is_audited[id]) {
-                    continue;
-                }
-                let fill = filling.record(at);
-                let label = Label::of(&fill, &self.needs);
-                wrong[id] = label != self.labels[id];
-                audit.wrong += usize::from(wrong[id]);
-                let [sampled, amiss] = by_kind.entry(label.kind).or_default();
-                *sampled += 1;
-                *amiss += usize::from(wrong[id]);
-                if fill.valid & valid::WORD != 0 {
-                    audit.words += 1;
-                    audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id]));
-                }
+        let mut fillings: HashMap<Tile, Filling<'_>> = HashMap::new();
+        for &id in &self.audited {
+            let at = self.at(id);
+            let tile = self.tiling.owner(at);
+            let fill = fillings.entry(tile).or_insert_with(|| self.filling(tile, records)).record(at);
+            let label = Label::of(&fill, &self.needs);
+            let is_wrong = label != self.labels[id as usize];
+            if is_wrong {
+                wrong.push(id);
+            }
+            let [sampled, amiss] = by_kind.entry(label.kind).or_default();
+            *sampled += 1;
+            *amiss += usize::from(is_wrong);
+            if fill.valid & valid::WORD != 0 {
+                audit.words += 1;
+                audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id as usize]));
             }
         }
+        audit.wrong = wrong.len();
         self.audits.push(audit);
         Verdict { wrong, bad: worst(&by_kind, (self.refine.max_error * audit.sampled as f64) as usize) }
+    }
+
+    fn filling<'r>(&self, tile: Tile, records: &'r [Record]) -> Filling<'r> {
+        let block = self.tiling.block(tile);
+        Filling::new(&block, block.corners().map(|at| &records[self.id(at)]))
     }
 
     fn id(&self, [i, j]: [usize; 2]) -> usize {
         j * self.counts[0] + i
     }
 
+    fn at(&self, id: u32) -> [usize; 2] {
+        [id as usize % self.counts[0], id as usize / self.counts[0]]
+    }
+
     fn label(&self, at: [usize; 2]) -> Label {
         self.labels[self.id(at)]
-    }
-
-    fn corner_labels(&self, block: &Block) -> [Label; 4] {
-        block.corners().map(|at| self.label(at))
-    }
-
-    /// Whether any two cells of a block are known to differ.
-    fn is_crossed(&self, block: &Block) -> bool {
-        let first = self.label(block.corners()[0]);
-        block.cells().map(|at| self.label(at)).any(|label| label.is_known() && label != first)
-    }
-
-    /// Whether the corners of a block differ in more than the word.
-    fn has_border(&self, block: &Block) -> bool {
-        let labels = self.corner_labels(block);
-        labels.iter().any(|label| label.kind != labels[0].kind)
-    }
-
-    /// Corners of open blocks that nothing is known of, neighbours one after the other.
-    fn unknown_corners(&self) -> Vec<u32> {
-        let corners =
-            self.open.iter().flat_map(|block| block.corners()).filter(|&at| !self.label(at).is_known());
-        let mut cells: Vec<[usize; 2]> = corners.collect();
-        cells.sort_by_cached_key(|&at| crate::plan::morton_key(at));
-        cells.dedup();
-        cells.into_iter().map(|at| self.id(at) as u32).collect()
     }
 
     /// Fills every cell that was not integrated; returns how many.
     pub(super) fn fill(&self, records: &mut [Record]) -> usize {
         let mut count = 0;
-        for block in &self.closed {
+        for tile in self.tiling.tiles().filter(|&tile| self.tiling.is_leaf(tile)) {
+            let block = self.tiling.block(tile);
             let corners = block.corners().map(|at| records[self.id(at)]);
-            let filling = Filling::new(block, corners.each_ref());
-            for at in block.cells() {
+            let filling = Filling::new(&block, corners.each_ref());
+            for at in block.cells().filter(|&at| self.tiling.owner(at) == tile) {
                 let id = self.id(at);
-                // A cell on a common border is filled by the first of its blocks.
-                if !self.labels[id].is_known() && records[id] == Record::default() {
+                if !self.is_asked[id] {
                     records[id] = filling.record(at);
                     count += 1;
                 }
@@ -299,6 +368,10 @@ impl Adaptive {
         }
         count
     }
+}
+
+fn bit(level: u32) -> u16 {
+    1 << level.min(LEVELS - 1)
 }
 
 /// The kinds of which the largest part is wrong, as many as it takes until no more than `allowed` wrong

@@ -1,7 +1,5 @@
 //! The audit of filled cells: how many of them are wrong?
 
-use crate::random::Random;
-
 /// What an audit measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Audit {
@@ -60,13 +58,6 @@ impl Audit {
         let is_open = self.rate() > max_error && surely <= max_error && 2 * self.sampled <= most;
         if is_open { self.sampled } else { 0 }
     }
-}
-
-/// `count` of the `candidates`, chosen at random by `seed`.
-pub(super) fn sample(mut candidates: Vec<u32>, count: usize, seed: u64) -> Vec<u32> {
-    Random::new(seed).draw(&mut candidates, count);
-    candidates.truncate(count);
-    candidates
 }
 
 #[cfg(test)]

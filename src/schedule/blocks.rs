@@ -1,4 +1,4 @@
-//! Blocks of cells between lattice lines, and how they are cut.
+//! Blocks of cells between lattice lines, and how they are halved.
 
 /// A rectangle of cells, borders included, by its first and last indices on the two axes.
 /// Neighbours share their borders.
@@ -36,18 +36,12 @@ impl Block {
         self.cut([(self.i[0] + self.i[1]) / 2, (self.j[0] + self.j[1]) / 2])
     }
 
-    /// The blocks without insides that it consists of.
-    pub(super) fn single_cells(&self) -> Vec<Block> {
-        let parts = |[from, to]: [usize; 2]| match from < to {
-            true => (from..to).map(|at| [at, at + 1]).collect(),
-            false => vec![[from, to]],
-        };
-        let rows = parts(self.j);
-        parts(self.i).into_iter().flat_map(|i| rows.iter().map(move |&j| Block { i, j })).collect()
+    /// Whether a cell is one of its corners.
+    pub(super) fn has_corner(&self, [i, j]: [usize; 2]) -> bool {
+        self.i.contains(&i) && self.j.contains(&j)
     }
 
-    /// The blocks that the lines through one of its cells leave.
-    pub(super) fn cut(&self, [i, j]: [usize; 2]) -> Vec<Block> {
+    fn cut(&self, [i, j]: [usize; 2]) -> Vec<Block> {
         let parts = |[from, to]: [usize; 2], at: usize| {
             if from < at && at < to { vec![[from, at], [at, to]] } else { vec![[from, to]] }
         };
@@ -84,16 +78,6 @@ mod tests {
         assert!(seen.iter().all(|&times| times > 0));
         assert_eq!(seen[0], 1);
         assert_eq!(seen[4 * 11 + 4], 4, "four blocks meet in a lattice point");
-    }
-
-    #[test]
-    fn single_cells_have_all_corners_and_no_inside() {
-        for (block, cells) in [(Block { i: [2, 5], j: [1, 3] }, 6), (Block { i: [4, 4], j: [0, 3] }, 3)] {
-            let parts = block.single_cells();
-            assert!(parts.len() == cells && parts.iter().all(|part| !part.has_inside()), "{parts:?}");
-            let corners: std::collections::BTreeSet<_> = parts.iter().flat_map(Block::corners).collect();
-            assert!(corners.into_iter().eq(block.cells().collect::<std::collections::BTreeSet<_>>()));
-        }
     }
 
     #[test]
