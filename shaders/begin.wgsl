@@ -1,11 +1,12 @@
-// Before the first dispatch: every lane at its start.
+// Before its first dispatch: a lane at its start.
 
 @compute @workgroup_size(WORKGROUP)
 fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
-    lane = id.y * settings.row + id.x;
-    if lane >= settings.lanes {
+    let i = settings.fresh + id.y * settings.row + id.x;
+    if i >= settings.rostered {
         return;
     }
+    lane = rostered(i);
     cell = cells[lane];
     tally.status = cell.refused;
     tally.mode = MODE_FREE;

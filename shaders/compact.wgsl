@@ -1,23 +1,28 @@
-// The queue of lanes that are still running, compacted between dispatches: ended lanes cost
-// nothing, and those that are left keep their order, for neighbours behave alike.
+// The queue of lanes that a variant has work for: ended lanes cost nothing, and those that are left
+// keep their order, for neighbours behave alike.
 //
-// Four passes: blocks of the queue are counted, the counts summed up, what is left of every block
-// moved to its place in the queue's other half, and that half made the queue.
+// Three passes: blocks of the roster are counted, the counts summed up, and what is left of every block
+// put in its place in the queue.
 
 const BLOCK: u32 = 256u;
 
 var<workgroup> block_counts: array<u32, BLOCK>;
 
-fn queued(i: u32) -> u32 {
-    return queue.lanes[queue.half * settings.lanes + i];
+// The lane at a place of the roster, and of the queue.
+fn rostered(i: u32) -> u32 {
+    return queue.lanes[i];
 }
 
-// Whether place `i` of the queue holds a lane that this variant has work for.
+fn queued(i: u32) -> u32 {
+    return queue.lanes[settings.slots + i];
+}
+
+// Whether place `i` of the roster holds a lane that this variant has work for.
 fn is_left(i: u32) -> bool {
-    if i >= queue.count {
+    if i >= settings.rostered {
         return false;
     }
-    tally = tallies[queued(i)].now;
+    tally = tallies[rostered(i)].now;
     return running();
 }
 
@@ -39,7 +44,7 @@ fn sum_block(k: u32, own: u32) {
 // Each workgroup takes every `groups.x`-th block: there may be more of them than workgroups.
 @compute @workgroup_size(BLOCK)
 fn count_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
-    let blocks = (settings.lanes + BLOCK - 1u) / BLOCK;
+    let blocks = (settings.rostered + BLOCK - 1u) / BLOCK;
     for (var b = group.x; b < blocks; b += groups.x) {
         sum_block(k, select(0u, 1u, is_left(b * BLOCK + k)));
         if k == BLOCK - 1u {
@@ -52,7 +57,7 @@ fn count_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
 // One workgroup: where each block's lanes go, and how many there are.
 @compute @workgroup_size(BLOCK)
 fn sum_left(@builtin(local_invocation_index) k: u32) {
-    let blocks = (settings.lanes + BLOCK - 1u) / BLOCK;
+    let blocks = (settings.rostered + BLOCK - 1u) / BLOCK;
     let share = (blocks + BLOCK - 1u) / BLOCK;
     let begin_at = min(k * share, blocks);
     let end_at = min(begin_at + share, blocks);
@@ -68,13 +73,13 @@ fn sum_left(@builtin(local_invocation_index) k: u32) {
         start += count;
     }
     if k == BLOCK - 1u {
-        queue.left = block_counts[k];
+        queue.count = block_counts[k];
     }
 }
 
 @compute @workgroup_size(BLOCK)
 fn move_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
-    let blocks = (settings.lanes + BLOCK - 1u) / BLOCK;
+    let blocks = (settings.rostered + BLOCK - 1u) / BLOCK;
     for (var b = group.x; b < blocks; b += groups.x) {
         let i = b * BLOCK + k;
         let stays = is_left(i);
@@ -82,15 +87,8 @@ fn move_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         sum_block(k, own);
         if stays {
             let place = starts_of_blocks[b] + block_counts[k] - own;
-            queue.lanes[(1u - queue.half) * settings.lanes + place] = queued(i);
+            queue.lanes[settings.slots + place] = rostered(i);
         }
         workgroupBarrier();
     }
-}
-
-// The other half is the queue from here on.
-@compute @workgroup_size(1)
-fn turn_over() {
-    queue.half = 1u - queue.half;
-    queue.count = queue.left;
 }

@@ -67,8 +67,11 @@ struct Cell {
 }
 
 struct Settings {
-    // Lanes in the buffers.
-    lanes: u32,
+    // Lanes that the buffers have room for, lanes under way, and where those of them begin that are
+    // at their starts.
+    slots: u32,
+    rostered: u32,
+    fresh: u32,
     // Forcing periods to integrate, and the most that undecided lanes get.
     periods: u32,
     longest: u32,
@@ -235,6 +238,8 @@ struct Reading {
 struct Finding {
     // VALID_* bits; what is not valid is zero.
     valid: u32,
+    // 1 if the lane has ended.
+    ended: u32,
     status: u32,
     // 0 for none.
     period: u32,
@@ -250,13 +255,11 @@ struct Finding {
     word: array<u32, 7>,
 }
 
-// Lanes that are still running, in the order in which they were handed in.
+// Slots of lanes: first the roster, those under way in the order in which they were begun; from `slots` on those of
+// them that a variant has work for.
 struct Queue {
-    // How many, and which half of `lanes` they are in.
+    // How many the latter are.
     count: u32,
-    half: u32,
-    // How many are left of them.
-    left: u32,
     lanes: array<u32>,
 }
 

@@ -3,12 +3,13 @@
 @compute @workgroup_size(WORKGROUP)
 fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * settings.row + id.x;
-    if i >= settings.lanes {
+    if i >= settings.rostered {
         return;
     }
-    take_up(i);
+    take_up(rostered(i));
     var reading: Reading;
     var finding: Finding;
+    finding.ended = select(1u, 0u, running());
     finding.status = last_status();
     finding.periods_run = tally.period;
     if cell.refused == 0u {

@@ -33,7 +33,7 @@ pub(crate) fn run() -> Result<(), Failure> {
 }
 
 fn print(adapter: &AdapterReport) {
-    let AdapterReport { info, precisions, largest_binding, batch_lanes } = adapter;
+    let AdapterReport { info, precisions, largest_binding, most_lanes } = adapter;
     let names: Vec<&str> = precisions.iter().map(|precision| precision.name()).collect();
     let kind = if gpu::is_hardware(info) { "hardware" } else { "software" };
     println!("gpu: {}", gpu::describe(info));
@@ -41,5 +41,5 @@ fn print(adapter: &AdapterReport) {
     println!("  interface   {:?}, {}", info.backend, gpu::interface_rank(info));
     println!("  precision   {}", names.join(", "));
     println!("  binding     {:.1} GiB", *largest_binding as f64 / f64::from(1 << 30));
-    println!("  batch       up to {batch_lanes} lanes");
+    println!("  lanes       up to {most_lanes} at a time");
 }

@@ -119,15 +119,15 @@ impl Engine<'_> {
         Ok(())
     }
 
-    /// Computes until many of the cells under way have ended, or all: their records, by id. None if no cell is
-    /// under way.
+    /// Computes until no more than `until` of the cells under way are left, or for longer: the records of those that
+    /// have ended, by id. None if no cell is under way.
     ///
     /// # Errors
     /// [`EngineError`], after which nothing is under way.
-    pub async fn advance(&mut self) -> Result<Vec<(u32, Record)>, EngineError> {
+    pub async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         match self {
             Engine::Cpu(cpu) => Ok(cpu.advance()),
-            Engine::Gpu(gpu) => gpu.advance().await,
+            Engine::Gpu(gpu) => gpu.advance(until).await,
             Engine::Fake(fake) => fake.advance(),
         }
     }
@@ -140,7 +140,7 @@ impl Engine<'_> {
         self.begin(&batch.cells).await?;
         let mut records = HashMap::new();
         loop {
-            let ended = self.advance().await?;
+            let ended = self.advance(0).await?;
             if ended.is_empty() {
                 break;
             }

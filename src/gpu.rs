@@ -1,20 +1,20 @@
 //! The GPU engine: WGSL lanes on whatever adapter there is.
 //!
 //! [`Gpu::open`] takes an adapter and compiles the lane for one precision; [`Gpu::run`]
-//! integrates lanes in batches that the adapter's limits allow, by short dispatches over
-//! state that stays on the device, and hands back one [`Record`] per lane. The engine knows
-//! no files, threads or blocking waits of its own.
+//! integrates lanes, as many at a time as the adapter's limits allow, by short dispatches over
+//! state that stays on the device, and hands back one [`Record`] per lane; in a [`Pool`] lanes are begun and
+//! end at any time. The engine knows no files, threads or blocking waits of its own.
 //!
 //! The lane is independent of [`crate::reference`]: it takes the model's description
 //! ([`crate::model`]) and nothing else. A fixed grid of steps with the exact propagator
 //! carries it from event to event; see `shaders/`.
 
 mod averaging;
-mod batch;
 pub(crate) mod constants;
 mod device;
 mod guard;
 pub mod layout;
+mod pool;
 mod reading;
 mod rounds;
 mod self_test;
@@ -30,6 +30,7 @@ use std::collections::HashMap;
 pub(crate) use averaging::Averaging;
 pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
 pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware};
+pub use pool::Pool;
 pub use shader::{Precision, Variant, WORKGROUP};
 pub use stage::Stage;
 pub use tables::Tables;
@@ -77,7 +78,7 @@ pub enum GpuError {
         count: usize,
     },
     /// The device was lost on the way.
-    #[error("the device was lost during a batch: {message}; finished batches are kept")]
+    #[error("the device was lost on the way: {message}; finished batches are kept")]
     Lost {
         /// The driver's words.
         message: String,
@@ -177,7 +178,7 @@ pub struct LaneSettings {
     /// roundings add up like a random walk, and a short flight between impacts that spans
     /// several steps is known to the rounding of the gap, no longer to its own.
     pub steps_per_period: Option<u32>,
-    /// Lanes per batch at most; none for what the adapter's limits allow.
+    /// Lanes under way at most; none for what the adapter's limits allow.
     pub batch: Option<usize>,
     /// Loop trips that one dispatch may spend on a lane. Some drivers stop loops after
     /// 65,535 trips in all.
@@ -274,7 +275,7 @@ impl Gpu {
         self.pipelines.clear();
     }
 
-    /// Tells `watcher` from here on how far every batch has come: for measurements.
+    /// Tells `watcher` from here on how far lanes have come: for measurements.
     pub fn watch(&mut self, watcher: impl Fn(Stage) + Send + Sync + 'static) {
         self.watcher = Some(Box::new(watcher));
     }
@@ -287,8 +288,8 @@ impl Gpu {
 
     /// Integrates every lane and returns its record, in the same order.
     ///
-    /// What a lane gives depends on its own flow, law and start alone: not on batch size,
-    /// dispatch length, workgroup size or neighbours.
+    /// What a lane gives depends on its own flow, law and start alone: not on what else is
+    /// under way, dispatch length, workgroup size or neighbours.
     ///
     /// # Errors
     /// A [`GpuError`]; a lane that ends early is no error but a status in its record.
@@ -335,6 +336,29 @@ impl Gpu {
         lanes: &[Lane],
         settings: &LaneSettings,
     ) -> Result<Vec<Record>, GpuError> {
+        let mut pool = self.pool(settings).await?;
+        let mut records = vec![Record::default(); lanes.len()];
+        let mut begun = 0;
+        loop {
+            let next = begun..(begun + pool.room()).min(lanes.len());
+            begun = next.end;
+            let next: Vec<(u32, Lane)> = next.map(|i| (i as u32, lanes[i])).collect();
+            self.begin(&mut pool, tables, &next).await?;
+            if pool.under_way() == 0 {
+                return Ok(records);
+            }
+            let until = if begun < lanes.len() { pool.under_way() / 2 } else { 0 };
+            for (i, record) in self.advance(&mut pool, tables, until).await? {
+                records[i as usize] = record;
+            }
+        }
+    }
+
+    /// A pool without lanes.
+    ///
+    /// # Errors
+    /// What the device refuses.
+    pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
         let LaneSettings { workgroup, exponent, word, mesh, symmetry, chatter, .. } = *settings;
         let keep = !is_hardware(&self.info);
         // Until they need it, lanes go on without the tangent vector.
@@ -349,7 +373,35 @@ impl Gpu {
                 self.pipelines.insert(variant, pipelines);
             }
         }
-        let pipelines: Vec<_> = variants.iter().map(|variant| &self.pipelines[variant]).collect();
-        batch::run(self, &pipelines, tables, lanes, settings).await
+        Ok(Pool::new(self, variants, settings))
+    }
+
+    /// Puts lanes at their starts, in a pool all of whose lanes are on these tables. Each has a number by which its
+    /// record is known.
+    ///
+    /// # Errors
+    /// [`GpuError::NoSuchCell`], [`GpuError::OutOfMemory`] if there are more than [`Pool::room`] or than
+    /// the device has memory for, or what the device refuses. None of them is begun then.
+    pub async fn begin(
+        &self,
+        pool: &mut Pool,
+        tables: &Tables,
+        lanes: &[(u32, Lane)],
+    ) -> Result<(), GpuError> {
+        pool.begin(self, tables, lanes).await
+    }
+
+    /// Integrates until no more than `until` lanes are left; returns the records of those that have ended, with
+    /// their numbers.
+    ///
+    /// # Errors
+    /// What the device refuses; the pool is of no use then.
+    pub async fn advance(
+        &self,
+        pool: &mut Pool,
+        tables: &Tables,
+        until: usize,
+    ) -> Result<Vec<(u32, Record)>, GpuError> {
+        pool.advance(self, tables, until).await
     }
 }

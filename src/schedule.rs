@@ -66,7 +66,13 @@ impl Schedule {
     /// The schedule of a plan.
     pub fn new(plan: &Plan) -> Schedule {
         let kept = Course::new(plan);
-        Schedule { ahead: kept.clone(), kept, begun: 0, begun_before: 0, has_come: vec![false; plan.run_count()] }
+        Schedule {
+            ahead: kept.clone(),
+            kept,
+            begun: 0,
+            begun_before: 0,
+            has_come: vec![false; plan.run_count()],
+        }
     }
 
     /// Ids of the cells to integrate, as far as they are known by the records that were kept.
@@ -184,7 +190,10 @@ mod tests {
                 schedule.keep(place, &records);
             }
         }
-        assert!(waiting.is_empty() && schedule.next(plan, 1).is_empty(), "cells were begun that nobody asks for");
+        assert!(
+            waiting.is_empty() && schedule.next(plan, 1).is_empty(),
+            "cells were begun that nobody asks for"
+        );
         let refined = schedule.finish(&mut records).unwrap();
         assert_eq!(refined.integrated + refined.filled, plan.cell_count());
         assert!(records.iter().all(|r| (r.periods_run == 0) == (r.valid & valid::FILLED != 0)));

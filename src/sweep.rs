@@ -56,8 +56,9 @@ pub async fn run(
             other => other?,
         }
         under_way += next.len();
+        assert!(under_way > 0, "a schedule that is not finished has cells to begin");
         let clock = Instant::now();
-        let ended = engine.advance().await?;
+        let ended = engine.advance(under_way / 2).await?;
         pace.adapt(under_way, ended.len(), clock.elapsed());
         under_way -= ended.len();
         for (id, record) in ended {

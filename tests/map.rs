@@ -211,7 +211,9 @@ fn slow_cells_hold_up_nobody_and_records_keep_their_order() {
                 Ok(ControlFlow::Continue(()))
             };
             let engine = &mut Engine::Fake(fake);
-            assert!(pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, 0, keep)).unwrap());
+            assert!(
+                pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, 0, keep)).unwrap()
+            );
             let refined = schedule.finish(&mut records);
             (kept, records, refined)
         };

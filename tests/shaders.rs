@@ -120,6 +120,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 4,
                 [
                     valid,
+                    ended,
                     status,
                     period,
                     periods_run,
@@ -138,7 +139,9 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 4,
                 4,
                 [
-                    lanes,
+                    slots,
+                    rostered,
+                    fresh,
                     periods,
                     longest,
                     chaos_from,

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use super::EngineError;
-use crate::gpu::{self, FOLLOWED_MESH_SPEED, GpuError, Lane, LaneSettings, Tables};
-use crate::plan::{Batch, Cell, Needs, Plan};
+use crate::gpu::{self, FOLLOWED_MESH_SPEED, GpuError, Lane, LaneSettings, Pool, Tables};
+use crate::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use crate::scene::Steps;
 
@@ -21,7 +21,10 @@ pub struct Gpu<'p> {
     tables: Option<Tables>,
     /// Free steps taken so far.
     steps: u64,
-    under_way: Vec<Cell>,
+    /// Cells under way, where there are tables.
+    pool: Option<Pool>,
+    /// And where there are none.
+    waiting: Vec<Cell>,
 }
 
 impl<'p> Gpu<'p> {
@@ -31,7 +34,8 @@ impl<'p> Gpu<'p> {
     /// [`EngineError`] if the device takes no constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let settings = lane_settings(plan);
-        let mut engine = Gpu { plan, device, settings, tables: None, steps: 0, under_way: Vec::new() };
+        let mut engine =
+            Gpu { plan, device, settings, tables: None, steps: 0, pool: None, waiting: Vec::new() };
         if plan.keeps_flows() {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
@@ -67,41 +71,59 @@ impl<'p> Gpu<'p> {
     }
 
     pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
-        self.under_way.extend(cells);
-        Ok(())
+        let begun = match &self.tables {
+            Some(tables) => {
+                if self.pool.is_none() {
+                    let pool = self.device.pool(&self.settings).await;
+                    self.pool = Some(pool.map_err(|error| self.error(error, cells.len()))?);
+                }
+                let Some(pool) = &mut self.pool else { return Ok(()) };
+                let lanes: Vec<_> =
+                    cells.iter().map(|cell| (cell.id, lane(cell, cell.flow, cell.law))).collect();
+                self.device.begin(pool, tables, &lanes).await
+            }
+            None => {
+                self.waiting.extend(cells);
+                Ok(())
+            }
+        };
+        begun.map_err(|error| self.error(error, self.pool.as_ref().map_or(0, Pool::under_way) + cells.len()))
     }
 
-    pub(super) async fn advance(&mut self) -> Result<Vec<(u32, Record)>, EngineError> {
-        let cells = std::mem::take(&mut self.under_way);
-        let records = self.run(&Batch { places: 0..cells.len(), cells: cells.clone() }).await?;
-        Ok(cells.iter().map(|cell| cell.id).zip(records).collect())
+    pub(super) async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
+        let ended = match (&self.tables, &mut self.pool) {
+            (Some(tables), Some(pool)) => match self.device.advance(pool, tables, until).await {
+                Ok(ended) => {
+                    let steps = |id: u32| tables.steps_per_period(self.plan.cell(id).flow);
+                    self.steps += steps_of(ended.iter().map(|(id, record)| (record, steps(*id))));
+                    Ok(ended)
+                }
+                error => {
+                    // Its lanes are lost.
+                    self.pool = None;
+                    error
+                }
+            },
+            _ => self.run_waiting().await,
+        };
+        let mut ended = ended.map_err(|error| self.error(error, self.waiting.len()))?;
+        ended.iter_mut().for_each(|(_, record)| keep(record, self.plan.needs()));
+        Ok(ended)
     }
 
-    async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
-        let failed = |engine: &Gpu<'_>, error| engine.error(error, batch.cells.len());
-        if let Some(tables) = self.tables.take() {
-            let lanes: Vec<Lane> = batch.cells.iter().map(|cell| lane(cell, cell.flow, cell.law)).collect();
-            let ran = self.run_on(&tables, &lanes).await;
-            self.tables = Some(tables);
-            return ran.map_err(|error| failed(self, error));
-        }
-        let mut records = Vec::with_capacity(batch.cells.len());
-        for cells in batch.cells.chunks(self.plan.most_flows()) {
+    /// Cells whose flows are too many to be kept all together: some after the others.
+    async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
+        let waiting = std::mem::take(&mut self.waiting);
+        let mut ended = Vec::with_capacity(waiting.len());
+        for cells in waiting.chunks(self.plan.most_flows()) {
             let (flows, laws, lanes) = renumbered(cells);
-            let tables = self.load(&flows, &laws).await.map_err(|error| failed(self, error))?;
-            records.extend(self.run_on(&tables, &lanes).await.map_err(|error| failed(self, error))?);
+            let tables = self.load(&flows, &laws).await?;
+            let records = self.device.run_on(&tables, &lanes, &self.settings).await?;
+            let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
+            self.steps += steps_of(records.iter().zip(steps));
+            ended.extend(cells.iter().map(|cell| cell.id).zip(records));
         }
-        Ok(records)
-    }
-
-    /// The records of lanes, with what somebody asked for.
-    async fn run_on(&mut self, tables: &Tables, lanes: &[Lane]) -> Result<Vec<Record>, GpuError> {
-        let mut records = self.device.run_on(tables, lanes, &self.settings).await?;
-        for (record, lane) in records.iter_mut().zip(lanes) {
-            self.steps += u64::from(record.periods_run) * u64::from(tables.steps_per_period(lane.flow));
-            keep(record, self.plan.needs());
-        }
-        Ok(records)
+        Ok(ended)
     }
 
     async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
@@ -120,6 +142,11 @@ impl<'p> Gpu<'p> {
             other => EngineError::Refused { device, reason: other.to_string() },
         }
     }
+}
+
+/// Free steps of lanes, by their records and by those of a period.
+fn steps_of<'r>(lanes: impl Iterator<Item = (&'r Record, u32)>) -> u64 {
+    lanes.map(|(record, steps)| u64::from(record.periods_run) * u64::from(steps)).sum()
 }
 
 /// The flows and laws of these cells alone, and their lanes with indices among them.

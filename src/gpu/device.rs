@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::batch::largest_batch;
+use super::pool::most_slots;
 use super::{Gpu, GpuError, Precision};
 
 /// Which adapter to take.
@@ -27,24 +27,23 @@ pub(super) struct EntryPoint {
 }
 
 /// Puts every lane at its start.
-pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 5, 6, 7, 9] };
+pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 5, 6, 7, 8, 9] };
 /// Integrates.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
-/// Compacts the queue, one after the other.
-pub(super) const COMPACT: [EntryPoint; 4] = [
+/// Queues the lanes that a variant has work for, one after the other.
+pub(super) const COMPACT: [EntryPoint; 3] = [
     EntryPoint { name: "count_left", storage: &[7, 8, 12] },
     EntryPoint { name: "sum_left", storage: &[8, 12] },
     EntryPoint { name: "move_left", storage: &[7, 8, 12] },
-    EntryPoint { name: "turn_over", storage: &[8] },
 ];
 /// Makes records.
-pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 10, 11] };
+pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 8, 10, 11] };
 
 /// The pipelines of one variant.
 pub(super) struct Pipelines {
     pub(super) begin: wgpu::ComputePipeline,
     pub(super) sweep: wgpu::ComputePipeline,
-    pub(super) compact: [wgpu::ComputePipeline; 4],
+    pub(super) compact: [wgpu::ComputePipeline; 3],
     pub(super) conclude: wgpu::ComputePipeline,
 }
 
@@ -99,8 +98,8 @@ pub struct AdapterReport {
     pub precisions: Vec<Precision>,
     /// Largest storage buffer that a shader sees, in bytes.
     pub largest_binding: u64,
-    /// Lanes of one batch at most.
-    pub batch_lanes: usize,
+    /// Lanes that may be under way at a time.
+    pub most_lanes: usize,
 }
 
 /// All adapters of this machine, the best first.
@@ -109,7 +108,7 @@ pub async fn adapters() -> Vec<AdapterReport> {
         info: adapter.get_info(),
         precisions: Precision::ALL.into_iter().filter(|&p| has(adapter, p)).collect(),
         largest_binding: adapter.limits().max_storage_buffer_binding_size,
-        batch_lanes: largest_batch(&adapter.limits()),
+        most_lanes: most_slots(&adapter.limits()),
     };
     all_adapters().await.iter().map(report).collect()
 }

@@ -91,8 +91,12 @@ pub struct Cell {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Settings {
-    /// Lanes in the buffers.
-    pub lanes: u32,
+    /// Lanes that the buffers have room for.
+    pub slots: u32,
+    /// Lanes under way: the roster is as long.
+    pub rostered: u32,
+    /// Where those in it begin that are at their starts.
+    pub fresh: u32,
     /// Forcing periods to integrate.
     pub periods: u32,
     /// The most that undecided lanes get.
@@ -286,6 +290,8 @@ pub struct Reading {
 pub struct Finding {
     /// Bits of [`valid`](crate::record::valid); what is not valid is zero.
     pub valid: u32,
+    /// 1 if the lane has ended.
+    pub ended: u32,
     /// Status code.
     pub status: u32,
     /// Period; 0 for none.

@@ -1,13 +1,13 @@
-//! Rounds of dispatches over one batch, until no lane is running.
+//! Rounds of dispatches over the lanes under way, until few enough are running.
 //!
-//! Every round compacts the queue of running lanes and dispatches them a few times. The next
-//! round is under way while the host looks at the last one, which tells how many lanes are left
+//! Every round queues the lanes that a variant has work for, in the order of the roster, and dispatches them a few times.
+//! The next round is under way while the host looks at the last one, which tells how many lanes are left
 //! and how long it took: rounds are kept short enough for drivers that reset a device whose work
 //! takes seconds, and long enough to cost nothing.
 
 use web_time::{Duration, Instant};
 
-use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
+use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP, is_hardware};
 use super::stage::Clock;
 use super::transfer::{landing, read};
 use super::{Gpu, GpuError};
@@ -15,8 +15,10 @@ use super::{Gpu, GpuError};
 /// Dispatches of one round.
 const DISPATCHES: u32 = 4;
 
-/// How long a round should take. Windows resets a device after two seconds.
-const ROUND: Duration = Duration::from_millis(100);
+/// How long a round should take. Windows resets a device after two seconds; in software a round costs the more
+/// the more lanes there are, on hardware nobody should wait for the end of one.
+const ROUND_IN_SOFTWARE: Duration = Duration::from_millis(100);
+const ROUND_ON_HARDWARE: Duration = Duration::from_millis(20);
 
 /// Trips of the first round of all, and at least of any: shorter dispatches cost more than they do.
 const FEWEST_TRIPS: u32 = 250;
@@ -24,106 +26,140 @@ const FEWEST_TRIPS: u32 = 250;
 /// Lanes of a workgroup that compacts (`BLOCK` in the shader).
 const BLOCK: u32 = 256;
 
-/// Bytes of a look: lanes left, room, two timestamps.
+/// Bytes of a look: lanes left for each of two variants, two timestamps.
 const LOOK: u64 = 24;
 const TIMES: u64 = 8;
 
 /// Byte offset of the trips in the shader's settings.
 const TRIPS: u64 = std::mem::offset_of!(super::layout::Settings, trips) as u64;
 
-/// What the host needs of a batch for its rounds.
+/// What the host needs of a pool for its rounds.
 pub(super) struct Rounds<'a> {
     pub(super) gpu: &'a Gpu,
     pub(super) settings: &'a wgpu::Buffer,
     pub(super) queue: &'a wgpu::Buffer,
     /// All buffers, by binding.
     pub(super) buffers: &'a [&'a wgpu::Buffer],
-    pub(super) lanes: u32,
-    pub(super) workgroup: u32,
+    /// Lanes of the roster.
+    pub(super) rostered: u32,
+    /// Workgroups for so many lanes.
+    pub(super) grid: &'a dyn Fn(u32) -> [u32; 2],
     /// Most trips that one dispatch may spend on a lane.
     pub(super) most_trips: u32,
-    /// Workgroups in a row of the grid.
-    pub(super) row: u32,
+}
+
+/// A variant, bound to the buffers.
+struct Bound<'a> {
+    sweep: (&'a wgpu::ComputePipeline, wgpu::BindGroup),
+    compact: Vec<(&'a wgpu::ComputePipeline, wgpu::BindGroup)>,
+}
+
+/// A round under way.
+struct Sent<'a> {
+    look: &'a wgpu::Buffer,
+    submission: wgpu::SubmissionIndex,
+    /// Which variants it dispatched.
+    ran: Vec<bool>,
+    trips: u32,
 }
 
 impl Rounds<'_> {
-    /// Runs every variant to its end, one after the other. Returns the device's own time where
-    /// somebody measures.
-    pub(super) async fn run(&self, variants: &[&Pipelines]) -> Result<Option<f64>, GpuError> {
-        let clock = self.gpu.watcher.as_ref().and_then(|_| Clock::new(&self.gpu.device, &self.gpu.queue));
+    /// Runs lanes until no more than `until` are left, `trips` at first in a dispatch. Each variant takes over where
+    /// the one before leaves off. Returns the device's own time where somebody measures.
+    pub(super) async fn run(
+        &self,
+        variants: &[&Pipelines],
+        until: u32,
+        trips: &mut u32,
+    ) -> Result<Option<f64>, GpuError> {
+        let gpu = self.gpu;
+        let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue));
+        let bound: Vec<Bound<'_>> = variants.iter().map(|pipelines| self.bound(pipelines)).collect();
+        let looks = [landing(gpu, "look", LOOK), landing(gpu, "look", LOOK)];
+        // Lanes that a variant may have work for, those aside that come from the ones before.
+        let mut left = vec![0; variants.len()];
+        left[0] = self.rostered;
+        let most = self.most_trips.max(1);
+        let round = if is_hardware(&gpu.info) { ROUND_ON_HARDWARE } else { ROUND_IN_SOFTWARE };
+        *trips = (*trips).clamp(FEWEST_TRIPS.min(most), most);
         let mut seconds = 0.0;
-        for pipelines in variants {
-            seconds += self.run_variant(pipelines, clock.as_ref()).await?;
+        let mut before: Option<Sent<'_>> = None;
+        let mut last_end = Instant::now();
+        for (slot, look) in (0..2).zip(&looks).cycle() {
+            let sent = self.send(&bound, &left, *trips, (slot, look), clock.as_ref());
+            let Some(sent) = before.replace(sent) else { continue };
+            let take = |bytes: &[u8]| {
+                let took = clock.as_ref().map_or(0.0, |clock| clock.seconds(&bytes[TIMES as usize..]));
+                (bytemuck::pod_read_unaligned::<[u32; 2]>(&bytes[..8]), took)
+            };
+            let (now_left, took) = read(gpu, sent.look, LOOK, sent.submission, take).await?;
+            seconds += took;
+            for (left, (now, ran)) in left.iter_mut().zip(now_left.into_iter().zip(sent.ran)) {
+                *left = if ran { now } else { 0 };
+            }
+            // A lane on its way from one variant to the next is counted in both.
+            if left.iter().sum::<u32>() <= until {
+                break;
+            }
+            *trips = next_trips(sent.trips, last_end.elapsed(), round).clamp(FEWEST_TRIPS.min(most), most);
+            last_end = Instant::now();
         }
         Ok(clock.map(|_| seconds))
     }
 
-    async fn run_variant(&self, pipelines: &Pipelines, clock: Option<&Clock>) -> Result<f64, GpuError> {
-        let gpu = self.gpu;
-        // All lanes are looked at anew: those that waited for this variant are left.
-        let everyone: Vec<u32> = [self.lanes, 0, self.lanes].into_iter().chain(0..self.lanes).collect();
-        gpu.queue.write_buffer(self.queue, 0, bytemuck::cast_slice(&everyone));
-        let looks = [landing(gpu, "look", LOOK), landing(gpu, "look", LOOK)];
-        let sweep = bind(gpu, &pipelines.sweep, SWEEP, self.buffers);
-        let compact: Vec<_> = COMPACT
-            .into_iter()
-            .zip(&pipelines.compact)
-            .map(|(entry_point, pipeline)| (pipeline, bind(gpu, pipeline, entry_point, self.buffers)))
-            .collect();
-        let (mut left, mut seconds) = (self.lanes, 0.0);
-        let most = self.most_trips.max(1);
-        let mut trips = FEWEST_TRIPS.min(most);
-        let mut before: Option<(&wgpu::Buffer, wgpu::SubmissionIndex, u32)> = None;
-        let mut last_end = Instant::now();
-        for (slot, look) in (0..2).zip(&looks).cycle() {
-            gpu.queue.write_buffer(self.settings, TRIPS, bytemuck::bytes_of(&trips));
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            for (nth, (pipeline, bindings)) in (0..).zip(&compact) {
-                let writes = clock.and_then(|clock| clock.writes(slot, nth == 0, false));
-                let blocks = self.lanes.div_ceil(BLOCK).min(65_535);
-                let groups = if nth == 1 || nth == 3 { 1 } else { blocks };
-                dispatch(&mut encoder, pipeline, bindings, [groups, 1], writes);
-            }
-            encoder.copy_buffer_to_buffer(self.queue, 0, look, 0, 4);
-            let groups = self.grid(left);
-            for nth in 1..=DISPATCHES {
-                let writes = clock.and_then(|clock| clock.writes(slot, false, nth == DISPATCHES));
-                dispatch(&mut encoder, &pipelines.sweep, &sweep, groups, writes);
-            }
-            if let Some(clock) = clock {
-                clock.copy(&mut encoder, slot, look, TIMES);
-            }
-            let submission = gpu.queue.submit([encoder.finish()]);
-            let Some((look, submission, its_trips)) = before.replace((look, submission, trips)) else {
-                continue;
-            };
-            let take = |bytes: &[u8]| {
-                let took = clock.map_or(0.0, |clock| clock.seconds(&bytes[TIMES as usize..]));
-                (bytemuck::pod_read_unaligned::<u32>(&bytes[..4]), took)
-            };
-            let (now_left, took) = read(gpu, look, submission, take).await?;
-            seconds += took;
-            left = now_left;
-            if left == 0 {
-                break;
-            }
-            trips = next_trips(its_trips, last_end.elapsed()).clamp(FEWEST_TRIPS.min(most), most);
-            last_end = Instant::now();
+    fn bound<'a>(&self, pipelines: &'a Pipelines) -> Bound<'a> {
+        let with = |pipeline: &'a wgpu::ComputePipeline, entry_point| {
+            (pipeline, bind(self.gpu, pipeline, entry_point, self.buffers))
+        };
+        let compact = COMPACT.into_iter().zip(&pipelines.compact);
+        Bound {
+            sweep: with(&pipelines.sweep, SWEEP),
+            compact: compact.map(|(entry_point, pipeline)| with(pipeline, entry_point)).collect(),
         }
-        Ok(seconds)
     }
 
-    /// Workgroups for so many lanes.
-    pub(super) fn grid(&self, lanes: u32) -> [u32; 2] {
-        let groups = lanes.div_ceil(self.workgroup).max(1);
-        [groups.min(self.row), groups.div_ceil(self.row)]
+    /// Submits a round: each variant's queue, then its dispatches.
+    fn send<'a>(
+        &self,
+        variants: &[Bound<'_>],
+        left: &[u32],
+        trips: u32,
+        (slot, look): (u32, &'a wgpu::Buffer),
+        clock: Option<&Clock>,
+    ) -> Sent<'a> {
+        let gpu = self.gpu;
+        gpu.queue.write_buffer(self.settings, TRIPS, bytemuck::bytes_of(&trips));
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        // Lanes may come from the variants before, so that a variant has work if one of them has.
+        let first = left.iter().position(|&left| left > 0).unwrap_or(0);
+        let mut lanes = 0;
+        for (n, variant) in variants.iter().enumerate().skip(first) {
+            lanes += left[n];
+            for (nth, (pipeline, bindings)) in (0..).zip(&variant.compact) {
+                let writes = clock.and_then(|clock| clock.writes(slot, n == first && nth == 0, false));
+                let blocks = if nth == 1 { 1 } else { self.rostered.div_ceil(BLOCK).min(65_535) };
+                dispatch(&mut encoder, pipeline, bindings, [blocks, 1], writes);
+            }
+            encoder.copy_buffer_to_buffer(self.queue, 0, look, 4 * n as u64, 4);
+            let (pipeline, bindings) = &variant.sweep;
+            for nth in 1..=DISPATCHES {
+                let is_last = n + 1 == variants.len() && nth == DISPATCHES;
+                let writes = clock.and_then(|clock| clock.writes(slot, false, is_last));
+                dispatch(&mut encoder, pipeline, bindings, (self.grid)(lanes), writes);
+            }
+        }
+        if let Some(clock) = clock {
+            clock.copy(&mut encoder, slot, look, TIMES);
+        }
+        let submission = gpu.queue.submit([encoder.finish()]);
+        Sent { look, submission, ran: (0..variants.len()).map(|n| n >= first).collect(), trips }
     }
 }
 
 /// Trips for a round of the wanted length, from those of an earlier one and the time that it took.
 /// What is done does not depend on it.
-fn next_trips(trips: u32, took: Duration) -> u32 {
-    let factor = ROUND.as_secs_f64() / took.as_secs_f64().max(1e-6);
+fn next_trips(trips: u32, took: Duration, round: Duration) -> u32 {
+    let factor = round.as_secs_f64() / took.as_secs_f64().max(1e-6);
     (f64::from(trips) * factor.clamp(0.25, 2.0)) as u32
 }
 
@@ -172,12 +208,12 @@ mod tests {
         // 0.3 ms per trip; what a round took is known when the next one is already under way.
         let (mut under_way, mut trips) = (1000, 1000);
         for _ in 0..20 {
-            let next = next_trips(under_way, Duration::from_micros(300) * under_way);
+            let next = next_trips(under_way, Duration::from_micros(300) * under_way, ROUND_IN_SOFTWARE);
             (under_way, trips) = (trips, next);
         }
         assert!((300..=340).contains(&trips), "{trips}");
         assert!((300..=340).contains(&under_way), "{under_way}");
-        assert_eq!(next_trips(1000, Duration::ZERO), 2000);
-        assert_eq!(next_trips(1000, Duration::from_secs(100)), 250);
+        assert_eq!(next_trips(1000, Duration::ZERO, ROUND_IN_SOFTWARE), 2000);
+        assert_eq!(next_trips(1000, Duration::from_secs(100), ROUND_IN_SOFTWARE), 250);
     }
 }

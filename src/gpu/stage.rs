@@ -1,17 +1,17 @@
-//! How far a batch has come: told to whoever measures, who keeps the clock.
+//! How far lanes have come: told to whoever measures, who keeps the clock.
 
-/// What has just been done for a batch.
+/// What has just been done for lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stage {
-    /// Its buffers are made and its lanes handed to the device.
+    /// They are handed to the device.
     Uploaded,
-    /// Every lane has ended.
+    /// They have ended, or many of them.
     Integrated {
         /// Seconds between the first and the last pass of every submission, by the device's own
         /// clock; none if it has none.
         device_seconds: Option<f64>,
     },
-    /// Its records are here.
+    /// The records of those are here.
     Read,
 }
 

@@ -57,16 +57,17 @@ pub(super) fn landing(gpu: &Gpu, label: &'static str, size: u64) -> wgpu::Buffer
     })
 }
 
-/// What a [`landing`] holds after the work up to `submission`, handed to `take`.
+/// The first `size` bytes of what a [`landing`] holds after the work up to `submission`, handed to `take`.
 pub(super) async fn read<T>(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,
+    size: u64,
     submission: wgpu::SubmissionIndex,
     take: impl FnOnce(&[u8]) -> T,
 ) -> Result<T, GpuError> {
     let lost = |message: String| gpu.failure(GpuError::Lost { message });
     let (mapped, send) = Signal::new();
-    buffer.map_async(wgpu::MapMode::Read, .., send);
+    buffer.map_async(wgpu::MapMode::Read, ..size, send);
     // Native devices call back only while they are polled; a browser's do so by themselves.
     let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
     gpu.device.poll(wait).map_err(|error| lost(error.to_string()))?;
@@ -74,7 +75,7 @@ pub(super) async fn read<T>(
         return Err(GpuError::Lost { message });
     }
     mapped.await.map_err(|error| lost(error.to_string()))?;
-    let taken = take(&buffer.get_mapped_range(..).map_err(|error| lost(error.to_string()))?);
+    let taken = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
     buffer.unmap();
     Ok(taken)
 }
