@@ -41,5 +41,5 @@ fn print(adapter: &AdapterReport) {
     println!("  interface   {:?}, {}", info.backend, gpu::interface_rank(info));
     println!("  precision   {}", names.join(", "));
     println!("  binding     {:.1} GiB", *largest_binding as f64 / f64::from(1 << 30));
-    println!("  lanes       up to {most_lanes} at a time");
+    println!("  batch       up to {most_lanes} lanes");
 }

@@ -40,7 +40,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     }
     let mut work = Work::new(&plan);
     let mut file = open_records(ask, &folder, &scene, &mut work, &engine)?;
-    let resumed_cells = file.places();
+    let resumed_cells = file.count();
     let clock = Instant::now();
     let unit = unit(&plan);
     let progress = Progress::new(work.schedule.expected(), resumed_cells, unit, ask.run.quiet);
@@ -111,10 +111,8 @@ fn open_records(
     let path = folder.path().join(RECORDS);
     let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
     let file = if ask.resume && path.is_file() {
-        let Work { plan, schedule, records } = work;
-        RecordFile::resume(&path, &identity, |place, batch| {
-            sweep::replay(plan, schedule, records, place, batch)
-        })?
+        let Work { schedule, records, .. } = work;
+        RecordFile::resume(&path, &identity, |batch| sweep::replay(schedule, records, batch))?
     } else {
         RecordFile::create(&path, &identity)?
     };
@@ -145,17 +143,15 @@ fn integrate(
     progress: &Progress,
 ) -> Result<(), Failure> {
     let stop = stop_on_interrupt(ask.run.quiet)?;
-    let from = file.places();
     let Work { plan, schedule, records } = work;
-    let swept =
-        pollster::block_on(sweep::run(plan, schedule, engine, records, from, |batch, computed, known| {
-            file.append(computed)?;
-            progress.report(batch.places.end, known);
-            let stopped = stop.load(Ordering::Relaxed);
-            Ok(if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
-        }));
+    let swept = pollster::block_on(sweep::run(plan, schedule, engine, records, |batch, known| {
+        file.append(batch)?;
+        progress.report(file.count(), known);
+        let stopped = stop.load(Ordering::Relaxed);
+        Ok(if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    }));
     let go_on = || {
-        let (done, total, unit) = (file.places(), plan.run_count(), unit(plan));
+        let (done, total, unit) = (file.count(), plan.run_count(), unit(plan));
         let most = if plan.refine().is_some() { "at most " } else { "" };
         format!("{done} of {most}{total} {unit} are kept; go on with: {}", ask.resume_command())
     };

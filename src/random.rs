@@ -1,7 +1,6 @@
 //! Random numbers that are the same everywhere: SplitMix64 (Steele, Lea, Flood 2014).
 
 /// A stream of numbers that its seed decides.
-#[derive(Clone)]
 pub(crate) struct Random(u64);
 
 impl Random {

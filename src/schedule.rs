@@ -12,14 +12,12 @@
 //! starts from the last states of the row before. Several starts per cell are
 //! further runs over all cells, one start after the other: what runs side by side starts alike.
 //!
-//! The order of the cells follows from the records of the cells before. So a run that was
-//! interrupted goes on by replaying its records. Cells are begun before their turn, as soon as it is known
-//! that their turn will come: nobody waits for the slowest cell but what depends on it.
+//! What is asked for follows from the records that have come, not from their order. So nobody waits for the
+//! slowest cell but what depends on it, and a run that was interrupted goes on by replaying its records.
 
 mod adaptive;
 mod audit;
 mod blocks;
-mod course;
 mod fill;
 mod follow;
 mod label;
@@ -27,25 +25,43 @@ mod tiling;
 
 pub use audit::Audit;
 
-use course::Course;
+use adaptive::Adaptive;
+use follow::Follow;
 
 use crate::plan::{Batch, Cell, Plan};
 use crate::record::Record;
 
-/// The order of work on a map, and what may be begun before its turn.
-///
-/// Records are kept in the order of [`Schedule::sequence`], which follows from the records kept before. Cells are begun
-/// in the order of [`Schedule::next`], which follows from the records that have come so far, kept or not. Both end
-/// with the same cells.
+/// The order of work on a map: which cells are asked for, and which of them have their records.
 pub struct Schedule {
-    kept: Course,
-    /// The same in the order in which records come.
-    ahead: Course,
+    /// Cells in the order in which they were asked for.
+    sequence: Vec<u32>,
     /// Places of it that were handed out, and how many had been before the last time.
     begun: usize,
     begun_before: usize,
-    /// By run: whether its record has come.
-    has_come: Vec<bool>,
+    /// How many records have come.
+    come: usize,
+    /// By run.
+    states: Vec<State>,
+    /// Where the last row begins.
+    row: usize,
+    rule: Rule,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    Unasked,
+    Asked,
+    Come,
+}
+
+/// What asks for cells.
+enum Rule {
+    /// All are asked for from the beginning.
+    Whole,
+    /// Rows that follow each other.
+    Follow(Follow),
+    /// Blocks that differ.
+    Adaptive(Box<Adaptive>),
 }
 
 /// What became of an adaptive map.
@@ -55,7 +71,8 @@ pub struct Refined {
     pub integrated: usize,
     /// Cells that were filled.
     pub filled: usize,
-    /// The longest chain of cells each of which was asked for by the record of the one before, audits included.
+    /// Steps that had to follow each other: the coarse grid, the halvings of the block that was halved most, the
+    /// samples of the audits.
     pub rounds: usize,
     /// Audits in order; the last one found no more wrong cells than the scene allows, unless
     /// nothing was left to refine or blocks had been halved as often as they may.
@@ -65,19 +82,28 @@ pub struct Refined {
 impl Schedule {
     /// The schedule of a plan.
     pub fn new(plan: &Plan) -> Schedule {
-        let kept = Course::new(plan);
-        Schedule {
-            ahead: kept.clone(),
-            kept,
-            begun: 0,
-            begun_before: 0,
-            has_come: vec![false; plan.run_count()],
-        }
+        let mut sequence = Vec::new();
+        let rule = match plan.refine() {
+            Some(refine) => Rule::Adaptive(Box::new(Adaptive::new(plan, refine, &mut sequence))),
+            None if plan.policy().follows() => {
+                let follow = Follow::new(plan);
+                sequence = follow.row();
+                Rule::Follow(follow)
+            }
+            None => {
+                sequence = every_run(plan);
+                Rule::Whole
+            }
+        };
+        let states = vec![State::Unasked; plan.run_count()];
+        let mut schedule = Schedule { sequence, begun: 0, begun_before: 0, come: 0, states, row: 0, rule };
+        schedule.note_asked(0);
+        schedule
     }
 
-    /// Ids of the cells to integrate, as far as they are known by the records that were kept.
+    /// Ids of the cells to integrate, as far as they are known by now.
     pub fn sequence(&self) -> &[u32] {
-        self.kept.sequence()
+        &self.sequence
     }
 
     /// Up to `count` cells to begin next; none while what comes next depends on cells under way, or if
@@ -85,9 +111,9 @@ impl Schedule {
     pub fn next(&mut self, plan: &Plan, count: usize) -> Vec<Cell> {
         let mut cells = Vec::new();
         self.begun_before = self.begun;
-        while cells.len() < count && self.begun < self.ahead.sequence().len() {
-            if !self.has_come[self.ahead.sequence()[self.begun] as usize] {
-                cells.push(self.ahead.cell(plan, self.begun));
+        while cells.len() < count && self.begun < self.sequence.len() {
+            if self.states[self.sequence[self.begun] as usize] == State::Asked {
+                cells.push(self.cell(plan, self.begun));
             }
             self.begun += 1;
         }
@@ -99,34 +125,49 @@ impl Schedule {
         self.begun = self.begun_before;
     }
 
-    /// Takes up the record of a cell that was begun; `records` are those of all runs, this one included.
-    pub fn come(&mut self, id: u32, records: &[Record]) {
-        self.has_come[id as usize] = true;
-        self.ahead.take(id, records);
+    /// Whether a cell is asked for and has no record yet.
+    pub fn waits_for(&self, id: u32) -> bool {
+        self.states.get(id as usize) == Some(&State::Asked)
     }
 
-    /// The places from `from` on whose records have come.
-    pub fn ready(&self, from: usize) -> std::ops::Range<usize> {
-        let has_come = |&&id: &&u32| self.has_come[id as usize];
-        from..from + self.sequence()[from..].iter().take_while(has_come).count()
+    /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included.
+    pub fn take(&mut self, id: u32, records: &[Record]) {
+        self.states[id as usize] = State::Come;
+        self.come += 1;
+        let end = self.sequence.len();
+        if let Rule::Adaptive(adaptive) = &mut self.rule {
+            adaptive.take(id, &records[id as usize], &mut self.sequence);
+        }
+        if self.come == self.sequence.len() {
+            match &mut self.rule {
+                Rule::Whole => {}
+                Rule::Follow(follow) => {
+                    self.sequence.extend(follow.next(records));
+                    self.row = end;
+                }
+                Rule::Adaptive(adaptive) => adaptive.settle(records, &mut self.sequence),
+            }
+        }
+        self.note_asked(end);
     }
 
-    /// Takes up the records of the places before `end` as kept: the sequence goes on from there.
-    pub fn keep(&mut self, end: usize, records: &[Record]) {
-        while self.kept.taken() < end {
-            let id = self.kept.sequence()[self.kept.taken()];
-            self.kept.take(id, records);
+    fn note_asked(&mut self, from: usize) {
+        for &id in &self.sequence[from..] {
+            self.states[id as usize] = State::Asked;
         }
     }
 
-    /// Whether every cell has been kept.
+    /// Whether every cell that is asked for has its record.
     pub fn is_finished(&self) -> bool {
-        self.kept.taken() == self.kept.sequence().len()
+        self.come == self.sequence.len()
     }
 
     /// Runs that there will be, as far as is known by now.
     pub fn expected(&self) -> usize {
-        self.kept.expected()
+        match &self.rule {
+            Rule::Follow(follow) => follow.cell_count(),
+            Rule::Whole | Rule::Adaptive(_) => self.sequence.len(),
+        }
     }
 
     /// The batch of up to `count` cells of the sequence from place `from` on.
@@ -134,15 +175,37 @@ impl Schedule {
     /// # Panics
     /// Where cells follow their neighbours, if `from` lies before the last row.
     pub fn batch(&self, plan: &Plan, from: usize, count: usize) -> Batch {
-        let places = from..from.saturating_add(count).min(self.sequence().len());
-        let cells = places.clone().map(|place| self.kept.cell(plan, place)).collect();
+        let places = from..from.saturating_add(count).min(self.sequence.len());
+        let cells = places.clone().map(|place| self.cell(plan, place)).collect();
         Batch { places, cells }
+    }
+
+    fn cell(&self, plan: &Plan, place: usize) -> Cell {
+        let cell = plan.cell(self.sequence[place]);
+        match &self.rule {
+            Rule::Follow(follow) => Cell { start: follow.start(place - self.row), ..cell },
+            Rule::Whole | Rule::Adaptive(_) => cell,
+        }
     }
 
     /// Fills what was not integrated and says how it went; none where every cell was.
     pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
-        self.kept.finish(records)
+        let Rule::Adaptive(adaptive) = &self.rule else { return None };
+        let filled = adaptive.fill(records);
+        Some(Refined {
+            integrated: self.sequence.len(),
+            filled,
+            rounds: adaptive.rounds(),
+            audits: adaptive.audits().to_vec(),
+        })
     }
+}
+
+/// All cells in the plan's order, for every start.
+fn every_run(plan: &Plan) -> Vec<u32> {
+    let cells = plan.cell_count() as u32;
+    let of = |nth: u32| plan.order().iter().map(move |id| nth * cells + id);
+    (0..plan.start_count() as u32).flat_map(of).collect()
 }
 
 #[cfg(test)]
@@ -174,7 +237,6 @@ mod tests {
         let mut schedule = Schedule::new(plan);
         let mut records = vec![Record::default(); plan.cell_count()];
         let mut waiting = Vec::new();
-        let mut place = 0;
         while !schedule.is_finished() {
             waiting.extend(schedule.next(plan, usize::MAX).iter().map(|cell| cell.id));
             for id in come(&mut waiting) {
@@ -183,11 +245,8 @@ mod tests {
                 let valid = valid::PERIOD;
                 records[id as usize] =
                     Record { period: period(i, j), valid, periods_run: 7, ..Record::default() };
-                schedule.come(id, &records);
-            }
-            while !schedule.ready(place).is_empty() {
-                place = schedule.ready(place).end;
-                schedule.keep(place, &records);
+                assert!(schedule.waits_for(id));
+                schedule.take(id, &records);
             }
         }
         assert!(

@@ -1,4 +1,4 @@
-//! The run of a map: cells go through an engine as soon as they are asked for, records are kept in their order.
+//! The run of a map: cells go through an engine as soon as they are asked for, records are kept as they come.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -6,12 +6,15 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 
 use crate::engine::{Engine, EngineError};
-use crate::plan::{Batch, Plan};
+use crate::plan::Plan;
 use crate::record::Record;
 use crate::schedule::Schedule;
 
 /// What cells should take until some have ended: short enough to lose them, long enough not to be noticed.
 const BATCH_SECONDS: f64 = 1.0;
+
+/// Records that came after the last ones were kept wait no longer than this.
+const KEPT_AFTER: Duration = Duration::from_millis(500);
 
 /// Most cells under way, lest those of a fast engine fill the memory.
 const LARGEST_BATCH: usize = 1 << 20;
@@ -27,12 +30,12 @@ pub enum SweepError {
     Keep(anyhow::Error),
 }
 
-/// Runs the cells of a schedule from place `from` on, puts their records into `records` (by
-/// run) and hands what is next in the sequence to `keep`, with the number of places that are foreseen by
+/// Runs the cells that a schedule asks for, puts their records into `records` (by
+/// run) and hands them to `keep` about once a second, with the number of runs that are foreseen by
 /// now; `keep` says whether to go on. True if the map is finished.
 ///
-/// So many cells are under way that some end in about a second; records do not depend on it, nor does
-/// their order. If there are too many for the engine's memory it gets half as many.
+/// So many cells are under way that some end in about a second; records do not depend on it. If there are too many
+/// for the engine's memory it gets half as many.
 ///
 /// # Errors
 /// [`SweepError`], after which everything handed to `keep` before is still good.
@@ -41,61 +44,63 @@ pub async fn run(
     schedule: &mut Schedule,
     engine: &mut Engine<'_>,
     records: &mut [Record],
-    from: usize,
-    mut keep: impl FnMut(&Batch, &[Record], usize) -> anyhow::Result<ControlFlow<()>>,
+    mut keep: impl FnMut(&[(u32, Record)], usize) -> anyhow::Result<ControlFlow<()>>,
 ) -> Result<bool, SweepError> {
     let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH };
-    let (mut place, mut under_way) = (from, 0);
+    let mut under_way = 0;
+    let (mut unkept, mut last_kept) = (Vec::new(), Instant::now());
     while !schedule.is_finished() {
         let next = schedule.next(plan, pace.cells.saturating_sub(under_way));
-        match engine.begin(&next).await {
+        let clock = Instant::now();
+        let ended = match engine.begin(&next).await {
             Err(EngineError::OutOfMemory { .. }) if pace.halve(under_way + next.len()) => {
                 schedule.take_back();
                 continue;
             }
-            other => other?,
-        }
-        under_way += next.len();
-        assert!(under_way > 0, "a schedule that is not finished has cells to begin");
-        let clock = Instant::now();
-        let ended = engine.advance(under_way / 2).await?;
-        pace.adapt(under_way, ended.len(), clock.elapsed());
-        under_way -= ended.len();
-        for (id, record) in ended {
-            records[id as usize] = record;
-            schedule.come(id, records);
-        }
-        while !schedule.ready(place).is_empty() {
-            let ready = schedule.ready(place);
-            let batch = schedule.batch(plan, place, ready.len());
-            let computed: Vec<Record> = batch.cells.iter().map(|cell| records[cell.id as usize]).collect();
-            place = ready.end;
-            schedule.keep(place, records);
-            let stops = keep(&batch, &computed, schedule.expected()).map_err(SweepError::Keep)?.is_break();
+            Err(error) => Err(error),
+            Ok(()) => {
+                under_way += next.len();
+                assert!(under_way > 0, "a schedule that is not finished has cells to begin");
+                engine.advance(under_way / 2).await
+            }
+        };
+        let is_over = match &ended {
+            Err(_) => true,
+            Ok(ended) => {
+                pace.adapt(under_way, ended.len(), clock.elapsed());
+                under_way -= ended.len();
+                for &(id, record) in ended {
+                    records[id as usize] = record;
+                    schedule.take(id, records);
+                }
+                unkept.extend_from_slice(ended);
+                schedule.is_finished()
+            }
+        };
+        if !unkept.is_empty() && (is_over || last_kept.elapsed() >= KEPT_AFTER) {
+            let stops = keep(&unkept, schedule.expected()).map_err(SweepError::Keep)?.is_break();
+            unkept.clear();
+            last_kept = Instant::now();
             if stops && !schedule.is_finished() {
                 return Ok(false);
             }
         }
+        ended?;
     }
     Ok(true)
 }
 
-/// Takes up the records of an interrupted run, a batch that begins at `place`. False if the
-/// schedule has no such places.
-pub fn replay(
-    plan: &Plan,
-    schedule: &mut Schedule,
-    records: &mut [Record],
-    place: usize,
-    computed: &[Record],
-) -> bool {
-    let batch = schedule.batch(plan, place, computed.len());
-    for (cell, record) in batch.cells.iter().zip(computed) {
-        records[cell.id as usize] = *record;
-        schedule.come(cell.id, records);
-    }
-    schedule.keep(batch.places.end, records);
-    batch.cells.len() == computed.len()
+/// Takes up records of an interrupted run, in the order in which they were kept. False if the schedule does not wait
+/// for one of them.
+pub fn replay(schedule: &mut Schedule, records: &mut [Record], kept: &[(u32, Record)]) -> bool {
+    kept.iter().all(|&(id, record)| {
+        let is_waited_for = schedule.waits_for(id);
+        if is_waited_for {
+            records[id as usize] = record;
+            schedule.take(id, records);
+        }
+        is_waited_for
+    })
 }
 
 /// How many cells are under way.

@@ -121,8 +121,7 @@ fn read_records(
     let identity = Identity::new(&manifest.engine, &manifest.precision, &manifest.device, scene.identity());
     let mut schedule = Schedule::new(plan);
     let mut records = vec![Record::default(); plan.run_count()];
-    let take =
-        |place: usize, batch: &[Record]| sweep::replay(plan, &mut schedule, &mut records, place, batch);
+    let take = |batch: &[(u32, Record)]| sweep::replay(&mut schedule, &mut records, batch);
     let again = "make the map again with `rattlemap map SCENE --force`";
     let done = RecordFile::read(&path, &identity, take).map_err(|error| match error {
         RecordFileError::OtherRun { path, differences } => {

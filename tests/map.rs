@@ -8,7 +8,7 @@ use rattlemap::engine::{Cpu, Engine, EngineError, Fake};
 use rattlemap::flow::Flow;
 use rattlemap::model::GearPair;
 use rattlemap::orbit::{Class, Orbit, Settings, analyse};
-use rattlemap::plan::{Batch, Cell, Plan};
+use rattlemap::plan::{Cell, Plan};
 use rattlemap::record::{Record, valid};
 use rattlemap::reference::Trajectory;
 use rattlemap::scene::{Purpose, REST, Scene};
@@ -152,17 +152,19 @@ fn by_id(cell: &Cell) -> Record {
     Record { period: cell.id + 1, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
 }
 
-/// Sweeps with a fake; returns what it says and the ids kept, in order.
-fn sweep(plan: &Plan, fake: Fake, from: usize) -> (Result<bool, SweepError>, Vec<u32>) {
+/// Sweeps with a fake from where `before` ends; returns what it says and what it kept, in order.
+fn sweep(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, Vec<u32>) {
     let (mut schedule, mut kept) = (Schedule::new(plan), Vec::new());
     let mut records = vec![Record::default(); plan.cell_count()];
+    let done: Vec<_> = before.iter().map(|&id| (id, by_id(&plan.cell(id)))).collect();
+    assert!(sweep::replay(&mut schedule, &mut records, &done));
     let engine = &mut Engine::Fake(fake);
-    let keep = |batch: &Batch, computed: &[Record], _| {
-        assert!(batch.cells.iter().zip(computed).all(|(cell, record)| record.period == cell.id + 1));
-        kept.extend(batch.cells.iter().map(|cell| cell.id));
+    let keep = |batch: &[(u32, Record)], _| {
+        assert!(batch.iter().all(|(id, record)| record.period == id + 1));
+        kept.extend(batch.iter().map(|(id, _)| *id));
         Ok(ControlFlow::Continue(()))
     };
-    let end = pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, from, keep));
+    let end = pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, keep));
     (end, kept)
 }
 
@@ -170,10 +172,10 @@ fn sweep(plan: &Plan, fake: Fake, from: usize) -> (Result<bool, SweepError>, Vec
 fn a_lost_engine_leaves_what_was_done_and_the_next_goes_on() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, kept) = sweep(&plan, Fake::lost_after(2, by_id), 0);
+    let (end, kept) = sweep(&plan, Fake::lost_after(2, by_id), &[]);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::Lost { .. }))), "{end:?}");
     assert!(!kept.is_empty() && kept.len() < plan.cell_count());
-    let (end, rest) = sweep(&plan, Fake::new(by_id), kept.len());
+    let (end, rest) = sweep(&plan, Fake::new(by_id), &kept);
     assert!(end.unwrap());
     assert_eq!([kept, rest].concat(), plan.order());
 }
@@ -182,17 +184,31 @@ fn a_lost_engine_leaves_what_was_done_and_the_next_goes_on() {
 fn batches_shrink_to_the_memory_there_is() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, kept) = sweep(&plan, Fake::with_memory(3, by_id), 0);
+    let (end, kept) = sweep(&plan, Fake::with_memory(3, by_id), &[]);
     assert!(end.unwrap());
     assert_eq!(kept, plan.order());
-    let (end, kept) = sweep(&plan, Fake::with_memory(0, by_id), 0);
+    let (end, kept) = sweep(&plan, Fake::with_memory(0, by_id), &[]);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::OutOfMemory { cells: 1, .. }))), "{end:?}");
     assert!(kept.is_empty());
 }
 
-/// Cells whose neighbours take a hundred times as long: nobody waits for them, and all are kept in their order.
 #[test]
-fn slow_cells_hold_up_nobody_and_records_keep_their_order() {
+fn records_that_nobody_asked_for_are_refused() {
+    let plan = Plan::new(&scene(41, &["refine.minimum_grid=8"]));
+    let replay = |ids: &[u32]| {
+        let mut records = vec![Record::default(); plan.cell_count()];
+        let kept: Vec<_> = ids.iter().map(|&id| (id, Record::default())).collect();
+        sweep::replay(&mut Schedule::new(&plan), &mut records, &kept)
+    };
+    assert!(replay(&[0, 8, 16]));
+    for wrong in [&[0, 8, 8][..], &[1], &[41 * 41], &[u32::MAX]] {
+        assert!(!replay(wrong), "{wrong:?}");
+    }
+}
+
+/// Cells whose neighbours take a hundred times as long: nobody waits for them, and the map is the same.
+#[test]
+fn slow_cells_hold_up_nobody() {
     let adaptive = ["refine.minimum_grid=8", "refine.max_error=0.05", "refine.audit=50"];
     for sets in [&[][..], &adaptive] {
         let scene = scene(41, sets);
@@ -205,21 +221,27 @@ fn slow_cells_hold_up_nobody_and_records_keep_their_order() {
         let run = |fake: Fake| {
             let (mut schedule, mut kept) = (Schedule::new(&plan), Vec::new());
             let mut records = vec![Record::default(); plan.cell_count()];
-            let keep = |batch: &Batch, _: &[Record], _| {
-                assert_eq!(batch.places.start, kept.len());
-                kept.extend(batch.cells.iter().map(|cell| cell.id));
+            let keep = |batch: &[(u32, Record)], _| {
+                kept.extend(batch.iter().map(|(id, _)| *id));
                 Ok(ControlFlow::Continue(()))
             };
             let engine = &mut Engine::Fake(fake);
-            assert!(
-                pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, 0, keep)).unwrap()
-            );
+            let end = pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, keep));
+            assert!(end.unwrap());
             let refined = schedule.finish(&mut records);
             (kept, records, refined)
         };
-        let (kept, records, refined) = run(Fake::new(disc));
-        let slow = run(Fake::slow(|cell| if cell.id % 7 == 3 { 100 } else { 1 + cell.id % 2 }, disc));
-        assert_eq!((kept, refined), (slow.0, slow.2));
-        assert!(records == slow.1);
+        let (mut kept, records, refined) = run(Fake::new(disc));
+        let is_slow = |id: u32| id % 7 == 3;
+        let fake = Fake::slow(|cell| if cell.id % 7 == 3 { 100 } else { 1 + cell.id % 2 }, disc);
+        let (mut late, same_records, same_refined) = run(fake);
+        // A coarse cell that is slow comes after what its neighbours ask for.
+        let first_slow = late.iter().position(|&id| is_slow(id)).unwrap();
+        assert!(refined.is_none() || first_slow > 36, "{first_slow}");
+        assert_eq!(refined, same_refined);
+        assert!(records == same_records);
+        kept.sort_unstable();
+        late.sort_unstable();
+        assert_eq!(kept, late);
     }
 }

@@ -52,11 +52,11 @@ fn plan(sets: &[&str]) -> Plan {
 fn swept(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
     let mut schedule = Schedule::new(plan);
     let mut records = vec![Record::default(); plan.run_count()];
-    let go_on = |_: &_, _: &[Record], expected| {
+    let go_on = |_: &[(u32, Record)], expected| {
         assert_eq!(expected, plan.run_count());
         Ok(ControlFlow::Continue(()))
     };
-    assert!(pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, 0, go_on)).unwrap());
+    assert!(pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, go_on)).unwrap());
     records
 }
 

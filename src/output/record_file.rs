@@ -1,11 +1,11 @@
 //! `records.bin`: what a killed run leaves and the next one goes on from.
 //!
-//! A header that says whose records these are, then batches, appended one by one in the
-//! plan's order, each with its checksum. All numbers are little-endian:
+//! A header that says whose records these are, then batches, appended one by one as cells end,
+//! each with its checksum. All numbers are little-endian:
 //!
 //! ```text
-//! magic "RTLMAP\0\x01"   length u32   crc32 u32   identity (JSON)
-//! then per batch: first place u64   cells u32   crc32 u32 (over place, cells and records)   records
+//! magic "RTLMAP\0\x02"   length u32   crc32 u32   identity (JSON)
+//! then per batch: cells before it u64   cells u32   crc32 u32 (over all else)   ids u32 each   records
 //! ```
 //!
 //! A run that is killed while it writes leaves a torn last batch; it is cut off and
@@ -24,9 +24,10 @@ use crate::record::{RECORD_VERSION, Record};
 /// Its name in a map's folder.
 pub const RECORDS: &str = "records.bin";
 
-const MAGIC: [u8; 8] = *b"RTLMAP\0\x01";
+const MAGIC: [u8; 8] = *b"RTLMAP\0\x02";
 const BATCH_HEAD: usize = 16;
 const RECORD: usize = size_of::<Record>();
+const ID: usize = size_of::<u32>();
 /// Batches above this are no batches of ours.
 const MOST_CELLS: u32 = 1 << 24;
 
@@ -150,7 +151,7 @@ impl Identity {
 pub struct RecordFile {
     file: File,
     path: PathBuf,
-    places: usize,
+    count: usize,
 }
 
 impl RecordFile {
@@ -169,11 +170,11 @@ impl RecordFile {
         head.extend(crc32fast::hash(&identity).to_le_bytes());
         head.extend(identity);
         file.set_len(0).and_then(|()| file.write_all(&head)).and_then(|()| file.sync_all()).map_err(io)?;
-        Ok(RecordFile { file, path: path.to_owned(), places: 0 })
+        Ok(RecordFile { file, path: path.to_owned(), count: 0 })
     }
 
-    /// Opens the file of an interrupted run; `take` gets every batch that is whole, its first
-    /// place and its records, and says whether the run has such places. A torn last batch is
+    /// Opens the file of an interrupted run; `take` gets every batch that is whole, ids with their
+    /// records, and says whether the run asks for them. A torn last batch is
     /// cut off.
     ///
     /// # Errors
@@ -181,7 +182,7 @@ impl RecordFile {
     pub fn resume(
         path: &Path,
         identity: &Identity,
-        take: impl FnMut(usize, &[Record]) -> bool,
+        take: impl FnMut(&[(u32, Record)]) -> bool,
     ) -> Result<RecordFile, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         let mut file = lock(OpenOptions::new().read(true).write(true).open(path).map_err(io)?, path)?;
@@ -195,18 +196,18 @@ impl RecordFile {
         let (done, end) = reader.batches(take)?;
         drop(reader);
         file.set_len(end).and_then(|()| file.seek(SeekFrom::End(0))).map_err(io)?;
-        Ok(RecordFile { file, path: path.to_owned(), places: done })
+        Ok(RecordFile { file, path: path.to_owned(), count: done })
     }
 
-    /// Reads a file and leaves it alone; `take` is as for [`RecordFile::resume`]. Returns the
-    /// places read.
+    /// Reads a file and leaves it alone; `take` is as for [`RecordFile::resume`]. Returns how many
+    /// records were read.
     ///
     /// # Errors
     /// [`RecordFileError`] if the file is another run's, damaged or unreadable.
     pub fn read(
         path: &Path,
         identity: &Identity,
-        take: impl FnMut(usize, &[Record]) -> bool,
+        take: impl FnMut(&[(u32, Record)]) -> bool,
     ) -> Result<usize, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         let file = File::open(path).map_err(io)?;
@@ -219,26 +220,28 @@ impl RecordFile {
         Ok(reader.batches(take)?.0)
     }
 
-    /// Cells that the file holds: the place in the plan's order to go on from.
-    pub fn places(&self) -> usize {
-        self.places
+    /// Records that the file holds.
+    pub fn count(&self) -> usize {
+        self.count
     }
 
-    /// Appends the next batch and sees it onto the disk.
+    /// Appends the next batch, ids with their records, and sees it onto the disk.
     ///
     /// # Errors
     /// [`RecordFileError::Io`], for instance on a full disk.
-    pub fn append(&mut self, records: &[Record]) -> Result<(), RecordFileError> {
-        let bytes: &[u8] = bytemuck::cast_slice(records);
-        let (place, cells) = ((self.places as u64).to_le_bytes(), (records.len() as u32).to_le_bytes());
-        let sum = checksum(&place, &cells, bytes).to_le_bytes();
-        let head = [&place[..], &cells, &sum].concat();
+    pub fn append(&mut self, batch: &[(u32, Record)]) -> Result<(), RecordFileError> {
+        let ids: Vec<u8> = batch.iter().flat_map(|(id, _)| id.to_le_bytes()).collect();
+        let records: Vec<Record> = batch.iter().map(|(_, record)| *record).collect();
+        let bytes = [&ids, bytemuck::cast_slice(&records)].concat();
+        let (before, cells) = ((self.count as u64).to_le_bytes(), (batch.len() as u32).to_le_bytes());
+        let sum = checksum(&before, &cells, &bytes).to_le_bytes();
+        let head = [&before[..], &cells, &sum].concat();
         self.file
             .write_all(&head)
-            .and_then(|()| self.file.write_all(bytes))
+            .and_then(|()| self.file.write_all(&bytes))
             .and_then(|()| self.file.sync_data())
             .map_err(|reason| RecordFileError::Io { path: self.path.clone(), reason })?;
-        self.places += records.len();
+        self.count += batch.len();
         Ok(())
     }
 }
@@ -251,9 +254,9 @@ fn lock(file: File, path: &Path) -> Result<File, RecordFileError> {
     }
 }
 
-fn checksum(place: &[u8], cells: &[u8], records: &[u8]) -> u32 {
+fn checksum(before: &[u8], cells: &[u8], body: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
-    [place, cells, records].into_iter().for_each(|part| hasher.update(part));
+    [before, cells, body].into_iter().for_each(|part| hasher.update(part));
     hasher.finalize()
 }
 
@@ -303,20 +306,20 @@ impl Reader<'_> {
         serde_json::from_slice(&identity).map_err(|_| self.damaged(16, "its header cannot be read"))
     }
 
-    /// Reads batches up to the end or a torn last one; returns the places read and the
+    /// Reads batches up to the end or a torn last one; returns the number of records and the
     /// length of what is whole.
     fn batches(
         &mut self,
-        mut take: impl FnMut(usize, &[Record]) -> bool,
+        mut take: impl FnMut(&[(u32, Record)]) -> bool,
     ) -> Result<(usize, u64), RecordFileError> {
         let mut done = 0;
-        let mut records: Vec<Record> = Vec::new();
+        let mut body = Vec::new();
         while self.left() >= BATCH_HEAD as u64 {
             let start = self.at;
             let mut head = [0; BATCH_HEAD];
             self.take(&mut head)?;
             let cells = u32_at(&head, 8);
-            let bytes = u64::from(cells) * RECORD as u64;
+            let bytes = u64::from(cells) * (ID + RECORD) as u64;
             if bytes > self.left() {
                 // A batch this long may be torn, or its length may be wrong.
                 let plausible = cells <= MOST_CELLS && head[..8] == (done as u64).to_le_bytes();
@@ -326,9 +329,9 @@ impl Reader<'_> {
                     Err(self.damaged(start, "a batch that cannot be"))
                 };
             }
-            records.resize(cells as usize, Record::default());
-            self.take(bytemuck::cast_slice_mut(&mut records))?;
-            if checksum(&head[..8], &head[8..12], bytemuck::cast_slice(&records)) != u32_at(&head, 12) {
+            body.resize(bytes as usize, 0);
+            self.take(&mut body)?;
+            if checksum(&head[..8], &head[8..12], &body) != u32_at(&head, 12) {
                 // A batch is torn only if nothing follows it.
                 let torn = self.left() == 0;
                 return if torn {
@@ -337,7 +340,11 @@ impl Reader<'_> {
                     Err(self.damaged(start, "a batch does not match its checksum"))
                 };
             }
-            if head[..8] != (done as u64).to_le_bytes() || !take(done, &records) {
+            let (ids, records) = body.split_at(cells as usize * ID);
+            let ids = ids.chunks_exact(ID).map(|id| u32_at(id, 0));
+            let batch: Vec<(u32, Record)> =
+                ids.zip(bytemuck::pod_collect_to_vec::<u8, Record>(records)).collect();
+            if head[..8] != (done as u64).to_le_bytes() || !take(&batch) {
                 return Err(self.damaged(start, "a batch is out of place"));
             }
             done += cells as usize;

@@ -23,7 +23,6 @@ const NARROW: usize = 4;
 const LEVELS: u32 = u16::BITS;
 
 /// The state of an adaptive map.
-#[derive(Clone)]
 pub(super) struct Adaptive {
     counts: [usize; 2],
     refine: Refine,
@@ -46,8 +45,9 @@ pub(super) struct Adaptive {
     deepest: u32,
     /// Cells of the audit under way.
     audited: Vec<u32>,
-    /// Where samples are drawn from.
+    /// Where samples are drawn from, and how many have been.
     random: Random,
+    samples: usize,
     audits: Vec<Audit>,
     stage: Stage,
 }
@@ -104,6 +104,7 @@ impl Adaptive {
             deepest: 0,
             audited: Vec::new(),
             random: Random::new(1),
+            samples: 0,
             audits: Vec::new(),
             stage: Stage::Halving,
         };
@@ -116,6 +117,11 @@ impl Adaptive {
 
     pub(super) fn audits(&self) -> &[Audit] {
         &self.audits
+    }
+
+    /// Steps that had to follow each other: the coarse grid, halvings, samples.
+    pub(super) fn rounds(&self) -> usize {
+        1 + self.deepest as usize + self.samples
     }
 
     /// Takes up the record of a cell that was asked for; `asks` gets the cells that are needed for that.
@@ -144,7 +150,7 @@ impl Adaptive {
     /// Tells all blocks that a cell belongs to what it is.
     fn show(&mut self, at: [usize; 2], label: Label) {
         for tile in self.tiling.covering(at) {
-            self.show_to(tile, at, label);
+            self.show_to(tile, label);
             // A block may have been halved before all of its corners were known.
             let with_corner = |&tile: &Tile| self.tiling.block(tile).has_corner(at);
             let corner_of: Vec<Tile> = self.tiling.lineage(tile).take_while(with_corner).collect();
@@ -152,14 +158,13 @@ impl Adaptive {
         }
     }
 
-    fn show_to(&mut self, tile: Tile, at: [usize; 2], label: Label) {
+    fn show_to(&mut self, tile: Tile, label: Label) {
         let sight = &mut self.sights[tile];
         if !sight.label.is_known() {
             sight.label = label;
         } else if sight.label != label {
             self.pending.push(tile);
         }
-        debug_assert!(self.tiling.covering(at).any(|leaf| leaf == tile));
     }
 
     fn show_corner(&mut self, tile: Tile, label: Label) {
@@ -212,7 +217,7 @@ impl Adaptive {
                 for at in block.cells() {
                     let label = self.label(at);
                     if label.is_known() {
-                        self.show_to(part, at, label);
+                        self.show_to(part, label);
                         if block.has_corner(at) {
                             self.show_corner(part, label);
                         }
@@ -273,6 +278,7 @@ impl Adaptive {
             self.ask(id, asks);
         }
         self.audited.extend(&asks[from..]);
+        self.samples += usize::from(count > 0);
         count
     }
 

@@ -6,7 +6,6 @@ use crate::record::Record;
 use crate::scene::{REST, Start};
 
 /// Where a map that follows its neighbours stands.
-#[derive(Clone)]
 pub(super) struct Follow {
     columns: usize,
     rows: usize,

@@ -8,7 +8,6 @@ use super::blocks::{Block, coarse};
 pub(super) type Tile = usize;
 
 /// Blocks that cover a map without gaps, and all that they were made from by halving.
-#[derive(Clone)]
 pub(super) struct Tiling {
     counts: [usize; 2],
     tiles: Vec<Entry>,
@@ -16,7 +15,6 @@ pub(super) struct Tiling {
     owners: Vec<u32>,
 }
 
-#[derive(Clone)]
 struct Entry {
     block: Block,
     parent: Option<u32>,
@@ -70,8 +68,8 @@ impl Tiling {
 
     /// Halves a leaf; returns what it is made of.
     pub(super) fn halve(&mut self, tile: Tile) -> Range<Tile> {
-        let Entry { block, level, .. } = self.tiles[tile];
-        self.tiles[tile].is_leaf = false;
+        let Entry { block, level, ref mut is_leaf, .. } = self.tiles[tile];
+        *is_leaf = false;
         let from = self.tiles.len();
         for part in block.halves() {
             self.add(part, Some(tile as u32), level + 1);
