@@ -225,7 +225,7 @@ mod tests {
 
     /// Runs a schedule on a picture: a period for every cell.
     fn run(plan: &Plan, period: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
-        run_in(plan, |waiting| waiting.drain(..).collect(), period)
+        run_in(plan, std::mem::take, period)
     }
 
     /// The same where `come` says which of the cells under way come next.
