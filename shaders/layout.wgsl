@@ -170,8 +170,9 @@ struct TallyNow {
     tries: u32,
     // Period at which counting began.
     counted_from: u32,
-    // How many tangent vectors there are.
+    // How many tangent vectors there are, and 1 for lanes of the variant that carries one for the exponent.
     tangent_count: u32,
+    grows: u32,
     // Blocks of the exponent, and periods in the present one.
     blocks: u32,
     block_periods: u32,

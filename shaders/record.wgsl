@@ -9,7 +9,7 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
     take_up(rostered(i));
     var reading: Reading;
     var finding: Finding;
-    finding.ended = select(1u, 0u, running());
+    finding.ended = select(0u, 1u, is_over());
     finding.status = last_status();
     finding.periods_run = tally.period;
     if cell.refused == 0u {

@@ -18,11 +18,19 @@ fn check_finite() {
     }
 }
 
-// Whether there is work for this variant: without the tangent vector for the exponent, lanes go
-// on until they need it, and whoever reads a cycle reads it to its end.
+fn is_over() -> bool {
+    return tally.status != STATUS_OK || tally.stage >= STAGE_READ;
+}
+
+// Whether there is work for this variant. Without the tangent vector for the exponent lanes go
+// on until they need it, and who reads a cycle reads it to its end; then they are the other variant's for good.
+// Which one has a lane must not depend on when a dispatch ends: they round differently.
 fn running() -> bool {
-    let waits = EXPONENT && !GROWTH && tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from;
-    return tally.status == STATUS_OK && tally.stage < STAGE_READ && !waits;
+    if is_over() || !EXPONENT {
+        return !is_over();
+    }
+    let grows = tally.grows == 1u || (tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from);
+    return grows == GROWTH;
 }
 
 // Takes lane `i` into registers.

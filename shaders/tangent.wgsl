@@ -32,6 +32,7 @@ fn store_tangent(i: u32, u: array<Real, 4>) {
 // At the start and the end of a dispatch. The first one with the vector begins it.
 fn fetch_tangent() {
     if GROWTH {
+        tally.grows = 1u;
         if tally.tangent_count == 0u {
             forget_growth();
             keep_tangent();

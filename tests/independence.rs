@@ -74,3 +74,43 @@ fn records_do_not_depend_on_how_the_work_is_cut() {
             .unwrap();
     }
 }
+
+/// Lanes that are begun while others are under way, in slots that others have left or in a pool that has
+/// grown meanwhile, give what they give together.
+#[test]
+fn records_do_not_depend_on_when_lanes_are_begun() {
+    let pairs: Vec<GearPair> = (0..60u32)
+        .map(|i| GearPair {
+            omega: 1.0 + f64::from(i * 37 % 60) / 6.0,
+            ..GearPair::paper(f64::from(i * 23 % 60) / 60.0)
+        })
+        .collect();
+    let flows: Vec<_> = pairs.iter().map(|pair| pair.oscillator().unwrap()).collect();
+    let laws: Vec<_> = pairs.iter().map(|pair| pair.law()).collect();
+    let lanes: Vec<(u32, Lane)> =
+        (0..60).map(|i| (1000 + i, Lane { flow: i, law: i, start: [0.0; 4] })).collect();
+    let settings = LaneSettings { trips: 500, ..LaneSettings::default() };
+    for precision in Precision::ALL {
+        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+        let together: Vec<Lane> = lanes.iter().map(|&(_, lane)| lane).collect();
+        let expected = records(&mut gpu, (&flows, &laws), &together, &settings);
+        let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
+        let mut pool = pollster::block_on(gpu.pool(&settings)).unwrap();
+        let mut ended = Vec::new();
+        // Five are begun first, then more than the pool has slots for, then as many as have ended.
+        for (from, to, left) in [(0, 5, 3), (5, 9, 6), (9, 40, 12), (40, 48, 10), (48, 60, 1), (60, 60, 0)] {
+            pollster::block_on(gpu.begin(&mut pool, &tables, &lanes[from..to])).unwrap();
+            let some = pollster::block_on(gpu.advance(&mut pool, &tables, left)).unwrap();
+            assert!(pool.under_way() <= left, "{} of {left} are left", pool.under_way());
+            ended.extend(some);
+            assert_eq!(ended.len() + pool.under_way(), to);
+        }
+        assert!(pollster::block_on(gpu.advance(&mut pool, &tables, 0)).unwrap().is_empty());
+        ended.sort_by_key(|(number, _)| *number);
+        let numbers: Vec<u32> = ended.iter().map(|(number, _)| *number).collect();
+        assert_eq!(numbers, (1000..1060).collect::<Vec<_>>());
+        for ((number, record), expected) in ended.iter().zip(&expected) {
+            assert_eq!(record, expected, "{precision:?}, lane {number}");
+        }
+    }
+}

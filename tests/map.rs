@@ -1,6 +1,7 @@
 //! Maps through the library: classes against single orbits, and independence of how the
 //! work was cut up.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use rattlemap::classify::classify;
@@ -244,4 +245,42 @@ fn slow_cells_hold_up_nobody() {
         late.sort_unstable();
         assert_eq!(kept, late);
     }
+}
+
+/// Periods until the last of an adaptive map's cells has ended, on a device that runs as many side by side as there
+/// are: if what is asked for is begun at once, and if it waits for all that was asked for before.
+#[test]
+fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_often() {
+    let sets = ["refine.minimum_grid=8", "refine.max_error=0.02", "integration.undecided_periods=1584"];
+    let plan = Plan::new(&scene(256, &sets));
+    let mut measured = vec![Record::default(); plan.cell_count()];
+    let engine = &mut Engine::Cpu(Cpu::new(&plan));
+    let go_on = |_: &[(u32, Record)], _| Ok(ControlFlow::Continue(()));
+    let mut schedule = Schedule::new(&plan);
+    assert!(pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, go_on)).unwrap());
+    let mut integrated = schedule.sequence().to_vec();
+    integrated.sort_unstable();
+    let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();
+    let [overlapped, in_rounds] = [false, true].map(|waits| {
+        let mut schedule = Schedule::new(&plan);
+        let mut records = vec![Record::default(); plan.cell_count()];
+        let (mut now, mut under_way) = (0, BTreeSet::new());
+        while !schedule.is_finished() {
+            if !waits || under_way.is_empty() {
+                let next = schedule.next(&plan, usize::MAX);
+                under_way
+                    .extend(next.iter().map(|cell| (now + measured[cell.id as usize].periods_run, cell.id)));
+            }
+            let (end, id) = under_way.pop_first().unwrap();
+            now = end;
+            records[id as usize] = measured[id as usize];
+            schedule.take(id, &records);
+        }
+        let mut asked = schedule.sequence().to_vec();
+        asked.sort_unstable();
+        assert_eq!(asked, integrated, "waiting: {waits}");
+        now
+    });
+    println!("slowest cell {slowest} periods; all cells {overlapped}, in rounds {in_rounds}");
+    assert!(overlapped < 8 * slowest && 2 * overlapped < in_rounds, "{slowest}, {overlapped}, {in_rounds}");
 }

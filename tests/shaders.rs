@@ -185,6 +185,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     tries,
                     counted_from,
                     tangent_count,
+                    grows,
                     blocks,
                     block_periods,
                     anchor_period,

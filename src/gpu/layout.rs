@@ -208,6 +208,8 @@ pub struct Tally {
     pub counted_from: u32,
     /// Tangent vectors carried.
     pub tangent_count: u32,
+    /// 1 once a lane is of the variant that carries one for the exponent.
+    pub grows: u32,
     /// Whole blocks of the exponent.
     pub blocks: u32,
     /// Periods in the present block.
