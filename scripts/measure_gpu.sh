@@ -20,7 +20,9 @@ set -euo pipefail
 binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
-scene="$(cd "$(dirname "$0")/.." && pwd)/scenes/e_omega.toml"
+scenes="$(cd "$(dirname "$0")/.." && pwd)/scenes"
+scene="$scenes/e_omega.toml"
+adaptive="$scenes/adaptive.toml"
 mkdir -p "$out"
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
@@ -46,7 +48,7 @@ timed() {
     shift 2
     for run in 1 2 3; do
         # shellcheck disable=SC2046
-        "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/timed" --force $(square "$side") \
+        "$binary" map "${of:-$scene}" --engine gpu --precision "$precision" --out "$work/timed" --force $(square "$side") \
             "$@" 2>"$work/said"
         # "N cells on gpu (f32) in S s: C cells/s, P lane-periods/s, K ns per lane-step; outputs O s"
         grep -E '^[0-9]+ cells.* on gpu' "$work/said" |
@@ -60,6 +62,11 @@ for precision in "${precisions[@]}"; do
     timed brute_force "$precision" --set integration.early_stop=false
     timed early_stop "$precision"
     timed period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
+    of="$adaptive" timed adaptive "$precision" --set 'outputs.files=["npy"]'
+    of="$adaptive" timed adaptive_period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
+    # Four lanes for as long as the slowest of a map may take: what no map is faster than.
+    side=2 timed slowest_lane "$precision" --set integration.early_stop=false \
+        --set integration.transient_periods=2000 --set integration.observed_periods=112
 done
 
 # What it finds is a finding, too.

@@ -9,8 +9,6 @@ mod fake;
 mod flows;
 mod gpu;
 
-use std::collections::HashMap;
-
 use thiserror::Error;
 
 pub use cpu::Cpu;
@@ -137,15 +135,20 @@ impl Engine<'_> {
     /// # Errors
     /// [`EngineError`], with nothing of the batch computed.
     pub async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
+        let ids = || batch.cells.iter().map(|cell| cell.id as usize);
+        let (Some(first), Some(last)) = (ids().min(), ids().max()) else { return Ok(Vec::new()) };
+        let mut places = vec![0; last - first + 1];
+        ids().enumerate().for_each(|(place, id)| places[id - first] = place);
+        let mut records = vec![Record::default(); batch.cells.len()];
         self.begin(&batch.cells).await?;
-        let mut records = HashMap::new();
         loop {
             let ended = self.advance(0).await?;
             if ended.is_empty() {
                 break;
             }
-            records.extend(ended);
+            ended.into_iter().for_each(|(id, record)| records[places[id as usize - first]] = record);
         }
-        Ok(batch.cells.iter().map(|cell| records[&cell.id]).collect())
+        // Cells that were asked for twice.
+        Ok(ids().map(|id| records[places[id - first]]).collect())
     }
 }

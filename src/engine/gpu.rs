@@ -44,6 +44,9 @@ impl<'p> Gpu<'p> {
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
                 other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
             };
+            // Compiled now, not while somebody waits for cells.
+            let pool = engine.device.pool(&settings).await;
+            engine.pool = Some(pool.map_err(|error| engine.error(error, 0))?);
         }
         Ok(engine)
     }
@@ -71,23 +74,13 @@ impl<'p> Gpu<'p> {
     }
 
     pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
-        let begun = match &self.tables {
-            Some(tables) => {
-                if self.pool.is_none() {
-                    let pool = self.device.pool(&self.settings).await;
-                    self.pool = Some(pool.map_err(|error| self.error(error, cells.len()))?);
-                }
-                let Some(pool) = &mut self.pool else { return Ok(()) };
-                let lanes: Vec<_> =
-                    cells.iter().map(|cell| (cell.id, lane(cell, cell.flow, cell.law))).collect();
-                self.device.begin(pool, tables, &lanes).await
-            }
-            None => {
-                self.waiting.extend(cells);
-                Ok(())
-            }
+        let (Some(tables), Some(pool)) = (&self.tables, &mut self.pool) else {
+            self.waiting.extend(cells);
+            return Ok(());
         };
-        begun.map_err(|error| self.error(error, self.pool.as_ref().map_or(0, Pool::under_way) + cells.len()))
+        let count = pool.under_way() + cells.len();
+        let lanes: Vec<_> = cells.iter().map(|cell| (cell.id, lane(cell, cell.flow, cell.law))).collect();
+        self.device.begin(pool, tables, &lanes).await.map_err(|error| self.error(error, count))
     }
 
     pub(super) async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
@@ -99,8 +92,7 @@ impl<'p> Gpu<'p> {
                     Ok(ended)
                 }
                 error => {
-                    // Its lanes are lost.
-                    self.pool = None;
+                    pool.clear();
                     error
                 }
             },

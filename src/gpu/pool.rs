@@ -79,6 +79,11 @@ impl Pool {
         self.most - self.roster.len()
     }
 
+    /// Forgets the lanes under way.
+    pub fn clear(&mut self) {
+        self.free.append(&mut self.roster);
+    }
+
     /// Puts lanes at their starts; each has a number of the caller's.
     pub(super) async fn begin(
         &mut self,
