@@ -96,6 +96,20 @@ fn a_gap_at_rest_is_let_go_once() {
     }
 }
 
+/// Two gears at rest on each other whose load is about to change sign, beside displacements of 31: single precision let
+/// them go by the third derivative, at a rate of 3e-19, and pressed them back by a second one that was rounding, ten
+/// thousand times at one instant.
+#[test]
+fn gears_at_rest_are_let_go_at_rest() {
+    let plan = cell("released").plan();
+    for precision in Precision::ALL {
+        let record = lane(&plan, precision);
+        assert_eq!(classify(&record), Class::Undecided, "{precision:?}: {record:?}");
+        assert_eq!([record.impacts_per_period, record.mesh_fraction], [0.0; 2], "{precision:?}: {record:?}");
+        assert_eq!(explanation(&plan, record, precision), Err(()), "{precision:?}: {record:?}");
+    }
+}
+
 /// A meshing speed that is next to none in units of a lane's step, but not in those of the motion: 240 impacts a
 /// period, of which a lane that went by its step closed 83 by the limit of an infinite series.
 #[test]
