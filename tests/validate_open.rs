@@ -99,6 +99,26 @@ fn neutral_motion_is_no_chaos_in_anybodys_blocks() {
     }
 }
 
+/// Lanes that may stop early count from where exponents begin, 100 periods after the start, not from the end of the
+/// transient: this one is left open by a slow cycle after 2,112 periods, and has averaged 1,917.
+#[test]
+fn lanes_that_may_stop_early_count_before_the_transient_is_over() {
+    let text = "[[axis]]\nparameter = 'e'\nmin = 0.7480314960629921\nmax = 1.0\ncount = 2\n\
+         [[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 12.0\ncount = 2\n\
+         [integration]\nundecided_periods = 1584\n\
+         [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n";
+    let plan = Plan::new(&Scene::parse(text, "cell", &[], Purpose::Map).unwrap());
+    let strobe = [1.2445701956748962, -0.08700716515500079, 0.7460595965385437, 0.2017984370626537];
+    let record = open([101_761.0 / 1917.0, 0.29894429445266724], strobe, 2112);
+    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
+    let planted: [(&str, Spoil); 3] = [
+        ("meshing", |record| record.mesh_fraction += 1e-3),
+        ("impacts", |record| record.impacts_per_period += 0.5),
+        ("counted too long", |record| record.impacts_per_period = 106_861.0 / 2013.0),
+    ];
+    stays_unexplained(&plan, record, Precision::F32, &planted);
+}
+
 /// The reference calls a motion chaos that ends on a cycle in time; a lane that is there by its last period
 /// may be left open on it, and nowhere else.
 #[test]

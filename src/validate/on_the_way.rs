@@ -1,7 +1,7 @@
 //! What a lane that decides nothing has averaged.
 //!
-//! Lanes count impacts and meshing from the end of the transient on, and anew wherever a cycle has been read in
-//! vain: up to the last strobe, over a number of periods that their record does not tell.
+//! Lanes count impacts and meshing from the end of the transient on, or from where exponents begin if they may stop
+//! early, and anew wherever a cycle has been read in vain: up to the last strobe, over a number of periods that their record does not tell.
 
 use super::case::Case;
 use super::explanation::{ELSEWHERE, strobe};
@@ -33,7 +33,7 @@ pub(super) fn has_averages_on_the_way(case: &Case<'_>) -> bool {
     if classify(record) != Class::Undecided || record.valid & (valid::IMPACTS | valid::MESH) == 0 {
         return true;
     }
-    let longest = record.periods_run.saturating_sub(case.budget.settings.transient_periods).max(1);
+    let longest = record.periods_run.saturating_sub(counted_from(case)).max(1);
     // Impacts are whole.
     let is_whole = |periods: &u32| {
         let impacts = record.impacts_per_period * f64::from(*periods);
@@ -61,6 +61,16 @@ pub(super) fn has_averages_on_the_way(case: &Case<'_>) -> bool {
             own.extend(starts.iter().copied().filter_map(of_start));
             is_met(case, &own, &ahead, lengths)
         })
+}
+
+/// The first period that may count.
+fn counted_from(case: &Case<'_>) -> u32 {
+    let transient_periods = case.budget.settings.transient_periods;
+    if case.budget.early_stop {
+        transient_periods.min(case.budget.exponent_from())
+    } else {
+        transient_periods
+    }
 }
 
 /// Whether rounding decides where the motion is at last.
@@ -123,7 +133,7 @@ fn ahead(case: &Case<'_>, periods: u32) -> Vec<Course> {
 fn is_met(case: &Case<'_>, own: &[Course], ahead: &[Course], [shortest, longest]: [usize; 2]) -> bool {
     // Where rounding decides that, any stretch of it is as good, and the shortest scatter most.
     if is_scattered(case, own) {
-        let from = case.budget.settings.transient_periods as usize;
+        let from = counted_from(case) as usize;
         let all = own.iter().map(|course| (course, from)).chain(ahead.iter().map(|course| (course, 0)));
         return lies_between(
             case,
