@@ -226,6 +226,9 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
     return Find(false, false, len);
 }
 
+// What the acceleration of a gap may have been that began this step at rest and was taken for none, else 0.
+var<private> balanced: Real;
+
 // Bound on the eighth derivative of the gap where the dip asks for it.
 var<private> pressing_bound: Real;
 
@@ -245,9 +248,14 @@ fn careful() -> bool {
         pressing_bound =
             derivative_bound(5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
     }
-    if tally.order == 2u && abs(gap_terms[2]) <= 0.5 * balance(here.gap_row, share, motion.q) {
-        gap_terms[2] = 0.0;
-        tally.order = 3u;
+    balanced = 0.0;
+    if tally.order == 2u {
+        let most = balance(here.gap_row, share, motion.q);
+        if abs(gap_terms[2]) <= 0.5 * most {
+            gap_terms[2] = 0.0;
+            tally.order = 3u;
+            balanced = most;
+        }
     }
     let mark = next_mark();
     let part = to_mark(mark) * substeps;
@@ -299,7 +307,7 @@ fn act(second: bool, tau: Real) {
     if mode == MODE_FREE {
         jump = contact(side, settling);
     } else if mode < MODE_DIP {
-        jump = end_meshing(side, settling);
+        jump = end_meshing(side, settling, tau);
     } else if second {
         jump = end_dip(side, tau);
     } else {

@@ -122,8 +122,8 @@ fn contact(side: u32, settling: bool) -> Jump {
     return jump;
 }
 
-// The gap falls back through the wall.
-fn end_meshing(side: u32, settling: bool) -> Jump {
+// The gap falls back through the wall, `tau` after the expansion.
+fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
     let sign = sign_of(side);
     var jump = Jump(false, tally.mode, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
     if settling && sign * motion.q[1] > 0.0 {
@@ -132,7 +132,10 @@ fn end_meshing(side: u32, settling: bool) -> Jump {
     jump.event = true;
     jump.mode = MODE_FREE;
     motion.q[0] = walls[side];
-    motion.q[1] = -sign * max(-sign * motion.q[1], Real(0.0));
+    // One that was at rest, its load balanced, is let go at rest: by the rate that it has by then, which is
+    // rounding, free motion would go by the sign of an acceleration that is rounding, too, and press it back.
+    let leaving = max(-sign * motion.q[1], Real(0.0));
+    motion.q[1] = select(-sign * leaving, Real(0.0), leaving <= here.substeps * balanced * tau);
     return jump;
 }
 

@@ -16,6 +16,7 @@ mod explanation;
 mod lane_growth;
 mod lane_model;
 mod limits;
+mod on_the_way;
 mod reading;
 mod rounded;
 mod rounding;

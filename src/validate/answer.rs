@@ -96,8 +96,8 @@ pub(super) struct Bars {
     multiplier: f64,
     /// Multipliers below this are rounding of the monodromy matrix: as good as zero.
     no_multiplier: f64,
-    mesh: f64,
-    impacts: f64,
+    pub(super) mesh: f64,
+    pub(super) impacts: f64,
     /// The forcing period.
     forcing_period: f64,
 }

@@ -10,6 +10,7 @@ use super::lane_growth::{rare_chaos, weak_chaos};
 use super::limits::{
     flip, held, is_shaken, is_spent, late, longer, rest, scattered, undecided_chaos, within_scatter,
 };
+use super::on_the_way::has_averages_on_the_way;
 use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
 use super::unsettled::unsettled;
@@ -152,7 +153,8 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rare_chaos,
         rare_cap,
     ];
-    CHECKS.iter().find_map(|check| check(case))
+    // A record without a period claims averages all the same.
+    CHECKS.iter().find_map(|check| check(case)).filter(|_| has_averages_on_the_way(case))
 }
 
 fn engine_cap(case: &Case<'_>) -> Option<Explanation> {

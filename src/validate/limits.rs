@@ -221,6 +221,10 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
     if !case.is_lane || !is_shaken(case, &case.standing(from).ok()?, period)? {
         return None;
     }
+    // The cheaper question first.
+    if !has_its_averages(case)? {
+        return None;
+    }
     let answer = |pair: GearPair| Answer::from(&analyse(&pair, from, &case.budget.settings));
     let answers: Vec<Answer> =
         SCATTERS.iter().flat_map(|times| case.nudged_pairs(times * scatter)).map(answer).collect();
@@ -241,7 +245,7 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
         && lies_between(case.record.mesh_fraction, |answer| answer.mesh_fraction);
     let is_border = answers.iter().any(|answer| case.is_the_records(answer))
         || (is_between && answers.iter().any(claims));
-    (is_border && has_its_averages(case)?).then_some(Explanation::Border)
+    is_border.then_some(Explanation::Border)
 }
 
 /// A motion this close to where it was a cycle ago rests on it as nearly as lanes can that amplify no

@@ -9,10 +9,10 @@ use crate::orbit::Class;
 use crate::reference::Trajectory;
 
 /// Newton's steps that a lane may take (`REFINEMENTS` in the shaders).
-const NEWTON_STEPS: u32 = 5;
+pub(super) const NEWTON_STEPS: u32 = 5;
 
 /// And how often it may set out in vain (`VAIN`).
-const NEWTON_TRIES: u32 = 2;
+pub(super) const NEWTON_TRIES: u32 = 2;
 
 /// Forcing periods in which a motion that is about to rest is seen to stay.
 const STAYING_PERIODS: u32 = 1024;
