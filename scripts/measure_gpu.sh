@@ -66,7 +66,7 @@ for precision in "${precisions[@]}"; do
     of="$adaptive" timed adaptive_period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
     # Four lanes for as long as the slowest of a map may take: what no map is faster than.
     side=2 timed slowest_lane "$precision" --set integration.early_stop=false \
-        --set integration.transient_periods=2000 --set integration.observed_periods=112
+        --set integration.transient_periods=1984 --set integration.observed_periods=128
 done
 
 # What it finds is a finding, too.
