@@ -1,8 +1,8 @@
 // Chatter: ever slower impacts while the load presses. Short flights are followed by a
 // recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
 
-// A threshold below 1e-10 of half the walls' distance times the rate of free motion is none, as on the reference. That
-// rate is 1.6e-4 (`CLOSING_ANGLE` of the host) over `closing`.
+// A threshold below 1e-10 of half the walls' distance times the rate of free motion is none, as on the
+// reference. That rate is 1.6e-4 (`CLOSING_ANGLE` of the host) over `closing`.
 const NO_THRESHOLD: Real = 8e-15;
 
 // Whether impacts that the load presses back have no end.

@@ -117,8 +117,8 @@ impl Engine<'_> {
         Ok(())
     }
 
-    /// Computes until no more than `until` of the cells under way are left, or for longer: the records of those that
-    /// have ended, by id. None if no cell is under way.
+    /// Computes until no more than `until` of the cells under way are left, or for longer: the records of those
+    /// that have ended, by id. None if no cell is under way.
     ///
     /// # Errors
     /// [`EngineError`], after which nothing is under way.

@@ -144,8 +144,8 @@ pub struct Lane {
 /// How lanes are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneSettings {
-    /// Forcing periods to integrate at most, `undecided_periods` aside; the last of them read the cycle of a periodic
-    /// cell.
+    /// Forcing periods to integrate at most, `undecided_periods` aside; the last of them read the cycle of a
+    /// periodic cell.
     pub periods: u32,
     /// Periods before averages are taken, or `exponent_from` if that is less and lanes stop
     /// early. Those of periodic cells are taken over one cycle.

@@ -90,8 +90,8 @@ pub async fn run(
     Ok(true)
 }
 
-/// Takes up records of an interrupted run, in the order in which they were kept. False if the schedule does not wait
-/// for one of them.
+/// Takes up records of an interrupted run, in the order in which they were kept. False if the schedule does not
+/// wait for one of them.
 pub fn replay(schedule: &mut Schedule, records: &mut [Record], kept: &[(u32, Record)]) -> bool {
     kept.iter().all(|&(id, record)| {
         let is_waited_for = schedule.waits_for(id);
@@ -117,9 +117,9 @@ impl Pace {
         self.most > 0
     }
 
-    /// Aims at a second, by no more than a factor of 4 at a time: costs differ from one part
-    /// of a map to the next. Of `under_way` cells `ended` did in the time that elapsed; the last few, which are waited
-    /// for, say nothing.
+    /// Aims at a second, by no more than a factor of 4 at a time: costs differ from one part of a map to the
+    /// next. Of `under_way` cells `ended` did in the time that elapsed; the last few, which are waited for, say
+    /// nothing.
     fn adapt(&mut self, under_way: usize, ended: usize, elapsed: Duration) {
         if 2 * under_way < self.cells || 4 * ended < under_way {
             return;

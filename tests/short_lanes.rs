@@ -96,9 +96,9 @@ fn a_gap_at_rest_is_let_go_once() {
     }
 }
 
-/// Two gears at rest on each other whose load is about to change sign, beside displacements of 31: single precision let
-/// them go by the third derivative, at a rate of 3e-19, and pressed them back by a second one that was rounding, ten
-/// thousand times at one instant.
+/// Two gears at rest on each other whose load is about to change sign, beside displacements of 31: single
+/// precision let them go by the third derivative, at a rate of 3e-19, and pressed them back by a second one
+/// that was rounding, ten thousand times at one instant.
 #[test]
 fn gears_at_rest_are_let_go_at_rest() {
     let plan = cell("released").plan();

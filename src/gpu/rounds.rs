@@ -1,9 +1,9 @@
 //! Rounds of dispatches over the lanes under way, until few enough are running.
 //!
-//! Every round queues the lanes that a variant has work for, in the order of the roster, and dispatches them a few times.
-//! The next round is under way while the host looks at the last one, which tells how many lanes are left
-//! and how long it took: rounds are kept short enough for drivers that reset a device whose work
-//! takes seconds, and long enough to cost nothing.
+//! Every round queues the lanes that a variant has work for, in the order of the roster, and dispatches them a
+//! few times. The next round is under way while the host looks at the last one, which tells how many lanes are
+//! left and how long it took: rounds are kept short enough for drivers that reset a device whose work takes
+//! seconds, and long enough to cost nothing.
 
 use web_time::{Duration, Instant};
 
@@ -64,8 +64,8 @@ struct Sent<'a> {
 }
 
 impl Rounds<'_> {
-    /// Runs lanes until no more than `until` are left, `trips` at first in a dispatch. Each variant takes over where
-    /// the one before leaves off. Returns the device's own time where somebody measures.
+    /// Runs lanes until no more than `until` are left, `trips` at first in a dispatch. Each variant takes over
+    /// where the one before leaves off. Returns the device's own time where somebody measures.
     pub(super) async fn run(
         &self,
         variants: &[&Pipelines],

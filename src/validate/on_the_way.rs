@@ -1,7 +1,8 @@
 //! What a lane that decides nothing has averaged.
 //!
-//! Lanes count impacts and meshing from the end of the transient on, or from where exponents begin if they may stop
-//! early, and anew wherever a cycle has been read in vain: up to the last strobe, over a number of periods that their record does not tell.
+//! Lanes count impacts and meshing from the end of the transient on, or from where exponents begin if they may
+//! stop early, and anew wherever a cycle has been read in vain: up to the last strobe, over a number of periods
+//! that their record does not tell.
 
 use super::case::Case;
 use super::explanation::{ELSEWHERE, strobe};
