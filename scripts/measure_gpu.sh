@@ -64,7 +64,7 @@ for precision in "${precisions[@]}"; do
     timed period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
     of="$adaptive" timed adaptive "$precision" --set 'outputs.files=["npy"]'
     of="$adaptive" timed adaptive_period_only "$precision" --set 'outputs.quantities=["class"]' --set 'outputs.files=["npy"]'
-    # Four lanes for as long as the slowest of a map may take: what no map is faster than.
+    # The latency of a lane: four of them, side by side, for as many periods as the slowest of a map may take.
     side=2 timed slowest_lane "$precision" --set integration.early_stop=false \
         --set integration.transient_periods=1984 --set integration.observed_periods=128
 done

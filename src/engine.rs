@@ -23,12 +23,12 @@ use crate::record::Record;
 /// Why a batch was not computed.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum EngineError {
-    /// The batch does not fit the engine's memory; a smaller one may.
-    #[error("no memory on {device} for a batch of {cells} cells")]
+    /// Cells do not fit the engine's memory; fewer may.
+    #[error("no memory on {device} for {cells} cells at a time")]
     OutOfMemory {
         /// The engine's device.
         device: String,
-        /// Cells in the batch.
+        /// Cells under way and those that were to be begun.
         cells: usize,
     },
     /// The engine's device did not do what it was asked.
@@ -104,6 +104,14 @@ impl Engine<'_> {
         }
     }
 
+    /// Cells that may be begun now: more would be refused for want of memory.
+    pub fn room(&self) -> usize {
+        match self {
+            Engine::Cpu(_) | Engine::Fake(_) => usize::MAX,
+            Engine::Gpu(gpu) => gpu.room(),
+        }
+    }
+
     /// Takes up cells; their records come from [`Engine::advance`].
     ///
     /// # Errors
@@ -117,8 +125,8 @@ impl Engine<'_> {
         Ok(())
     }
 
-    /// Computes until no more than `until` of the cells under way are left, or for longer: the records of those
-    /// that have ended, by id. None if no cell is under way.
+    /// Computes until some of the cells under way have ended, best until no more than `until` are left: the records
+    /// of those that have, by id. None if no cell is under way.
     ///
     /// # Errors
     /// [`EngineError`], after which nothing is under way.
@@ -140,8 +148,11 @@ impl Engine<'_> {
         let mut places = vec![0; last - first + 1];
         ids().enumerate().for_each(|(place, id)| places[id - first] = place);
         let mut records = vec![Record::default(); batch.cells.len()];
-        self.begin(&batch.cells).await?;
+        let mut left = &batch.cells[..];
         loop {
+            let (next, later) = left.split_at(left.len().min(self.room()));
+            self.begin(next).await?;
+            left = later;
             let ended = self.advance(0).await?;
             if ended.is_empty() {
                 break;

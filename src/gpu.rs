@@ -78,7 +78,7 @@ pub enum GpuError {
         count: usize,
     },
     /// The device was lost on the way.
-    #[error("the device was lost on the way: {message}; finished batches are kept")]
+    #[error("the device was lost on the way: {message}; finished cells are kept")]
     Lost {
         /// The driver's words.
         message: String,

@@ -134,7 +134,7 @@ impl<'p> Work<'p> {
     }
 }
 
-/// Integrates what is left. Ctrl-C ends it after the batch at hand.
+/// Integrates what is left. Ctrl-C ends it once some cells have ended; those under way are computed again.
 fn integrate(
     ask: &Map,
     work: &mut Work<'_>,
@@ -173,7 +173,7 @@ fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
             process::exit(KILLED);
         }
         if !quiet {
-            eprintln!("finishing the batch at hand; Ctrl-C again ends at once");
+            eprintln!("stopping as soon as some cells have ended; Ctrl-C again ends at once");
         }
     })
     .context("cannot listen for Ctrl-C")?;

@@ -50,7 +50,7 @@ pub async fn run(
     let mut under_way = 0;
     let (mut unkept, mut last_kept) = (Vec::new(), Instant::now());
     while !schedule.is_finished() {
-        let next = schedule.next(plan, pace.cells.saturating_sub(under_way));
+        let next = schedule.next(plan, pace.cells.saturating_sub(under_way).min(engine.room()));
         let clock = Instant::now();
         let ended = match engine.begin(&next).await {
             Err(EngineError::OutOfMemory { .. }) if pace.halve(under_way + next.len()) => {

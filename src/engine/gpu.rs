@@ -23,8 +23,9 @@ pub struct Gpu<'p> {
     steps: u64,
     /// Cells under way, where there are tables.
     pool: Option<Pool>,
-    /// And where there are none.
+    /// And where there are none; so many of them are run at a time.
     waiting: Vec<Cell>,
+    most_waiting: usize,
 }
 
 impl<'p> Gpu<'p> {
@@ -34,8 +35,16 @@ impl<'p> Gpu<'p> {
     /// [`EngineError`] if the device takes no constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let settings = lane_settings(plan);
-        let mut engine =
-            Gpu { plan, device, settings, tables: None, steps: 0, pool: None, waiting: Vec::new() };
+        let mut engine = Gpu {
+            plan,
+            device,
+            settings,
+            tables: None,
+            steps: 0,
+            pool: None,
+            waiting: Vec::new(),
+            most_waiting: plan.most_flows(),
+        };
         if plan.keeps_flows() {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
@@ -73,6 +82,11 @@ impl<'p> Gpu<'p> {
         self.steps
     }
 
+    /// Cells that may be begun now.
+    pub(super) fn room(&self) -> usize {
+        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
+    }
+
     pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
         let (Some(tables), Some(pool)) = (&self.tables, &mut self.pool) else {
             self.waiting.extend(cells);
@@ -103,19 +117,33 @@ impl<'p> Gpu<'p> {
         Ok(ended)
     }
 
-    /// Cells whose flows are too many to be kept all together: some after the others.
+    /// Some of the cells whose flows are too many to be kept all together, fewer where the device has no memory
+    /// for as many.
     async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
-        let waiting = std::mem::take(&mut self.waiting);
-        let mut ended = Vec::with_capacity(waiting.len());
-        for cells in waiting.chunks(self.plan.most_flows()) {
-            let (flows, laws, lanes) = renumbered(cells);
-            let tables = self.load(&flows, &laws).await?;
-            let records = self.device.run_on(&tables, &lanes, &self.settings).await?;
-            let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
-            self.steps += steps_of(records.iter().zip(steps));
-            ended.extend(cells.iter().map(|cell| cell.id).zip(records));
+        while !self.waiting.is_empty() {
+            let left = self.waiting.len() - self.waiting.len().min(self.most_waiting);
+            let cells = self.waiting[left..].to_vec();
+            match self.run_cells(&cells).await {
+                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if cells.len() > 1 => {
+                    self.most_waiting = cells.len() / 2;
+                }
+                Err(error) => return Err(error),
+                Ok(records) => {
+                    self.waiting.truncate(left);
+                    return Ok(cells.iter().map(|cell| cell.id).zip(records).collect());
+                }
+            }
         }
-        Ok(ended)
+        Ok(Vec::new())
+    }
+
+    async fn run_cells(&mut self, cells: &[Cell]) -> Result<Vec<Record>, GpuError> {
+        let (flows, laws, lanes) = renumbered(cells);
+        let tables = self.load(&flows, &laws).await?;
+        let records = self.device.run_on(&tables, &lanes, &self.settings).await?;
+        let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
+        self.steps += steps_of(records.iter().zip(steps));
+        Ok(records)
     }
 
     async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {

@@ -101,6 +101,9 @@ impl Pool {
             return Ok(());
         }
         self.make_room(gpu, lanes.len()).await?;
+        // A few lanes had long dispatches; with many more these would take as many times longer.
+        self.trips = (u64::from(self.trips) * self.roster.len() as u64
+            / (self.roster.len() + lanes.len()) as u64) as u32;
         // The lowest slots: what is begun together lies together.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
@@ -193,8 +196,15 @@ impl Pool {
         if needed <= had {
             return Ok(());
         }
-        let slots = needed.max(2 * had).min(self.most);
-        let made = guarded(gpu, "lanes", slots, || Buffers::new(gpu, slots, self.settings.workgroup)).await?;
+        // Twice as many, so that lanes seldom move; as many as it takes if there is no memory for that.
+        let ample = needed.max(2 * had).min(self.most);
+        let make = async |slots| {
+            guarded(gpu, "lanes", slots, || Buffers::new(gpu, slots, self.settings.workgroup)).await
+        };
+        let (slots, made) = match make(ample).await {
+            Err(GpuError::OutOfMemory { .. }) if needed < ample => (needed, make(needed).await?),
+            made => (ample, made?),
+        };
         if let Some(old) = &self.buffers {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             for (from, to) in [(&old.motions, &made.motions), (&old.tallies, &made.tallies)] {

@@ -20,6 +20,9 @@ const DISPATCHES: u32 = 4;
 const ROUND_IN_SOFTWARE: Duration = Duration::from_millis(100);
 const ROUND_ON_HARDWARE: Duration = Duration::from_millis(20);
 
+/// Rounds after which lanes that have ended wait no longer for others.
+const PATIENCE: u32 = 8;
+
 /// Trips of the first round of all, and at least of any: shorter dispatches cost more than they do.
 const FEWEST_TRIPS: u32 = 250;
 
@@ -64,8 +67,8 @@ struct Sent<'a> {
 }
 
 impl Rounds<'_> {
-    /// Runs lanes until no more than `until` are left, `trips` at first in a dispatch. Each variant takes over
-    /// where the one before leaves off. Returns the device's own time where somebody measures.
+    /// Runs lanes until no more than `until` are left, or, if that is not none, some have ended and waited for long
+    /// enough; `trips` at first in a dispatch. Each variant takes over where the one before leaves off. Returns the device's own time where somebody measures.
     pub(super) async fn run(
         &self,
         variants: &[&Pipelines],
@@ -85,6 +88,7 @@ impl Rounds<'_> {
         let mut seconds = 0.0;
         let mut before: Option<Sent<'_>> = None;
         let mut last_end = Instant::now();
+        let mut looked = 0;
         for (slot, look) in (0..2).zip(&looks).cycle() {
             let sent = self.send(&bound, &left, *trips, (slot, look), clock.as_ref());
             let Some(sent) = before.replace(sent) else { continue };
@@ -98,7 +102,9 @@ impl Rounds<'_> {
                 *left = if ran { now } else { 0 };
             }
             // A lane on its way from one variant to the next is counted in both.
-            if left.iter().sum::<u32>() <= until {
+            let all_left = left.iter().sum::<u32>();
+            looked += 1;
+            if all_left <= until || (until > 0 && looked >= PATIENCE && all_left < self.rostered) {
                 break;
             }
             *trips = next_trips(sent.trips, last_end.elapsed(), round).clamp(FEWEST_TRIPS.min(most), most);
