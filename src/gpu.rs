@@ -20,6 +20,7 @@ mod rounds;
 mod self_test;
 mod shader;
 mod signal;
+mod slots;
 mod stage;
 mod tables;
 mod transfer;

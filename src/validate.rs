@@ -12,6 +12,7 @@
 
 mod answer;
 mod case;
+mod explain;
 mod explanation;
 mod lane_growth;
 mod lane_model;
@@ -189,7 +190,7 @@ fn replay_cell(subject: &Subject<'_>, id: u32, lane: Option<&Record>) -> Replaye
     }
     let differences: Vec<Difference> = fields.iter().filter_map(|(_, differs)| differs.clone()).collect();
     let mismatch = (!differences.is_empty()).then(|| {
-        let explanation = explanation::explain(&case, &differences);
+        let explanation = explain::explain(&case, &differences);
         Mismatch { id, differences, explanation }
     });
     let fields = fields.into_iter().map(|(field, differs)| (field, differs.is_none())).collect();

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::pool::most_slots;
+use super::layout::{Motion, Tally};
 use super::{Gpu, GpuError, Precision};
 
 /// Which adapter to take.
@@ -170,6 +170,17 @@ pub fn interface_rank(info: &wgpu::AdapterInfo) -> &'static str {
         wgpu::Backend::Gl => "last choice: no f64, smaller buffers, no clock of its own",
         wgpu::Backend::BrowserWebGpu | wgpu::Backend::Noop => "last choice",
     }
+}
+
+/// Slots that a pool has at most: below 1 GB on the device.
+const MOST_SLOTS: usize = 1 << 20;
+
+/// Slots that an adapter's limits allow.
+pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
+    let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
+    let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
+    let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
+    by_binding.min(by_grid).clamp(1, MOST_SLOTS as u64) as usize
 }
 
 pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {

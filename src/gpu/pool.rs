@@ -1,27 +1,18 @@
 //! Lanes under way on a device: each has a slot from its beginning to its record.
 
-use super::averaging::Averaging;
-use super::device::{BEGIN, CONCLUDE, Pipelines};
+use super::device::{BEGIN, Pipelines, most_slots};
 use super::guard::guarded;
-use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
+use super::layout::Cell;
 use super::reading::record;
-use super::rounds::{Rounds, bind, dispatch, row};
+use super::rounds::{Rounds, bind, dispatch};
 use super::shader::Variant;
+use super::slots::Slots;
 use super::stage::Stage;
 use super::tables::Tables;
-use super::transfer::{buffer, from_reals, landing, read, reals, upload};
+use super::transfer::reals;
 use super::{Gpu, GpuError, Lane, LaneSettings};
 use crate::orbit::Status;
 use crate::record::Record;
-
-/// Slots that a pool has at most: below 1 GB on the device.
-const MOST_SLOTS: usize = 1 << 20;
-
-/// Longest period that a lane can look for: a byte per lag.
-const LONGEST_PERIOD: u32 = 64;
-
-/// Numbers of the queue before its lanes.
-const QUEUE_HEAD: usize = 1;
 
 /// Lanes under way on a device. They may be begun at any time, and their records come as they end: what is
 /// begun later does not wait for the slowest.
@@ -30,7 +21,7 @@ pub struct Pool {
     pub(super) variants: Vec<Variant>,
     /// Slots at most.
     most: usize,
-    buffers: Option<Buffers>,
+    buffers: Option<Slots>,
     /// Slots of the lanes under way, in the order in which they were begun: neighbours behave alike.
     roster: Vec<u32>,
     /// Slots without a lane.
@@ -42,14 +33,6 @@ pub struct Pool {
     starts: Vec<[f64; 4]>,
     /// Trips of the next round.
     trips: u32,
-}
-
-/// Slots that an adapter's limits allow.
-pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
-    let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
-    let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
-    let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
-    by_binding.min(by_grid).clamp(1, MOST_SLOTS as u64) as usize
 }
 
 impl Pool {
@@ -123,7 +106,7 @@ impl Pool {
             bytemuck::cast_slice(cells),
         );
         gpu.queue.write_buffer(&buffers.starts, (lowest * 4 * real) as u64, &reals(starts, gpu.precision));
-        self.call_roster(gpu, buffers, self.roster.len() - lanes.len());
+        buffers.call(gpu, &self.roster, self.roster.len() - lanes.len(), &self.settings);
         let first = &gpu.pipelines[&self.variants[0]];
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let bindings = bind(gpu, &first.begin, BEGIN, &buffers.bindings(tables));
@@ -155,7 +138,7 @@ impl Pool {
             most_trips: self.settings.trips,
         };
         let variants: Vec<&Pipelines> = self.variants.iter().map(|variant| &gpu.pipelines[variant]).collect();
-        self.call_roster(gpu, buffers, self.roster.len());
+        buffers.call(gpu, &self.roster, self.roster.len(), &self.settings);
         let device_seconds = rounds.run(&variants, until as u32, &mut self.trips).await?;
         gpu.tell(Stage::Integrated { device_seconds });
         let last = variants[variants.len() - 1];
@@ -176,17 +159,6 @@ impl Pool {
         Ok(ended)
     }
 
-    /// Tells the device which slots have lanes; those from place `fresh` on are to begin.
-    fn call_roster(&self, gpu: &Gpu, buffers: &Buffers, fresh: usize) {
-        let called = uniform(buffers, self.roster.len(), fresh, &self.settings);
-        gpu.queue.write_buffer(&buffers.settings, 0, bytemuck::bytes_of(&called));
-        gpu.queue.write_buffer(
-            &buffers.queue,
-            (QUEUE_HEAD * size_of::<u32>()) as u64,
-            bytemuck::cast_slice(&self.roster),
-        );
-    }
-
     /// Makes slots for so many more lanes; those under way move with what they have.
     async fn make_room(&mut self, gpu: &Gpu, count: usize) -> Result<(), GpuError> {
         let (had, needed) = (self.lanes.len(), self.roster.len() + count);
@@ -199,7 +171,7 @@ impl Pool {
         // Twice as many, so that lanes seldom move; as many as it takes if there is no memory for that.
         let ample = needed.max(2 * had).min(self.most);
         let make = async |slots| {
-            guarded(gpu, "lanes", slots, || Buffers::new(gpu, slots, self.settings.workgroup)).await
+            guarded(gpu, "lanes", slots, || Slots::new(gpu, slots, self.settings.workgroup)).await
         };
         let (slots, made) = match make(ample).await {
             Err(GpuError::OutOfMemory { .. }) if needed < ample => (needed, make(needed).await?),
@@ -219,130 +191,6 @@ impl Pool {
         self.cells.resize(slots, Cell { flow_index: 0, law_index: 0, refused: 0 });
         self.starts.resize(slots, [0.0; 4]);
         Ok(())
-    }
-}
-
-/// The buffers of a pool.
-struct Buffers {
-    slots: usize,
-    workgroup: u32,
-    settings: wgpu::Buffer,
-    cells: wgpu::Buffer,
-    starts: wgpu::Buffer,
-    motions: wgpu::Buffer,
-    tallies: wgpu::Buffer,
-    queue: wgpu::Buffer,
-    blocks: wgpu::Buffer,
-    readings: wgpu::Buffer,
-    findings: wgpu::Buffer,
-    /// Where the host reads the last two.
-    landings: [wgpu::Buffer; 2],
-    /// Workgroups in a row of the grid.
-    row: u32,
-}
-
-impl Buffers {
-    fn new(gpu: &Gpu, slots: usize, workgroup: u32) -> Buffers {
-        let of_reals = |label, bytes: usize| {
-            buffer(gpu, label, slots * bytes / size_of::<f64>() * gpu.precision.bytes())
-        };
-        let readings = of_reals("readings", size_of::<Reading>());
-        let findings = buffer(gpu, "findings", slots * size_of::<Finding>());
-        Buffers {
-            slots,
-            workgroup,
-            settings: upload(gpu, "settings", bytemuck::bytes_of(&Settings::default())),
-            cells: buffer(gpu, "cells", slots * size_of::<Cell>()),
-            starts: of_reals("starts", size_of::<[f64; 4]>()),
-            motions: of_reals("motions", size_of::<Motion>()),
-            tallies: buffer(gpu, "tallies", slots * size_of::<Tally>()),
-            queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
-            blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
-            landings: [&readings, &findings].map(|buffer| landing(gpu, "results", buffer.size())),
-            readings,
-            findings,
-            row: row(gpu, slots, workgroup),
-        }
-    }
-
-    /// All buffers by binding.
-    fn bindings<'a>(&'a self, tables: &'a Tables) -> [&'a wgpu::Buffer; 13] {
-        [
-            &self.settings,
-            &tables.flows,
-            &tables.shapes,
-            &tables.phasors,
-            &tables.laws,
-            &self.cells,
-            &self.motions,
-            &self.tallies,
-            &self.queue,
-            &self.starts,
-            &self.readings,
-            &self.findings,
-            &self.blocks,
-        ]
-    }
-
-    /// Workgroups for so many lanes.
-    fn grid(&self, lanes: u32) -> [u32; 2] {
-        let groups = lanes.div_ceil(self.workgroup).max(1);
-        [groups.min(self.row), groups.div_ceil(self.row)]
-    }
-
-    /// What the lanes of the roster have to say, in its order.
-    async fn conclude(
-        &self,
-        gpu: &Gpu,
-        pipelines: &Pipelines,
-        bindings: &[&wgpu::Buffer],
-        lanes: usize,
-    ) -> Result<Vec<(Reading, Finding)>, GpuError> {
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
-        dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(lanes as u32), None);
-        let [readings, findings] = &self.landings;
-        let numbers = (lanes * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
-        let counts = (lanes * size_of::<Finding>()) as u64;
-        encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
-        encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
-        let submission = gpu.queue.submit([encoder.finish()]);
-        let to_readings = |bytes: &[u8]| from_reals::<Reading>(bytes, gpu.precision);
-        let readings = read(gpu, readings, numbers, submission.clone(), to_readings).await?;
-        let to_findings = bytemuck::pod_collect_to_vec::<u8, Finding>;
-        let findings = read(gpu, findings, counts, submission, to_findings).await?;
-        Ok(readings.into_iter().zip(findings).collect())
-    }
-}
-
-fn uniform(buffers: &Buffers, rostered: usize, fresh: usize, settings: &LaneSettings) -> Settings {
-    let LaneSettings { periods, early_stop, .. } = *settings;
-    let more = if early_stop { settings.undecided_periods } else { 0 };
-    // Lanes that stop early may do so before a long transient is over.
-    let transient_periods = if early_stop {
-        settings.transient_periods.min(settings.exponent_from)
-    } else {
-        settings.transient_periods
-    };
-    let averaging = Averaging::new(periods, settings.exponent_from);
-    Settings {
-        slots: buffers.slots as u32,
-        rostered: rostered as u32,
-        fresh: fresh as u32,
-        periods,
-        longest: periods.saturating_add(more),
-        chaos_from: settings.chaos_from,
-        chaos_errors: settings.chaos_errors,
-        trips: settings.trips,
-        passes_per_period: settings.passes_per_period,
-        events_per_period: settings.events_per_period,
-        row: buffers.row * settings.workgroup,
-        transient_periods,
-        growth_from: averaging.growth_from,
-        exponent_from: averaging.exponent_from,
-        exponent_block: averaging.block,
-        max_period: settings.max_period.min(LONGEST_PERIOD),
-        early_stop: u32::from(early_stop),
     }
 }
 

@@ -1,8 +1,7 @@
 //! One cell under examination, and what the reference can be asked about it.
 
 use super::Subject;
-use super::answer::{Answer, Bars};
-use super::explanation::ELSEWHERE;
+use super::answer::{Answer, Bars, Field};
 use nalgebra::{Matrix4, Vector4};
 
 use crate::classify::classify;
@@ -11,7 +10,7 @@ use crate::gpu::Precision;
 use crate::model::{GearPair, Law, Side, State};
 use crate::orbit::{Budget, Class, Measured, analyse_flow, measure};
 use crate::random::Random;
-use crate::record::Record;
+use crate::record::{Record, valid};
 use crate::reference::{Stop, Trajectory};
 use crate::stability::StrobeMap;
 
@@ -26,6 +25,9 @@ pub(super) fn rounding(precision: Precision) -> f64 {
 
 /// No rounding moves the meshing speed by more than this share.
 const MOST_OF_MESH_SPEED: f64 = 0.01;
+
+/// A motion this far from where it was a cycle ago, relative to its size, is not on the cycle.
+pub(super) const ELSEWHERE: f64 = 1e-2;
 
 /// States this close, relative to the motion, are the same to lanes (`MIRROR` in the shaders).
 pub(super) const LANE_RESOLUTION: f64 = 2.5e-4;
@@ -207,5 +209,29 @@ impl<'a> Case<'a> {
         let reach = 0.5 * (self.flow.walls[0] - self.flow.walls[1]);
         let position = y[0].abs().max(y[2].abs()).max(reach);
         [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
+    }
+
+    /// Where the record says that its motion was at last.
+    pub(super) fn strobe(&self) -> Option<State> {
+        let record = self.record;
+        let known = record.valid & valid::STROBE != 0 && record.strobe.iter().all(|x| x.is_finite());
+        known.then_some(record.strobe)
+    }
+
+    /// Whether no part of the record's period recurs: a multiple of a period always does.
+    pub(super) fn is_least(&self) -> Option<bool> {
+        let Class::Periodic { period } = classify(self.record) else { return Some(true) };
+        let stands = self.standing(self.strobe()?).ok()?;
+        let mut parts = (1..period).filter(|&part| period.is_multiple_of(part));
+        Some(parts.all(|part| self.unrest(&stands, part) > LANE_RESOLUTION))
+    }
+
+    /// Whether impacts and meshing are those that are read where the record says that its motion was.
+    pub(super) fn has_its_averages(&self) -> Option<bool> {
+        let Class::Periodic { period } = classify(self.record) else { return Some(true) };
+        let read = self.read_as_is(&self.standing(self.strobe()?).ok()?, period)?;
+        let compared = read.compare(self.record, &self.bars);
+        let is_average = |field: &Field| [Field::Impacts, Field::Mesh].contains(field);
+        Some(compared.iter().all(|(field, differs)| !is_average(field) || differs.is_none()))
     }
 }

@@ -1,8 +1,8 @@
 //! What a lane cannot tell within its precision, or within its budget.
 
 use super::answer::Answer;
-use super::case::{Case, rounding};
-use super::explanation::{ELSEWHERE, Explanation, has_its_averages, is_least, strobe};
+use super::case::{Case, ELSEWHERE, rounding};
+use super::explanation::Explanation;
 use super::rounding::moved_by_rounding;
 use super::same_cycle::{may_repel, within_reach};
 use crate::classify::classify;
@@ -68,7 +68,7 @@ pub(super) fn longer(case: &Case<'_>) -> Option<Explanation> {
 /// The record has no period and the reference has one, or the other way round in chaos: the
 /// side that decided is right in the end, the other was still on its way.
 pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
-    let (ours, from) = (classify(case.record), strobe(case)?);
+    let (ours, from) = (classify(case.record), case.strobe()?);
     let stands = case.standing(from).ok()?;
     match (ours, case.truth.class) {
         (Class::Chaotic, Class::Periodic { period }) => {
@@ -159,7 +159,7 @@ pub(super) fn flip(case: &Case<'_>) -> Option<Explanation> {
     if ours != 2 * period || !case.is_lane {
         return None;
     }
-    let from = strobe(case)?;
+    let from = case.strobe()?;
     let stands = case.standing(from).ok()?;
     let image = StrobeMap::Periods(period).apply(&stands, from).ok()?;
     let [re, im] = *multipliers(&image.derivative())?.first()?;
@@ -186,14 +186,14 @@ pub(super) fn is_shaken(case: &Case<'_>, stands: &Trajectory<'_>, period: u32) -
 /// The lane rests on a cycle that repels, and rounding of its tangents hides that.
 pub(super) fn held(case: &Case<'_>) -> Option<Explanation> {
     let Class::Periodic { period } = classify(case.record) else { return None };
-    let from = strobe(case)?;
+    let from = case.strobe()?;
     let stands = case.standing(from).ok()?;
     if !case.is_lane || case.unrest(&stands, period) > UNSETTLED {
         return None;
     }
     let answer = case.read_as_is(&stands, period)?;
     let is_hidden = || within_reach(case, from, &answer) == Some(Explanation::BelowResolution);
-    (is_least(case)? && is_hidden()).then_some(Explanation::BelowResolution)
+    (case.is_least()? && is_hidden()).then_some(Explanation::BelowResolution)
 }
 
 /// Chaos on the way to a cycle: how long it lasts is decided by rounding, and among many starts
@@ -210,7 +210,7 @@ pub(super) fn scattered(case: &Case<'_>) -> Option<Explanation> {
 /// reference has the record's cycle, with averages between those that it meets there; or, where the lane
 /// decides nothing, other cycles than its own.
 pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
-    let (from, ours) = (strobe(case)?, classify(case.record));
+    let (from, ours) = (case.strobe()?, classify(case.record));
     let period = match (ours, case.truth.class) {
         (Class::Periodic { period }, _) => period,
         (Class::Undecided, Class::Periodic { period }) if is_spent(case) => period,
@@ -222,7 +222,7 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
         return None;
     }
     // The cheaper question first.
-    if !has_its_averages(case)? {
+    if !case.has_its_averages()? {
         return None;
     }
     let answer = |pair: GearPair| Answer::from(&analyse(&pair, from, &case.budget.settings));

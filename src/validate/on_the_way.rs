@@ -4,10 +4,10 @@
 //! stop early, and anew wherever a cycle has been read in vain: up to the last strobe, over a number of periods
 //! that their record does not tell.
 
-use super::case::Case;
-use super::explanation::{ELSEWHERE, strobe};
+use super::case::{Case, ELSEWHERE};
 use super::lane_model::LaneModel;
-use super::rounded::{Rounded, counts};
+use super::reading::counts;
+use super::rounded::Rounded;
 use super::unsettled::{NEWTON_STEPS, NEWTON_TRIES};
 use crate::classify::classify;
 use crate::model::State;
@@ -119,7 +119,7 @@ fn course<M>(
 
 /// The motion from where the lane was at last, and from where the cycle that it may have read there lies.
 fn ahead(case: &Case<'_>, periods: u32) -> Vec<Course> {
-    let Some(stands) = strobe(case).and_then(|from| case.standing(from).ok()) else { return Vec::new() };
+    let Some(stands) = case.strobe().and_then(|from| case.standing(from).ok()) else { return Vec::new() };
     let limit = match case.truth.class {
         Class::Periodic { period } => case.limit(&stands, period),
         _ => None,

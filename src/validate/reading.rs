@@ -4,7 +4,6 @@ use nalgebra::Matrix4;
 
 use super::answer::Answer;
 use super::case::Case;
-use super::rounded::counts;
 use crate::model::State;
 use crate::orbit::Class;
 use crate::reference::{Happening, Trajectory};
@@ -81,4 +80,9 @@ impl Case<'_> {
         }
         self.read_along(&motion, period)
     }
+}
+
+/// Impacts and meshing time of a motion so far.
+pub(super) fn counts<const N: usize>(trajectory: &Trajectory<'_, N>) -> [f64; 2] {
+    [trajectory.work().impacts as f64, trajectory.meshing_time()]
 }

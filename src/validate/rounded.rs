@@ -3,7 +3,7 @@
 use super::answer::Answer;
 use super::case::Case;
 use super::lane_model::{LaneModel, in_precision};
-use super::reading::{Met, log_radius};
+use super::reading::{Met, counts, log_radius};
 use super::states::unit_roundoff;
 use crate::model::{Side, State};
 use crate::random::Random;
@@ -217,11 +217,6 @@ impl<'m, const N: usize> Rounded<'m, N> {
     pub(super) fn trajectory(&self) -> &Trajectory<'m, N> {
         &self.trajectory
     }
-}
-
-/// Impacts and meshing time of a motion so far.
-pub(super) fn counts<const N: usize>(trajectory: &Trajectory<'_, N>) -> [f64; 2] {
-    [trajectory.work().impacts as f64, trajectory.meshing_time()]
 }
 
 /// A cycle of `period` as a lane would read it from where a motion stands, but for its exponent; none if it

@@ -1,8 +1,8 @@
 //! What rounding at every step of a lane does to a motion, beyond what rounding at its start does.
 
 use super::answer::{Answer, Field};
-use super::case::{Case, LANE_RESOLUTION, rounding};
-use super::explanation::{ELSEWHERE, Explanation, strobe};
+use super::case::{Case, ELSEWHERE, LANE_RESOLUTION, rounding};
+use super::explanation::Explanation;
 use super::lane_model::LaneModel;
 use super::rounded::{Rounded, read_cycle, read_exponent};
 use crate::classify::{classify, status};
@@ -26,7 +26,7 @@ pub(super) fn rounded_cycle(case: &Case<'_>) -> Option<Explanation> {
     if case.truth.class != classify(case.record) {
         return None;
     }
-    let stands = case.standing(strobe(case)?).ok()?;
+    let stands = case.standing(case.strobe()?).ok()?;
     let Class::Periodic { period } = case.truth.class else { return None };
     if case.unrest(&stands, period) > ELSEWHERE {
         return None;
@@ -149,7 +149,7 @@ pub(super) fn at_rest(case: &Case<'_>) -> Option<Explanation> {
     if !case.is_lane || !(is_cap || is_open) {
         return None;
     }
-    let there = strobe(case)?;
+    let there = case.strobe()?;
     let mut motion = case.after(case.start, case.record.periods_run + 1).ok()?;
     let before = motion.state();
     let [position, velocity] = case.units(&before);

@@ -2,8 +2,8 @@
 //! lane read it?
 
 use super::answer::{Answer, Difference, Field};
-use super::case::{Case, LANE_RESOLUTION, rounding};
-use super::explanation::{ELSEWHERE, Explanation, strobe};
+use super::case::{Case, ELSEWHERE, LANE_RESOLUTION, rounding};
+use super::explanation::Explanation;
 use super::lane_model::LaneModel;
 use super::reading::log_radius;
 use super::rounded::Rounded;
@@ -27,7 +27,7 @@ const ROUNDED_PER_PERIOD: u32 = 16;
 
 /// The record describes the reference's cycle, and each field that differs has its own reason.
 pub(super) fn same_cycle(case: &Case<'_>) -> Option<Explanation> {
-    within_reach(case, strobe(case)?, &case.truth)
+    within_reach(case, case.strobe()?, &case.truth)
 }
 
 /// The same for the cycle that `truth` describes, which the reference reaches from `from`.

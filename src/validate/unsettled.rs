@@ -1,7 +1,7 @@
 //! Cycles that a lane read before the motion had settled on them.
 
-use super::case::{Case, LANE_RESOLUTION};
-use super::explanation::{ELSEWHERE, Explanation, is_least, strobe};
+use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
+use super::explanation::Explanation;
 use super::rounding::{is_read_rounded, whole_units};
 use crate::classify::classify;
 use crate::model::State;
@@ -28,7 +28,7 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     if case.truth.class != classify(case.record) && !is_open {
         return None;
     }
-    let stands = case.standing(strobe(case)?).ok()?;
+    let stands = case.standing(case.strobe()?).ok()?;
     // Motions at rest in different places are different motions.
     let is_own = |own: Trajectory<'_>| apart(case, &own.state(), &stands.state()) < ELSEWHERE;
     let is_on_the_way = !is_open || case.after(case.start, case.record.periods_run).is_ok_and(is_own);
@@ -44,7 +44,7 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     if !is_read {
         return None;
     }
-    let is_there = !is_open || (is_least(case)? && stays(case, &stands, period));
+    let is_there = !is_open || (case.is_least()? && stays(case, &stands, period));
     is_there.then_some(Explanation::Unsettled)
 }
 

@@ -1,0 +1,148 @@
+//! The buffers of a pool: what lies on the device for each slot, and what the host tells and asks of it.
+
+use super::averaging::Averaging;
+use super::device::{CONCLUDE, Pipelines};
+use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
+use super::rounds::{bind, dispatch, row};
+use super::tables::Tables;
+use super::transfer::{buffer, from_reals, landing, read, upload};
+use super::{Gpu, GpuError, LaneSettings};
+
+/// Longest period that a lane can look for: a byte per lag.
+const LONGEST_PERIOD: u32 = 64;
+
+/// Numbers of the queue before its lanes.
+const QUEUE_HEAD: usize = 1;
+
+/// The buffers of so many slots.
+pub(super) struct Slots {
+    count: usize,
+    workgroup: u32,
+    pub(super) settings: wgpu::Buffer,
+    pub(super) cells: wgpu::Buffer,
+    pub(super) starts: wgpu::Buffer,
+    pub(super) motions: wgpu::Buffer,
+    pub(super) tallies: wgpu::Buffer,
+    pub(super) queue: wgpu::Buffer,
+    blocks: wgpu::Buffer,
+    readings: wgpu::Buffer,
+    findings: wgpu::Buffer,
+    /// Where the host reads the last two.
+    landings: [wgpu::Buffer; 2],
+    /// Workgroups in a row of the grid.
+    row: u32,
+}
+
+impl Slots {
+    pub(super) fn new(gpu: &Gpu, slots: usize, workgroup: u32) -> Slots {
+        let of_reals = |label, bytes: usize| {
+            buffer(gpu, label, slots * bytes / size_of::<f64>() * gpu.precision.bytes())
+        };
+        let readings = of_reals("readings", size_of::<Reading>());
+        let findings = buffer(gpu, "findings", slots * size_of::<Finding>());
+        Slots {
+            count: slots,
+            workgroup,
+            settings: upload(gpu, "settings", bytemuck::bytes_of(&Settings::default())),
+            cells: buffer(gpu, "cells", slots * size_of::<Cell>()),
+            starts: of_reals("starts", size_of::<[f64; 4]>()),
+            motions: of_reals("motions", size_of::<Motion>()),
+            tallies: buffer(gpu, "tallies", slots * size_of::<Tally>()),
+            queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
+            blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
+            landings: [&readings, &findings].map(|buffer| landing(gpu, "results", buffer.size())),
+            readings,
+            findings,
+            row: row(gpu, slots, workgroup),
+        }
+    }
+
+    /// All buffers by binding.
+    pub(super) fn bindings<'a>(&'a self, tables: &'a Tables) -> [&'a wgpu::Buffer; 13] {
+        [
+            &self.settings,
+            &tables.flows,
+            &tables.shapes,
+            &tables.phasors,
+            &tables.laws,
+            &self.cells,
+            &self.motions,
+            &self.tallies,
+            &self.queue,
+            &self.starts,
+            &self.readings,
+            &self.findings,
+            &self.blocks,
+        ]
+    }
+
+    /// Workgroups for so many lanes.
+    pub(super) fn grid(&self, lanes: u32) -> [u32; 2] {
+        let groups = lanes.div_ceil(self.workgroup).max(1);
+        [groups.min(self.row), groups.div_ceil(self.row)]
+    }
+
+    /// Tells the device which slots have lanes, in the order in which these were begun; those from place `fresh` on
+    /// are to begin.
+    pub(super) fn call(&self, gpu: &Gpu, roster: &[u32], fresh: usize, settings: &LaneSettings) {
+        let called = uniform(self, roster.len(), fresh, settings);
+        gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&called));
+        let head = (QUEUE_HEAD * size_of::<u32>()) as u64;
+        gpu.queue.write_buffer(&self.queue, head, bytemuck::cast_slice(roster));
+    }
+
+    /// What the lanes of the roster have to say, in its order.
+    pub(super) async fn conclude(
+        &self,
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        bindings: &[&wgpu::Buffer],
+        lanes: usize,
+    ) -> Result<Vec<(Reading, Finding)>, GpuError> {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
+        dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(lanes as u32), None);
+        let [readings, findings] = &self.landings;
+        let numbers = (lanes * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
+        let counts = (lanes * size_of::<Finding>()) as u64;
+        encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
+        encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
+        let submission = gpu.queue.submit([encoder.finish()]);
+        let to_readings = |bytes: &[u8]| from_reals::<Reading>(bytes, gpu.precision);
+        let readings = read(gpu, readings, numbers, submission.clone(), to_readings).await?;
+        let to_findings = bytemuck::pod_collect_to_vec::<u8, Finding>;
+        let findings = read(gpu, findings, counts, submission, to_findings).await?;
+        Ok(readings.into_iter().zip(findings).collect())
+    }
+}
+
+fn uniform(slots: &Slots, rostered: usize, fresh: usize, settings: &LaneSettings) -> Settings {
+    let LaneSettings { periods, early_stop, .. } = *settings;
+    let more = if early_stop { settings.undecided_periods } else { 0 };
+    // Lanes that stop early may do so before a long transient is over.
+    let transient_periods = if early_stop {
+        settings.transient_periods.min(settings.exponent_from)
+    } else {
+        settings.transient_periods
+    };
+    let averaging = Averaging::new(periods, settings.exponent_from);
+    Settings {
+        slots: slots.count as u32,
+        rostered: rostered as u32,
+        fresh: fresh as u32,
+        periods,
+        longest: periods.saturating_add(more),
+        chaos_from: settings.chaos_from,
+        chaos_errors: settings.chaos_errors,
+        trips: settings.trips,
+        passes_per_period: settings.passes_per_period,
+        events_per_period: settings.events_per_period,
+        row: slots.row * settings.workgroup,
+        transient_periods,
+        growth_from: averaging.growth_from,
+        exponent_from: averaging.exponent_from,
+        exponent_block: averaging.block,
+        max_period: settings.max_period.min(LONGEST_PERIOD),
+        early_stop: u32::from(early_stop),
+    }
+}
