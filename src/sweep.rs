@@ -81,7 +81,7 @@ pub async fn run(
             let stops = keep(&unkept, schedule.expected()).map_err(SweepError::Keep)?.is_break();
             unkept.clear();
             last_kept = Instant::now();
-            if stops && !schedule.is_finished() {
+            if stops && ended.is_ok() && !schedule.is_finished() {
                 return Ok(false);
             }
         }
