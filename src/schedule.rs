@@ -335,11 +335,35 @@ mod tests {
         assert_eq!(wrong(&records, 241, one), 0, "{refined:?}");
     }
 
+    /// Where classes alone make borders, only coarse blocks are halved for touching one, until an audit finds too many
+    /// wrong cells: teeth of a border that no corner of the blocks beside it meets.
+    #[test]
+    fn a_failed_audit_has_borders_followed_more_closely_first() {
+        let beaded = |i: usize, j: usize| {
+            let is_bead = (1..4).contains(&(i % 8)) && (97..103).contains(&j);
+            if j < 96 || is_bead { 1 } else { 2 }
+        };
+        let run_with = |quantities: &str| {
+            let outputs =
+                format!("minimum_grid = 8\nmax_error = 0.002\n[outputs]\nquantities = [{quantities}]");
+            run(&plan([241, 241], &outputs), beaded)
+        };
+        let (records, refined) = run_with("'class'");
+        let [first, second] = refined.audits[..] else { panic!("{refined:?}") };
+        assert!(first.rate() > 0.002 && second.rate() <= 0.002, "{refined:?}");
+        assert_eq!(first.sampled, crate::scene::AUDIT as usize, "mended before more is audited: {refined:?}");
+        // As with symmetries from the beginning, but for what the audits integrate.
+        let (closely, by_symmetry) = run_with("'class', 'symmetric'");
+        assert_eq!(by_symmetry.audits.len(), 1, "{by_symmetry:?}");
+        assert!(refined.integrated < by_symmetry.integrated + 2100, "{refined:?}, {by_symmetry:?}");
+        assert!(wrong(&records, 241, beaded) <= wrong(&closely, 241, beaded));
+    }
+
     /// Single cells strewn over the map, fewer than it allows: where the first sample happens to hold
     /// too many of them, a larger one tells.
     #[test]
     fn an_audit_that_may_be_chance_goes_on() {
-        let plan = plan([301, 301], "minimum_grid = 8\nmax_error = 0.003");
+        let plan = plan([301, 301], "minimum_grid = 8\n[outputs]\nquantities = ['class', 'symmetric']");
         let (mut prolonged, mut passed) = (0, 0);
         for salt in 0..40u64 {
             let strewn = |i: usize, j: usize| {

@@ -285,11 +285,12 @@ impl Analysis<'_> {
         distance: f64,
     ) -> Result<Orbit, Stop> {
         let mut trajectory = seed.at(cycle.state, []);
-        // Once around, so that the first flight has its symbol.
-        for _ in 0..cycle.period {
-            trajectory.advance_period(&mut ())?;
+        let begun = trajectory.clone();
+        let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
+        // The first flight has its symbol from where `seed` came from: right if the cycle comes from there, too.
+        if !trajectory.stands_as(&begun) || reading.near_grazing || reading.on_strobe {
+            reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
         }
-        let reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
         let status = if reading.near_grazing || cycle.near_grazing {
             Status::NearGrazing
         } else if reading.on_strobe {

@@ -326,8 +326,7 @@ impl<'a> Watch<'a> {
             word: Some(orbit.word),
             strobe,
             periods_run: self.strobes.len() as u32 - 1,
-            // Once around before it is read.
-            periods_beside: self.newton.periods() + 2 * orbit.cycle_periods,
+            periods_beside: self.newton.periods() + orbit.cycle_periods,
         }
     }
 

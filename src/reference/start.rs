@@ -123,6 +123,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// Whether it is in the same domain as another one, and comes from the same wall.
+    pub(crate) fn stands_as(&self, other: &Trajectory<'_, N>) -> bool {
+        (self.mode, self.origin, self.from_wall) == (other.mode, other.origin, other.from_wall)
+    }
+
     /// A trajectory from the mirror image of the present state at phase 0, in the mirrored domain:
     /// half a period on, a motion goes on as this one does.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {

@@ -16,8 +16,12 @@ use crate::record::{Record, valid};
 use crate::scene::Refine;
 
 /// Blocks narrower than this are not halved for touching one that a border crosses: the cells on
-/// their common edge show whether it goes on here.
-const NARROW: usize = 4;
+/// their common edge show whether it goes on here. On the main plane 0.24 % of what is filled is wrong then, with
+/// classes alone. Symmetries add 0.1 %, thin bands that none of these rules finds, and leave no room for that.
+const NARROW: usize = 8;
+
+/// The same with symmetries, and where an audit has shown too many wrong cells.
+const NARROWEST: usize = 4;
 
 /// Levels that are told apart where blocks touch.
 const LEVELS: u32 = u16::BITS;
@@ -43,6 +47,8 @@ pub(super) struct Adaptive {
     pending: Vec<Tile>,
     /// The most that a coarse block has been halved.
     deepest: u32,
+    /// Blocks narrower than this are not halved for touching others.
+    narrow: usize,
     /// Cells of the audit under way.
     audited: Vec<u32>,
     /// Where samples are drawn from, and how many have been.
@@ -90,10 +96,12 @@ impl Adaptive {
         let counts = plan.axes().each_ref().map(|axis| axis.count());
         let tiling = Tiling::new(counts, refine.minimum_grid as usize);
         let cells = plan.cell_count();
+        let needs = Needs { word: plan.needs().word && refine.word, ..*plan.needs() };
         let mut adaptive = Adaptive {
             counts,
             refine,
-            needs: Needs { word: plan.needs().word && refine.word, ..*plan.needs() },
+            narrow: if needs.symmetric { NARROWEST } else { NARROW },
+            needs,
             labels: vec![Label::default(); cells],
             is_asked: vec![false; cells],
             unasked: cells,
@@ -198,7 +206,7 @@ impl Adaptive {
     fn is_touched(&self, tile: Tile) -> bool {
         let (level, block) = (self.tiling.level(tile), self.tiling.block(tile));
         let is_touched = |&at: &[usize; 2]| self.touched[self.id(at)] & bit(level) != 0;
-        block.width() >= NARROW && block.corners().iter().any(is_touched)
+        block.width() >= self.narrow && block.corners().iter().any(is_touched)
     }
 
     /// Halves what is to be halved, and what that shows.
@@ -283,21 +291,30 @@ impl Adaptive {
     }
 
     /// After an audit blocks with wrong cells are halved down to them. If there are too many of them,
-    /// all blocks are halved that are filled with what is wrong most often: mostly chaos with its
+    /// borders are followed more closely first. If that is done and there still are, all blocks are halved
+    /// that are filled with what is wrong most often: mostly chaos with its
     /// windows, which the plain regions around need not pay for. If that may be chance, more cells are
-    /// audited first.
+    /// audited before.
     fn judge_audit(&mut self, records: &[Record], asks: &mut Vec<u32>) {
         let Verdict { wrong, bad } = self.count_wrong(records);
-        let asks_more = |audit: &Audit| audit.more(self.refine.audited(audit.filled), self.refine.max_error);
-        let more = self.audits.last().map_or(0, asks_more);
-        if more > 0 && !self.is_spent() {
-            self.sample(more, asks);
-            return;
-        }
-        let is_over = bad.is_empty() || self.is_spent();
-        self.stage = if is_over { Stage::Mending } else { Stage::Halving };
-        if !is_over {
-            let is_bad = |&tile: &Tile| bad.contains(&self.sights[tile].kind) && self.may_halve(tile);
+        let audit = *self.audits.last().unwrap_or(&Audit::default());
+        let closer = if audit.rate() > self.refine.max_error { self.follow_closely() } else { Vec::new() };
+        self.stage = Stage::Halving;
+        if self.is_spent() {
+            self.stage = Stage::Mending;
+        } else if !closer.is_empty() {
+            self.pending = closer;
+        } else {
+            let more = audit.more(self.refine.audited(audit.filled), self.refine.max_error);
+            if more > 0 {
+                self.stage = Stage::Auditing;
+                self.sample(more, asks);
+                return;
+            }
+            if bad.is_empty() {
+                self.stage = Stage::Mending;
+            }
+            let is_bad = |&tile: &Tile| bad.contains(&self.sights[tile].kind);
             self.pending = self.tiling.tiles().filter(is_bad).collect();
         }
         for id in wrong {
@@ -309,6 +326,15 @@ impl Adaptive {
             self.show(self.at(id), self.labels[id as usize]);
         }
         self.halve(asks);
+    }
+
+    /// From now on narrower blocks are halved, too, for touching one that a border crosses: those that there are.
+    fn follow_closely(&mut self) -> Vec<Tile> {
+        if self.narrow <= NARROWEST {
+            return Vec::new();
+        }
+        self.narrow = NARROWEST;
+        self.tiling.tiles().filter(|&tile| self.may_halve(tile) && self.is_touched(tile)).collect()
     }
 
     /// Compares what was filled into the audited cells with their records.

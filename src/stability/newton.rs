@@ -15,14 +15,16 @@ struct Patience {
     steps: u32,
     /// Trials of a step that does not reduce the residual, each half as long as the last.
     trials: u32,
+    /// Whether the last step may be taken unseen, and an orbit that repels left where it was seen to.
+    foresees: bool,
 }
 
 /// For an orbit that is wanted wherever it lies.
-const PATIENT: Patience = Patience { steps: 40, trials: 12 };
+const PATIENT: Patience = Patience { steps: 40, trials: 12, foresees: false };
 
 /// For one that the motion is about to reach: of 343 found in 400 cells along a map's borders, 4
 /// took more. Searches in vain, half of them without an end, were seven tenths of all periods.
-const HASTY: Patience = Patience { steps: 12, trials: 3 };
+const HASTY: Patience = Patience { steps: 12, trials: 3, foresees: true };
 
 /// Where the map expands by more than this, no orbit close by attracts.
 pub(crate) const LARGEST_MULTIPLIER: f64 = 2.0;
@@ -39,6 +41,16 @@ const SVD_CAP: usize = 1000;
 
 /// Residuals below this, relative to the state, are rounding.
 const CONVERGED: f64 = 1e-13;
+
+/// Below this the next residual is foreseen from the last two, each as the square of the one before; the
+/// derivative is off by as little.
+const FORESEEN: f64 = 1e-8;
+
+/// Where a step has led below this, an orbit close by has the multipliers seen here, if they exceed 1 by ...
+const CLOSE: f64 = 1e-3;
+
+/// ... as much.
+const REPELLING: f64 = 1.25;
 
 /// Refines the state of `seed`, a trajectory at phase 0, to a fixed point of `map`; none if
 /// Newton does not converge.
@@ -67,7 +79,8 @@ impl Newton {
     }
 
     /// The same for a motion that will be looked at again: gives up where no orbit that attracts
-    /// seems to be near, since the motion will come nearer to one that does.
+    /// seems to be near, since the motion will come nearer to one that does. The state of one that repels
+    /// may be off by a thousandth squared.
     pub(crate) fn refine_nearby(
         &mut self,
         seed: &Trajectory<'_>,
@@ -96,12 +109,17 @@ impl Newton {
     ) -> Option<Cycle> {
         let mut y = Vector4::from(seed.state());
         let mut residual = Vector4::from(image.state) - y;
+        let mut before = f64::INFINITY;
         for _ in 0..patience.steps {
-            let size = size_of(seed, &y);
-            if residual.amax() <= CONVERGED * size {
+            let now = residual.amax() / size_of(seed, &y);
+            if now <= CONVERGED {
                 break;
             }
             let step = newton_step(&image.derivative(), &residual)?;
+            if patience.foresees && is_foreseen(&image, now, before) {
+                return cycle(map, (y + step).into(), &image);
+            }
+            before = now;
             if !is_near(&(y + step).into()) {
                 return None;
             }
@@ -139,6 +157,13 @@ impl Newton {
         }
         None
     }
+}
+
+/// Whether another image would tell no more: of residuals `before` and `now`, relative to the state.
+fn is_foreseen(image: &Image, now: f64, before: f64) -> bool {
+    let repels = || lies_within_unit_circle(&(image.derivative() / REPELLING)) == Some(false);
+    let converges = now < FORESEEN && now * (now / before).powi(2) <= CONVERGED;
+    before.is_finite() && (converges || now < CLOSE && repels())
 }
 
 /// Whether the derivative has a multiplier above [`LARGEST_MULTIPLIER`]; none if that cannot be told.
