@@ -15,16 +15,16 @@ struct Patience {
     steps: u32,
     /// Trials of a step that does not reduce the residual, each half as long as the last.
     trials: u32,
-    /// Whether the last step may be taken unseen, and an orbit that repels left where it was seen to.
-    foresees: bool,
+    /// Whether an orbit that repels is left where it is seen to.
+    leaves_repelling: bool,
 }
 
 /// For an orbit that is wanted wherever it lies.
-const PATIENT: Patience = Patience { steps: 40, trials: 12, foresees: false };
+const PATIENT: Patience = Patience { steps: 40, trials: 12, leaves_repelling: false };
 
 /// For one that the motion is about to reach: of 343 found in 400 cells along a map's borders, 4
 /// took more. Searches in vain, half of them without an end, were seven tenths of all periods.
-const HASTY: Patience = Patience { steps: 12, trials: 3, foresees: true };
+const HASTY: Patience = Patience { steps: 12, trials: 3, leaves_repelling: true };
 
 /// Where the map expands by more than this, no orbit close by attracts.
 pub(crate) const LARGEST_MULTIPLIER: f64 = 2.0;
@@ -41,10 +41,6 @@ const SVD_CAP: usize = 1000;
 
 /// Residuals below this, relative to the state, are rounding.
 const CONVERGED: f64 = 1e-13;
-
-/// Below this the next residual is foreseen from the last two, each as the square of the one before; the
-/// derivative is off by as little.
-const FORESEEN: f64 = 1e-8;
 
 /// Where a step has led below this, an orbit close by has the multipliers seen here, if they exceed 1 by ...
 const CLOSE: f64 = 1e-3;
@@ -109,17 +105,15 @@ impl Newton {
     ) -> Option<Cycle> {
         let mut y = Vector4::from(seed.state());
         let mut residual = Vector4::from(image.state) - y;
-        let mut before = f64::INFINITY;
-        for _ in 0..patience.steps {
+        for nth in 0..patience.steps {
             let now = residual.amax() / size_of(seed, &y);
             if now <= CONVERGED {
                 break;
             }
             let step = newton_step(&image.derivative(), &residual)?;
-            if patience.foresees && is_foreseen(&image, now, before) {
+            if patience.leaves_repelling && nth > 0 && now < CLOSE && repels(&image) {
                 return cycle(map, (y + step).into(), &image);
             }
-            before = now;
             if !is_near(&(y + step).into()) {
                 return None;
             }
@@ -159,11 +153,9 @@ impl Newton {
     }
 }
 
-/// Whether another image would tell no more: of residuals `before` and `now`, relative to the state.
-fn is_foreseen(image: &Image, now: f64, before: f64) -> bool {
-    let repels = || lies_within_unit_circle(&(image.derivative() / REPELLING)) == Some(false);
-    let converges = now < FORESEEN && now * (now / before).powi(2) <= CONVERGED;
-    before.is_finite() && (converges || now < CLOSE && repels())
+/// Whether an orbit that is close by repels.
+fn repels(image: &Image) -> bool {
+    lies_within_unit_circle(&(image.derivative() / REPELLING)) == Some(false)
 }
 
 /// Whether the derivative has a multiplier above [`LARGEST_MULTIPLIER`]; none if that cannot be told.
