@@ -117,6 +117,7 @@ fn judge_cycle() {
         tally.cycle = tally.candidate;
         return;
     }
+    carry_vector();
     motion.cycle_growth = spectral_growth();
     note_branch();
     let to = fixed_point();
@@ -174,11 +175,11 @@ fn look_again() {
     tally.has_read = 0u;
     tally.refuted = 0u;
     begin_counting();
-    forget_growth();
+    resume_growth();
     begin_window(strobe_state(), tally.window);
 }
 
-// The exponent starts anew, but for what it has collected; recurrence from scratch.
+// The exponent goes on; recurrence from scratch.
 fn search_on() {
     // Rounding may hold a lane on a cycle that repels for ever.
     let repels = motion.cycle_growth > NEUTRAL * Real(tally.candidate);
@@ -197,7 +198,7 @@ fn search_on() {
     tally.tries += 1u;
     tally.refuted = select(0u, tally.candidate, tally.asked == 1u);
     begin_counting();
-    forget_growth();
+    resume_growth();
     tally.window = 0u;
     tally.candidate = 0u;
     tally.streak = 0u;

@@ -133,6 +133,8 @@ struct Motion {
     now: MotionNow,
     // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
     tangents: array<Real, 16>,
+    // The one for the exponent while the matrix takes its place.
+    vector: array<Real, 4>,
 }
 
 // What a lane carries between dispatches: the counting.

@@ -93,6 +93,7 @@ fn begin_reading() {
     motion.anchor = strobe_state();
     narrow_scales(motion.anchor);
     if EXPONENT {
+        set_vector_aside();
         tally.tangent_count = 4u;
         motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     }

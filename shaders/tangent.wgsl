@@ -34,7 +34,7 @@ fn fetch_tangent() {
     if GROWTH {
         tally.grows = 1u;
         if tally.tangent_count == 0u {
-            forget_growth();
+            resume_growth();
             keep_tangent();
         }
         let t = motions[lane].tangents;
@@ -42,10 +42,55 @@ fn fetch_tangent() {
     }
 }
 
-// The vector starts anew, in no direction in particular.
-fn forget_growth() {
+// A vector in no direction in particular.
+const FRESH: array<Real, 4> = array<Real, 4>(0.5, 0.5, 0.5, 0.5);
+
+// While a cycle is read the vector is not carried along.
+fn set_vector_aside() {
+    if tally.tangent_count == 1u {
+        motions[lane].vector = tangent_now;
+    }
+}
+
+// It turns and grows as the matrix has it that was read along the motion. A fresh one instead would grow once more until
+// it has its direction: where cycles are read again and again, by 0.2 in a period of motion whose exponent is zero.
+fn carry_vector() {
+    if tally.refinements > 0u {
+        return;
+    }
+    let u = motions[lane].vector;
+    let m = motions[lane].tangents;
+    var image: array<Real, 4>;
+    for (var i = 0u; i < 4u; i++) {
+        image[i] = (m[i] * u[0] + m[i + 4u] * u[1]) + (m[i + 8u] * u[2] + m[i + 12u] * u[3]);
+    }
+    let size = largest(image);
+    if !(size > 1e-30 && size < 1e30) {
+        motions[lane].vector = FRESH;
+        return;
+    }
+    let length = unit(&image, size);
+    motions[lane].vector = image;
+    if GROWTH && tally.period - tally.candidate >= settings.exponent_from {
+        count_growth(Real(log2(f32(size)) + log2(f32(length))), tally.candidate);
+    }
+}
+
+// Gives a vector unit length, whose largest entry is `size`; what is left of its length without that factor.
+fn unit(u: ptr<function, array<Real, 4>>, size: Real) -> Real {
+    // Squares would leave the range.
+    let scale = 1.0 / size;
+    let v = array<Real, 4>(scale * (*u)[0], scale * (*u)[1], scale * (*u)[2], scale * (*u)[3]);
+    let length = sqrt((v[0] * v[0] + v[1] * v[1]) + (v[2] * v[2] + v[3] * v[3]));
+    let inverse = 1.0 / length;
+    *u = array<Real, 4>(inverse * v[0], inverse * v[1], inverse * v[2], inverse * v[3]);
+    return length;
+}
+
+// The vector from where it was left.
+fn resume_growth() {
     tally.tangent_count = select(0u, 1u, GROWTH);
-    tangent_now = array<Real, 4>(0.5, 0.5, 0.5, 0.5);
+    tangent_now = motions[lane].vector;
 }
 
 fn keep_tangent() {
@@ -218,19 +263,15 @@ const NO_RATE: Real = 1e-14;
 
 // Growth of the one vector since the last strobe, in octaves; it is given unit length.
 fn renormalise() -> Real {
-    let u = tangent(0u);
-    // Squares would leave the range.
+    var u = tangent(0u);
     let size = largest(u);
     if !(size > 1e-30) {
         // Superstable: as large a loss as can be told. Start anew.
-        set_tangent(0u, array<Real, 4>(0.5, 0.5, 0.5, 0.5));
+        set_tangent(0u, FRESH);
         return -100.0;
     }
-    let scale = 1.0 / size;
-    let v = array<Real, 4>(scale * u[0], scale * u[1], scale * u[2], scale * u[3]);
-    let length = sqrt((v[0] * v[0] + v[1] * v[1]) + (v[2] * v[2] + v[3] * v[3]));
-    let inverse = 1.0 / length;
-    set_tangent(0u, array<Real, 4>(inverse * v[0], inverse * v[1], inverse * v[2], inverse * v[3]));
+    let length = unit(&u, size);
+    set_tangent(0u, u);
     // Averages alone are made of it: single precision will do, and f64 has no logarithm.
     return Real(log2(f32(size)) + log2(f32(length)));
 }
@@ -243,11 +284,17 @@ fn accumulate_growth() {
     if tally.period <= settings.exponent_from {
         return;
     }
+    count_growth(growth, 1u);
+}
+
+// Growth over so many periods. A block that a cycle makes longer than the others counts like them.
+fn count_growth(growth: Real, periods: u32) {
     motion.block_growth += growth;
-    tally.block_periods += 1u;
-    if tally.block_periods == settings.exponent_block {
-        motion.growth_sum += motion.block_growth;
-        motion.growth_squares += motion.block_growth * motion.block_growth;
+    tally.block_periods += periods;
+    if tally.block_periods >= settings.exponent_block {
+        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(tally.block_periods));
+        motion.growth_sum += whole;
+        motion.growth_squares += whole * whole;
         motion.block_growth = 0.0;
         tally.block_periods = 0u;
         tally.blocks += 1u;

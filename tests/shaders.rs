@@ -107,7 +107,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     position_scale,
                     rate_scale,
                     cycle_growth,
-                    tangents
+                    tangents,
+                    vector
                 ]
             );
             same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);

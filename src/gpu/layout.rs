@@ -160,6 +160,8 @@ pub struct Motion {
     pub cycle_growth: f64,
     /// Tangent vectors in lane units.
     pub tangents: [f64; 16],
+    /// The one for the exponent while the monodromy matrix takes their place.
+    pub vector: [f64; 4],
 }
 
 /// The counting of a lane between dispatches.
