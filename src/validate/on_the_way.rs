@@ -4,12 +4,13 @@
 //! stop early, and anew wherever a cycle has been read in vain: up to the last strobe, over a number of periods
 //! that their record does not tell.
 
-use super::case::{Case, ELSEWHERE};
+use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
 use super::lane_model::LaneModel;
 use super::reading::counts;
 use super::rounded::Rounded;
 use super::unsettled::{NEWTON_STEPS, NEWTON_TRIES};
 use crate::classify::classify;
+use crate::gpu::Precision;
 use crate::model::State;
 use crate::orbit::Class;
 use crate::record::valid;
@@ -20,6 +21,9 @@ const ROUNDED_RUNS: u64 = 8;
 
 /// Starts within rounding whose motions are tried where these end on different places.
 const SCATTERED_STARTS: usize = 1000;
+
+/// Periods over which a motion is seen to stay where it is.
+const STAYS: u32 = 128;
 
 /// A motion by its impacts and meshing time so far, at every strobe.
 struct Course {
@@ -41,7 +45,8 @@ pub(super) fn has_averages_on_the_way(case: &Case<'_>) -> bool {
         (impacts - impacts.round()).abs() <= case.bars.impacts * f64::from(*periods)
     };
     let Some(shortest) = (1..=longest).find(is_whole) else { return false };
-    let lengths = [shortest as usize, longest as usize];
+    // What single precision does not resolve it may be held anywhere in.
+    let lengths = if is_unresolved(case) { [1; 2] } else { [shortest, longest].map(|length| length as usize) };
     let of_start = |start| exact(case, Trajectory::new(&case.flow, case.law, start), record.periods_run);
     let nudged = (0..8).map(|k| case.nudged_start(k));
     let mut own: Vec<Course> = std::iter::once(case.start).chain(nudged).filter_map(of_start).collect();
@@ -62,6 +67,15 @@ pub(super) fn has_averages_on_the_way(case: &Case<'_>) -> bool {
             own.extend(starts.iter().copied().filter_map(of_start));
             is_met(case, &own, &ahead, lengths)
         })
+}
+
+/// Whether all that the motion still does lies within the resolution of a lane: rounding may hold that in any of
+/// its periods.
+fn is_unresolved(case: &Case<'_>) -> bool {
+    let Ok(mut motion) = case.after(case.start, case.record.periods_run) else { return false };
+    let there = motion.state();
+    let stays = |_| motion.advance_period(&mut ()).is_ok() && case.apart(&there, &motion.state()) < LANE_RESOLUTION;
+    case.is_lane && case.precision == Precision::F32 && (0..STAYS).all(stays)
 }
 
 /// The first period that may count.
