@@ -35,6 +35,23 @@ fn open([impacts_per_period, mesh_fraction]: [f64; 2], strobe: [f64; 4], periods
     }
 }
 
+fn with_exponent(record: Record, [lyapunov, lyapunov_error]: [f64; 2]) -> Record {
+    Record { lyapunov, lyapunov_error, valid: record.valid | valid::LYAPUNOV, ..record }
+}
+
+/// For cells that are undecided by the end of the budget.
+const MORE_PERIODS: &str = "[integration]\nundecided_periods = 1584\n";
+
+/// The main plane with its first cell there.
+fn plan_at(e: f64, omega: f64, integration: &str) -> Plan {
+    let text = format!(
+        "[[axis]]\nparameter = 'e'\nmin = {e}\nmax = 1.0\ncount = 2\n\
+         [[axis]]\nparameter = 'omega'\nmin = {omega}\nmax = 20.0\ncount = 2\n\
+         {integration}[outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n"
+    );
+    Plan::new(&Scene::parse(&text, "cell", &[], Purpose::Map).unwrap())
+}
+
 /// Beside an unsymmetric cycle a symmetric one: rounding keeps a lane off either, and moves its averages.
 #[test]
 fn what_is_left_open_has_the_averages_of_its_motion() {
@@ -103,11 +120,7 @@ fn neutral_motion_is_no_chaos_in_anybodys_blocks() {
 /// transient: this one is left open by a slow cycle after 2,112 periods, and has averaged 1,917.
 #[test]
 fn lanes_that_may_stop_early_count_before_the_transient_is_over() {
-    let text = "[[axis]]\nparameter = 'e'\nmin = 0.7480314960629921\nmax = 1.0\ncount = 2\n\
-         [[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 12.0\ncount = 2\n\
-         [integration]\nundecided_periods = 1584\n\
-         [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n";
-    let plan = Plan::new(&Scene::parse(text, "cell", &[], Purpose::Map).unwrap());
+    let plan = plan_at(0.7480314960629921, 1.0, MORE_PERIODS);
     let strobe = [1.2445701956748962, -0.08700716515500079, 0.7460595965385437, 0.2017984370626537];
     let record = open([101_761.0 / 1917.0, 0.29894429445266724], strobe, 2112);
     assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
@@ -119,17 +132,57 @@ fn lanes_that_may_stop_early_count_before_the_transient_is_over() {
     stays_unexplained(&plan, record, Precision::F32, &planted);
 }
 
+/// Bands of chaos a hundred-thousandth of the motion wide, with 68 or 70 impacts a period: rounding holds a lane in a
+/// pattern of four periods, and in 573 of them it has met 69 on average, but for one impact. No stretch of the
+/// reference as long has so few.
+#[test]
+fn what_is_not_resolved_has_the_averages_of_any_period() {
+    let plan = plan_at(0.8062622309197651, 1.1076320939334638, MORE_PERIODS);
+    let strobe = [1.2475126087665558, 0.4332843715321194, 0.7775796055793762, -0.8528200569797216];
+    let record = with_exponent(
+        open([68.99825479930192, 0.05525544658303261], strobe, 2112),
+        [0.04426941373598075, 0.0002834432499675276],
+    );
+    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
+    let planted: [(&str, Spoil); 4] = [
+        ("more impacts", |record| record.impacts_per_period += 2.0),
+        ("fewer impacts", |record| record.impacts_per_period -= 2.0),
+        ("meshing", |record| record.mesh_fraction += 1e-2),
+        ("exponent", |record| record.lyapunov = 0.06),
+    ];
+    stays_unexplained(&plan, record, Precision::F32, &planted);
+    // Double precision resolves them.
+    assert_eq!(explanation(&plan, record, Precision::F64), Ok(None));
+}
+
+/// From rest the reference comes to a cycle of 16 impacts, and a lane to a motion beside it of 14 and now and then 15:
+/// chaos too weak to be told in 2,112 periods.
+#[test]
+fn weak_chaos_beside_a_cycle_may_be_left_open() {
+    let plan = plan_at(0.5440313111545988, 3.8199608610567513, MORE_PERIODS);
+    let strobe = [5.325708985328674, 15.185622256063587, 5.027534008026123, 16.502757142735994];
+    let record = with_exponent(
+        open([14.016483516483516, 0.0], strobe, 2112),
+        [0.053449972824758, 0.019188195534138718],
+    );
+    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
+    let planted: [(&str, Spoil); 4] = [
+        ("impacts", |record| record.impacts_per_period += 1.0),
+        ("meshing", |record| record.mesh_fraction += 1e-3),
+        ("another exponent", |record| record.lyapunov = -0.1),
+        ("a cycle", |record| {
+            (record.period, record.status, record.lyapunov_error) = (1, Status::Ok.code(), 0.0);
+        }),
+    ];
+    stays_unexplained(&plan, record, Precision::F32, &planted);
+}
+
 /// The reference calls a motion chaos that ends on a cycle in time; a lane that is there by its last period
 /// may be left open on it, and nowhere else.
 #[test]
 fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
     for (e, omega) in [(0.6088, 3.4487), (0.8789, 5.6876)] {
-        let text = format!(
-            "[[axis]]\nparameter = 'e'\nmin = {e}\nmax = 1.0\ncount = 2\n\
-             [[axis]]\nparameter = 'omega'\nmin = {omega}\nmax = 20.0\ncount = 2\n\
-             [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n"
-        );
-        let plan = Plan::new(&Scene::parse(&text, "cell", &[], Purpose::Map).unwrap());
+        let plan = plan_at(e, omega, "");
         let batch = Schedule::new(&plan).batch(&plan, 0, 1);
         let chaos = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&batch)).unwrap()[0];
         assert_eq!(classify(&chaos), Class::Chaotic, "{chaos:?}");

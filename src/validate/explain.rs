@@ -9,9 +9,10 @@ use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
 use super::explanation::Explanation;
 use super::lane_growth::{rare_chaos, weak_chaos};
 use super::limits::{
-    flip, held, is_shaken, is_spent, late, longer, rest, scattered, undecided_chaos, within_scatter,
+    flip, held, is_shaken, is_spent, late, leaves_chaos_open, longer, rest, scattered, undecided_chaos,
+    within_scatter,
 };
-use super::on_the_way::has_averages_on_the_way;
+use super::on_the_way::{has_averages_ahead, has_averages_on_the_way};
 use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
 use super::unsettled::unsettled;
@@ -140,11 +141,16 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         }
         _ => None,
     };
+    let is_left_open = || {
+        let is_too_weak = leaves_chaos_open(case, &case.standing(from).ok()?, &answer)?;
+        Some(is_too_weak && has_averages_ahead(case))
+    };
     let same = case.is_the_records(&answer)
         || read().is_some_and(|answer| case.is_the_records(&answer))
         || within_reach(case, from, &answer).is_some()
         || unresolved(case, from, &answer) == Some(true)
-        || read_rounded(case, from, &answer) == Some(true);
+        || read_rounded(case, from, &answer) == Some(true)
+        || is_left_open() == Some(true);
     same.then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,

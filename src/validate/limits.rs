@@ -92,17 +92,27 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
                 .then_some(Explanation::UndecidedInBudget)
         }
         (Class::Undecided, Class::Chaotic) => {
-            let [theirs, error] = case.truth.exponent?;
-            let (ours, bar) = (case.record.lyapunov, 5.0 * error.hypot(case.record.lyapunov_error));
-            let known = case.record.valid & valid::LYAPUNOV != 0 && (ours - theirs).abs() <= bar;
-            let is_weak = ours <= CHAOS_ERRORS * case.record.lyapunov_error;
-            let lags = case.budget.settings.max_period / 2;
-            let lingers = || (1..=lags).any(|lag| case.unrest(&stands, lag) < LINGERING);
             let is_over = || has_left_chaos(case, &stands) == Some(true);
-            (known && (is_weak || lingers()) || is_over()).then_some(Explanation::UndecidedInBudget)
+            let explains = leaves_chaos_open(case, &stands, &case.truth)? || is_over();
+            explains.then_some(Explanation::UndecidedInBudget)
         }
         _ => None,
     }
+}
+
+/// Whether the record is undecided with the exponent of the chaos that `truth` describes: too weak to be told in its
+/// budget, or where the motion lingers at some cycle.
+pub(super) fn leaves_chaos_open(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Option<bool> {
+    if classify(case.record) != Class::Undecided || truth.class != Class::Chaotic || !is_spent(case) {
+        return Some(false);
+    }
+    let [theirs, error] = truth.exponent?;
+    let (ours, bar) = (case.record.lyapunov, 5.0 * error.hypot(case.record.lyapunov_error));
+    let known = case.record.valid & valid::LYAPUNOV != 0 && (ours - theirs).abs() <= bar;
+    let is_weak = ours <= CHAOS_ERRORS * case.record.lyapunov_error;
+    let lags = case.budget.settings.max_period / 2;
+    let lingers = || (1..=lags).any(|lag| case.unrest(stands, lag) < LINGERING);
+    Some(known && (is_weak || lingers()))
 }
 
 /// Whether the reference goes on from where the lane was at last to the cycle that `truth` describes, and

@@ -38,15 +38,10 @@ pub(super) fn has_averages_on_the_way(case: &Case<'_>) -> bool {
     if classify(record) != Class::Undecided || record.valid & (valid::IMPACTS | valid::MESH) == 0 {
         return true;
     }
-    let longest = record.periods_run.saturating_sub(counted_from(case)).max(1);
-    // Impacts are whole.
-    let is_whole = |periods: &u32| {
-        let impacts = record.impacts_per_period * f64::from(*periods);
-        (impacts - impacts.round()).abs() <= case.bars.impacts * f64::from(*periods)
-    };
-    let Some(shortest) = (1..=longest).find(is_whole) else { return false };
+    let Some([shortest, longest]) = lengths(case) else { return false };
     // What single precision does not resolve it may be held anywhere in.
-    let lengths = if is_unresolved(case) { [1; 2] } else { [shortest, longest].map(|length| length as usize) };
+    let lengths =
+        if is_unresolved(case) { [1; 2] } else { [shortest, longest].map(|length| length as usize) };
     let of_start = |start| exact(case, Trajectory::new(&case.flow, case.law, start), record.periods_run);
     let nudged = (0..8).map(|k| case.nudged_start(k));
     let mut own: Vec<Course> = std::iter::once(case.start).chain(nudged).filter_map(of_start).collect();
@@ -69,12 +64,34 @@ pub(super) fn has_averages_on_the_way(case: &Case<'_>) -> bool {
         })
 }
 
+/// Whether they are those of a stretch of the motion that the lane has ahead of it.
+pub(super) fn has_averages_ahead(case: &Case<'_>) -> bool {
+    lengths(case).is_some_and(|[shortest, longest]| {
+        let ahead = ahead(case, longest);
+        lies_between(
+            case,
+            ahead.iter().flat_map(|course| stretches(course, shortest as usize, 0, usize::MAX)),
+        )
+    })
+}
+
+/// The least and the most periods over which the record may have averaged; none if its impacts are not whole over any.
+fn lengths(case: &Case<'_>) -> Option<[u32; 2]> {
+    let longest = case.record.periods_run.saturating_sub(counted_from(case)).max(1);
+    let is_whole = |periods: &u32| {
+        let impacts = case.record.impacts_per_period * f64::from(*periods);
+        (impacts - impacts.round()).abs() <= case.bars.impacts * f64::from(*periods)
+    };
+    (1..=longest).find(is_whole).map(|shortest| [shortest, longest])
+}
+
 /// Whether all that the motion still does lies within the resolution of a lane: rounding may hold that in any of
 /// its periods.
 fn is_unresolved(case: &Case<'_>) -> bool {
     let Ok(mut motion) = case.after(case.start, case.record.periods_run) else { return false };
     let there = motion.state();
-    let stays = |_| motion.advance_period(&mut ()).is_ok() && case.apart(&there, &motion.state()) < LANE_RESOLUTION;
+    let stays =
+        |_| motion.advance_period(&mut ()).is_ok() && case.apart(&there, &motion.state()) < LANE_RESOLUTION;
     case.is_lane && case.precision == Precision::F32 && (0..STAYS).all(stays)
 }
 
