@@ -230,12 +230,15 @@ fn refinement(refined: &Refined, count: usize) -> String {
             (_, 0) => String::new(),
             (wrong, words) => format!(", and {wrong} of {words} filled words"),
         };
+        let failed = if audit.rate() > refined.max_error {
+            let allowed = 100.0 * refined.max_error;
+            format!(", more than the {allowed:.2} % of refine.max_error, but refine.rounds lets no block be halved again")
+        } else {
+            String::new()
+        };
         format!(
-            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}"
+            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}{failed}"
         )
     });
-    format!(
-        "{share:.1} % of {count} cells integrated in {} rounds, the others filled{audit}\n",
-        refined.rounds
-    )
+    format!("{share:.1} % of {count} cells integrated, the others filled{audit}\n")
 }

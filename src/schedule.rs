@@ -74,6 +74,8 @@ pub struct Refined {
     /// Steps that had to follow each other: the coarse grid, the halvings of the block that was halved most, the
     /// samples of the audits.
     pub rounds: usize,
+    /// Fraction of the filled cells that the scene lets be wrong.
+    pub max_error: f64,
     /// Audits in order; the last one found no more wrong cells than the scene allows, unless
     /// nothing was left to refine or blocks had been halved as often as they may.
     pub audits: Vec<Audit>,
@@ -196,6 +198,7 @@ impl Schedule {
             integrated: self.sequence.len(),
             filled,
             rounds: adaptive.rounds(),
+            max_error: adaptive.max_error(),
             audits: adaptive.audits().to_vec(),
         })
     }
@@ -414,6 +417,13 @@ mod tests {
         let plan = self::plan([129, 129], "minimum_grid = 16\nrounds = 2\nmax_error = 1e-3\naudit = 500");
         let (_, refined) = run(&plan, half);
         assert!(refined.audits.len() == 1 && refined.audits[0].rate() > 1e-3, "{refined:?}");
+        // A block down to which a wrong cell was cut is no reason not to halve others.
+        let islands = |i: usize, j: usize| {
+            if (2..7).contains(&(i % 16)) && (3..9).contains(&(j % 16)) { 5 } else { half(i, j) }
+        };
+        let plan = self::plan([129, 129], "minimum_grid = 16\nrounds = 3\nmax_error = 1e-3\naudit = 500");
+        let (_, islanded) = run(&plan, islands);
+        assert!(islanded.audits.len() > 1 && islanded.audits[0].rate() > 1e-3, "{islanded:?}");
         // What is wrong in the audit is mended, and nothing else.
         assert!(refined.integrated < 1000, "{refined:?}");
     }

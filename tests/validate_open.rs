@@ -1,4 +1,5 @@
-//! Explanations of lanes that leave a cell open: they claim no class, but averages all the same.
+//! Explanations of lanes that leave open what the reference decides or tells apart: whatever they claim has to be
+//! some motion's own.
 //!
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
@@ -152,6 +153,33 @@ fn what_is_not_resolved_has_the_averages_of_any_period() {
     ];
     stays_unexplained(&plan, record, Precision::F32, &planted);
     // Double precision resolves them.
+    assert_eq!(explanation(&plan, record, Precision::F64), Ok(None));
+}
+
+/// A cycle of seven points, two of them 2.5e-5 of the motion apart: single precision rests on six.
+#[test]
+fn a_point_that_is_not_resolved_may_be_left_out() {
+    let plan = plan_at(0.5185909980430529, 3.647749510763209, MORE_PERIODS);
+    let strobe = [4.349817514419556, 7.34684832088109, 4.049044132232666, 6.912274701279334];
+    let averages = open([101.0 / 6.0, 0.06931833177804947], strobe, 237);
+    let record = Record {
+        period: 6,
+        status: Status::Ok.code(),
+        word_hash: 0x642c_8fc3_3ceb_dd00,
+        word_length: 125,
+        valid: averages.valid | valid::LYAPUNOV | valid::SYMMETRIC | valid::WORD,
+        lyapunov: -0.20000232699814274,
+        ..averages
+    };
+    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::BelowResolution)));
+    let planted: [(&str, Spoil); 5] = [
+        ("another period", |record| record.period = 5),
+        ("impacts", |record| record.impacts_per_period += 1.0 / 6.0),
+        ("exponent", |record| record.lyapunov *= 1.5),
+        ("meshing", |record| record.mesh_fraction += 1e-3),
+        ("word", |record| record.word_length = 127),
+    ];
+    stays_unexplained(&plan, record, Precision::F32, &planted);
     assert_eq!(explanation(&plan, record, Precision::F64), Ok(None));
 }
 

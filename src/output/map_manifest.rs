@@ -119,7 +119,7 @@ impl From<&Refined> for RefinementObject {
             words: audit.words,
             wrong_words: audit.wrong_words,
         };
-        let Refined { integrated, filled, rounds, ref audits } = *refined;
+        let Refined { integrated, filled, rounds, ref audits, .. } = *refined;
         RefinementObject { integrated, filled, rounds, audits: audits.iter().map(audit).collect() }
     }
 }

@@ -86,7 +86,7 @@ enum Stage {
 struct Verdict {
     /// Cells that were filled wrongly.
     wrong: Vec<u32>,
-    /// Kinds that are wrong most often; none if the audit is passed.
+    /// Kinds that are wrong most often in blocks that may be halved; none if the audit is passed.
     bad: HashSet<u32>,
 }
 
@@ -125,6 +125,10 @@ impl Adaptive {
 
     pub(super) fn audits(&self) -> &[Audit] {
         &self.audits
+    }
+
+    pub(super) fn max_error(&self) -> f64 {
+        self.refine.max_error
     }
 
     /// Steps that had to follow each other: the coarse grid, halvings, samples.
@@ -246,11 +250,6 @@ impl Adaptive {
         self.tiling.is_leaf(tile) && self.tiling.block(tile).has_inside() && is_allowed()
     }
 
-    /// Whether blocks have been halved as often as the scene allows.
-    fn is_spent(&self) -> bool {
-        self.refine.rounds.is_some_and(|most| self.deepest >= most)
-    }
-
     fn ask_corners(&mut self, tile: Tile, asks: &mut Vec<u32>) {
         for at in self.tiling.block(tile).corners() {
             let id = self.id(at);
@@ -294,29 +293,23 @@ impl Adaptive {
     /// borders are followed more closely first. If that is done and there still are, all blocks are halved
     /// that are filled with what is wrong most often: mostly chaos with its
     /// windows, which the plain regions around need not pay for. If that may be chance, more cells are
-    /// audited before.
+    /// audited before. Where blocks have been halved as often as they may there is nothing left to do.
     fn judge_audit(&mut self, records: &[Record], asks: &mut Vec<u32>) {
         let Verdict { wrong, bad } = self.count_wrong(records);
         let audit = *self.audits.last().unwrap_or(&Audit::default());
-        let closer = if audit.rate() > self.refine.max_error { self.follow_closely() } else { Vec::new() };
-        self.stage = Stage::Halving;
-        if self.is_spent() {
-            self.stage = Stage::Mending;
-        } else if !closer.is_empty() {
-            self.pending = closer;
-        } else {
+        let is_over = audit.rate() > self.refine.max_error;
+        let closer = if is_over { self.follow_closely() } else { Vec::new() };
+        let is_bad = |tile: Tile| bad.contains(&self.sights[tile].kind);
+        let worst: Vec<Tile> = self.tiles_to_halve(is_bad).collect();
+        if is_over && closer.is_empty() && !worst.is_empty() {
             let more = audit.more(self.refine.audited(audit.filled), self.refine.max_error);
             if more > 0 {
-                self.stage = Stage::Auditing;
                 self.sample(more, asks);
                 return;
             }
-            if bad.is_empty() {
-                self.stage = Stage::Mending;
-            }
-            let is_bad = |&tile: &Tile| bad.contains(&self.sights[tile].kind);
-            self.pending = self.tiling.tiles().filter(is_bad).collect();
         }
+        self.pending = if closer.is_empty() { worst } else { closer };
+        self.stage = if self.pending.is_empty() { Stage::Mending } else { Stage::Halving };
         for id in wrong {
             let tile = self.tiling.owner(self.at(id));
             self.sights[tile].is_free = true;
@@ -334,7 +327,12 @@ impl Adaptive {
             return Vec::new();
         }
         self.narrow = NARROWEST;
-        self.tiling.tiles().filter(|&tile| self.may_halve(tile) && self.is_touched(tile)).collect()
+        self.tiles_to_halve(|tile| self.is_touched(tile)).collect()
+    }
+
+    /// Blocks that may be halved, and are `wanted`.
+    fn tiles_to_halve(&self, wanted: impl Fn(Tile) -> bool) -> impl Iterator<Item = Tile> {
+        self.tiling.tiles().filter(move |&tile| self.may_halve(tile) && wanted(tile))
     }
 
     /// Compares what was filled into the audited cells with their records.
@@ -355,7 +353,7 @@ impl Adaptive {
             }
             let [sampled, amiss] = by_kind.entry(label.kind).or_default();
             *sampled += 1;
-            *amiss += usize::from(is_wrong);
+            *amiss += usize::from(is_wrong && self.may_halve(tile));
             if fill.valid & valid::WORD != 0 {
                 audit.words += 1;
                 audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id as usize]));

@@ -17,7 +17,7 @@ use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
 use super::unsettled::unsettled;
 use crate::classify::{classify, status};
-use crate::gpu::{Constants, LaneSettings};
+use crate::gpu::{Constants, LaneSettings, Precision};
 use crate::model::State;
 use crate::orbit::{Class, Status};
 use crate::reference::Trajectory;
@@ -28,6 +28,9 @@ const NEAR_BIFURCATION: f64 = 0.01;
 
 /// Share of a state error that rounding at the start must make on the reference itself.
 const SENSITIVE: f64 = 0.1;
+
+/// Lanes in single precision take recurrences this close for rounding: 2^-15 of the motion.
+const SINGLE_RESOLUTION: f64 = 3.05e-5;
 
 /// Starts within rounding from which a motion may meet its caps: chaos decides which does.
 const SCATTERED_STARTS: usize = 100;
@@ -213,7 +216,13 @@ fn resolution(case: &Case<'_>) -> Option<Explanation> {
         let read = case.read_as_is(&stands, period)?;
         case.is_the_records(&read) || rounding::is_read_rounded(case, &stands, period, &read)?
     };
-    (hides || scatters).then_some(Explanation::BelowResolution)
+    // Or the lane's cycle leaves out a point of this one that lies nearer to the next than rounding.
+    let is_rounded = case.precision == Precision::F32 && case.unrest(&stands, period) < SINGLE_RESOLUTION;
+    let leaves_out = !divides && !multiplies && is_rounded && {
+        let read = case.read_along(&stands, period)?;
+        case.is_the_records(&read)
+    };
+    (hides || scatters || leaves_out).then_some(Explanation::BelowResolution)
 }
 
 fn bifurcation(case: &Case<'_>) -> Option<Explanation> {
