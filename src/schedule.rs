@@ -218,6 +218,24 @@ mod tests {
     use crate::orbit::Class;
     use crate::record::valid;
     use crate::scene::{Purpose, Scene};
+    use crate::word::Word;
+
+    /// In a picture's number beside the period: cycles that are their own mirror image, and another word.
+    const SYMMETRIC: u32 = 1000;
+    const WORD: u32 = 2000;
+
+    /// The record of a cell that a picture shows.
+    fn shown(number: u32) -> Record {
+        let mut record = Record {
+            period: number % SYMMETRIC,
+            symmetric: number / SYMMETRIC % 2,
+            valid: valid::PERIOD | valid::SYMMETRIC,
+            periods_run: 7,
+            ..Record::default()
+        };
+        record.set_word(&Word::cyclic(&[b'1' + (number / WORD) as u8]));
+        record
+    }
 
     fn plan(counts: [usize; 2], refine: &str) -> Plan {
         let axis =
@@ -226,16 +244,16 @@ mod tests {
         Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
     }
 
-    /// Runs a schedule on a picture: a period for every cell.
-    fn run(plan: &Plan, period: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
-        run_in(plan, std::mem::take, period)
+    /// Runs a schedule on a picture: a number for every cell.
+    fn run(plan: &Plan, picture: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
+        run_in(plan, std::mem::take, picture)
     }
 
     /// The same where `come` says which of the cells under way come next.
     fn run_in(
         plan: &Plan,
         mut come: impl FnMut(&mut Vec<u32>) -> Vec<u32>,
-        period: impl Fn(usize, usize) -> u32,
+        picture: impl Fn(usize, usize) -> u32,
     ) -> (Vec<Record>, Refined) {
         let mut schedule = Schedule::new(plan);
         let mut records = vec![Record::default(); plan.cell_count()];
@@ -245,9 +263,7 @@ mod tests {
             for id in come(&mut waiting) {
                 let [i, j] = plan.indices(id);
                 assert_eq!(records[id as usize].periods_run, 0, "cell {id} was asked for twice");
-                let valid = valid::PERIOD;
-                records[id as usize] =
-                    Record { period: period(i, j), valid, periods_run: 7, ..Record::default() };
+                records[id as usize] = shown(picture(i, j));
                 assert!(schedule.waits_for(id));
                 schedule.take(id, &records);
             }
@@ -339,7 +355,7 @@ mod tests {
     }
 
     /// Where classes alone make borders, only coarse blocks are halved for touching one, until an audit finds too many
-    /// wrong cells: teeth of a border that no corner of the blocks beside it meets.
+    /// wrong cells: islands beside a border that no corner of the blocks there meets.
     #[test]
     fn a_failed_audit_has_borders_followed_more_closely_first() {
         let beaded = |i: usize, j: usize| {
@@ -436,10 +452,19 @@ mod tests {
             let strewn = crate::random::Random::new((j * 203 + i) as u64).unit() < 0.01;
             let band = (j as f64 - 60.0 - 20.0 * (i as f64 / 17.0).sin()).abs() < 1.5;
             let disc = (i as f64 - 150.0).hypot(j as f64 - 110.0) < 31.0;
-            1 + u32::from(strewn && disc) + 2 * u32::from(band) + 4 * u32::from(disc)
+            let slope = (j as f64 - 0.3 * i as f64 - 80.0).abs() < 2.5;
+            let corner = i + 2 * j > 420;
+            let period = 1 + u32::from(strewn && disc) + 2 * u32::from(band) + 4 * u32::from(disc);
+            period + SYMMETRIC * u32::from(slope) + WORD * u32::from(corner)
         };
-        for refine in ["minimum_grid = 16\nmax_error = 0.003", "minimum_grid = 8\nrounds = 2\naudit = 100"] {
-            let plan = plan([203, 170], refine);
+        let everything = "[outputs]\nquantities = ['class', 'symmetric', 'word']";
+        for (refine, outputs) in [
+            ("minimum_grid = 16\nmax_error = 0.003", ""),
+            ("minimum_grid = 8\nrounds = 2\naudit = 100", ""),
+            ("minimum_grid = 16\nmax_error = 0.003", everything),
+            ("minimum_grid = 16\nmax_error = 0.003\nword = true", everything),
+        ] {
+            let plan = plan([203, 170], &format!("{refine}\n{outputs}"));
             let (records, refined) = run(&plan, picture);
             assert!(refined.audits.iter().any(|audit| audit.wrong > 0), "{refined:?}");
             for seed in 0..20 {

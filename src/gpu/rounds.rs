@@ -68,7 +68,8 @@ struct Sent<'a> {
 
 impl Rounds<'_> {
     /// Runs lanes until no more than `until` are left, or, if that is not none, some have ended and waited for long
-    /// enough; `trips` at first in a dispatch. Each variant takes over where the one before leaves off. Returns the device's own time where somebody measures.
+    /// enough; `trips` at first in a dispatch. Each variant takes over where the one before leaves off. Returns the
+    /// device's own time where somebody measures.
     pub(super) async fn run(
         &self,
         variants: &[&Pipelines],
@@ -109,6 +110,11 @@ impl Rounds<'_> {
             }
             *trips = next_trips(sent.trips, last_end.elapsed(), round).clamp(FEWEST_TRIPS.min(most), most);
             last_end = Instant::now();
+        }
+        // The last round is in time, too; what comes next waits for it anyway.
+        if let (Some(clock), Some(sent)) = (&clock, before) {
+            let take = |bytes: &[u8]| clock.seconds(&bytes[TIMES as usize..]);
+            seconds += read(gpu, sent.look, LOOK, sent.submission, take).await?;
         }
         Ok(clock.map(|_| seconds))
     }
