@@ -234,7 +234,7 @@ fn precision(text: &str) -> Result<Precision, String> {
 /// Engines by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum EngineChoice {
-    /// A hardware GPU if there is one, else the faster of CPU and software GPU
+    /// A hardware GPU if there is one, else the CPU; a software GPU where that is faster on long maps
     Auto,
     /// Lanes on a graphics device
     Gpu,

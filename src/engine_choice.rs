@@ -17,8 +17,9 @@ const TRIAL: Duration = Duration::from_millis(200);
 const TRIAL_CELLS: usize = 128;
 const TRIAL_PERIODS: u32 = 64;
 
-/// Smaller maps than this are done before a trial would be.
-const WORTH_A_TRIAL: usize = 4096;
+/// Maps that the CPU does in less time than this are done before a trial would pay: a software driver compiles for ten
+/// seconds.
+const WORTH_A_TRIAL: Duration = Duration::from_secs(60);
 
 /// An engine, and why it was taken.
 pub(crate) struct Chosen<'p> {
@@ -80,23 +81,43 @@ fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, Failu
             |failure| cpu(failure.to_string()),
             |engine| Chosen { engine, why: "a hardware GPU".to_owned() },
         )),
-        Some(_) if plan.cell_count() < WORTH_A_TRIAL => {
-            Ok(cpu("a small map, and no hardware GPU".to_owned()))
-        }
         Some(_) => Ok(faster(plan, wanted).unwrap_or_else(|failure| cpu(failure.to_string()))),
     }
 }
 
-/// The faster of the CPU and a software GPU on the same cells, for a few periods each.
+/// The CPU where it has soon done the map, else the faster of it and a software GPU.
 fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, Failure> {
     let brief = plan.brief(TRIAL_PERIODS);
-    let device = open_device(precision)?;
+    let on_cpu =
+        rate(&brief, &mut Engine::Cpu(Cpu::new(&brief))).map_err(|error| Failure::Run(error.into()))?;
+    if !is_worth_a_trial(plan, on_cpu) {
+        let why = format!("no hardware GPU, and {on_cpu:.0} cells/s, {TRIAL_PERIODS} periods each");
+        return Ok(Chosen { engine: Engine::Cpu(Cpu::new(plan)), why });
+    }
+    on_trial(plan, &brief, precision, on_cpu)
+}
+
+/// Whether the CPU has enough to do, which does so many cells of a trial in a second.
+fn is_worth_a_trial(plan: &Plan, on_cpu: f64) -> bool {
+    let budget = plan.budget();
+    // Most cells that may stop early have done so by then.
+    let trials = if budget.early_stop { 1.0 } else { f64::from(budget.periods()) / f64::from(TRIAL_PERIODS) };
+    plan.run_count() as f64 * trials > on_cpu * WORTH_A_TRIAL.as_secs_f64()
+}
+
+/// The faster of the CPU, whose rate is known, and a software GPU on the same cells, for a few periods each.
+fn on_trial<'p>(
+    plan: &'p Plan,
+    brief: &Plan,
+    precision: Precision,
+    on_cpu: f64,
+) -> Result<Chosen<'p>, Failure> {
     let failed = |error: EngineError| Failure::Run(error.into());
-    let on_cpu = rate(&brief, &mut Engine::Cpu(Cpu::new(&brief))).map_err(failed)?;
-    let mut lanes = Engine::Gpu(Box::new(pollster::block_on(Gpu::new(&brief, device)).map_err(failed)?));
+    let device = open_device(precision)?;
+    let mut lanes = Engine::Gpu(Box::new(pollster::block_on(Gpu::new(brief, device)).map_err(failed)?));
     // The first batch compiles the shader.
-    pollster::block_on(lanes.run(&spread(&brief, 0, 1))).map_err(failed)?;
-    let on_gpu = rate(&brief, &mut lanes).map_err(failed)?;
+    pollster::block_on(lanes.run(&spread(brief, 0, 1))).map_err(failed)?;
+    let on_gpu = rate(brief, &mut lanes).map_err(failed)?;
     let name = precision.name();
     let why = format!(
         "on trial {on_cpu:.0} cells/s on cpu (f64), {on_gpu:.0} cells/s on gpu ({name}), {TRIAL_PERIODS} periods each"
@@ -127,4 +148,44 @@ fn spread(plan: &Plan, from: usize, cells: usize) -> Batch {
     // An odd multiplier near the golden section of 2^32 scatters consecutive numbers.
     let id = |n: usize| plan.order()[(((n as u64 * 2_654_435_761) % (1 << 32) * count) >> 32) as usize];
     Batch { places: 0..cells, cells: (from..from + cells).map(|n| plan.cell(id(n))).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use rattlemap::scene::{Purpose, Scene};
+
+    use super::*;
+
+    fn plan(sets: &[&str]) -> Plan {
+        let text = "[[axis]]\nparameter = 'e'\nmin = 0.0\nmax = 1.0\ncount = 64\n\
+                    [[axis]]\nparameter = 'omega'\nmin = 11.0\nmax = 12.0\ncount = 64\n";
+        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+        Plan::new(&Scene::parse(text, "s", &sets, Purpose::Map).unwrap())
+    }
+
+    #[test]
+    fn a_trial_has_to_pay() {
+        // 4,096 cells in a minute are 68 in a second.
+        assert!(!is_worth_a_trial(&plan(&[]), 70.0));
+        assert!(is_worth_a_trial(&plan(&[]), 66.0));
+        // By brute force each of them takes 528 periods, 8.25 times those of a trial.
+        let brute = plan(&["integration.early_stop=false"]);
+        assert!(!is_worth_a_trial(&brute, 70.0 * 8.25));
+        assert!(is_worth_a_trial(&brute, 66.0 * 8.25));
+    }
+
+    /// A long budget does not lengthen it.
+    #[test]
+    fn a_trial_takes_the_faster() {
+        let plan = plan(&["integration.transient_periods=100000"]);
+        let brief = plan.brief(TRIAL_PERIODS);
+        for (on_cpu, name) in [(1e9, "cpu"), (1e-3, "gpu")] {
+            let chosen =
+                on_trial(&plan, &brief, Precision::F32, on_cpu).unwrap_or_else(|_| panic!("no adapter"));
+            assert_eq!(chosen.engine.name(), name, "{}", chosen.why);
+            assert!(
+                chosen.why.contains("cells/s on cpu (f64)") && chosen.why.contains("cells/s on gpu (f32)")
+            );
+        }
+    }
 }

@@ -69,10 +69,5 @@ fn devices_says_what_there_is_and_what_auto_takes() {
     ]));
     let hardware = || says(&["a hardware GPU"]);
     let run = map(&folder, &["--engine", "auto", "--out", "few"]);
-    run.success().stderr(says(&["cpu (f64): a small map"]).or(hardware()));
-    // Enough cells for a trial; a long budget does not lengthen it.
-    let long = ["--set", "integration.transient_periods=100000", "--set", "axis.1.min=11"];
-    let many = ["--engine", "auto", "--set", "axis.0.count=64", "--set", "axis.1.count=64"];
-    let run = map(&folder, &[&many[..], &long].concat());
-    run.success().stderr(says(&["cells/s on cpu (f64)", "cells/s on gpu (f32)"]).or(hardware()));
+    run.success().stderr(says(&["cpu (f64): no hardware GPU, and "]).or(hardware()));
 }
