@@ -91,7 +91,9 @@ fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, Failure> {
     let on_cpu =
         rate(&brief, &mut Engine::Cpu(Cpu::new(&brief))).map_err(|error| Failure::Run(error.into()))?;
     if !is_worth_a_trial(plan, on_cpu) {
-        let why = format!("no hardware GPU, and {on_cpu:.0} cells/s, {TRIAL_PERIODS} periods each");
+        let why = format!(
+            "no hardware GPU, and soon done: {on_cpu:.0} cells/s on trial, {TRIAL_PERIODS} periods each"
+        );
         return Ok(Chosen { engine: Engine::Cpu(Cpu::new(plan)), why });
     }
     on_trial(plan, &brief, precision, on_cpu)
