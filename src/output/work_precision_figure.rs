@@ -94,6 +94,7 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         ),
     };
     frame.draw_grid(canvas)?;
+    let mut labels = Vec::new();
     for (style, points) in &present {
         if style.method == MEASURE {
             let x = frame.at(microseconds(points[0]), 1.0).0;
@@ -109,8 +110,12 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
             // On the side that the curve does not come from.
             let is_from_right = path.iter().rev().nth(1).is_some_and(|before| before.0 > at.0);
             let (side, align) = if is_from_right { (-1.0, Align::Right) } else { (1.0, Align::Left) };
-            canvas.text(&setting(point), (at.0 + side * LABEL, at.1), SMALLEST, align, style.color)?;
+            labels.push((setting(point), (at.0 + side * LABEL, at.1), align, style.color));
         }
+    }
+    // No marker covers them.
+    for (text, at, align, color) in labels {
+        canvas.text(&text, at, SMALLEST, align, color)?;
     }
     frame.draw_axes(canvas, true)
 }

@@ -49,7 +49,7 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
     Layer {
         name: "map",
         short: "period and chaos",
-        title: "period, and chaos by exponent",
+        title: if shows_chaos { "period, and chaos by exponent" } else { "period and chaos" },
         entries,
         bar: (has_chaos && shows_chaos).then_some(bar),
         indices,
