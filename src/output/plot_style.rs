@@ -6,6 +6,7 @@
 //! as one polygon, which leaves holes wherever a trajectory crosses itself.
 
 pub(super) mod axes;
+pub(super) mod labels;
 pub(super) mod legend;
 mod raster;
 mod ticks;

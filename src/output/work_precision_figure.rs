@@ -6,15 +6,16 @@ use anyhow::Result;
 use plotters::style::RGBColor;
 
 use super::plot_style::axes::{Axis, Frame};
+use super::plot_style::labels::Labels;
 use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::{Align, Canvas, DARK, FAINT, Marker, Shape, save_figure};
+use super::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
 use crate::bench::work_precision::points::Point;
 
 const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;
-/// The setting at the end of a curve: its type, and how far it stands off.
+/// The setting at the end of a curve.
 const SMALLEST: f64 = 18.0;
-const LABEL: f64 = 13.0;
+const RADIUS: f64 = 7.0;
 /// Errors outside of this are drawn on its ends.
 const ERRORS: (f64, f64) = (1e-16, 10.0);
 
@@ -94,29 +95,27 @@ fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> 
         ),
     };
     frame.draw_grid(canvas)?;
-    let mut labels = Vec::new();
+    let place = |point: &Point| frame.at(microseconds(point), error(point));
+    let markers: Vec<_> =
+        drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| place(point)).collect();
+    let mut labels = Labels::beside(&markers, RADIUS, frame.rect, SMALLEST);
     for (style, points) in &present {
         if style.method == MEASURE {
             let x = frame.at(microseconds(points[0]), 1.0).0;
             canvas.dashes((x, frame.rect.top), (x, frame.rect.bottom), 2.0, style.color)?;
             continue;
         }
-        let path: Vec<_> = points.iter().map(|point| frame.at(microseconds(point), error(point))).collect();
+        let path: Vec<_> = points.iter().map(|point| place(point)).collect();
         canvas.stroke(&path, 2.0, style.color)?;
         for (point, at) in points.iter().zip(&path) {
             canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) })?;
         }
         if let (Some(point), Some(at)) = (points.last(), path.last()) {
-            // On the side that the curve does not come from.
-            let is_from_right = path.iter().rev().nth(1).is_some_and(|before| before.0 > at.0);
-            let (side, align) = if is_from_right { (-1.0, Align::Right) } else { (1.0, Align::Left) };
-            labels.push((setting(point), (at.0 + side * LABEL, at.1), align, style.color));
+            let before = path.iter().rev().nth(1).copied();
+            labels.add(canvas, setting(point), *at, before, style.color)?;
         }
     }
-    // No marker covers them.
-    for (text, at, align, color) in labels {
-        canvas.text(&text, at, SMALLEST, align, color)?;
-    }
+    labels.draw(canvas)?;
     frame.draw_axes(canvas, true)
 }
 
@@ -143,7 +142,7 @@ fn entry(style: &Style) -> Entry {
 }
 
 fn marker(style: &Style) -> Marker {
-    Marker { shape: style.shape, color: style.color, radius: 7.0, hollow: false }
+    Marker { shape: style.shape, color: style.color, radius: RADIUS, hollow: false }
 }
 
 fn microseconds(point: &Point) -> f64 {
