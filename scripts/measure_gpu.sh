@@ -7,16 +7,18 @@
 # scenes/, so that both can be carried to a machine without Rust. Checks first that the lanes
 # are right in both precisions, cell by cell against the reference; then times maps of
 # SIDE x SIDE cells (1024 unless given), each three times; then the same map on every engine, from
-# 10^3 lanes to as many as fit (`rattlemap bench engines`, five minutes at most). Writes to OUT:
+# 10^3 lanes to as many as fit (`rattlemap bench engines`, five minutes at most). The first hardware
+# adapter is measured, or the one that WGPU_ADAPTER_NAME names, be it a software one. Writes to OUT:
 #
 #     devices.txt             adapters, limits, drivers
 #     validation_*.json       correctness, 128 x 128, per precision
 #     speed.csv               one row per timed run
 #     engines/                throughput against lanes on every engine: tables and figures
 #     summary.md              medians, and what they were measured on
+#     failed                  what did not go well, if anything: the exit code is 1 then
 set -euo pipefail
 
-[[ $# -ge 2 ]] || { sed -n '2,17p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+[[ $# -ge 2 ]] || { sed -n '2,19p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
@@ -29,17 +31,35 @@ trap 'rm -rf "$work"' EXIT
 
 square() { printf -- '--set axis.0.count=%s --set axis.1.count=%s' "$1" "$1"; }
 
+rm -f "$out/failed"
+# What fails is a finding; the machine is there to be measured all the same.
+failed() { echo "$*" | tee -a "$out/failed" >&2; }
+
 "$binary" devices | tee "$out/devices.txt"
+
+# The block of an adapter: its name, then "  key  value" lines. A software driver beside the hardware must not be
+# measured in its place.
+if [[ -n "${WGPU_ADAPTER_NAME:-}" ]]; then
+    adapter="$(grep -iF -A3 -- "$WGPU_ADAPTER_NAME" <(grep -A3 '^gpu:' "$out/devices.txt") | head -n 4 || true)"
+else
+    adapter="$(grep -A3 '^gpu:' "$out/devices.txt" | grep -B1 -A2 '^  kind  *hardware' | head -n 4 || true)"
+fi
+if [[ "$adapter" != gpu:* ]]; then
+    echo "error: no hardware adapter; install its Vulkan driver, or name an adapter by WGPU_ADAPTER_NAME" >&2
+    exit 1
+fi
+WGPU_ADAPTER_NAME="$(sed -n '1s/^gpu: //p' <<<"$adapter")"
+export WGPU_ADAPTER_NAME
 
 precisions=()
 for precision in f32 f64; do
-    grep -q "precision .*$precision" <(grep -A3 '^gpu:' "$out/devices.txt") || continue
+    grep -q "^  precision .*$precision" <<<"$adapter" || continue
     precisions+=("$precision")
     # shellcheck disable=SC2046 # the words of square are meant to be split
-    "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/right" --force $(square 128)
-    # What it finds is a finding; the machine is there to be measured all the same.
-    "$binary" validate "$work/right" --samples 2000 || echo "validate: $precision has unexplained cells" >>"$out/failed"
-    cp "$work/right/validation.json" "$out/validation_$precision.json"
+    "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/right" --force $(square 128) ||
+        { failed "map: $precision is not there"; continue; }
+    "$binary" validate "$work/right" --samples 2000 || failed "validate: $precision has unexplained cells"
+    cp "$work/right/validation.json" "$out/validation_$precision.json" || true
 done
 
 # name, precision, further settings
@@ -49,7 +69,7 @@ timed() {
     for run in 1 2 3; do
         # shellcheck disable=SC2046
         "$binary" map "${of:-$scene}" --engine gpu --precision "$precision" --out "$work/timed" --force $(square "$side") \
-            "$@" 2>"$work/said"
+            "$@" 2>"$work/said" || { failed "map: $name, $precision: $(tail -n 1 "$work/said")"; continue; }
         # "N cells on gpu (f32) in S s: C cells/s, P lane-periods/s, K ns per lane-step; outputs O s"
         grep -E '^[0-9]+ cells.* on gpu' "$work/said" |
             sed -E 's/^([0-9]+) cells.* in ([0-9.]+) s: ([0-9]+) cells\/s, ([0-9]+) lane-periods\/s, ([0-9.]+) ns per lane-step; outputs ([0-9.]+) s.*/\1,\2,\3,\4,\5,\6/' |
@@ -71,7 +91,7 @@ done
 
 # What it finds is a finding, too.
 "$binary" bench engines --budget "${ENGINES_SECONDS:-300}" --out "$out/engines" --force 2>&1 | tee "$out/engines.txt" ||
-    echo "bench engines: unexplained cells, or nothing measured" >>"$out/failed"
+    failed "bench engines: unexplained cells, or nothing measured"
 
 {
     echo "# rattlemap on a GPU"
@@ -92,4 +112,4 @@ done
     sed -n '/^largest map/,$p' "$out/engines.txt" | sed 's/^/    /'
 } >"$out/summary.md"
 cat "$out/summary.md"
-[[ ! -e "$out/failed" ]] || { cat "$out/failed" >&2; exit 1; }
+[[ ! -e "$out/failed" ]]

@@ -1,5 +1,5 @@
-// The queue of lanes that a variant has work for: ended lanes cost nothing, and those that are left
-// keep their order, for neighbours behave alike.
+// The queue of lanes that a variant has work for, or whose records are to be read: the others cost nothing, and those
+// in it keep their order, for neighbours behave alike.
 //
 // Three passes: blocks of the roster are counted, the counts summed up, and what is left of every block
 // put in its place in the queue.
@@ -17,12 +17,15 @@ fn queued(i: u32) -> u32 {
     return queue.lanes[settings.slots + i];
 }
 
-// Whether place `i` of the roster holds a lane that this variant has work for.
+// Whether place `i` of the roster holds a lane that this variant has work for, or one that has ended.
 fn is_left(i: u32) -> bool {
     if i >= settings.rostered {
         return false;
     }
     tally = tallies[rostered(i)].now;
+    if settings.ended == 1u {
+        return is_over();
+    }
     return running();
 }
 
@@ -74,6 +77,7 @@ fn sum_left(@builtin(local_invocation_index) k: u32) {
     }
     if k == BLOCK - 1u {
         queue.count = block_counts[k];
+        queue.beat += 1u;
     }
 }
 

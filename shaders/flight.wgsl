@@ -55,6 +55,9 @@ fn scan() -> u32 {
     var n = tally.step;
     var bound = motion.bound;
     var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + row[5]);
+    if tally.cut == 1u {
+        a = motion.bend;
+    }
     var taken = 0u;
     var leaves = tally.order > 0u;
     // The tangent vector goes along; where a cycle is read, four follow.
@@ -123,6 +126,9 @@ fn scan() -> u32 {
     motion.phasor[1] = s;
     motion.theta = theta;
     motion.bound = bound;
+    // Computed anew it might be rounded in another way, and where a dispatch ends must not matter.
+    motion.bend = a;
+    tally.cut = select(0u, 1u, verdict == SCAN_BUDGET);
     tally.step = n;
     tally.passes_in_period += taken;
     tally.order = select(0u, 1u, leaves);

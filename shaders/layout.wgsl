@@ -98,6 +98,8 @@ struct Settings {
     max_period: u32,
     // 1: lanes end once they are decided.
     early_stop: u32,
+    // 1: lanes that have ended are queued, not those that there is work for.
+    ended: u32,
 }
 
 // What a lane carries between dispatches: the motion. While it runs, numbers lie in
@@ -111,6 +113,8 @@ struct MotionNow {
     theta: Real,
     // Bound on the sixth derivative of the gap, in steps of the present domain.
     bound: Real,
+    // Second derivative of the gap where a scan was cut.
+    bend: Real,
     // Time spent meshing in parts of steps, in free steps, less the whole ones.
     mesh_part: Real,
     // Growth of the tangent vector, binary logarithms: of this block, the sum of the whole
@@ -141,6 +145,8 @@ struct Motion {
 struct TallyNow {
     // Free steps since phase 0.
     step: u32,
+    // 1 where a scan was cut by the end of a dispatch.
+    cut: u32,
     // MODE_*.
     mode: u32,
     // Wall of the last event: SIDE_*.
@@ -241,8 +247,8 @@ struct Reading {
 struct Finding {
     // VALID_* bits; what is not valid is zero.
     valid: u32,
-    // 1 if the lane has ended.
-    ended: u32,
+    // The lane's slot.
+    slot: u32,
     status: u32,
     // 0 for none.
     period: u32,
@@ -259,10 +265,11 @@ struct Finding {
 }
 
 // Slots of lanes: first the roster, those under way in the order in which they were begun; from `slots` on those of
-// them that a variant has work for.
+// them that a variant has work for, or that have ended.
 struct Queue {
-    // How many the latter are.
+    // How many the latter are, and how often they have been counted: a device that stands still does not.
     count: u32,
+    beat: u32,
     lanes: array<u32>,
 }
 

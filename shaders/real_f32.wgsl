@@ -15,6 +15,12 @@ const SHORTEST: Real = 0.001;
 const BRIEFEST: Real = 1e-6;
 // States beyond this are taken for a loss of finiteness.
 const HUGE: Real = 1e15;
+
+// Whether a size is a number below HUGE. By its bits: arithmetic that drivers call fast knows no NaN.
+fn is_bounded(size: Real) -> bool {
+    return bitcast<u32>(size) < bitcast<u32>(HUGE);
+}
+
 // Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
 const RESOLVED: u32 = 60u;
 // And these are rounding itself: a motion this near to its last strobes is at rest.

@@ -15,6 +15,13 @@ const SHORTEST: Real = 1e-8;
 const BRIEFEST: Real = 1e-14;
 // States beyond this are taken for a loss of finiteness.
 const HUGE: Real = 1e150;
+
+// Whether a size is a number below HUGE. By the bits of a single: arithmetic that drivers call fast knows no NaN.
+fn is_bounded(size: Real) -> bool {
+    let single = 1e30f;
+    return bitcast<u32>(f32(size * 1e-120)) < bitcast<u32>(single);
+}
+
 // Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
 const RESOLVED: u32 = 160u;
 // And these are rounding itself: a motion this near to its last strobes is at rest.

@@ -3,13 +3,13 @@
 @compute @workgroup_size(WORKGROUP)
 fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * settings.row + id.x;
-    if i >= settings.rostered {
+    if i >= queue.count {
         return;
     }
-    take_up(rostered(i));
+    take_up(queued(i));
     var reading: Reading;
     var finding: Finding;
-    finding.ended = select(0u, 1u, is_over());
+    finding.slot = lane;
     finding.status = last_status();
     finding.periods_run = tally.period;
     if cell.refused == 0u {

@@ -20,7 +20,7 @@ fn refine(to: array<Real, 4>) -> bool {
     if stalls || is_over || tally.mode >= MODE_DIP || tally.order > 0u {
         return false;
     }
-    if !(keeps_domain(to) && distance_between(to, motion.home) < Real(REACH)) {
+    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, motion.home) < Real(REACH)) {
         return false;
     }
     motion.q = to;

@@ -8,11 +8,13 @@ var<private> lane: u32;
 // Loop trips of this dispatch.
 var<private> trips: u32;
 
-// NaN compares false with everything, itself included.
+// The sum of sizes: a NaN among them makes it one.
+fn sum_of_sizes(q: array<Real, 4>) -> Real {
+    return (abs(q[0]) + abs(q[1])) + (abs(q[2]) + abs(q[3]));
+}
+
 fn check_finite() {
-    let size = max(max(abs(motion.q[0]), abs(motion.q[1])), max(abs(motion.q[2]), abs(motion.q[3])));
-    let sum = abs(motion.q[0]) + abs(motion.q[1]) + abs(motion.q[2]) + abs(motion.q[3]);
-    if !(size < HUGE && sum < HUGE) {
+    if !is_bounded(sum_of_sizes(motion.q)) {
         tally.status = STATUS_NON_FINITE;
         motion.q = array<Real, 4>(0.0, 0.0, 0.0, 0.0);
     }

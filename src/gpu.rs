@@ -16,6 +16,7 @@ mod guard;
 pub mod layout;
 mod pool;
 mod reading;
+mod rhythm;
 mod rounds;
 mod self_test;
 mod shader;
@@ -39,6 +40,7 @@ pub(crate) use tables::bytes as table_bytes;
 
 use crate::model::{Law, Oscillator, State};
 use crate::record::Record;
+use rhythm::Rhythm;
 
 /// Why the engine could not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -242,20 +244,18 @@ pub struct Gpu {
     precision: Precision,
     pipelines: HashMap<Variant, device::Pipelines>,
     trouble: device::Trouble,
-    rewrite: fn(String) -> String,
+    rewrite: Option<fn(String) -> String>,
+    rhythm: Rhythm,
     watcher: Option<stage::Watcher>,
 }
 
 impl Gpu {
-    /// Opens an adapter for a precision and asks it for known answers.
+    /// Opens an adapter for a precision.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] if there is none with that precision, [`GpuError::WrongAnswer`]
-    /// if it computes wrongly, and what the device refuses.
+    /// [`GpuError::NoAdapter`] if there is none with that precision, and what the device refuses.
     pub async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
-        let mut gpu = device::open(precision, choice).await?;
-        self_test::check(&mut gpu).await?;
-        Ok(gpu)
+        device::open(precision, choice).await
     }
 
     /// The adapter in use.
@@ -268,12 +268,18 @@ impl Gpu {
         self.precision
     }
 
-    /// Compiles shaders from here on as `rewrite` turns them: measurements count work and
+    /// Compiles shaders from here on as `rewrite` turns them, whatever they compute: measurements count work and
     /// compare forms of a loop in this way.
     #[doc(hidden)]
     pub fn rewrite_shaders(&mut self, rewrite: fn(String) -> String) {
-        self.rewrite = rewrite;
+        self.rewrite = Some(rewrite);
         self.pipelines.clear();
+    }
+
+    /// Drives lanes from here on as on hardware of their own: for tests where there is none.
+    #[doc(hidden)]
+    pub fn drive_as_dedicated(&mut self) {
+        self.rhythm = Rhythm::of(wgpu::DeviceType::DiscreteGpu);
     }
 
     /// Tells `watcher` from here on how far lanes have come: for measurements.
@@ -355,24 +361,35 @@ impl Gpu {
         }
     }
 
-    /// A pool without lanes.
+    /// A pool without lanes. What has to be compiled for it is asked for known answers.
     ///
     /// # Errors
-    /// What the device refuses.
+    /// [`GpuError::WrongAnswer`] if the device computes something else, and what it refuses.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
         let LaneSettings { workgroup, exponent, word, mesh, symmetry, chatter, .. } = *settings;
         let keep = !is_hardware(&self.info);
-        // Until they need it, lanes go on without the tangent vector.
-        let growths: &[bool] = if exponent { &[false, true] } else { &[false] };
+        // Until they need it, lanes go on without the tangent vector where that pays.
+        let growths: &[bool] = match (exponent, self.rhythm.late_tangent) {
+            (false, _) => &[false],
+            (true, true) => &[false, true],
+            (true, false) => &[true],
+        };
         let precision = self.precision;
         let variant =
             |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, chatter, keep };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
-        for &variant in &variants {
-            if !self.pipelines.contains_key(&variant) {
-                let pipelines = device::pipelines(self, variant).await?;
-                self.pipelines.insert(variant, pipelines);
-            }
+        let missing: Vec<Variant> =
+            variants.iter().copied().filter(|variant| !self.pipelines.contains_key(variant)).collect();
+        for &variant in &missing {
+            let pipelines = device::pipelines(self, variant).await?;
+            self.pipelines.insert(variant, pipelines);
+        }
+        if !missing.is_empty() && self.rewrite.is_none() {
+            let watcher = self.watcher.take();
+            let checked = self_test::check(self, variants.clone(), settings).await;
+            self.watcher = watcher;
+            checked
+                .inspect_err(|_| missing.iter().for_each(|variant| drop(self.pipelines.remove(variant))))?;
         }
         Ok(Pool::new(self, variants, settings))
     }

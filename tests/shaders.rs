@@ -98,6 +98,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     phasor,
                     theta,
                     bound,
+                    bend,
                     mesh_part,
                     block_growth,
                     growth_sum,
@@ -121,7 +122,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 4,
                 [
                     valid,
-                    ended,
+                    slot,
                     status,
                     period,
                     periods_run,
@@ -156,7 +157,8 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                     exponent_from,
                     exponent_block,
                     max_period,
-                    early_stop
+                    early_stop,
+                    ended
                 ]
             );
             same_layout!(
@@ -166,6 +168,7 @@ fn every_variant_is_valid_and_lies_as_the_host_says() {
                 4,
                 [
                     step,
+                    cut,
                     mode,
                     origin,
                     order,

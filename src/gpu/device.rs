@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::layout::{Motion, Tally};
+use super::rhythm::Rhythm;
 use super::{Gpu, GpuError, Precision};
 
 /// Which adapter to take.
@@ -202,7 +203,8 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
-    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: |source| source, watcher: None })
+    let rhythm = Rhythm::of(info.device_type);
+    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: None, rhythm, watcher: None })
 }
 
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
@@ -243,10 +245,14 @@ fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::Bi
 
 /// Compiles a variant.
 pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipelines, GpuError> {
-    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    // What a driver's own compiler refuses is internal, or memory.
+    let filters =
+        [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation];
+    let scopes = filters.map(|filter| gpu.device.push_error_scope(filter));
+    let source = gpu.rewrite.map_or_else(|| variant.source(), |rewrite| rewrite(variant.source()));
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("lane"),
-        source: wgpu::ShaderSource::Wgsl((gpu.rewrite)(variant.source()).into()),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
     });
     let pipelines = Pipelines {
         begin: pipeline(gpu, &module, BEGIN),
@@ -254,9 +260,13 @@ pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipe
         compact: COMPACT.map(|entry_point| pipeline(gpu, &module, entry_point)),
         conclude: pipeline(gpu, &module, CONCLUDE),
     };
-    match scope.pop().await {
+    let mut refused = None;
+    for scope in scopes.into_iter().rev() {
+        refused = refused.or(scope.pop().await);
+    }
+    match refused {
         None => Ok(pipelines),
-        Some(error) => Err(GpuError::Refused { what: "a shader", message: error.to_string() }),
+        Some(error) => Err(gpu.failure(GpuError::Refused { what: "a shader", message: error.to_string() })),
     }
 }
 

@@ -125,6 +125,8 @@ pub struct Settings {
     pub max_period: u32,
     /// 1: lanes end once they are decided.
     pub early_stop: u32,
+    /// 1: lanes that have ended are queued, not those that there is work for.
+    pub ended: u32,
 }
 
 /// The motion of a lane between dispatches.
@@ -140,6 +142,8 @@ pub struct Motion {
     pub theta: f64,
     /// Bound on the sixth derivative of the gap.
     pub bound: f64,
+    /// Second derivative of the gap where a scan was cut.
+    pub bend: f64,
     /// Time spent meshing in parts of steps, in free steps, less the whole ones.
     pub mesh_part: f64,
     /// Growth of the present block, in octaves.
@@ -170,6 +174,8 @@ pub struct Motion {
 pub struct Tally {
     /// Free steps since phase 0.
     pub step: u32,
+    /// 1 where a scan was cut by the end of a dispatch.
+    pub cut: u32,
     /// What governs the motion.
     pub mode: u32,
     /// Wall of the last event.
@@ -294,8 +300,8 @@ pub struct Reading {
 pub struct Finding {
     /// Bits of [`valid`](crate::record::valid); what is not valid is zero.
     pub valid: u32,
-    /// 1 if the lane has ended.
-    pub ended: u32,
+    /// The lane's slot.
+    pub slot: u32,
     /// Status code.
     pub status: u32,
     /// Period; 0 for none.

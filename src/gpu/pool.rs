@@ -143,18 +143,20 @@ impl Pool {
         gpu.tell(Stage::Integrated { device_seconds });
         let last = variants[variants.len() - 1];
         let results = buffers.conclude(gpu, last, &bindings, self.roster.len()).await?;
-        let (mut ended, mut left) = (Vec::new(), Vec::new());
-        for (&slot, (reading, finding)) in self.roster.iter().zip(results) {
-            if finding.ended == 0 {
-                left.push(slot);
-                continue;
-            }
-            let (number, lane) = self.lanes[slot as usize];
-            let constants = tables.constants[lane.flow as usize].as_ref();
-            ended.push((number, record(constants, &reading, &finding)));
-            self.free.push(slot);
+        if results.is_empty() {
+            let message = "it has records of no lane that it said had ended".into();
+            return Err(gpu.failure(GpuError::Lost { message }));
         }
-        self.roster = left;
+        let mut ended = Vec::with_capacity(results.len());
+        for (reading, finding) in &results {
+            let (number, lane) = self.lanes[finding.slot as usize];
+            let constants = tables.constants[lane.flow as usize].as_ref();
+            ended.push((number, record(constants, reading, finding)));
+            self.free.push(finding.slot);
+        }
+        // Both are in the roster's order.
+        let mut slots = results.iter().map(|(_, finding)| finding.slot).peekable();
+        self.roster.retain(|&slot| slots.next_if_eq(&slot).is_none());
         gpu.tell(Stage::Read);
         Ok(ended)
     }

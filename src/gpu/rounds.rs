@@ -1,37 +1,30 @@
 //! Rounds of dispatches over the lanes under way, until few enough are running.
 //!
-//! Every round queues the lanes that a variant has work for, in the order of the roster, and dispatches them a
-//! few times. The next round is under way while the host looks at the last one, which tells how many lanes are
-//! left and how long it took: rounds are kept short enough for drivers that reset a device whose work takes
-//! seconds, and long enough to cost nothing.
+//! Every round queues the lanes that a variant has work for, in the order of the roster, dispatches them a few times,
+//! and counts those that are left. The next round is under way while the host looks at the last one: rounds are kept
+//! short enough for drivers that reset a device whose work takes seconds, and long enough to cost nothing.
 
 use web_time::{Duration, Instant};
 
-use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP, is_hardware};
+use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
+use super::slots::{BEAT_AT, COUNT_AT};
 use super::stage::Clock;
 use super::transfer::{landing, read};
 use super::{Gpu, GpuError};
 
-/// Dispatches of one round.
-const DISPATCHES: u32 = 4;
-
-/// How long a round should take. Windows resets a device after two seconds; in software a round costs the more
-/// the more lanes there are, on hardware nobody should wait for the end of one.
-const ROUND_IN_SOFTWARE: Duration = Duration::from_millis(100);
-const ROUND_ON_HARDWARE: Duration = Duration::from_millis(20);
-
-/// Rounds after which lanes that have ended wait no longer for others.
-const PATIENCE: u32 = 8;
-
 /// Trips of the first round of all, and at least of any: shorter dispatches cost more than they do.
 const FEWEST_TRIPS: u32 = 250;
+
+/// With more lanes than this as many fewer of them, so that the first round, whose time nobody knows, is no longer.
+const FEWEST_TRIPS_FOR: u32 = 1 << 14;
 
 /// Lanes of a workgroup that compacts (`BLOCK` in the shader).
 const BLOCK: u32 = 256;
 
-/// Bytes of a look: lanes left for each of two variants, two timestamps.
-const LOOK: u64 = 24;
-const TIMES: u64 = 8;
+/// Bytes of a look: lanes left for each of two variants, the device's count of its own work, two timestamps.
+const LOOK: u64 = 32;
+const BEAT: u64 = 8;
+const TIMES: u64 = 16;
 
 /// Byte offset of the trips in the shader's settings.
 const TRIPS: u64 = std::mem::offset_of!(super::layout::Settings, trips) as u64;
@@ -84,9 +77,10 @@ impl Rounds<'_> {
         let mut left = vec![0; variants.len()];
         left[0] = self.rostered;
         let most = self.most_trips.max(1);
-        let round = if is_hardware(&gpu.info) { ROUND_ON_HARDWARE } else { ROUND_IN_SOFTWARE };
-        *trips = (*trips).clamp(FEWEST_TRIPS.min(most), most);
+        let fewest = fewest_trips(self.rostered).min(most);
+        *trips = (*trips).clamp(fewest, most);
         let mut seconds = 0.0;
+        let mut last_beat = 0;
         let mut before: Option<Sent<'_>> = None;
         let mut last_end = Instant::now();
         let mut looked = 0;
@@ -95,20 +89,23 @@ impl Rounds<'_> {
             let Some(sent) = before.replace(sent) else { continue };
             let take = |bytes: &[u8]| {
                 let took = clock.as_ref().map_or(0.0, |clock| clock.seconds(&bytes[TIMES as usize..]));
-                (bytemuck::pod_read_unaligned::<[u32; 2]>(&bytes[..8]), took)
+                (bytemuck::pod_read_unaligned::<[u32; 3]>(&bytes[..12]), took)
             };
-            let (now_left, took) = read(gpu, sent.look, LOOK, sent.submission, take).await?;
+            let ([first, second, beat], took) = read(gpu, sent.look, LOOK, sent.submission, take).await?;
+            if beat <= last_beat {
+                return Err(gpu.failure(GpuError::Lost { message: "it drops what it is given to do".into() }));
+            }
+            last_beat = beat;
             seconds += took;
-            for (left, (now, ran)) in left.iter_mut().zip(now_left.into_iter().zip(sent.ran)) {
+            for (left, (now, ran)) in left.iter_mut().zip([first, second].into_iter().zip(sent.ran)) {
                 *left = if ran { now } else { 0 };
             }
-            // A lane on its way from one variant to the next is counted in both.
             let all_left = left.iter().sum::<u32>();
             looked += 1;
-            if all_left <= until || (until > 0 && looked >= PATIENCE && all_left < self.rostered) {
+            if all_left <= until || (until > 0 && looked >= gpu.rhythm.patience && all_left < self.rostered) {
                 break;
             }
-            *trips = next_trips(sent.trips, last_end.elapsed(), round).clamp(FEWEST_TRIPS.min(most), most);
+            *trips = next_trips(sent.trips, last_end.elapsed(), gpu.rhythm.round).clamp(fewest, most);
             last_end = Instant::now();
         }
         // The last round is in time, too; what comes next waits for it anyway.
@@ -130,7 +127,7 @@ impl Rounds<'_> {
         }
     }
 
-    /// Submits a round: each variant's queue, then its dispatches.
+    /// Submits a round: each variant's queue and its dispatches, then what each has left.
     fn send<'a>(
         &self,
         variants: &[Bound<'_>],
@@ -147,25 +144,43 @@ impl Rounds<'_> {
         let mut lanes = 0;
         for (n, variant) in variants.iter().enumerate().skip(first) {
             lanes += left[n];
-            for (nth, (pipeline, bindings)) in (0..).zip(&variant.compact) {
+            for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate() {
                 let writes = clock.and_then(|clock| clock.writes(slot, n == first && nth == 0, false));
-                let blocks = if nth == 1 { 1 } else { self.rostered.div_ceil(BLOCK).min(65_535) };
-                dispatch(&mut encoder, pipeline, bindings, [blocks, 1], writes);
+                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.rostered), writes);
             }
-            encoder.copy_buffer_to_buffer(self.queue, 0, look, 4 * n as u64, 4);
             let (pipeline, bindings) = &variant.sweep;
-            for nth in 1..=DISPATCHES {
-                let is_last = n + 1 == variants.len() && nth == DISPATCHES;
-                let writes = clock.and_then(|clock| clock.writes(slot, false, is_last));
-                dispatch(&mut encoder, pipeline, bindings, (self.grid)(lanes), writes);
+            for _ in 0..gpu.rhythm.dispatches {
+                dispatch(&mut encoder, pipeline, bindings, (self.grid)(lanes), None);
             }
         }
+        for (n, variant) in variants.iter().enumerate().skip(first) {
+            for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate().take(COUNTED) {
+                let is_last = n + 1 == variants.len() && nth + 1 == COUNTED;
+                let writes = clock.and_then(|clock| clock.writes(slot, false, is_last));
+                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.rostered), writes);
+            }
+            encoder.copy_buffer_to_buffer(self.queue, COUNT_AT, look, 4 * n as u64, 4);
+        }
+        encoder.copy_buffer_to_buffer(self.queue, BEAT_AT, look, BEAT, 4);
         if let Some(clock) = clock {
             clock.copy(&mut encoder, slot, look, TIMES);
         }
         let submission = gpu.queue.submit([encoder.finish()]);
         Sent { look, submission, ran: (0..variants.len()).map(|n| n >= first).collect(), trips }
     }
+}
+
+/// Passes of the compaction after which the queue's length is known.
+const COUNTED: usize = 2;
+
+/// Workgroups of a pass of the compaction.
+pub(super) fn compacting(pass: usize, rostered: u32) -> [u32; 2] {
+    [if pass == 1 { 1 } else { rostered.div_ceil(BLOCK).min(65_535) }, 1]
+}
+
+/// Trips of a round at least, with so many lanes.
+fn fewest_trips(lanes: u32) -> u32 {
+    (FEWEST_TRIPS * FEWEST_TRIPS_FOR / lanes.max(1)).clamp(1, FEWEST_TRIPS)
 }
 
 /// Trips for a round of the wanted length, from those of an earlier one and the time that it took.
@@ -215,17 +230,20 @@ pub(super) fn dispatch(
 mod tests {
     use super::*;
 
+    const ROUND: Duration = Duration::from_millis(100);
+
     #[test]
     fn rounds_tend_to_their_length() {
         // 0.3 ms per trip; what a round took is known when the next one is already under way.
         let (mut under_way, mut trips) = (1000, 1000);
         for _ in 0..20 {
-            let next = next_trips(under_way, Duration::from_micros(300) * under_way, ROUND_IN_SOFTWARE);
+            let next = next_trips(under_way, Duration::from_micros(300) * under_way, ROUND);
             (under_way, trips) = (trips, next);
         }
         assert!((300..=340).contains(&trips), "{trips}");
         assert!((300..=340).contains(&under_way), "{under_way}");
-        assert_eq!(next_trips(1000, Duration::ZERO, ROUND_IN_SOFTWARE), 2000);
-        assert_eq!(next_trips(1000, Duration::from_secs(100), ROUND_IN_SOFTWARE), 250);
+        assert_eq!(next_trips(1000, Duration::ZERO, ROUND), 2000);
+        assert_eq!(next_trips(1000, Duration::from_secs(100), ROUND), 250);
+        assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(fewest_trips), [250, 250, 125, 3]);
     }
 }

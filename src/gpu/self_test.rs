@@ -1,6 +1,6 @@
-//! Known answers: a device is asked before it is trusted.
+//! Known answers: a device is asked for them by every program that it has compiled, before that is trusted.
 
-use super::{Gpu, GpuError, Lane, LaneSettings, Precision};
+use super::{Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
 use crate::model::{GearPair, State};
 
 /// Forcing periods from rest to the answers.
@@ -16,22 +16,37 @@ const ANSWERS: [(f64, f64, State); 4] = [
     (0.5, 11.5, [-0.21607397150986443, 0.2323746135365504, 0.0, 0.0]),
 ];
 
-/// Runs the known answers.
+/// Runs the known answers by variants that have just been compiled for these settings.
 ///
 /// # Errors
 /// [`GpuError::WrongAnswer`] if the device computes something else, and what it refuses.
-pub(super) async fn check(gpu: &mut Gpu) -> Result<(), GpuError> {
+pub(super) async fn check(
+    gpu: &Gpu,
+    variants: Vec<Variant>,
+    settings: &LaneSettings,
+) -> Result<(), GpuError> {
     let pairs = ANSWERS.map(|(e, omega, _)| GearPair { omega, ..GearPair::paper(e) });
     let flows: Vec<_> = pairs.iter().filter_map(|pair| pair.oscillator().ok()).collect();
     let laws = pairs.map(|pair| pair.law());
-    let lanes = [0, 1, 2, 3].map(|i| Lane { flow: i, law: i, start: [0.0; 4] });
-    let settings = LaneSettings { periods: PERIODS, max_period: 0, ..LaneSettings::default() };
-    let records = gpu.run(&flows, &laws, &lanes, &settings).await?;
+    let lanes = [0, 1, 2, 3].map(|i| (i, Lane { flow: i, law: i, start: [0.0; 4] }));
+    let settings = LaneSettings {
+        periods: PERIODS,
+        transient_periods: 0,
+        max_period: 0,
+        undecided_periods: 0,
+        steps_per_period: None,
+        batch: None,
+        ..*settings
+    };
+    let tables = gpu.load(&flows, &laws, None).await?;
+    let mut pool = Pool::new(gpu, variants, &settings);
+    pool.begin(gpu, &tables, &lanes).await?;
     let bar = match gpu.precision {
         Precision::F32 => 1e-3,
         Precision::F64 => 1e-9,
     };
-    for (record, (e, omega, answer)) in records.iter().zip(ANSWERS) {
+    for (i, record) in pool.advance(gpu, &tables, 0).await? {
+        let (e, omega, answer) = ANSWERS[i as usize];
         let error = record.strobe.iter().zip(answer).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         if record.status != 0 || error.is_nan() || error > bar {
             let adapter = gpu.info.name.clone();
@@ -39,4 +54,25 @@ pub(super) async fn check(gpu: &mut Gpu) -> Result<(), GpuError> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::AdapterChoice;
+
+    #[test]
+    fn a_driver_that_computes_wrongly_is_found_out() {
+        let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
+        let settings = LaneSettings::default();
+        let asked = async |gpu: &mut Gpu| {
+            let pool = gpu.pool(&settings).await?;
+            check(gpu, pool.variants, &settings).await
+        };
+        pollster::block_on(asked(&mut gpu)).unwrap();
+        // The forcing's part in a step, a hundredth too large.
+        gpu.rewrite_shaders(|source| source.replace("(m[4] * c +", "(1.01 * m[4] * c +"));
+        let error = pollster::block_on(asked(&mut gpu)).unwrap_err();
+        assert!(matches!(error, GpuError::WrongAnswer { .. }), "{error}");
+    }
 }

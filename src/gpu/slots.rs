@@ -1,9 +1,9 @@
 //! The buffers of a pool: what lies on the device for each slot, and what the host tells and asks of it.
 
 use super::averaging::Averaging;
-use super::device::{CONCLUDE, Pipelines};
+use super::device::{COMPACT, CONCLUDE, Pipelines};
 use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
-use super::rounds::{bind, dispatch, row};
+use super::rounds::{bind, compacting, dispatch, row};
 use super::tables::Tables;
 use super::transfer::{buffer, from_reals, landing, read, upload};
 use super::{Gpu, GpuError, LaneSettings};
@@ -11,8 +11,15 @@ use super::{Gpu, GpuError, LaneSettings};
 /// Longest period that a lane can look for: a byte per lag.
 const LONGEST_PERIOD: u32 = 64;
 
-/// Numbers of the queue before its lanes.
-const QUEUE_HEAD: usize = 1;
+/// Numbers of the queue before its lanes, and where they lie.
+const QUEUE_HEAD: usize = 2;
+pub(super) const COUNT_AT: u64 = 0;
+pub(super) const BEAT_AT: u64 = 4;
+
+/// Byte offset of what compaction looks for in the shader's settings.
+const ENDED: u64 = std::mem::offset_of!(Settings, ended) as u64;
+
+const COUNT_BYTES: u64 = size_of::<u32>() as u64;
 
 /// The buffers of so many slots.
 pub(super) struct Slots {
@@ -27,8 +34,9 @@ pub(super) struct Slots {
     blocks: wgpu::Buffer,
     readings: wgpu::Buffer,
     findings: wgpu::Buffer,
-    /// Where the host reads the last two.
+    /// Where the host reads the last two, and how many there are.
     landings: [wgpu::Buffer; 2],
+    count_landing: wgpu::Buffer,
     /// Workgroups in a row of the grid.
     row: u32,
 }
@@ -51,6 +59,7 @@ impl Slots {
             queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
             blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
             landings: [&readings, &findings].map(|buffer| landing(gpu, "results", buffer.size())),
+            count_landing: landing(gpu, "count", COUNT_BYTES),
             readings,
             findings,
             row: row(gpu, slots, workgroup),
@@ -85,26 +94,42 @@ impl Slots {
     /// Tells the device which slots have lanes, in the order in which these were begun; those from place `fresh` on
     /// are to begin.
     pub(super) fn call(&self, gpu: &Gpu, roster: &[u32], fresh: usize, settings: &LaneSettings) {
-        let called = uniform(self, roster.len(), fresh, settings);
+        let called = uniform(self, roster.len(), fresh, settings, gpu.rhythm.late_tangent);
         gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&called));
         let head = (QUEUE_HEAD * size_of::<u32>()) as u64;
         gpu.queue.write_buffer(&self.queue, head, bytemuck::cast_slice(roster));
     }
 
-    /// What the lanes of the roster have to say, in its order.
+    /// What those of the roster's lanes have to say that have ended, in its order.
     pub(super) async fn conclude(
         &self,
         gpu: &Gpu,
         pipelines: &Pipelines,
         bindings: &[&wgpu::Buffer],
-        lanes: usize,
+        rostered: usize,
     ) -> Result<Vec<(Reading, Finding)>, GpuError> {
+        gpu.queue.write_buffer(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        for (pass, (entry_point, pipeline)) in COMPACT.into_iter().zip(&pipelines.compact).enumerate() {
+            let compact = bind(gpu, pipeline, entry_point, bindings);
+            dispatch(&mut encoder, pipeline, &compact, compacting(pass, rostered as u32), None);
+        }
         let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
-        dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(lanes as u32), None);
+        dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(rostered as u32), None);
+        encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_landing, 0, COUNT_BYTES);
+        let submission = gpu.queue.submit([encoder.finish()]);
+        let count = read(gpu, &self.count_landing, COUNT_BYTES, submission, |bytes| {
+            bytemuck::pod_read_unaligned::<u32>(bytes) as usize
+        })
+        .await?
+        .min(rostered);
+        if count == 0 {
+            return Ok(Vec::new());
+        }
         let [readings, findings] = &self.landings;
-        let numbers = (lanes * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
-        let counts = (lanes * size_of::<Finding>()) as u64;
+        let numbers = (count * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
+        let counts = (count * size_of::<Finding>()) as u64;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
         encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
         let submission = gpu.queue.submit([encoder.finish()]);
@@ -116,7 +141,13 @@ impl Slots {
     }
 }
 
-fn uniform(slots: &Slots, rostered: usize, fresh: usize, settings: &LaneSettings) -> Settings {
+fn uniform(
+    slots: &Slots,
+    rostered: usize,
+    fresh: usize,
+    settings: &LaneSettings,
+    late_tangent: bool,
+) -> Settings {
     let LaneSettings { periods, early_stop, .. } = *settings;
     let more = if early_stop { settings.undecided_periods } else { 0 };
     // Lanes that stop early may do so before a long transient is over.
@@ -139,10 +170,11 @@ fn uniform(slots: &Slots, rostered: usize, fresh: usize, settings: &LaneSettings
         events_per_period: settings.events_per_period,
         row: slots.row * settings.workgroup,
         transient_periods,
-        growth_from: averaging.growth_from,
+        growth_from: if late_tangent { averaging.growth_from } else { 0 },
         exponent_from: averaging.exponent_from,
         exponent_block: averaging.block,
         max_period: settings.max_period.min(LONGEST_PERIOD),
         early_stop: u32::from(early_stop),
+        ended: 0,
     }
 }
