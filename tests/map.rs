@@ -249,7 +249,8 @@ fn slow_cells_hold_up_nobody() {
 
 /// Periods until the last of an adaptive map's cells has ended, on a device that runs as many side by side as there
 /// are: if records are taken up one by one, once half of what is under way has ended, as the sweep does, and once
-/// all has.
+/// all has; and if a device is looked at every 64 periods, while the next 64 are under way, and what has ended is taken
+/// up after four looks at the latest, as on hardware of its own.
 #[test]
 fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_often() {
     let sets = ["refine.minimum_grid=8", "refine.max_error=0.02", "integration.undecided_periods=1584"];
@@ -262,16 +263,17 @@ fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_oft
     let mut integrated = schedule.sequence().to_vec();
     integrated.sort_unstable();
     let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();
-    let periods = |until: fn(usize) -> usize| {
+    // `wait` says when what has ended by then is taken up, from when each of those under way will.
+    let periods = |wait: &dyn Fn(u32, &BTreeSet<(u32, u32)>) -> u32| {
         let mut schedule = Schedule::new(&plan);
         let mut records = vec![Record::default(); plan.cell_count()];
         let (mut now, mut under_way) = (0, BTreeSet::new());
         while !schedule.is_finished() {
             let next = schedule.next(&plan, usize::MAX);
             under_way.extend(next.iter().map(|cell| (now + measured[cell.id as usize].periods_run, cell.id)));
-            let ended = under_way.len() - until(under_way.len());
-            for (end, id) in std::iter::from_fn(|| under_way.pop_first()).take(ended) {
-                now = end;
+            now = wait(now, &under_way);
+            let left = under_way.split_off(&(now + 1, 0));
+            for (_, id) in std::mem::replace(&mut under_way, left) {
                 records[id as usize] = measured[id as usize];
                 schedule.take(id, &records);
             }
@@ -281,11 +283,23 @@ fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_oft
         assert_eq!(asked, integrated);
         now
     };
-    let [singly, by_halves, in_rounds] = [periods(|n| n - 1), periods(|n| n / 2), periods(|_| 0)];
+    let end = |under_way: &BTreeSet<(u32, u32)>, n: usize| under_way.iter().nth(n).unwrap().0;
+    let singly = periods(&|_, under_way| end(under_way, 0));
+    let by_halves = periods(&|_, under_way| end(under_way, (under_way.len() - 1) / 2));
+    let in_rounds = periods(&|_, under_way| end(under_way, under_way.len() - 1));
+    let by_looks = periods(&|now, under_way| {
+        let enough = |look: u32| {
+            let ended = under_way.range(..(now + 64 * look + 1, 0)).count();
+            2 * ended >= under_way.len() || look >= 4 && ended > 0
+        };
+        now + 64 * (1 + (1..).find(|&look| enough(look)).unwrap())
+    });
     println!(
-        "slowest cell {slowest} periods; all cells {singly}, by halves {by_halves}, in rounds {in_rounds}"
+        "slowest cell {slowest} periods; all cells {singly}, by halves {by_halves}, in rounds {in_rounds}, by looks \
+         {by_looks}"
     );
-    let figures = (slowest, singly, by_halves, in_rounds);
+    let figures = (slowest, singly, by_halves, in_rounds, by_looks);
     assert!(singly < 4 * slowest && 2 * singly < in_rounds, "{figures:?}");
     assert!(by_halves < 5 * slowest && 3 * by_halves < 2 * in_rounds, "{figures:?}");
+    assert!(5 * by_looks < 6 * singly, "{figures:?}");
 }
