@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 use rattlemap::bench::engines::check::check;
+use rattlemap::bench::engines::output::{Asked, shares_of_peak, write};
 use rattlemap::bench::engines::work::work;
 use rattlemap::bench::engines::{
     Answers, Bench, Engine, Extent, LEAST_RUNS, Point, QUICK_SIDES, RUNS, Run, SIDES, Series, peak,
 };
 use rattlemap::gpu::{self, Precision};
 use rattlemap::output::Folder;
-use rattlemap::output::engines::{Asked, shares_of_peak, write};
 use rattlemap::scene::Scene;
 use rattlemap::validate::DEFAULT_SAMPLES;
 

@@ -3,10 +3,10 @@
 use anyhow::Context;
 use rattlemap::bench::work_precision::cells::subjects;
 use rattlemap::bench::work_precision::measure::{Curve, Method, ONE_CORE, Thoroughness, measure};
+use rattlemap::bench::work_precision::output::{FILES, Run, write};
 use rattlemap::bench::work_precision::points::{self, Point};
 use rattlemap::bench::work_precision::ratio::sentences;
 use rattlemap::output::Folder;
-use rattlemap::output::work_precision::{FILES, Run, write};
 
 use crate::cli::WorkPrecision;
 use crate::error::{Failure, fail_if};
