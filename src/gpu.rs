@@ -29,7 +29,7 @@ mod unroll;
 use std::collections::HashMap;
 
 pub(crate) use averaging::Averaging;
-pub use constants::{Constants, MOST_STEPS, STEP_ANGLE};
+pub use constants::{Constants, STEP_ANGLE};
 pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware};
 pub use pool::Pool;
 pub use shader::{Precision, Variant, WORKGROUP};
@@ -37,6 +37,7 @@ pub use stage::Stage;
 pub use tables::Tables;
 pub(crate) use tables::bytes as table_bytes;
 
+use crate::limits::MOST_STEPS;
 use crate::model::{Law, Oscillator, State};
 use crate::record::Record;
 

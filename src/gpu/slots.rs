@@ -7,9 +7,7 @@ use super::rounds::{bind, dispatch, row};
 use super::tables::Tables;
 use super::transfer::{buffer, from_reals, landing, read, upload};
 use super::{Gpu, GpuError, LaneSettings};
-
-/// Longest period that a lane can look for: a byte per lag.
-const LONGEST_PERIOD: u32 = 64;
+use crate::limits::LONGEST_CYCLE;
 
 /// Numbers of the queue before its lanes.
 const QUEUE_HEAD: usize = 1;
@@ -142,7 +140,7 @@ fn uniform(slots: &Slots, rostered: usize, fresh: usize, settings: &LaneSettings
         growth_from: averaging.growth_from,
         exponent_from: averaging.exponent_from,
         exponent_block: averaging.block,
-        max_period: settings.max_period.min(LONGEST_PERIOD),
+        max_period: settings.max_period.min(LONGEST_CYCLE),
         early_stop: u32::from(early_stop),
     }
 }
