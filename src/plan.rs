@@ -43,15 +43,6 @@ pub struct Cell {
     pub start: State,
 }
 
-/// Cells that an engine computes in one go.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Batch {
-    /// Places in the plan's order that it covers.
-    pub places: Range<usize>,
-    /// Its cells, in that order.
-    pub cells: Vec<Cell>,
-}
-
 /// Which quantities somebody asks for; nothing else is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Needs {
@@ -67,6 +58,12 @@ pub struct Needs {
     pub symmetric: bool,
     /// The cycle's word.
     pub word: bool,
+}
+
+impl Needs {
+    /// All that a record can tell.
+    pub const EVERYTHING: Needs =
+        Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
 }
 
 /// A scene as cells, flows and laws.
@@ -135,7 +132,7 @@ impl Plan {
         self.order.len()
     }
 
-    /// Cell ids in the order in which engines get them.
+    /// Cell ids in the order in which engines get them; for further starts the same again.
     pub fn order(&self) -> &[u32] {
         &self.order
     }
@@ -148,6 +145,12 @@ impl Plan {
     /// How many runs there are: one per cell and start.
     pub fn run_count(&self) -> usize {
         self.cell_count() * self.start_count()
+    }
+
+    /// The run at this place of the order: every cell with its first start, then with the next.
+    pub fn run_at(&self, place: usize) -> u32 {
+        let (nth, place) = (place / self.cell_count(), place % self.cell_count());
+        (nth * self.cell_count()) as u32 + self.order[place]
     }
 
     /// How cells start: the first run of each.
@@ -215,6 +218,11 @@ impl Plan {
     /// the neighbour's record says where it does ([`Plan::start`]).
     pub fn cell(&self, id: u32) -> Cell {
         Cell { id, flow: self.flow_of(id), law: self.part(id, true), start: self.own_start(id) }
+    }
+
+    /// The runs at these places of the order, each made as [`Plan::cell`] says.
+    pub fn cells(&self, places: Range<usize>) -> Vec<Cell> {
+        places.map(|place| self.cell(self.run_at(place))).collect()
     }
 
     fn flow_of(&self, id: u32) -> u32 {
