@@ -4,8 +4,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use crate::model::{GearPair, Side, State};
+use crate::model::{GearPair, REST, Side, State};
 use crate::orbit::{self, Class, EventKind, Settings, Status};
+use crate::scene::Start;
 
 /// The attractor's section points at one value of the axis.
 #[derive(Clone, Debug)]
@@ -35,41 +36,21 @@ pub struct SectionPoint {
     pub after: State,
 }
 
-/// Where each column starts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Policy {
-    /// Every column from the same state.
-    From(State),
-    /// Each column from the end of the one before, from the first to the last.
-    Up,
-    /// Each column from the end of the one after, from the last to the first.
-    Down,
-}
-
 /// Integrates every cell; `progress` is told how many columns are done so far.
 ///
 /// Columns that start from one state are independent and run in parallel; columns that
 /// follow the attractor run one after the other, the first of them from rest.
 pub fn run(
     cells: &[(f64, GearPair)],
-    policy: &Policy,
+    start: Start,
     settings: &Settings,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Vec<Column> {
-    match *policy {
-        Policy::From(start) => {
-            let done = AtomicUsize::new(0);
-            cells
-                .par_iter()
-                .map(|(value, pair)| {
-                    let column = column(*value, pair, start, settings).0;
-                    progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-                    column
-                })
-                .collect()
-        }
-        Policy::Up => follow(cells.iter(), settings, progress),
-        Policy::Down => {
+    match start {
+        Start::Rest => side_by_side(cells, REST, settings, progress),
+        Start::State(state) => side_by_side(cells, state, settings, progress),
+        Start::Up => follow(cells.iter(), settings, progress),
+        Start::Down => {
             let mut columns = follow(cells.iter().rev(), settings, progress);
             columns.reverse();
             columns
@@ -77,7 +58,22 @@ pub fn run(
     }
 }
 
-const REST: State = [0.0; 4];
+fn side_by_side(
+    cells: &[(f64, GearPair)],
+    start: State,
+    settings: &Settings,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Vec<Column> {
+    let done = AtomicUsize::new(0);
+    cells
+        .par_iter()
+        .map(|(value, pair)| {
+            let column = column(*value, pair, start, settings).0;
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+            column
+        })
+        .collect()
+}
 
 fn follow<'a>(
     cells: impl Iterator<Item = &'a (f64, GearPair)>,

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use rattlemap::output::RECORDS;
-use rattlemap::plan::Size;
 use rattlemap::scene::Scene;
+use rattlemap::size::Size;
 
 use crate::cli::EngineChoice;
 use crate::error::Failure;

@@ -6,9 +6,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use rattlemap::bench::stability::Part;
 use rattlemap::bench::work_precision::measure::Method;
 use rattlemap::gpu::Precision;
-use rattlemap::model::State;
+use rattlemap::model::{REST, State};
 use rattlemap::orbit::Settings;
-use rattlemap::scene::REST;
 use rattlemap::validate::DEFAULT_SAMPLES;
 
 /// Restitution where `orbit` is not told any: the paper's last periodic motion before chaos.

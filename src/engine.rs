@@ -17,7 +17,7 @@ pub use fake::Fake;
 pub(crate) use flows::Flows;
 pub use gpu::Gpu;
 
-use crate::plan::{Batch, Cell};
+use crate::plan::Cell;
 use crate::record::Record;
 
 /// Why a batch was not computed.
@@ -138,17 +138,17 @@ impl Engine<'_> {
         }
     }
 
-    /// Computes a batch: one record per cell, in the batch's order. Nothing else may be under way.
+    /// Computes cells: one record for each, in their order. Nothing else may be under way.
     ///
     /// # Errors
-    /// [`EngineError`], with nothing of the batch computed.
-    pub async fn run(&mut self, batch: &Batch) -> Result<Vec<Record>, EngineError> {
-        let ids = || batch.cells.iter().map(|cell| cell.id as usize);
+    /// [`EngineError`], with none of them computed.
+    pub async fn run(&mut self, cells: &[Cell]) -> Result<Vec<Record>, EngineError> {
+        let ids = || cells.iter().map(|cell| cell.id as usize);
         let (Some(first), Some(last)) = (ids().min(), ids().max()) else { return Ok(Vec::new()) };
         let mut places = vec![0; last - first + 1];
         ids().enumerate().for_each(|(place, id)| places[id - first] = place);
-        let mut records = vec![Record::default(); batch.cells.len()];
-        let mut left = &batch.cells[..];
+        let mut records = vec![Record::default(); cells.len()];
+        let mut left = cells;
         loop {
             let (next, later) = left.split_at(left.len().min(self.room()));
             self.begin(next).await?;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::anyhow;
 use rattlemap::engine::{Cpu, Engine, EngineError, Gpu};
 use rattlemap::gpu::{self, AdapterChoice, AdapterReport, Precision};
-use rattlemap::plan::{Batch, Plan};
+use rattlemap::plan::{Cell, Plan};
 
 use crate::cli::{EngineChoice, EngineOptions};
 use crate::error::Failure;
@@ -145,11 +145,11 @@ fn rate(plan: &Plan, engine: &mut Engine<'_>) -> Result<f64, EngineError> {
 }
 
 /// Cells at places far from each other.
-fn spread(plan: &Plan, from: usize, cells: usize) -> Batch {
-    let count = plan.cell_count() as u64;
+fn spread(plan: &Plan, from: usize, count: usize) -> Vec<Cell> {
+    let all = plan.cell_count() as u64;
     // An odd multiplier near the golden section of 2^32 scatters consecutive numbers.
-    let id = |n: usize| plan.order()[(((n as u64 * 2_654_435_761) % (1 << 32) * count) >> 32) as usize];
-    Batch { places: 0..cells, cells: (from..from + cells).map(|n| plan.cell(id(n))).collect() }
+    let id = |n: usize| plan.order()[(((n as u64 * 2_654_435_761) % (1 << 32) * all) >> 32) as usize];
+    (from..from + count).map(|n| plan.cell(id(n))).collect()
 }
 
 #[cfg(test)]

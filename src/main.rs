@@ -8,6 +8,7 @@ mod engine_choice;
 mod error;
 mod map_command;
 mod progress;
+mod scene_file;
 mod validate_command;
 
 use std::process::ExitCode;
@@ -48,13 +49,13 @@ fn run_orbit(ask: &cli::Orbit) -> Result<(), Failure> {
 
 fn run_bifurcation(ask: &cli::Bifurcation) -> Result<(), Failure> {
     let ask = &ask.run;
-    let scene = scene::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
+    let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
     let folder = Folder::open(&ask.out(), ask.force)?;
     let cells = scene.line();
     let progress = Progress::new(cells.len(), 0, "columns", ask.quiet);
     let clock = Instant::now();
     let report = |done| progress.report(done, cells.len());
-    let columns = bifurcation::run(&cells, &scene.start().into(), &scene.orbit_settings(), &report);
+    let columns = bifurcation::run(&cells, scene.start(), &scene.orbit_settings(), &report);
     let files = output::bifurcation::write(&folder, &scene, &ask.set, &columns, clock.elapsed())?;
     progress.finish(&format!("{}: {}", folder.path().display(), files.join(", ")));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);

@@ -14,7 +14,7 @@ use rattlemap::orbit::Class;
 use rattlemap::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
 use rattlemap::plan::{Plan, count_classes};
 use rattlemap::record::Record;
-use rattlemap::scene::{self, Purpose, Scene};
+use rattlemap::scene::{Purpose, Scene};
 use rattlemap::schedule::{Refined, Schedule};
 use rattlemap::sweep::{self, SweepError};
 
@@ -23,13 +23,14 @@ use crate::cli::{EngineChoice, EngineOptions, Map};
 use crate::engine_choice::{self, Chosen};
 use crate::error::{Failure, fail_if};
 use crate::progress::Progress;
+use crate::scene_file;
 
 /// Exit code after a second Ctrl-C, as shells count it.
 const KILLED: i32 = 130;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
-    let scene = scene::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
+    let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
     capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
     let folder = open_folder(ask)?;

@@ -20,6 +20,9 @@ pub use stops::Stops;
 /// State of an oscillator of two degrees of freedom: `(x1, v1, x2, v2)`, dimensionless.
 pub type State = [f64; 4];
 
+/// The state at rest.
+pub const REST: State = [0.0; 4];
+
 /// One of the two walls that bound the free gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Side {

@@ -9,14 +9,12 @@
 //! `k * cell_count + id`, so that the first runs are the map itself.
 
 mod morton;
-mod size;
 mod start;
 
 pub(crate) use morton::key as morton_key;
 
 use std::ops::Range;
 
-pub use size::Size;
 pub(crate) use start::followed;
 
 use crate::model::{GearPair, Law, Oscillator, State};
@@ -26,11 +24,11 @@ use crate::scene::{Axis, Quantity, Refine, Scene, Start, Steps};
 use start::Starts;
 
 /// The parameters that a contact law is made of; all others belong to the flow.
-const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
+pub(crate) const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
 
 /// Most flows that engines keep for all batches, or hand to a device at a time: below 1 GB but
 /// for motion that needs thousands of steps per forcing period.
-const KEPT_FLOWS: usize = 8_192;
+pub(crate) const KEPT_FLOWS: usize = 8_192;
 
 /// What a run of a cell is made of: indices of its flow and its law in the plan, and its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,15 +41,6 @@ pub struct Cell {
     pub law: u32,
     /// The state in which it starts at phase 0.
     pub start: State,
-}
-
-/// Cells that an engine computes in one go.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Batch {
-    /// Places in the plan's order that it covers.
-    pub places: Range<usize>,
-    /// Its cells, in that order.
-    pub cells: Vec<Cell>,
 }
 
 /// Which quantities somebody asks for; nothing else is computed.
@@ -71,6 +60,12 @@ pub struct Needs {
     pub word: bool,
 }
 
+impl Needs {
+    /// All that a record can tell.
+    pub const EVERYTHING: Needs =
+        Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
+}
+
 /// A scene as cells, flows and laws.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -86,14 +81,14 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans a map. The scene must have been read for a map, and its [`Size`] accepted.
+    /// Plans a map. The scene must have been read for a map, and its [`Size`](crate::size::Size) accepted.
     ///
     /// # Panics
     /// If the scene has not two axes, or more runs than a `u32` numbers: reading a scene for a
     /// map and asking its size rule that out.
     pub fn new(scene: &Scene) -> Plan {
         let &[first, second] = scene.axes() else { panic!("a map has two axes") };
-        assert!(Size::of(scene).is_countable(), "cells are numbered by u32");
+        assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
         let needs = needs(&scene.outputs().quantities);
         let integration = scene.integration();
         Plan {
@@ -137,7 +132,7 @@ impl Plan {
         self.order.len()
     }
 
-    /// Cell ids in the order in which engines get them.
+    /// Cell ids in the order in which engines get them; for further starts the same again.
     pub fn order(&self) -> &[u32] {
         &self.order
     }
@@ -150,6 +145,12 @@ impl Plan {
     /// How many runs there are: one per cell and start.
     pub fn run_count(&self) -> usize {
         self.cell_count() * self.start_count()
+    }
+
+    /// The run at this place of the order: every cell with its first start, then with the next.
+    pub fn run_at(&self, place: usize) -> u32 {
+        let (nth, place) = (place / self.cell_count(), place % self.cell_count());
+        (nth * self.cell_count()) as u32 + self.order[place]
     }
 
     /// How cells start: the first run of each.
@@ -219,6 +220,11 @@ impl Plan {
         Cell { id, flow: self.flow_of(id), law: self.part(id, true), start: self.own_start(id) }
     }
 
+    /// The runs at these places of the order, each made as [`Plan::cell`] says.
+    pub fn cells(&self, places: Range<usize>) -> Vec<Cell> {
+        places.map(|place| self.cell(self.run_at(place))).collect()
+    }
+
     fn flow_of(&self, id: u32) -> u32 {
         self.part(id, false)
     }
@@ -246,7 +252,7 @@ impl Plan {
 
     /// Whether several runs share a flow, and all flows can be kept.
     pub fn keeps_flows(&self) -> bool {
-        size::keeps_flows(self.flow_count() as u64, self.run_count() as u64)
+        keeps_flows(self.flow_count() as u64, self.run_count() as u64)
     }
 
     /// How many distinct laws there are.
@@ -290,6 +296,11 @@ impl Plan {
     pub fn gear_pair(&self, id: u32) -> GearPair {
         self.pair([true; 2], id % self.cell_count() as u32)
     }
+}
+
+/// Whether several runs share a flow, and all flows can be kept.
+pub(crate) fn keeps_flows(flows: u64, runs: u64) -> bool {
+    flows < runs && flows <= KEPT_FLOWS as u64
 }
 
 fn needs(quantities: &[Quantity]) -> Needs {

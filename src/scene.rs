@@ -16,12 +16,10 @@ mod start;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
-
 pub use axis::{Axis, MAX_COUNT};
 pub use error::{Place, Problem, SceneError};
 pub use settings::{AUDIT, Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
-pub use start::{Draw, REST, Start};
+pub use start::{Draw, Start};
 
 use crate::model::GearPair;
 use crate::orbit;
@@ -153,6 +151,16 @@ impl Scene {
         &self.outputs
     }
 
+    /// How many cells there are.
+    pub fn cell_count(&self) -> u64 {
+        self.axes.iter().map(|axis| axis.count() as u64).product()
+    }
+
+    /// How many runs there are: one per cell and start.
+    pub fn run_count(&self) -> u64 {
+        self.cell_count().saturating_mul(self.draw.map_or(1, |draw| u64::from(draw.count)))
+    }
+
     /// The gear pair of the cell with the given index on each axis.
     ///
     /// # Panics
@@ -176,19 +184,6 @@ impl Scene {
         let count = self.axes[0].count();
         (0..count).map(|i| (self.axes[0].value(i), self.cell(&[i]))).collect()
     }
-}
-
-/// Reads and parses the scene file at `path`.
-///
-/// # Errors
-/// [`SceneError`] if the file cannot be read, or for the first thing wrong in it.
-pub fn load(path: &Path, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| SceneError {
-        place: Place::File { file: name.as_str().into() },
-        problem: Problem::Unreadable { reason: error.to_string() },
-    })?;
-    Scene::parse(&text, &name, sets, purpose)
 }
 
 /// One gear pair from `NAME=VALUE` arguments alone: Table 1 with restitution `e` unless set.

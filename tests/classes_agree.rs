@@ -7,7 +7,6 @@ use rattlemap::orbit::{Class, Status};
 use rattlemap::plan::Plan;
 use rattlemap::record::{Record, valid};
 use rattlemap::scene::{Purpose, Scene};
-use rattlemap::schedule::Schedule;
 use rattlemap::validate::{Explanation, StateSource, Subject, replay, sample};
 use rattlemap::word::Word;
 
@@ -49,9 +48,9 @@ fn check_map(axes: [Axis<'_>; 2], sets: &[&str], precision: Precision) {
     let plan = Plan::new(&Scene::parse(&text, "plane", &sets, Purpose::Map).unwrap());
     let device = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
     let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(&plan, device)).unwrap()));
-    let batch = Schedule::new(&plan).batch(&plan, 0, plan.cell_count());
+    let cells = plan.cells(0..plan.cell_count());
     let mut records = vec![Record::default(); plan.cell_count()];
-    for (cell, record) in batch.cells.iter().zip(pollster::block_on(engine.run(&batch)).unwrap()) {
+    for (cell, record) in cells.iter().zip(pollster::block_on(engine.run(&cells)).unwrap()) {
         records[cell.id as usize] = record;
     }
     let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };

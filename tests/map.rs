@@ -7,12 +7,12 @@ use std::ops::ControlFlow;
 use rattlemap::classify::classify;
 use rattlemap::engine::{Cpu, Engine, EngineError, Fake};
 use rattlemap::flow::Flow;
-use rattlemap::model::GearPair;
+use rattlemap::model::{GearPair, REST};
 use rattlemap::orbit::{Class, Orbit, Settings, analyse};
 use rattlemap::plan::{Cell, Plan};
 use rattlemap::record::{Record, valid};
 use rattlemap::reference::Trajectory;
-use rattlemap::scene::{Purpose, REST, Scene};
+use rattlemap::scene::{Purpose, Scene};
 use rattlemap::schedule::Schedule;
 use rattlemap::sweep::{self, SweepError};
 use rayon::prelude::*;
@@ -32,14 +32,12 @@ fn scene(count: usize, sets: &[&str]) -> Scene {
 
 /// All records by id, computed in batches of `size`.
 fn records(plan: &Plan, engine: &mut Engine<'_>, size: usize) -> Vec<Record> {
-    let (schedule, mut place) = (Schedule::new(plan), 0);
     let mut records = vec![Record::default(); plan.cell_count()];
-    while place < plan.cell_count() {
-        let batch = schedule.batch(plan, place, size);
-        let computed = pollster::block_on(engine.run(&batch)).unwrap();
-        assert_eq!(computed.len(), batch.cells.len());
-        batch.cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
-        place = batch.places.end;
+    for from in (0..records.len()).step_by(size) {
+        let cells = plan.cells(from..records.len().min(from + size));
+        let computed = pollster::block_on(engine.run(&cells)).unwrap();
+        assert_eq!(computed.len(), cells.len());
+        cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
     }
     records
 }

@@ -7,7 +7,7 @@ use rattlemap::engine::{self, Cpu, Engine};
 use rattlemap::flow::Flow;
 use rattlemap::gpu::{AdapterChoice, Gpu, Precision};
 use rattlemap::orbit::{Class, Settings, analyse, measure};
-use rattlemap::plan::{Batch, Plan};
+use rattlemap::plan::{Cell, Plan};
 use rattlemap::record::Record;
 use rattlemap::scene::{Purpose, Scene};
 
@@ -34,7 +34,7 @@ enum By {
 /// Records of some cells of a plane, in the order of `ids`.
 fn run(by: By, side: usize, ids: &[u32], sets: &[&str]) -> Vec<Record> {
     let plan = plan(side, &sets.iter().map(ToString::to_string).collect::<Vec<_>>());
-    let batch = Batch { places: 0..ids.len(), cells: ids.iter().map(|&id| plan.cell(id)).collect() };
+    let cells: Vec<Cell> = ids.iter().map(|&id| plan.cell(id)).collect();
     let mut engine = match by {
         By::Reference => Engine::Cpu(Cpu::new(&plan)),
         By::Lanes(precision) => {
@@ -42,7 +42,7 @@ fn run(by: By, side: usize, ids: &[u32], sets: &[&str]) -> Vec<Record> {
             Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(&plan, device)).unwrap()))
         }
     };
-    pollster::block_on(engine.run(&batch)).unwrap()
+    pollster::block_on(engine.run(&cells)).unwrap()
 }
 
 /// Brute force of so many periods.

@@ -13,11 +13,12 @@ use rattlemap::coexistence::attractors;
 use rattlemap::engine::{Cpu, Engine, Fake, Gpu};
 use rattlemap::flow::Flow;
 use rattlemap::gpu::{self, AdapterChoice, Precision};
+use rattlemap::model::REST;
 use rattlemap::orbit::{Class, Status, analyse};
 use rattlemap::plan::{Cell, Plan};
 use rattlemap::record::{Record, valid};
 use rattlemap::reference::Trajectory;
-use rattlemap::scene::{Purpose, REST, Scene};
+use rattlemap::scene::{Purpose, Scene, Start};
 use rattlemap::schedule::Schedule;
 use rattlemap::sweep;
 
@@ -133,13 +134,13 @@ fn the_way_decides_between_coexisting_attractors() {
 
 #[test]
 fn a_column_is_a_bifurcation_diagram_with_the_same_policy() {
-    for (policy, way) in [("up", bifurcation::Policy::Up), ("down", bifurcation::Policy::Down)] {
+    for (policy, way) in [("up", Start::Up), ("down", Start::Down)] {
         let sets = ["axis.1.min=0.855", "axis.1.max=0.945", "axis.1.count=91"];
         let plan = plan(&[&sets[..], &[&format!("start.policy={policy}")]].concat());
         let records = on_cpu(&plan);
         let line: Vec<_> =
             (0..91).map(|j| 2 * j).map(|id| (plan.gear_pair(id).e, plan.gear_pair(id))).collect();
-        let columns = bifurcation::run(&line, &way, &plan.budget().settings, &|_| {});
+        let columns = bifurcation::run(&line, way, &plan.budget().settings, &|_| {});
         let mut compared = 0;
         for (j, column) in columns.iter().enumerate() {
             let class = classify(&records[2 * j]);

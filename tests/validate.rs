@@ -13,7 +13,6 @@ use rattlemap::output::{Identity, RECORDS, RecordFile};
 use rattlemap::plan::Plan;
 use rattlemap::record::{Record, valid};
 use rattlemap::scene::{Purpose, Scene};
-use rattlemap::schedule::Schedule;
 use rattlemap::validate::states::{lane_states, run_lanes};
 use rattlemap::validate::{
     Explanation, Sample, StateCheck, StateSource, Stratum, Subject, Validation, replay, sample,
@@ -148,9 +147,9 @@ fn plant(records: &mut [Record]) -> Vec<(u32, &'static str)> {
 /// Every record of a plan by the CPU engine, by id.
 fn computed(plan: &Plan) -> Vec<Record> {
     let mut engine = Engine::Cpu(Cpu::new(plan));
-    let batch = Schedule::new(plan).batch(plan, 0, plan.cell_count());
+    let cells = plan.cells(0..plan.cell_count());
     let mut records = vec![Record::default(); plan.cell_count()];
-    for (cell, record) in batch.cells.iter().zip(pollster::block_on(engine.run(&batch)).unwrap()) {
+    for (cell, record) in cells.iter().zip(pollster::block_on(engine.run(&cells)).unwrap()) {
         records[cell.id as usize] = record;
     }
     records

@@ -18,7 +18,6 @@ use rattlemap::plan::Plan;
 use rattlemap::record::{Record, valid};
 use rattlemap::reference::Trajectory;
 use rattlemap::scene::{Purpose, Scene};
-use rattlemap::schedule::Schedule;
 use rattlemap::stability::{StrobeMap, refine};
 use rattlemap::validate::Explanation;
 use short_cells::{Cell, cell, cells, explanation, lane};
@@ -211,8 +210,8 @@ fn weak_chaos_beside_a_cycle_may_be_left_open() {
 fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
     for (e, omega) in [(0.6088, 3.4487), (0.8789, 5.6876)] {
         let plan = plan_at(e, omega, "");
-        let batch = Schedule::new(&plan).batch(&plan, 0, 1);
-        let chaos = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&batch)).unwrap()[0];
+        let cells = plan.cells(0..1);
+        let chaos = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&cells)).unwrap()[0];
         assert_eq!(classify(&chaos), Class::Chaotic, "{chaos:?}");
         let pair = GearPair { omega, ..GearPair::paper(e) };
         let ends = analyse(&pair, [0.0; 4], &Settings { transient_periods: 4000, ..Settings::default() });

@@ -8,7 +8,9 @@
 //! to having their records.
 
 pub mod check;
+mod figure;
 mod instructions;
+pub mod output;
 pub mod peak;
 mod run;
 mod trips;

@@ -9,12 +9,14 @@
 
 mod cells;
 pub mod chatter;
+mod figures;
 pub mod fuzz;
 pub mod grazing;
 pub mod grid;
 pub mod impacts;
 mod lanes;
 pub mod long_runs;
+pub mod output;
 mod readout;
 mod shaken;
 pub mod stiffness;

@@ -26,11 +26,13 @@
 
 pub mod adaptive;
 pub mod cells;
+mod figure;
 pub mod fixed_step;
 pub mod flight;
 pub mod lanes;
 pub mod measure;
 pub mod outcome;
+pub mod output;
 pub mod points;
 pub mod ratio;
 mod shaders;

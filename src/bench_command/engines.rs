@@ -4,16 +4,17 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 use rattlemap::bench::engines::check::check;
+use rattlemap::bench::engines::output::{Asked, shares_of_peak, write};
 use rattlemap::bench::engines::work::work;
 use rattlemap::bench::engines::{
     Answers, Bench, Engine, Extent, LEAST_RUNS, Point, QUICK_SIDES, RUNS, Run, SIDES, Series, peak,
 };
 use rattlemap::gpu::{self, Precision};
 use rattlemap::output::Folder;
-use rattlemap::output::engines::{Asked, shares_of_peak, write};
 use rattlemap::scene::Scene;
 use rattlemap::validate::DEFAULT_SAMPLES;
 
+use super::{cores, processor};
 use crate::capacity;
 use crate::cli::{EngineChoice, Engines};
 use crate::error::Failure;
@@ -50,7 +51,7 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
         budget_seconds: budget,
         quick: ask.run.quick,
         cores: cores(),
-        processor: processor(),
+        processor: described_processor(),
         peaks: all.iter().map(|series| peak_of(ask, &series.engine)).collect(),
     };
     let files = write(&folder, &all, &asked)?;
@@ -58,16 +59,10 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
     verdict(&all)
 }
 
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-fn processor() -> String {
-    let mut system = sysinfo::System::new();
-    system.refresh_cpu_list(sysinfo::CpuRefreshKind::nothing());
-    let name = system.cpus().first().map_or(String::new(), |cpu| cpu.brand().trim().to_owned());
+fn described_processor() -> String {
     let cores = cores();
-    if name.is_empty() { format!("{cores} cores") } else { format!("{name}, {cores} cores") }
+    let named = processor().filter(|name| !name.is_empty());
+    named.map_or_else(|| format!("{cores} cores"), |name| format!("{name}, {cores} cores"))
 }
 
 /// The CPU on all cores, which the others are compared with; adapters, the best first; the CPU

@@ -4,9 +4,9 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, anyhow};
-use rattlemap::bench::stability::{self, Lanes, Part, Size, Verdict, Watch};
+use rattlemap::bench::stability::{self, Lanes, Part, Size, Verdict, Watch, output};
 use rattlemap::gpu::AdapterChoice;
-use rattlemap::output::{self, Folder};
+use rattlemap::output::Folder;
 
 use crate::cli::Stability;
 use crate::error::Failure;
@@ -25,8 +25,8 @@ pub(crate) fn run(ask: &Stability) -> Result<(), Failure> {
     let teller = Teller { quiet: ask.run.quiet, work: Mutex::default() };
     let report = stability::run(parts, size, SEED, &mut lanes, &teller).context("a device gave up")?;
     let device = lanes.device();
-    let made = output::stability::Made { size: name, seed: SEED, device: &device, elapsed: clock.elapsed() };
-    let files = output::stability::write(&folder, &report, &made)?;
+    let made = output::Made { size: name, seed: SEED, device: &device, elapsed: clock.elapsed() };
+    let files = output::write(&folder, &report, &made)?;
     if !ask.run.quiet {
         eprintln!("{}: {}", folder.path().display(), files.join(", "));
     }

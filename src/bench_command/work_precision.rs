@@ -3,11 +3,12 @@
 use anyhow::Context;
 use rattlemap::bench::work_precision::cells::subjects;
 use rattlemap::bench::work_precision::measure::{Curve, Method, ONE_CORE, Thoroughness, measure};
+use rattlemap::bench::work_precision::output::{FILES, Run, write};
 use rattlemap::bench::work_precision::points::{self, Point};
 use rattlemap::bench::work_precision::ratio::sentences;
 use rattlemap::output::Folder;
-use rattlemap::output::work_precision::{FILES, Run, write};
 
+use super::{cores, processor};
 use crate::cli::WorkPrecision;
 use crate::error::{Failure, fail_if};
 use crate::progress::Progress;
@@ -45,8 +46,8 @@ pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
     let left_out: Vec<&str> = methods.iter().filter(|m| !measured(m)).map(|m| m.name()).collect();
     let adapter = ours.iter().find(|point| point.device != ONE_CORE);
     let run = Run {
-        processor: &processor(),
-        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        processor: &processor().unwrap_or_else(|| "processor".to_owned()),
+        cores: cores(),
         adapter: adapter.map_or("no device", |point| &point.device),
         rounds: how.rounds,
         quick,
@@ -59,13 +60,6 @@ pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
     }
     progress.finish(&format!("{said}\n{}: {}", dir.display(), FILES.join(", ")));
     fail_if(ours.is_empty(), "nothing was measured: no adapter has double precision")
-}
-
-/// Name of the processor, as it gives it.
-fn processor() -> String {
-    let mut system = sysinfo::System::new();
-    system.refresh_cpu_all();
-    system.cpus().first().map_or_else(|| "processor".to_owned(), |cpu| cpu.brand().trim().to_owned())
 }
 
 fn summary(points: &[Point], ratios: &[String]) -> String {

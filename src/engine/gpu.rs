@@ -255,9 +255,7 @@ mod tests {
             ..Record::default()
         };
         let whole = record;
-        let all =
-            Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
-        keep(&mut record, &all);
+        keep(&mut record, &Needs::EVERYTHING);
         assert_eq!(record, whole);
         keep(
             &mut record,

@@ -4,6 +4,7 @@ use bytemuck::Zeroable;
 use nalgebra::{SMatrix, Vector2};
 
 use super::layout::{Domain, Flow};
+use crate::limits::MOST_STEPS;
 use crate::model;
 
 /// Largest angle, in radians, that the fastest mode may turn in one step: Taylor series and
@@ -13,9 +14,6 @@ pub const STEP_ANGLE: f64 = 1.0;
 /// Angle, in radians of the fastest free rate, below which a series of impacts is closed; the
 /// reference's, so that both count the same impacts before.
 const CLOSING_ANGLE: f64 = 1.6e-4;
-
-/// Most free steps per forcing period: a lane that takes more is refused as too stiff.
-pub const MOST_STEPS: u32 = 20_000;
 
 /// Terms of the matrix exponential over one step; rates times steps are below 1.
 const EXPONENTIAL_TERMS: u32 = 30;

@@ -7,9 +7,7 @@ use super::rounds::{bind, compacting, dispatch, row};
 use super::tables::Tables;
 use super::transfer::{buffer, from_reals, landing, read, upload};
 use super::{Gpu, GpuError, LaneSettings};
-
-/// Longest period that a lane can look for: a byte per lag.
-const LONGEST_PERIOD: u32 = 64;
+use crate::limits::LONGEST_CYCLE;
 
 /// Numbers of the queue before its lanes, and where they lie.
 const QUEUE_HEAD: usize = 2;
@@ -173,7 +171,7 @@ fn uniform(
         growth_from: if late_tangent { averaging.growth_from } else { 0 },
         exponent_from: averaging.exponent_from,
         exponent_block: averaging.block,
-        max_period: settings.max_period.min(LONGEST_PERIOD),
+        max_period: settings.max_period.min(LONGEST_CYCLE),
         early_stop: u32::from(early_stop),
         ended: 0,
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::manifest::{AxisObject, Head, StartObject, start};
 use super::names;
-use super::orbit_json::Parameters;
+use super::parameters::Parameters;
 use crate::bifurcation::Column;
 use crate::plan::count_classes;
 use crate::scene::Scene;

@@ -89,7 +89,7 @@ impl Folder {
     ///
     /// # Errors
     /// As [`Folder::replace`].
-    pub(super) fn write_json(&self, name: &str, object: &impl Serialize) -> anyhow::Result<()> {
+    pub(crate) fn write_json(&self, name: &str, object: &impl Serialize) -> anyhow::Result<()> {
         self.replace(name, |path| Ok(fs::write(path, serde_json::to_string_pretty(object)? + "\n")?))
     }
 

@@ -13,7 +13,7 @@ const FORMAT: u32 = 1;
 
 /// What a run's JSON begins with: what it is, and which program wrote it.
 #[derive(Serialize)]
-pub(super) struct Head {
+pub(crate) struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
@@ -23,7 +23,7 @@ pub(super) struct Head {
 
 impl Head {
     /// The head of what `command` writes.
-    pub(super) fn of(command: &'static str) -> Head {
+    pub(crate) fn of(command: &'static str) -> Head {
         Head {
             format: FORMAT,
             command,

@@ -9,7 +9,7 @@ use super::cells::{Cells, SOURCES};
 use super::cells_npy::ABSENT;
 use super::manifest::{AxisObject, Head, StartObject, start};
 use super::names;
-use super::orbit_json::Parameters;
+use super::parameters::Parameters;
 use crate::orbit::Status;
 use crate::plan::count_classes;
 use crate::scene::{Scene, Steps};

@@ -1,38 +1,11 @@
 //! `orbit --json`: one object, its fields a contract.
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::names;
+use super::parameters::Parameters;
 use crate::model::{GearPair, State};
 use crate::orbit::{Event, Orbit};
-use crate::scene::Scene;
-
-/// Every parameter by name, in the order of Table 1.
-pub(super) struct Parameters {
-    pair: GearPair,
-    /// Parameters to leave out because they are swept.
-    except: Vec<&'static str>,
-}
-
-impl Parameters {
-    /// All parameters of a gear pair.
-    pub(super) fn of(pair: &GearPair) -> Parameters {
-        Parameters { pair: *pair, except: Vec::new() }
-    }
-
-    /// Those of a scene that no axis sweeps.
-    pub(super) fn of_scene(scene: &Scene) -> Parameters {
-        let swept = scene.axes().iter().map(|axis| axis.parameter().name);
-        Parameters { pair: scene.base(), except: swept.collect() }
-    }
-}
-
-impl Serialize for Parameters {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let named = GearPair::PARAMETERS.iter().filter(|p| !self.except.contains(&p.name));
-        serializer.collect_map(named.map(|p| (p.name, self.pair.get(p.name).ok())))
-    }
-}
 
 /// The object; not-a-number becomes null, as JSON has no word for it.
 #[derive(Serialize)]

@@ -5,9 +5,9 @@
 //! outlines to whole pixels. Lines are rasterised here: plotters fills a thick polyline
 //! as one polygon, which leaves holes wherever a trajectory crosses itself.
 
-pub(super) mod axes;
-pub(super) mod labels;
-pub(super) mod legend;
+pub(crate) mod axes;
+pub(crate) mod labels;
+pub(crate) mod legend;
 mod raster;
 mod ticks;
 
@@ -24,29 +24,29 @@ use crate::model::Side;
 use crate::orbit::EventKind;
 
 /// Text, axes and outlines.
-pub(super) const DARK: RGBColor = RGBColor(0x26, 0x26, 0x26);
+pub(crate) const DARK: RGBColor = RGBColor(0x26, 0x26, 0x26);
 /// Lines that should not draw the eye: velocity jumps, marks without data.
-pub(super) const FAINT: RGBColor = RGBColor(0x96, 0x96, 0x96);
+pub(crate) const FAINT: RGBColor = RGBColor(0x96, 0x96, 0x96);
 /// Grid lines.
-pub(super) const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
+pub(crate) const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
 /// Trajectory while the teeth mesh.
-pub(super) const MESHING: RGBColor = RGBColor(0x00, 0x9e, 0x73);
+pub(crate) const MESHING: RGBColor = RGBColor(0x00, 0x9e, 0x73);
 /// Gear 1 where both gears share a panel.
-pub(super) const GEAR_1: RGBColor = DARK;
+pub(crate) const GEAR_1: RGBColor = DARK;
 /// Gear 2 where both gears share a panel.
-pub(super) const GEAR_2: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
+pub(crate) const GEAR_2: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
 
 /// Size of tick labels and legends.
-pub(super) const SMALL: f64 = 23.0;
+pub(crate) const SMALL: f64 = 23.0;
 /// Size of axis labels and subtitles.
-pub(super) const MEDIUM: f64 = 26.0;
+pub(crate) const MEDIUM: f64 = 26.0;
 /// Size of titles.
-pub(super) const LARGE: f64 = 32.0;
+pub(crate) const LARGE: f64 = 32.0;
 
 /// From a figure's edges to its panels: room for the last tick label on the right, for ticks and
 /// the axis' name below.
 const RIGHT: f64 = 58.0;
-pub(super) const BELOW: f64 = 105.0;
+pub(crate) const BELOW: f64 = 105.0;
 
 /// Canvas pixels per pixel of the finished picture, along each direction.
 const FINE: u32 = 2;
@@ -55,7 +55,7 @@ const FONT: &str = "figure";
 const CAP_HEIGHT: f64 = 0.62;
 
 /// The colour of a wall (Okabe and Ito's colour-blind safe set).
-pub(super) fn wall_color(side: Side) -> RGBColor {
+pub(crate) fn wall_color(side: Side) -> RGBColor {
     match side {
         Side::Right => RGBColor(0xd5, 0x5e, 0x00),
         Side::Left => RGBColor(0x00, 0x72, 0xb2),
@@ -63,20 +63,20 @@ pub(super) fn wall_color(side: Side) -> RGBColor {
 }
 
 /// A position in pixels of the finished picture, y downwards.
-pub(super) type Point = (f64, f64);
+pub(crate) type Point = (f64, f64);
 
 /// A rectangle in pixels of the finished picture.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rect {
-    pub(super) left: f64,
-    pub(super) top: f64,
-    pub(super) right: f64,
-    pub(super) bottom: f64,
+pub(crate) struct Rect {
+    pub(crate) left: f64,
+    pub(crate) top: f64,
+    pub(crate) right: f64,
+    pub(crate) bottom: f64,
 }
 
 /// Where the anchor of a text lies; vertically it is always the middle of the capitals.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Align {
+pub(crate) enum Align {
     Left,
     Center,
     Right,
@@ -86,14 +86,14 @@ pub(super) enum Align {
 
 /// The outline of a marker: one per kind of event.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Shape {
+pub(crate) enum Shape {
     Circle,
     Triangle,
     Square,
 }
 
 impl Shape {
-    pub(super) fn of(kind: EventKind) -> Shape {
+    pub(crate) fn of(kind: EventKind) -> Shape {
         match kind {
             EventKind::Impact => Shape::Circle,
             EventKind::MeshStart => Shape::Triangle,
@@ -104,17 +104,17 @@ impl Shape {
 
 /// How a marker looks.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Marker {
-    pub(super) shape: Shape,
-    pub(super) color: RGBColor,
+pub(crate) struct Marker {
+    pub(crate) shape: Shape,
+    pub(crate) color: RGBColor,
     /// Half its extent.
-    pub(super) radius: f64,
+    pub(crate) radius: f64,
     /// White inside: the state after the event where both are marked.
-    pub(super) hollow: bool,
+    pub(crate) hollow: bool,
 }
 
 /// A picture being drawn.
-pub(super) struct Canvas<'a> {
+pub(crate) struct Canvas<'a> {
     area: DrawingArea<BitMapBackend<'a>, Shift>,
     size: (f64, f64),
 }
@@ -123,7 +123,7 @@ pub(super) struct Canvas<'a> {
 ///
 /// # Errors
 /// What `draw` returns, or that the file could not be written; both name the file.
-pub(super) fn save_figure(
+pub(crate) fn save_figure(
     path: &Path,
     (width, height): (u32, u32),
     draw: impl FnOnce(&Canvas<'_>) -> Result<()>,
@@ -175,23 +175,23 @@ fn fine(at: Point) -> (i32, i32) {
 
 impl Canvas<'_> {
     /// Width and height.
-    pub(super) fn size(&self) -> (f64, f64) {
+    pub(crate) fn size(&self) -> (f64, f64) {
         self.size
     }
 
     /// What is left for panels of the picture below `top`, `left` pixels from its left edge.
-    pub(super) fn panel(&self, left: f64, top: f64) -> Rect {
+    pub(crate) fn panel(&self, left: f64, top: f64) -> Rect {
         Rect { left, top, right: self.size.0 - RIGHT, bottom: self.size.1 - BELOW }
     }
 
     /// Fills a rectangle.
-    pub(super) fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<()> {
+    pub(crate) fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<()> {
         let corners = [fine((rect.left, rect.top)), fine((rect.right, rect.bottom))];
         Ok(self.area.draw(&Rectangle::new(corners, color.mix(opacity).filled()))?)
     }
 
     /// Writes one line of text.
-    pub(super) fn text(&self, text: &str, at: Point, size: f64, align: Align, color: RGBColor) -> Result<()> {
+    pub(crate) fn text(&self, text: &str, at: Point, size: f64, align: Align, color: RGBColor) -> Result<()> {
         let size = size * f64::from(FINE);
         // Plotters puts the baseline half a size below the top of its box; going back from
         // there by half the height of a capital centres digits and capitals on the anchor.
@@ -209,7 +209,7 @@ impl Canvas<'_> {
     }
 
     /// Width of a text.
-    pub(super) fn text_width(&self, text: &str, size: f64) -> Result<f64> {
+    pub(crate) fn text_width(&self, text: &str, size: f64) -> Result<f64> {
         let scale = f64::from(FINE);
         let font = FontDesc::new(FontFamily::Name(FONT), size * scale, FontStyle::Normal);
         let (width, _) = self.area.estimate_text_size(text, &font.into())?;
@@ -217,7 +217,7 @@ impl Canvas<'_> {
     }
 
     /// The beginning of a text that is not wider than `room`, with an ellipsis if that is not all.
-    pub(super) fn fitted(&self, text: &str, size: f64, room: f64) -> Result<String> {
+    pub(crate) fn fitted(&self, text: &str, size: f64, room: f64) -> Result<String> {
         let mut text = text.to_owned();
         while text.chars().count() > 2 && self.text_width(&text, size)? > room {
             text.truncate(text.char_indices().nth_back(1).map_or(0, |(i, _)| i));
@@ -227,7 +227,7 @@ impl Canvas<'_> {
     }
 
     /// Draws an event marker, with a thin white rim that sets it off from the line.
-    pub(super) fn marker(&self, at: Point, marker: Marker) -> Result<()> {
+    pub(crate) fn marker(&self, at: Point, marker: Marker) -> Result<()> {
         let Marker { shape, color, radius, hollow } = marker;
         // Small markers are many, and the rim of one would wipe out its neighbour.
         if radius > 4.0 {
@@ -257,7 +257,7 @@ impl Canvas<'_> {
     }
 
     /// Draws a polyline with round joints and ends.
-    pub(super) fn stroke(&self, path: &[Point], width: f64, color: RGBColor) -> Result<()> {
+    pub(crate) fn stroke(&self, path: &[Point], width: f64, color: RGBColor) -> Result<()> {
         let scale = f64::from(FINE);
         let path: Vec<Point> = path.iter().map(|p| (p.0 * scale, p.1 * scale)).collect();
         let Some(mut coverage) = Coverage::of(&path, width * scale, self.area.dim_in_pixel()) else {
@@ -276,14 +276,14 @@ impl Canvas<'_> {
     }
 
     /// Draws the border of a rectangle.
-    pub(super) fn outline(&self, rect: Rect, width: f64) -> Result<()> {
+    pub(crate) fn outline(&self, rect: Rect, width: f64) -> Result<()> {
         let Rect { left, top, right, bottom } = rect;
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
         self.stroke(&corners, width, DARK)
     }
 
     /// Draws a dashed straight line.
-    pub(super) fn dashes(&self, from: Point, to: Point, width: f64, color: RGBColor) -> Result<()> {
+    pub(crate) fn dashes(&self, from: Point, to: Point, width: f64, color: RGBColor) -> Result<()> {
         const DASH: f64 = 5.0;
         let length = (to.0 - from.0).hypot(to.1 - from.1);
         if length == 0.0 || !length.is_finite() {
@@ -301,24 +301,24 @@ impl Canvas<'_> {
     }
 
     /// The canvas pixels inside a rectangle: `(left, top, width, height)`.
-    pub(super) fn fine_rect(rect: Rect) -> (i32, i32, usize, usize) {
+    pub(crate) fn fine_rect(rect: Rect) -> (i32, i32, usize, usize) {
         let (left, top) = fine((rect.left, rect.top));
         let (right, bottom) = fine((rect.right, rect.bottom));
         (left, top, (right - left).max(0) as usize, (bottom - top).max(0) as usize)
     }
 
     /// The canvas pixel at a position.
-    pub(super) fn fine_pixel(at: Point) -> (i32, i32) {
+    pub(crate) fn fine_pixel(at: Point) -> (i32, i32) {
         fine(at)
     }
 
     /// A length in canvas pixels.
-    pub(super) fn fine_length(length: f64) -> f64 {
+    pub(crate) fn fine_length(length: f64) -> f64 {
         length * f64::from(FINE)
     }
 
     /// Blends one canvas pixel.
-    pub(super) fn blend(&self, at: (i32, i32), color: RGBColor, opacity: f64) -> Result<()> {
+    pub(crate) fn blend(&self, at: (i32, i32), color: RGBColor, opacity: f64) -> Result<()> {
         Ok(self.area.draw_pixel(at, &color.mix(opacity))?)
     }
 }

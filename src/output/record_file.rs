@@ -186,15 +186,7 @@ impl RecordFile {
     ) -> Result<RecordFile, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         let mut file = lock(OpenOptions::new().read(true).write(true).open(path).map_err(io)?, path)?;
-        let length = file.metadata().map_err(io)?.len();
-        let mut reader = Reader { input: BufReader::new(&file), path, at: 0, length };
-        let found = reader.identity()?;
-        let differences = found.differences(identity);
-        if !differences.is_empty() {
-            return Err(RecordFileError::OtherRun { path: path.to_owned(), differences });
-        }
-        let (done, end) = reader.batches(take)?;
-        drop(reader);
+        let (done, end) = Reader::open(&file, path, identity)?.batches(take)?;
         file.set_len(end).and_then(|()| file.seek(SeekFrom::End(0))).map_err(io)?;
         Ok(RecordFile { file, path: path.to_owned(), count: done })
     }
@@ -211,13 +203,7 @@ impl RecordFile {
     ) -> Result<usize, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         let file = File::open(path).map_err(io)?;
-        let length = file.metadata().map_err(io)?.len();
-        let mut reader = Reader { input: BufReader::new(&file), path, at: 0, length };
-        let differences = reader.identity()?.differences(identity);
-        if !differences.is_empty() {
-            return Err(RecordFileError::OtherRun { path: path.to_owned(), differences });
-        }
-        Ok(reader.batches(take)?.0)
+        Ok(Reader::open(&file, path, identity)?.batches(take)?.0)
     }
 
     /// Records that the file holds.
@@ -267,7 +253,19 @@ struct Reader<'a> {
     length: u64,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    /// At the first batch of a file, which must be the run's that `identity` names.
+    fn open(file: &'a File, path: &'a Path, identity: &Identity) -> Result<Reader<'a>, RecordFileError> {
+        let length =
+            file.metadata().map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?.len();
+        let mut reader = Reader { input: BufReader::new(file), path, at: 0, length };
+        let differences = reader.identity()?.differences(identity);
+        if !differences.is_empty() {
+            return Err(RecordFileError::OtherRun { path: path.to_owned(), differences });
+        }
+        Ok(reader)
+    }
+
     fn take(&mut self, buffer: &mut [u8]) -> Result<(), RecordFileError> {
         let path = self.path;
         self.input

@@ -1,10 +1,10 @@
 //! Where runs begin. Pure.
 
 use crate::classify::status;
-use crate::model::{Oscillator, State};
+use crate::model::{Oscillator, REST, State};
 use crate::random::Random;
 use crate::record::{Record, valid};
-use crate::scene::{Draw, REST, Start};
+use crate::scene::{Draw, Start};
 
 /// Displacements are drawn within this many half backlashes of the middle, velocities within as
 /// many times what that is as a velocity: the attractors of the paper's plane lie inside.

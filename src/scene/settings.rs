@@ -4,14 +4,11 @@ use super::Purpose;
 use super::document::Value;
 use super::error::SceneError;
 use super::section::Section;
+use crate::limits::{LONGEST_CYCLE, MOST_STEPS};
 use crate::orbit;
 
 /// The most forcing periods that one field may ask for.
 const MAX_PERIODS: u32 = 1_000_000_000;
-/// The longest cycle, in forcing periods, that engines have memory for.
-const MAX_CYCLE: u32 = 64;
-/// The most steps per forcing period: lanes that take more are refused.
-const MAX_STEPS: u32 = crate::gpu::MOST_STEPS;
 
 /// How fine the lanes' time grid is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,8 +177,8 @@ fn read_steps(section: &Section<'_>) -> Result<Steps, SceneError> {
     let Some(field) = section.get("steps_per_period") else { return Ok(Steps::Auto) };
     match &field.node.value {
         Value::Text(text) if text == "auto" => Ok(Steps::Auto),
-        Value::Integer(_) => Ok(Steps::PerPeriod(field.whole(1..=MAX_STEPS)?)),
-        _ => Err(field.wrong_type(&format!("\"auto\" or a whole number from 1 to {MAX_STEPS}"))),
+        Value::Integer(_) => Ok(Steps::PerPeriod(field.whole(1..=MOST_STEPS)?)),
+        _ => Err(field.wrong_type(&format!("\"auto\" or a whole number from 1 to {MOST_STEPS}"))),
     }
 }
 
@@ -189,7 +186,7 @@ fn read_max_period(section: &Section<'_>, observed_periods: u32) -> Result<u32, 
     let Some(field) = section.get("max_period") else {
         return Ok(orbit::Settings::default().max_period.min(observed_periods / 2));
     };
-    let max_period = field.whole(1..=MAX_CYCLE)?;
+    let max_period = field.whole(1..=LONGEST_CYCLE)?;
     if max_period > observed_periods / 2 {
         return Err(field.conflict(format!(
             "a cycle has to come round twice, so `integration.observed_periods = {observed_periods}` must be at least {}",

@@ -3,14 +3,10 @@
 use super::Purpose;
 use super::error::SceneError;
 use super::section::{Field, Section};
-use crate::bifurcation;
 use crate::model::State;
 
 /// The most states that one cell may start from: attractors are counted in a byte.
 const MAX_STARTS: u32 = 255;
-
-/// The state at rest.
-pub const REST: State = [0.0; 4];
 
 /// The state in which cells start at phase 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,17 +37,6 @@ impl Start {
     /// Whether cells start from their neighbours.
     pub fn follows(&self) -> bool {
         matches!(self, Start::Up | Start::Down)
-    }
-}
-
-impl From<Start> for bifurcation::Policy {
-    fn from(start: Start) -> Self {
-        match start {
-            Start::Rest => bifurcation::Policy::From(REST),
-            Start::State(state) => bifurcation::Policy::From(state),
-            Start::Up => bifurcation::Policy::Up,
-            Start::Down => bifurcation::Policy::Down,
-        }
     }
 }
 

@@ -293,9 +293,3 @@ fn starts_from_a_state() {
         assert_eq!(parse(GOOD, &[&format!("start.policy={policy}")]).unwrap().start(), start);
     }
 }
-
-#[test]
-fn files_that_cannot_be_read() {
-    let message = load(Path::new("no/such.toml"), &[], Purpose::Map).unwrap_err().to_string();
-    assert_says(&message, &["no/such.toml: cannot read the scene (", "scenes/smoke.toml"]);
-}

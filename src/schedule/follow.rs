@@ -1,9 +1,9 @@
 //! Rows that follow the attractor: each cell starts where its neighbour in the row before ended.
 
-use crate::model::State;
+use crate::model::{REST, State};
 use crate::plan::{Plan, followed};
 use crate::record::Record;
-use crate::scene::{REST, Start};
+use crate::scene::Start;
 
 /// Where a map that follows its neighbours stands.
 pub(super) struct Follow {

@@ -11,7 +11,7 @@ use crate::record::{Record, Spelling, valid, word_hash};
 use crate::word::Word;
 
 /// Standard errors by which two averages of the same chaos may differ.
-const CHAOS_ERRORS: f64 = 5.0;
+const SAME_CHAOS_ERRORS: f64 = 5.0;
 
 /// What two exponents of the same chaos may differ by beside that, per forcing period:
 /// standard errors from 16 blocks are themselves uncertain.
@@ -127,10 +127,8 @@ pub(super) struct Answer {
 
 impl From<&Measured> for Answer {
     fn from(measured: &Measured) -> Answer {
-        let everything =
-            Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
         Answer {
-            class: classify(&measured_record(measured, &everything)),
+            class: classify(&measured_record(measured, &Needs::EVERYTHING)),
             status: measured.status,
             exponent: measured.lyapunov,
             impacts_per_period: Some(measured.impacts_per_period),
@@ -163,8 +161,8 @@ impl Answer {
     /// Compares a record with this answer, field by field as far as both have them.
     pub(super) fn compare(&self, record: &Record, bars: &Bars) -> Vec<Compared> {
         let class = classify(record);
-        let mut list = vec![compared(Field::Class, kind(class) == kind(self.class), || {
-            (Value::Text(kind(class).into()), Value::Text(kind(self.class).into()))
+        let mut list = vec![compared(Field::Class, class.index() == self.class.index(), || {
+            (Value::Text(class.name().into()), Value::Text(self.class.name().into()))
         })];
         match (class, self.class) {
             (Class::Periodic { period: ours }, Class::Periodic { period: theirs }) => {
@@ -233,7 +231,8 @@ impl Answer {
             list.push(compared(field, (ours - theirs).abs() <= bar, shown));
         };
         if let (true, Some([theirs, error])) = (has(valid::LYAPUNOV), self.exponent) {
-            let bar = CHAOS_ERRORS * error.hypot(record.lyapunov_error) + CHAOS_FLOOR / bars.forcing_period;
+            let bar =
+                SAME_CHAOS_ERRORS * error.hypot(record.lyapunov_error) + CHAOS_FLOOR / bars.forcing_period;
             compare(Field::Exponent, record.lyapunov, theirs, bar);
         }
         // Averages over chaos have no error of their own; these are far beyond their scatter.
@@ -253,16 +252,6 @@ fn compared(field: Field, same: bool, shown: impl FnOnce() -> (Value, Value)) ->
         Difference { field, record, reference }
     });
     (field, differs)
-}
-
-/// The class without its period.
-fn kind(class: Class) -> &'static str {
-    match class {
-        Class::Periodic { .. } => "periodic",
-        Class::Chaotic => "chaotic",
-        Class::Undecided => "undecided",
-        Class::Failed => "failed",
-    }
 }
 
 /// A word as a record would keep it.

@@ -8,7 +8,6 @@ use rattlemap::model::{GearPair, State};
 use rattlemap::plan::Plan;
 use rattlemap::record::Record;
 use rattlemap::scene::{Purpose, Scene};
-use rattlemap::schedule::Schedule;
 use rattlemap::validate::{Explanation, Pick, Sample, StateSource, Stratum, Subject, replay};
 
 const TABLE: &str = include_str!("../data/short_cells.csv");
@@ -82,12 +81,12 @@ fn device(precision: Precision) -> Gpu {
 pub(crate) fn lane(plan: &Plan, precision: Precision) -> Record {
     let device = device(precision);
     let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, device)).unwrap()));
-    let batch = Schedule::new(plan).batch(plan, 0, plan.cell_count());
-    let records = pollster::block_on(engine.run(&batch)).unwrap();
+    let cells = plan.cells(0..plan.cell_count());
+    let records = pollster::block_on(engine.run(&cells)).unwrap();
     if let Engine::Gpu(gpu) = engine {
         IDLE.lock().unwrap().push(gpu.into_device());
     }
-    batch.cells.iter().zip(records).find(|(cell, _)| cell.id == 0).unwrap().1
+    cells.iter().zip(records).find(|(cell, _)| cell.id == 0).unwrap().1
 }
 
 /// Why a record differs from the reference: an explanation, or none; an error if it does not differ.

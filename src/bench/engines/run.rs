@@ -15,7 +15,6 @@ use crate::output::{Cells, Folder, map};
 use crate::plan::Plan;
 use crate::record::Record;
 use crate::scene::Scene;
-use crate::schedule::Schedule;
 
 /// Most lanes handed over at a time.
 const BATCH: usize = 1 << 20;
@@ -253,17 +252,16 @@ fn sweep(
     began: Instant,
 ) -> std::result::Result<(Run, Vec<Record>), String> {
     let own = || split.lock().unwrap_or_else(PoisonError::into_inner);
-    let schedule = Schedule::new(plan);
     let mut records = vec![Record::default(); plan.run_count()];
     *own() = Split { last: began, times: Times::default() };
     let is_lane = engine.lane_steps().is_some();
     for from in (0..records.len()).step_by(BATCH) {
-        let batch = schedule.batch(plan, from, BATCH);
+        let cells = plan.cells(from..records.len().min(from + BATCH));
         own().lap(|times| &mut times.prepare);
-        let computed = pollster::block_on(engine.run(&batch)).map_err(|error| error.to_string())?;
+        let computed = pollster::block_on(engine.run(&cells)).map_err(|error| error.to_string())?;
         // Lanes have told of their integration; what is left is what the host made of them.
         own().lap(|times| if is_lane { &mut times.read } else { &mut times.integrate });
-        batch.cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
+        cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
     }
     let periods = records.iter().map(|record| u64::from(record.periods_run)).sum();
     let times = own().times;

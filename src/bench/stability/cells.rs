@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use crate::flow::Flow;
 use crate::gpu::Precision;
+pub(super) use crate::model::REST;
 use crate::model::{GearPair, State};
 use crate::reference::{Stop, Trajectory};
-pub(super) use crate::scene::REST;
 
 /// Who computed a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]

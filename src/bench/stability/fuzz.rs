@@ -37,10 +37,6 @@ pub(super) const SETTINGS: Settings =
 /// Periods of wild cells.
 const WILD_PERIODS: u32 = 4;
 
-/// All that a record can tell.
-const EVERYTHING: Needs =
-    Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
-
 /// A cell that takes longer than this hangs.
 const HANGS: Duration = Duration::from_secs(120);
 
@@ -88,7 +84,8 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes, watch: &dyn Watch) -> R
     let mut rows = Rows::default();
     let told = Told::new(watch, "cells on the reference", cells.len());
     let truth = each(&cells, |cell| told.count(on_reference(cell)));
-    let records: Vec<Record> = truth.iter().map(|measured| measured_record(measured, &EVERYTHING)).collect();
+    let records: Vec<Record> =
+        truth.iter().map(|measured| measured_record(measured, &Needs::EVERYTHING)).collect();
     rows.count("bounded", EngineName::Reference, &records);
     let most = size.pick(8, 60, usize::MAX);
     for precision in lanes.precisions() {

@@ -15,7 +15,7 @@ const APART_ON_BAR: f64 = 45.0;
 
 /// How values lie on an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::output) enum Scale {
+pub(crate) enum Scale {
     Linear,
     /// By decimal logarithms.
     Logarithmic,
@@ -23,17 +23,17 @@ pub(in crate::output) enum Scale {
 
 /// One axis: what it shows and from where to where.
 #[derive(Clone, Debug)]
-pub(in crate::output) struct Axis {
-    pub(in crate::output) label: String,
+pub(crate) struct Axis {
+    pub(crate) label: String,
     /// Ends in the scale: decimal logarithms on a logarithmic axis.
-    pub(in crate::output) low: f64,
-    pub(in crate::output) high: f64,
-    pub(in crate::output) scale: Scale,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    pub(crate) scale: Scale,
 }
 
 impl Axis {
     /// An axis from `low` to `high`; widened if that is empty or not finite.
-    pub(in crate::output) fn exact(label: &str, low: f64, high: f64) -> Axis {
+    pub(crate) fn exact(label: &str, low: f64, high: f64) -> Axis {
         let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 0.0) };
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-6);
         let (low, high) = if high - low > least { (low, high) } else { (low - 0.5, low + 0.5) };
@@ -44,7 +44,7 @@ impl Axis {
     ///
     /// It spans at least `least_span`, lest motion that has died down fills a panel with
     /// its rounding errors.
-    pub(in crate::output) fn around(label: &str, values: impl Iterator<Item = f64>, least_span: f64) -> Axis {
+    pub(crate) fn around(label: &str, values: impl Iterator<Item = f64>, least_span: f64) -> Axis {
         let Some((low, high)) = ends(values) else {
             return Axis::exact(label, -least_span / 2.0, least_span / 2.0);
         };
@@ -54,7 +54,7 @@ impl Axis {
 
     /// A logarithmic axis that holds all positive `values` with some room and spans at least
     /// `least_decades`.
-    pub(in crate::output) fn around_logarithms(
+    pub(crate) fn around_logarithms(
         label: &str,
         values: impl Iterator<Item = f64>,
         least_decades: f64,
@@ -64,7 +64,7 @@ impl Axis {
     }
 
     /// A logarithmic axis that holds all positive `values`, of whole decades, one at least.
-    pub(in crate::output) fn decades(label: &str, values: impl Iterator<Item = f64>) -> Axis {
+    pub(crate) fn decades(label: &str, values: impl Iterator<Item = f64>) -> Axis {
         let logarithms = values.filter(|v| *v > 0.0).map(f64::log10);
         let (low, high) = ends(logarithms).unwrap_or((-1.0, 1.0));
         let axis = Axis::exact(label, low.floor(), high.ceil().max(low.floor() + 1.0));
@@ -89,15 +89,15 @@ fn ends(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 
 /// A panel: its place on the canvas and what its edges mean.
 #[derive(Clone, Debug)]
-pub(in crate::output) struct Frame {
-    pub(in crate::output) rect: Rect,
-    pub(in crate::output) x: Axis,
-    pub(in crate::output) y: Axis,
+pub(crate) struct Frame {
+    pub(crate) rect: Rect,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
 }
 
 impl Frame {
     /// The pixel at which a data point lies.
-    pub(in crate::output) fn at(&self, x: f64, y: f64) -> Point {
+    pub(crate) fn at(&self, x: f64, y: f64) -> Point {
         (self.x_pixel(self.x.place(x)), self.y_pixel(self.y.place(y)))
     }
 
@@ -112,13 +112,13 @@ impl Frame {
     }
 
     /// The pixels between two values of x over the panel's whole height.
-    pub(in crate::output) fn column(&self, from: f64, to: f64) -> Rect {
+    pub(crate) fn column(&self, from: f64, to: f64) -> Rect {
         let [from, to] = [from, to].map(|x| self.at(x, 0.0).0.clamp(self.rect.left, self.rect.right));
         Rect { left: from, right: to, ..self.rect }
     }
 
     /// Draws the grid; comes before the data.
-    pub(in crate::output) fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<()> {
+    pub(crate) fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<()> {
         let Rect { left, top, right, bottom } = self.rect;
         for tick in self.x_ticks() {
             let x = self.x_pixel(tick.at);
@@ -133,7 +133,7 @@ impl Frame {
 
     /// Draws border, ticks and labels; comes after the data. `x_labels` is false for a
     /// panel that shares the x axis of the one below.
-    pub(in crate::output) fn draw_axes(&self, canvas: &Canvas<'_>, x_labels: bool) -> Result<()> {
+    pub(crate) fn draw_axes(&self, canvas: &Canvas<'_>, x_labels: bool) -> Result<()> {
         let Rect { left, top, bottom, .. } = self.rect;
         canvas.outline(self.rect, 1.5)?;
         self.draw_x_axis(canvas, x_labels)?;
@@ -149,7 +149,7 @@ impl Frame {
     }
 
     /// Draws the lower edge with its ticks, and labels if they are wanted.
-    pub(in crate::output) fn draw_x_axis(&self, canvas: &Canvas<'_>, labels: bool) -> Result<()> {
+    pub(crate) fn draw_x_axis(&self, canvas: &Canvas<'_>, labels: bool) -> Result<()> {
         let Rect { left, right, bottom, .. } = self.rect;
         canvas.stroke(&[(left, bottom), (right, bottom)], 1.5, DARK)?;
         for Tick { at, label } in self.x_ticks() {
@@ -167,7 +167,7 @@ impl Frame {
     }
 
     /// Draws ticks and labels of the y axis on the right: the scale of a colour bar.
-    pub(in crate::output) fn draw_scale(&self, canvas: &Canvas<'_>) -> Result<()> {
+    pub(crate) fn draw_scale(&self, canvas: &Canvas<'_>) -> Result<()> {
         let right = self.rect.right;
         for Tick { at, label } in self.y_ticks(APART_ON_BAR) {
             let y = self.y_pixel(at);

@@ -14,7 +14,7 @@ const PLACES: [Point; 6] = [(1.0, 0.0), (-1.0, 0.0), (1.0, -1.0), (1.0, 1.0), (-
 
 /// Places labels one after another; drawn after all markers, so that none covers them.
 #[derive(Debug)]
-pub(in crate::output) struct Labels {
+pub(crate) struct Labels {
     within: Rect,
     taken: Vec<Rect>,
     placed: Vec<(String, Rect, RGBColor)>,
@@ -23,14 +23,14 @@ pub(in crate::output) struct Labels {
 
 impl Labels {
     /// No labels yet, of type of `size`, to lie `within` a rectangle and beside `markers` of a radius.
-    pub(in crate::output) fn beside(markers: &[Point], radius: f64, within: Rect, size: f64) -> Labels {
+    pub(crate) fn beside(markers: &[Point], radius: f64, within: Rect, size: f64) -> Labels {
         let taken = markers.iter().map(|at| around(*at, radius, radius)).collect();
         Labels { within, taken, placed: Vec::new(), size }
     }
 
     /// Adds the label of a point of a curve that comes from `before`: on the side away from it if
     /// there is room, to the right if there is room nowhere.
-    pub(in crate::output) fn add(
+    pub(crate) fn add(
         &mut self,
         canvas: &Canvas<'_>,
         text: String,
@@ -52,7 +52,7 @@ impl Labels {
     }
 
     /// Writes what was added.
-    pub(in crate::output) fn draw(&self, canvas: &Canvas<'_>) -> Result<()> {
+    pub(crate) fn draw(&self, canvas: &Canvas<'_>) -> Result<()> {
         for (text, rect, color) in &self.placed {
             let at = (rect.left, (rect.top + rect.bottom) / 2.0);
             canvas.text(text, at, self.size, Align::Left, *color)?;

@@ -16,7 +16,7 @@ const MARGIN: f64 = 40.0;
 
 /// What stands before a legend's text.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::output) enum Key {
+pub(crate) enum Key {
     Line {
         color: RGBColor,
         width: f64,
@@ -39,24 +39,19 @@ pub(in crate::output) enum Key {
 
 /// One legend entry.
 #[derive(Clone, Debug)]
-pub(in crate::output) struct Entry {
+pub(crate) struct Entry {
     key: Key,
     text: String,
 }
 
 impl Entry {
-    pub(in crate::output) fn new(key: Key, text: &str) -> Entry {
+    pub(crate) fn new(key: Key, text: &str) -> Entry {
         Entry { key, text: text.to_owned() }
     }
 }
 
 /// Draws title, subtitle (may be empty) and legend; returns where the panels may start.
-pub(in crate::output) fn draw_head(
-    canvas: &Canvas<'_>,
-    title: &str,
-    subtitle: &str,
-    entries: &[Entry],
-) -> Result<f64> {
+pub(crate) fn draw_head(canvas: &Canvas<'_>, title: &str, subtitle: &str, entries: &[Entry]) -> Result<f64> {
     let mut y = 40.0;
     draw_fitted(canvas, title, y, LARGE)?;
     if !subtitle.is_empty() {

@@ -8,7 +8,7 @@ use super::{Canvas, Rect};
 impl Canvas<'_> {
     /// Fills a rectangle with a grid of colours, `[column, row]` counted from its lower left
     /// corner; each canvas pixel shows the cell that its centre lies in.
-    pub(in crate::output) fn raster(
+    pub(crate) fn raster(
         &self,
         rect: Rect,
         [columns, rows]: [usize; 2],

@@ -5,11 +5,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::Folder;
-use super::manifest::{Head, MANIFEST};
-use super::stability_figures as figures;
-use crate::bench::stability::{Report, Verdict, fuzz};
+use super::{Report, Verdict, figures, fuzz};
 use crate::model::GearPair;
+use crate::output::Folder;
+use crate::output::manifest::{Head, MANIFEST};
 
 /// All that a folder may hold: what an earlier run left goes before anything is written.
 const FILES: [&str; 14] = [

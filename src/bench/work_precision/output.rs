@@ -5,15 +5,15 @@ use std::path::Path;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::Folder;
-use super::manifest::{Head, MANIFEST};
-use super::orbit_json::Parameters;
-use super::work_precision_figure::{self, Shown};
-use crate::bench::work_precision::PERIODS;
-use crate::bench::work_precision::cells::Subject;
-use crate::bench::work_precision::measure::Curve;
-use crate::bench::work_precision::points::{self, Point};
+use super::PERIODS;
+use super::cells::Subject;
+use super::figure::{self, Shown};
+use super::measure::Curve;
+use super::points::{self, Point};
 use crate::model::State;
+use crate::output::Folder;
+use crate::output::manifest::{Head, MANIFEST};
+use crate::output::parameters::Parameters;
 
 const TABLE: &str = "work_precision.csv";
 const CELLS_TABLE: &str = "work_precision_cells.csv";
@@ -143,7 +143,7 @@ pub fn write(
     folder.write_json(CELLS, &objects)?;
     let subtitle = format!("{} cores: {}; lanes on {}", run.cores, run.processor, run.adapter);
     for (name, shown) in FIGURES {
-        folder.replace(name, |at| work_precision_figure::write(at, &subtitle, shown, &all))?;
+        folder.replace(name, |at| figure::write(at, &subtitle, shown, &all))?;
     }
     let manifest = Manifest {
         head: Head::of("bench work-precision"),

@@ -5,11 +5,11 @@ use std::path::Path;
 use anyhow::Result;
 use plotters::style::RGBColor;
 
-use super::plot_style::axes::{Axis, Frame};
-use super::plot_style::labels::Labels;
-use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
-use crate::bench::work_precision::points::Point;
+use super::points::Point;
+use crate::output::plot_style::axes::{Axis, Frame};
+use crate::output::plot_style::labels::Labels;
+use crate::output::plot_style::legend::{Entry, Key, draw_head};
+use crate::output::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
 
 const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;

@@ -6,10 +6,10 @@ use std::path::Path;
 use anyhow::Result;
 use plotters::style::RGBColor;
 
-use super::plot_style::axes::{Axis, Frame};
-use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
-use crate::bench::stability::{EngineName, grazing, grid, long_runs, stiffness};
+use super::{EngineName, grazing, grid, long_runs, stiffness};
+use crate::output::plot_style::axes::{Axis, Frame};
+use crate::output::plot_style::legend::{Entry, Key, draw_head};
+use crate::output::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
 
 const SIZE: (u32, u32) = (1500, 1150);
 const LEFT: f64 = 160.0;

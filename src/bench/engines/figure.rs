@@ -5,11 +5,11 @@ use std::path::Path;
 use anyhow::Result;
 use plotters::style::RGBColor;
 
-use super::plot_style::axes::{Axis, Frame};
-use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::{Align, Canvas, DARK, Marker, Rect, SMALL, Shape, save_figure};
-use crate::bench::engines::{Engine, Point, Run, Series, Times};
+use super::{Engine, Point, Run, Series, Times};
 use crate::gpu::Precision;
+use crate::output::plot_style::axes::{Axis, Frame};
+use crate::output::plot_style::legend::{Entry, Key, draw_head};
+use crate::output::plot_style::{Align, Canvas, DARK, Marker, Rect, SMALL, Shape, save_figure};
 
 const SIZE: (u32, u32) = (1700, 1150);
 const LEFT: f64 = 190.0;

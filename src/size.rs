@@ -1,7 +1,7 @@
 //! How large a map is, before anything of it exists.
 
-use super::{KEPT_FLOWS, LAW_PARAMETERS};
 use crate::gpu;
+use crate::plan::{KEPT_FLOWS, LAW_PARAMETERS, keeps_flows};
 use crate::record::Record;
 use crate::scene::{Axis, Format, Scene, Steps};
 
@@ -47,8 +47,7 @@ pub struct Size {
 impl Size {
     /// The size of a scene's map.
     pub fn of(scene: &Scene) -> Size {
-        let cells = scene.axes().iter().map(|axis| axis.count() as u64).product::<u64>();
-        let runs = cells.saturating_mul(scene.draw().map_or(1, |draw| u64::from(draw.count)));
+        let (cells, runs) = (scene.cell_count(), scene.run_count());
         let record = size_of::<Record>() as u64;
         let per_file = |format: &Format| match format {
             Format::Csv => CSV,
@@ -86,11 +85,6 @@ impl Size {
     pub fn is_countable(&self) -> bool {
         self.runs <= u64::from(u32::MAX)
     }
-}
-
-/// Whether several runs share a flow, and all flows can be kept.
-pub(super) fn keeps_flows(flows: u64, runs: u64) -> bool {
-    flows < runs && flows <= KEPT_FLOWS as u64
 }
 
 /// Distinct flows: one per value of the axes that are no contact law's.

@@ -6,11 +6,12 @@ use std::path::Path;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::manifest::{Head, MANIFEST};
-use super::{Folder, engines_figure, names};
-use crate::bench::engines::check::Check;
-use crate::bench::engines::{Point, Run, SCENE, Series};
+use super::check::Check;
+use super::{Point, Run, SCENE, Series, figure};
 use crate::bench::statistics::Spread;
+use crate::orbit::Class;
+use crate::output::Folder;
+use crate::output::manifest::{Head, MANIFEST};
 use crate::validate::Explanation;
 
 const TABLE: &str = "engines.csv";
@@ -41,8 +42,8 @@ pub fn write(folder: &Folder, series: &[Series], asked: &Asked) -> Result<Vec<&'
     folder.remove(&[MANIFEST, TABLE, RUNS, FIGURE, STAGES])?;
     folder.replace(TABLE, |path| write_table(path, series, asked))?;
     folder.replace(RUNS, |path| write_runs(path, series))?;
-    folder.replace(FIGURE, |path| engines_figure::write_rates(path, series, &asked.processor))?;
-    folder.replace(STAGES, |path| engines_figure::write_stages(path, series))?;
+    folder.replace(FIGURE, |path| figure::write_rates(path, series, &asked.processor))?;
+    folder.replace(STAGES, |path| figure::write_stages(path, series))?;
     let files = vec![TABLE, RUNS, FIGURE, STAGES, MANIFEST];
     folder.write_json(MANIFEST, &manifest(series, asked, &files))?;
     Ok(files)
@@ -109,7 +110,7 @@ fn write_table(path: &Path, all: &[Series], asked: &Asked) -> Result<()> {
         header.extend([name.to_owned(), format!("{name}_low"), format!("{name}_high")]);
     }
     header.extend(["peak_share_at_least", "peak_share_at_most"].map(ToOwned::to_owned));
-    header.extend(names::CLASSES.map(ToOwned::to_owned));
+    header.extend(Class::NAMES.map(ToOwned::to_owned));
     header.push("cells_differing".to_owned());
     table.write_record(header)?;
     for (series, &peak) in all.iter().zip(&asked.peaks) {
