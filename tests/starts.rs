@@ -2,17 +2,20 @@
 //!
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
+mod common;
+
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use assert_cmd::Command;
+use common::gpu;
 use rattlemap::bifurcation;
 use rattlemap::classify::classify;
 use rattlemap::coexistence::attractors;
-use rattlemap::engine::{Cpu, Engine, Fake, Gpu};
+use rattlemap::engine::{Cpu, Engine, Fake};
 use rattlemap::flow::Flow;
-use rattlemap::gpu::{self, AdapterChoice, Precision};
+use rattlemap::gpu::Precision;
 use rattlemap::orbit::{Class, Status, analyse};
 use rattlemap::plan::{Cell, Plan};
 use rattlemap::record::{Record, valid};
@@ -65,8 +68,7 @@ fn on_cpu(plan: &Plan) -> Vec<Record> {
 }
 
 fn on_lanes(plan: &Plan, precision: Precision) -> Vec<Record> {
-    let device = pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::default())).unwrap();
-    swept(plan, &mut Engine::Gpu(Box::new(pollster::block_on(Gpu::new(plan, device)).unwrap())))
+    swept(plan, &mut gpu::engine(plan, precision))
 }
 
 /// Period of a cell; 0 where there is none.
