@@ -173,7 +173,8 @@ impl Report {
     fn visited(&self, also: &str) -> Option<Value> {
         let Some(browser) = chromium() else {
             // Past the harness, which keeps what tests that pass print.
-            writeln!(io::stderr(), "SKIPPED: no Chromium to open the report with").unwrap();
+            let mut stderr = io::stderr();
+            writeln!(stderr, "SKIPPED: no Chromium to open the report with").unwrap();
             return None;
         };
         let visited = self.file("visited.html");
