@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use assert_cmd::Command;
-use common::gpu;
+use common::{apart, gpu};
 use rattlemap::bifurcation;
 use rattlemap::classify::classify;
 use rattlemap::coexistence::attractors;
@@ -280,8 +280,7 @@ fn attractors_are_told_apart_by_their_states() {
     // Contact-free motion is one attractor, however far from it a run ends.
     let far = later(11.0, 0.5, REST, 6, 0.0);
     let near = later(11.0, 0.5, REST, 200, 0.0);
-    let apart = (0..4).map(|i| (far[i] - near[i]).abs()).fold(0.0, f64::max);
-    assert!(apart > 0.1, "{far:?} {near:?}");
+    assert!(apart(far, near) > 0.1, "{far:?} {near:?}");
     assert_eq!(counted(11.0, 0.5, &[cycle(1, far), cycle(1, near)]), 1);
 }
 
