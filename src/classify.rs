@@ -8,10 +8,12 @@
 //!   enough, the orbit has to attract;
 //! - `chaotic` if there is none, the exponent exceeds zero by [`CHAOS_ERRORS`] standard
 //!   errors, and the engine did not see it linger at a cycle (status `slow`);
-//! - `undecided` otherwise: near bifurcations, and in long transients.
+//! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than
+//!   `max_period`, where the exponent is far below zero, on tori (quasi-periodic motion), and where a
+//!   multiplier is 1, as for pairs without supports.
 //!
-//! This misleads in one way that is known: transient chaos that outlives the budget is
-//! called chaotic.
+//! This misleads in two ways that are known: transient chaos that outlives the budget, and growth that
+//! is not bounded for good, as of undamped elastic pairs, are called chaotic.
 
 pub use crate::orbit::CHAOS_ERRORS;
 use crate::orbit::{Class, Status};

@@ -113,7 +113,7 @@ pub(crate) struct Engines {
     pub(crate) peak_f64: Option<f64>,
 }
 
-/// Long runs, grazing, chatter, stiff meshing, coarse grids and random parameters on every engine
+/// Long runs, impacts, grazing, chatter, stiff meshing, coarse grids and random parameters on every engine
 #[derive(Debug, Args)]
 pub(crate) struct Stability {
     #[command(flatten)]

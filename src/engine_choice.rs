@@ -38,8 +38,8 @@ pub(crate) fn check(asked: &EngineOptions) -> Result<(), Failure> {
     }
 }
 
-/// Opens the engine that is asked for; `auto` takes a hardware GPU if there is one, else the
-/// faster of the CPU and a software GPU on a few cells of the plan.
+/// Opens the engine that is asked for; `auto` takes a hardware GPU if there is one, else the CPU, or for
+/// long maps the faster of it and a software GPU on a few cells of the plan.
 pub(crate) fn open<'p>(plan: &'p Plan, asked: &EngineOptions) -> Result<Chosen<'p>, Failure> {
     check(asked)?;
     let precision = asked.precision.unwrap_or(Precision::F32);

@@ -51,7 +51,7 @@ pub enum Class {
         /// Forcing periods per cycle, at least 1.
         period: u32,
     },
-    /// A bounded motion that is not periodic, with a positive Lyapunov exponent.
+    /// A motion that is not periodic, with a positive Lyapunov exponent over the periods integrated.
     Chaotic,
     /// Neither was shown within the periods allowed.
     Undecided,
