@@ -23,7 +23,7 @@ use crate::cli::{EngineChoice, EngineOptions, Map};
 use crate::engine_choice::{self, Chosen};
 use crate::error::{Failure, fail_if};
 use crate::progress::Progress;
-use crate::scene_file;
+use crate::{say, scene_file};
 
 /// Exit code after a second Ctrl-C, as shells count it.
 const KILLED: i32 = 130;
@@ -37,7 +37,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let plan = Plan::new(&scene);
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;
     if !ask.run.quiet && !why.is_empty() {
-        eprintln!("{} ({}): {why}", engine.name(), engine.precision());
+        say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
     }
     let mut work = Work::new(&plan);
     let mut file = open_records(ask, &folder, &scene, &mut work, &engine)?;
@@ -174,7 +174,7 @@ fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
             process::exit(KILLED);
         }
         if !quiet {
-            eprintln!("stopping as soon as some cells have ended; Ctrl-C again ends at once");
+            say::note("stopping as soon as some cells have ended; Ctrl-C again ends at once");
         }
     })
     .context("cannot listen for Ctrl-C")?;

@@ -23,8 +23,10 @@ pub(crate) mod plot_style;
 mod record_file;
 mod replay;
 mod report;
+mod stdout;
 mod validation_json;
 
 pub use cells::Cells;
 pub use folder::{Folder, FolderError};
 pub use record_file::{Identity, RECORDS, RecordFile, RecordFileError};
+pub use stdout::print;

@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::say;
+
 /// Plain lines come once per this many parts of the whole.
 const LINES: usize = 10;
 
@@ -57,7 +59,7 @@ impl Progress {
                 // Of a total that has grown, what has been said may be said again.
                 let part = done * LINES / total;
                 if lines.said.swap(part, Ordering::Relaxed) < part {
-                    eprintln!("{}", lines.text(done, total));
+                    say::note(lines.text(done, total));
                 }
             }
         }
@@ -77,9 +79,9 @@ impl Progress {
             Progress::Quiet => {}
             Progress::Bar(bar) => {
                 bar.finish_and_clear();
-                eprintln!("{line}");
+                say::note(line);
             }
-            Progress::Lines(_) => eprintln!("{line}"),
+            Progress::Lines(_) => say::note(line),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `rattlemap map` as scripts see it: files of the contract, refusals, resumption.
 
 mod engines;
+mod streams;
 
 use std::fs;
 use std::path::{Path, PathBuf};
