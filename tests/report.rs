@@ -181,3 +181,61 @@ fn replay(command: &str, row: &[&str]) {
     assert_eq!((&orbit["class"], &orbit["word"]), (&row[4].into(), &row[11].into()));
     assert_eq!(orbit["period"].to_string(), row[5]);
 }
+
+/// Looks at a filled cell and at an integrated one.
+const LOOK: &str = r##"<script>
+function look() {
+  if (document.getElementById("wait")) return setTimeout(look, 20);
+  const said = {};
+  for (const [code, name] of map.sources.entries()) {
+    const id = values.source.findIndex((source, id) => source === code && map.classes[values.class[id]] === "chaotic");
+    choose({ i: id % columns, j: Math.floor(id / columns) });
+    said[name] = Object.fromEntries([...document.querySelectorAll("#readout tr")]
+      .map((row) => [...row.cells].map((cell) => cell.textContent)));
+  }
+  const result = document.createElement("pre");
+  result.id = "said";
+  result.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(said))));
+  document.body.append(result);
+}
+look();
+</script></body>"##;
+
+#[test]
+fn filled_cells_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    let run = |arguments: &[&str]| {
+        let arguments = [&["map", "s.toml", "--engine", "cpu", "--quiet"], arguments].concat();
+        Cargo::cargo_bin("rattlemap").unwrap().current_dir(folder.path()).args(arguments).assert().success();
+        fs::read_to_string(folder.path().join("out/s/report.html")).unwrap()
+    };
+    // Every cell of this one is integrated, and the page need not say so.
+    assert!(!run(&[]).contains("\"source\":{"));
+    let sets = [
+        "axis.0.count=81",
+        "axis.1.count=65",
+        "refine.minimum_grid=8",
+        "refine.max_error=0.05",
+        "refine.rounds=2",
+    ];
+    let page = run(&[&["--force"], &sets.map(|set| ["--set", set]).concat()[..]].concat());
+    assert!(page.contains("\"source\":{"));
+    let Some(browser) = chromium() else {
+        println!("skipped: no Chromium to open the report with");
+        return;
+    };
+    let visited = folder.path().join("visited.html");
+    fs::write(&visited, page.replace("</body>", LOOK)).unwrap();
+    let said = visit(browser, &visited);
+    let (filled, integrated) = (&said["filled"], &said["integrated"]);
+    assert_eq!((&filled["source"], &filled["periods run"]), (&"filled".into(), &"0".into()), "{said}");
+    assert_eq!(integrated["source"], "integrated", "{said}");
+    for name in ["exponent", "impacts per period", "meshing"] {
+        let text = |cell: &serde_json::Value| cell[name].as_str().unwrap().to_owned();
+        assert!(text(filled).ends_with(", interpolated"), "{said}");
+        assert!(!text(integrated).contains("interpolated"), "{said}");
+        assert!(!text(filled).contains('\u{b1}'), "{said}");
+    }
+    assert!(integrated["exponent"].as_str().unwrap().contains('\u{b1}'), "{said}");
+}
