@@ -1,6 +1,6 @@
 //! `rattlemap devices`: what there is to compute on, and what a map would take.
 
-use rattlemap::gpu::{self, AdapterReport};
+use rattlemap::gpu::{self, AdapterChoice, AdapterReport};
 use rattlemap::output::print;
 use rattlemap::plan::Plan;
 use rattlemap::scene::{Purpose, Scene};
@@ -22,7 +22,11 @@ pub(crate) fn run() -> Result<(), Failure> {
         print_adapter(adapter)?;
     }
     if adapters.is_empty() {
-        print("no graphics adapter; a software one comes with Mesa (Debian: mesa-vulkan-drivers)")?;
+        let mesa = || "a software one comes with Mesa (Debian: mesa-vulkan-drivers)".to_owned();
+        print(&format!(
+            "no graphics adapter; {}",
+            gpu::narrowed_by(&AdapterChoice::default()).unwrap_or_else(mesa)
+        ))?;
     }
     let scene = Scene::parse(MAIN_MAP, "e_omega", &[], Purpose::Map)?;
     let plan = Plan::new(&scene);
