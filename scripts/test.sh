@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change is taken: formatting, lints, docs, tests.
 # Installs a software Vulkan driver where there is none, so that shader tests run anywhere.
+# With --all the tests run, too, that take minutes each.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -71,6 +72,10 @@ say "docs: cargo doc --no-deps, warnings denied"
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 say "tests: cargo test"
 cargo test
+if [[ "${1:-}" == --all ]]; then
+    say "tests: those that take minutes each"
+    cargo test -- --ignored
+fi
 say "benchmarks: tiny sizes, so that they cannot rot"
 cargo test --quiet --bench reference
 cargo test --quiet --bench lane

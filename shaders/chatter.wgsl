@@ -16,7 +16,8 @@ fn is_endless() -> bool {
 // `u` is the leaving speed, with G the pressing acceleration, J its rate of change while the
 // gap stays closed and gamma the damping of the gap: the series lasts
 // `T (1 - J T / (3 G) - gamma T / 6)`, `T = 2 u / (G (1 - e))`, up to the third order.
-// Meanwhile the other coordinate moves as it does with the gap closed.
+// Meanwhile the other coordinate moves as it does with the gap closed. Tangents are those of these
+// formulas, up to the second order.
 fn close_chatter(side: u32, u: Real) {
     if !is_endless() {
         return;
@@ -41,9 +42,31 @@ fn close_chatter(side: u32, u: Real) {
     if lasts <= 0.0 || lasts >= to_mark(next_mark()) {
         return;
     }
-    crossing.pressing = sign * pressing;
-    crossing.leaving = sign * u;
-    motion.q = array<Real, 4>(0.0, 0.0, closed[2] + lasts * (rate + 0.5 * lasts * v_rate), rate + lasts * v_rate);
+    let across = here.x_row;
+    let v_by_x = across[2] + kick * row[2];
+    let v_by_v = across[3] + kick * row[3];
+    let v_jerk = (v_by_x * rate + v_by_v * v_rate) - (across[4] + kick * row[4]) * here.angle * motion.phasor[1];
+    if EXPONENT {
+        // A neighbour leaves at another time, and so at another speed and under another pressing acceleration: by
+        // `late_by` its series ends later.
+        let per_speed = (1.0 - 2.0 * (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole) * whole / u;
+        let per_pressing = whole / pressing;
+        crossing.lasts = lasts;
+        crossing.pressing = sign * (pressing + lasts * change);
+        crossing.late_by = array<Real, 4>(
+            sign * (1.0 - per_speed * (pressing + damping * u) - per_pressing * change) / u,
+            -sign * per_speed,
+            -sign * per_pressing * row[2],
+            -sign * per_pressing * row[3],
+        );
+        crossing.v_by = array<Real, 3>((across[1] + kick * row[1]) - kick * v_by_v, v_by_x, v_by_v);
+    }
+    motion.q = array<Real, 4>(
+        0.0,
+        0.0,
+        closed[2] + lasts * (rate + lasts * (0.5 * v_rate + lasts * (1.0 / 6.0) * v_jerk)),
+        rate + lasts * (v_rate + 0.5 * lasts * v_jerk),
+    );
     advance_phase(lasts);
     turn_phasor(lasts);
     count_event(side);

@@ -196,7 +196,9 @@ fn search_on() {
     tally.stage = STAGE_RUNNING;
     tally.has_read = 0u;
     tally.tries += 1u;
-    tally.refuted = select(0u, tally.candidate, tally.asked == 1u);
+    // One that attracts, and was not come near to, may be the cycle all the same.
+    let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    tally.refuted = select(0u, tally.candidate, tally.asked == 1u && !attracts);
     begin_counting();
     resume_growth();
     tally.window = 0u;
@@ -213,9 +215,15 @@ fn is_multiple() -> bool {
     return tally.divisor > 0u && is_closed;
 }
 
-// Whether the divisor was read for this multiple, does not attract, and surely is another cycle.
+// Quarter octaves by which the points of a multiple are farther apart than the lane is from it.
+const ASUNDER: u32 = 12u;
+
+// Whether the divisor was read for this multiple, does not attract, and surely is another cycle: it may have
+// been read elsewhere. A lane that comes to the divisor's own cycle from either side in turn is half as far
+// from it as its points seem to be apart.
 fn is_refuted() -> bool {
-    return tally.refuted == tally.divisor && tally.divisor_apart < AT_REST;
+    let is_asunder = tally.divisor_apart + ASUNDER <= tally.off;
+    return tally.refuted == tally.divisor && tally.divisor_apart < AT_REST && is_asunder;
 }
 
 // What rounding moves the state by over a cycle at most, relative to the motion: every event rounds, and

@@ -129,10 +129,13 @@ struct Crossing {
     jump: Jump,
     before: array<Real, 4>,
     after: array<Real, 4>,
-    // The closed series after it: the pressing acceleration and the leaving speed, signed
-    // into the wall; 0 if there is none.
+    // The closed series after it: how long it lasts, 0 if there is none; the pressing acceleration at its
+    // end, signed into the wall; by how much it ends later per (z, w, x, v) of a neighbour, the latter
+    // two with the gap closed; and what the acceleration of x then changes by with w, x, v.
+    lasts: Real,
     pressing: Real,
-    leaving: Real,
+    late_by: array<Real, 4>,
+    v_by: array<Real, 3>,
 }
 
 var<private> crossing: Crossing;
@@ -151,7 +154,7 @@ fn carry_tangents(flown: Pull, tau: Real) {
         if crossing.jump.event {
             u = saltate(u);
         }
-        if crossing.leaving != 0.0 {
+        if crossing.lasts > 0.0 {
             u = close(u);
         }
         set_tangent(i, u);
@@ -248,14 +251,16 @@ fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     );
 }
 
-// Through an infinite series of impacts: a neighbour leaves at another time and speed, so its
-// series ends `late`; until then it misses the pressing acceleration. Momentum is the same
-// either way.
+// Through an infinite series of impacts: a neighbour's ends `late`; until then it misses the pressing
+// acceleration. The centre of mass moves as it does with the gap closed, and feels the way of the gap.
 fn close(u: array<Real, 4>) -> array<Real, 4> {
-    let e = law.restitution;
-    let late = -(2.0 * u[1] / crossing.pressing + (1.0 + e) * u[0] / crossing.leaving) / (1.0 - e);
+    let x = u[2] + kick * u[0];
+    let v = u[3] + kick * u[1];
+    let by = crossing.late_by;
+    let late = (by[0] * u[0] + by[1] * u[1]) + (by[2] * x + by[3] * v);
     let behind = -crossing.pressing * late;
-    return array<Real, 4>(0.0, behind, u[2] + kick * u[0], u[3] + kick * (u[1] - behind));
+    let gained = crossing.lasts * (crossing.v_by[1] * x + crossing.v_by[2] * v) - crossing.v_by[0] * u[0];
+    return array<Real, 4>(0.0, behind, x + crossing.lasts * v, v + (gained - kick * behind));
 }
 
 // Rates below this at an event leave the linearisation without meaning.

@@ -168,6 +168,12 @@ impl Cycle {
         self.log_radius.exp()
     }
 
+    /// Whether it attracts for all that f64 can tell: a multiplier of 1, as a pair without supports has
+    /// (both gears moved alike), is found on either side of it.
+    pub fn attracts(&self) -> bool {
+        self.log_radius < -NEUTRAL * f64::from(self.period)
+    }
+
     /// `ln |mu1| / (p T)`, the largest Lyapunov exponent.
     pub fn exponent(&self, forcing_period: f64) -> f64 {
         self.log_radius / (f64::from(self.period) * forcing_period)
@@ -177,6 +183,10 @@ impl Cycle {
 fn modulus([re, im]: [f64; 2]) -> f64 {
     re.hypot(im)
 }
+
+/// Multipliers this near to 1 are 1 as far as one can tell, as a logarithm per forcing period: a double
+/// one scatters by the square root of rounding.
+const NEUTRAL: f64 = 1e-7;
 
 /// Sweeps of the QR iteration allowed.
 const EIGEN_CAP: usize = 1000;

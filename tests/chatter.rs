@@ -3,10 +3,11 @@
 
 mod common;
 
-use common::{REST, flow_of, paper};
+use common::gpu::{open, run_from_rest as run};
+use common::{REST, apart, flow_of, paper};
 use rattlemap::bench::engines::counting;
 use rattlemap::classify::classify;
-use rattlemap::gpu::{AdapterChoice, FOLLOWED_MESH_SPEED, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{FOLLOWED_MESH_SPEED, LaneSettings, Precision};
 use rattlemap::model::{GearPair, State};
 use rattlemap::orbit::{Class, Settings, Status, analyse};
 use rattlemap::record::Record;
@@ -25,18 +26,6 @@ fn cells() -> Vec<GearPair> {
     plane.into_iter().flatten().flat_map(at).collect()
 }
 
-fn open(precision: Precision) -> Gpu {
-    pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap()
-}
-
-/// From rest.
-fn run(gpu: &mut Gpu, pairs: &[GearPair], settings: &LaneSettings) -> Vec<Record> {
-    let flows: Vec<_> = pairs.iter().map(|pair| pair.oscillator().unwrap()).collect();
-    let laws: Vec<_> = pairs.iter().map(GearPair::law).collect();
-    let lanes: Vec<_> = (0..pairs.len() as u32).map(|i| Lane { flow: i, law: i, start: REST }).collect();
-    pollster::block_on(gpu.run(&flows, &laws, &lanes, settings)).unwrap()
-}
-
 /// The reference after the horizon, and its impacts.
 fn reference(pair: &GearPair) -> Result<(State, u64), Stop> {
     let flow = flow_of(pair);
@@ -47,10 +36,6 @@ fn reference(pair: &GearPair) -> Result<(State, u64), Stop> {
     Ok((trajectory.state(), trajectory.work().impacts))
 }
 
-fn apart(a: &State, b: &State) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
 /// How far the reference ends from where it does if the speed that every impact leaves, the
 /// force, a stiffness or the walls change by a share; at least that share.
 fn sensitivity(pair: &GearPair, share: f64) -> f64 {
@@ -58,7 +43,7 @@ fn sensitivity(pair: &GearPair, share: f64) -> f64 {
     let moved = |name: &str, by: f64| {
         let mut moved = *pair;
         moved.set(name, pair.get(name).unwrap() * (1.0 + by)).unwrap();
-        apart(&reference(&moved).unwrap().0, &end)
+        apart(reference(&moved).unwrap().0, end)
     };
     let names = ["e", "F", "k1", "k2", "b"];
     names.iter().flat_map(|name| [moved(name, share), moved(name, -share)]).fold(share, f64::max)
@@ -103,11 +88,11 @@ fn chatter_is_that_of_the_reference() {
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             let counted = (record.impacts_per_period * f64::from(HORIZON)).round() as u64;
             assert_eq!(counted, impacts, "{at}: impacts");
-            let error = apart(&record.strobe, &end);
+            let error = apart(record.strobe, end);
             assert!(error <= bars[i], "{at}: off by {error:.2e}, rounding may make {:.2e}", bars[i]);
             if mesh_speed <= FOLLOWED_MESH_SPEED {
                 errors[0].push(error / bars[i]);
-                errors[1].push(apart(&ordinary[i].strobe, &end) / bars[i]);
+                errors[1].push(apart(ordinary[i].strobe, end) / bars[i]);
             }
             short[i % MESH_SPEEDS.len()] += (followed[i].impacts_per_period * f64::from(HORIZON)).round();
             all[i % MESH_SPEEDS.len()] += impacts as f64;
@@ -196,7 +181,7 @@ fn errors_stay_below_the_stated_bound() {
         let mut beyond = 0;
         for ((record, shipped), pair) in records.iter().zip(&shipped).zip(&cells) {
             let end = reference(pair).unwrap().0;
-            let [error, usual] = [record, shipped].map(|record| apart(&record.strobe, &end));
+            let [error, usual] = [record, shipped].map(|record| apart(record.strobe, end));
             let share = left_out / (1.0 - pair.e.powi(power));
             let bound = sensitivity(pair, share) + bar(pair, precision);
             let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
@@ -233,7 +218,7 @@ fn errors_fall_by_the_order_of_the_series() {
         let errors = forms.map(|form| {
             gpu.rewrite_shaders(form);
             let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
-            records.iter().zip(&truth).map(|(r, truth)| apart(&r.strobe, truth)).collect::<Vec<_>>()
+            records.iter().zip(&truth).map(|(r, truth)| apart(r.strobe, *truth)).collect::<Vec<_>>()
         });
         let slopes: Vec<f64> = (0..cells.len()).map(|i| 0.5 * (errors[0][i] / errors[2][i]).log2()).collect();
         println!("order {order}: errors {errors:?}, slopes {slopes:.2?}");

@@ -10,9 +10,10 @@ mod common;
 
 use std::fmt::Write;
 
+use common::gpu::{open, run_from_rest};
 use common::{REST, flow_of, paper, work_since};
 use rattlemap::bench::engines::{LOOPS, counting};
-use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::model::GearPair;
 use rattlemap::reference::Trajectory;
 
@@ -78,17 +79,13 @@ fn the_reference_does_as_much_work_as_before() {
 /// Loop trips, function by function: forms of the shader report them in place of impacts.
 #[test]
 fn lanes_do_as_much_work_as_before() {
-    let pairs = pairs();
-    let flows = pairs.map(|pair| pair.oscillator().unwrap());
-    let laws = pairs.map(|pair| pair.law());
-    let lanes: Vec<_> = (0..pairs.len() as u32).map(|i| Lane { flow: i, law: i, start: REST }).collect();
     let settings = LaneSettings { transient_periods: SETTLING, ..LaneSettings::only(SETTLING + COUNTED) };
     let mut rows = Vec::new();
     for precision in Precision::ALL {
-        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+        let mut gpu = open(precision);
         let counts = LOOPS.map(|(function, _)| {
             gpu.rewrite_shaders(counting(function));
-            let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
+            let records = run_from_rest(&mut gpu, &pairs(), &settings);
             records.iter().map(|record| record.impacts_per_period).collect::<Vec<_>>()
         });
         for (i, (name, ..)) in CELLS.iter().enumerate() {

@@ -2,35 +2,20 @@
 //!
 //! No adapter is a failure: install a software driver (see `scripts/test.sh`).
 
-use rattlemap::flow::Flow;
-use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
+mod common;
+
+use common::gpu::{open, run};
+use common::table::{Row, rows};
+use common::{REST, apart, flow_of, paper as pair};
+use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::model::{GearPair, State};
 use rattlemap::orbit::{Class, Settings, Status, analyse};
-use rattlemap::record::Record;
 use rattlemap::reference::{EventKind, Happening, Observer, Trajectory};
 use rayon::prelude::*;
 
-const REST: State = [0.0; 4];
-
-fn pair(e: f64, omega: f64) -> GearPair {
-    GearPair { omega, ..GearPair::paper(e) }
-}
-
-fn open(precision: Precision) -> Gpu {
-    pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap()
-}
-
-/// One record per cell and start.
-fn run(gpu: &mut Gpu, cells: &[(GearPair, State)], settings: &LaneSettings) -> Vec<Record> {
-    let flows: Vec<_> = cells.iter().map(|(pair, _)| pair.oscillator().unwrap()).collect();
-    let laws: Vec<_> = cells.iter().map(|(pair, _)| pair.law()).collect();
-    let lanes: Vec<_> = (0u32..).zip(cells).map(|(i, &(_, start))| Lane { flow: i, law: i, start }).collect();
-    pollster::block_on(gpu.run(&flows, &laws, &lanes, settings)).unwrap()
-}
-
 /// Strobe states of the reference after `periods` and one more.
 fn reference(pair: &GearPair, start: State, periods: u32) -> [State; 2] {
-    let flow = Flow::new(&pair.oscillator().unwrap());
+    let flow = flow_of(pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), start);
     for _ in 0..periods {
         trajectory.advance_period(&mut ()).unwrap();
@@ -40,15 +25,15 @@ fn reference(pair: &GearPair, start: State, periods: u32) -> [State; 2] {
     [at, trajectory.state()]
 }
 
-fn apart(a: &State, b: &State) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
+/// Room for devices, drivers and processors that round otherwise than those measured: llvmpipe with AVX2.
+const ROOM: f64 = 5.0;
 
-/// Largest state error allowed in each precision.
-fn bar(precision: Precision) -> f64 {
-    match precision {
-        Precision::F32 => 1e-3,
-        Precision::F64 => 1e-9,
+/// The error allowed where so much was measured in f32 and in f64.
+fn bar(measured: [f64; 2], precision: Precision) -> f64 {
+    let [f32, f64] = measured;
+    ROOM * match precision {
+        Precision::F32 => f32,
+        Precision::F64 => f64,
     }
 }
 
@@ -63,23 +48,27 @@ fn sensitivity(pair: &GearPair, horizon: u32, precision: Precision) -> f64 {
     let ends = (0..8).map(|i| {
         let mut start = REST;
         start[i % 4] = if i < 4 { nudge } else { -nudge };
-        apart(&reference(pair, start, horizon)[0], &centre)
+        apart(reference(pair, start, horizon)[0], centre)
     });
     ends.fold(0.0, f64::max)
 }
 
-/// Compares cells after `horizon` periods, all of them within `bar` of the reference.
-fn check(cells: &[(GearPair, State)], horizon: u32, bar: impl Fn(Precision) -> f64) {
+/// Compares cells after `horizon` periods; the worst were `measured` so far off the reference in f32 and in f64.
+fn check(cells: &[(GearPair, State)], horizon: u32, measured: [f64; 2]) {
     let truth: Vec<_> = cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
     for precision in Precision::ALL {
         let records = run(&mut open(precision), cells, &LaneSettings::only(horizon));
+        let mut worst = 0.0f64;
         for ((record, truth), (pair, start)) in records.iter().zip(&truth).zip(cells) {
             let at = format!("{precision:?}, e = {}, omega = {} from {start:?}", pair.e, pair.omega);
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             assert_eq!(record.periods_run, horizon, "{at}");
-            let error = apart(&record.strobe, truth);
-            assert!(error < bar(precision), "{at}: off by {error:.2e}: {:?} {truth:?}", record.strobe);
+            let error = apart(record.strobe, *truth);
+            let bar = bar(measured, precision);
+            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {truth:?}", record.strobe);
+            worst = worst.max(error);
         }
+        println!("{precision:?}: {} cells after {horizon} periods, worst {worst:.2e}", cells.len());
     }
 }
 
@@ -95,19 +84,22 @@ fn stable_cells_of_the_plane_agree() {
         .into_par_iter()
         .filter_map(|cell| {
             let [at, next] = reference(&cell.0, cell.1, HORIZON);
-            (apart(&at, &next) < 1e-10).then_some((cell, at))
+            (apart(at, next) < 1e-10).then_some((cell, at))
         })
         .unzip();
-    assert!(cells.len() >= 400, "{} stable cells are too few", cells.len());
+    // Of 484.
+    assert!(cells.len() >= 470, "{} stable cells are too few", cells.len());
+    // Measured in f64: median 4.0e-15, 99 % 9.4e-14, worst 1.6e-12; in f32: 8.6e-7 and 2.3e-5, where the worst is a
+    // transient that ends on another attractor. Five times that, and a good twice the median in f32.
     for (precision, median_bar, bar_99, worst_bar) in
-        [(Precision::F64, 1e-12, 1e-10, 1e-9), (Precision::F32, 2e-6, 2e-4, 1e-3)]
+        [(Precision::F64, 2e-14, 5e-13, 8e-12), (Precision::F32, 2e-6, 1.2e-4, 1e-3)]
     {
         let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
         let mut errors: Vec<_> = records
             .iter()
             .zip(&truth)
             .zip(&cells)
-            .map(|((record, truth), (pair, _))| (apart(&record.strobe, truth), pair.e, pair.omega))
+            .map(|((record, truth), (pair, _))| (apart(record.strobe, *truth), pair.e, pair.omega))
             .collect();
         errors.sort_by(|a, b| a.0.total_cmp(&b.0));
         let at = |share: usize| errors[(errors.len() - 1) * share / 100];
@@ -149,9 +141,9 @@ fn scenarios_agree() {
         (pair(0.3, 4.0), [0.4, 0.0, -0.2, 0.0]), // starts meshing on the right
         (pair(0.3, 4.0), [-0.4, 0.0, 0.2, 0.0]), // starts meshing on the left
     ];
-    check(&cells, 6, bar);
+    check(&cells, 6, [5.0e-6, 1.3e-14]);
     // No loss at the walls: errors grow twentyfold in a period.
-    check(&[(pair(1.0, 3.0), REST)], 2, bar);
+    check(&[(pair(1.0, 3.0), REST)], 2, [1.9e-5, 1.2e-13]);
 }
 
 /// Impacts of the reference.
@@ -171,11 +163,11 @@ fn closed_chatter_agrees() {
     let endless = |e: f64, omega: f64| GearPair { mesh_speed: 0.0, ..pair(e, omega) };
     let rows = [0.05, 0.2, 0.4, 0.6, 0.75].map(|e| [0.3, 1.0, 1.7, 2.5, 5.6].map(|omega| endless(e, omega)));
     let cells: Vec<_> = rows.into_iter().flatten().map(|pair| (pair, REST)).collect();
-    check(&cells, HORIZON, bar);
+    check(&cells, HORIZON, [1.4e-4, 8.6e-14]);
     let truth: Vec<u32> = cells
         .iter()
         .map(|(pair, start)| {
-            let flow = Flow::new(&pair.oscillator().unwrap());
+            let flow = flow_of(pair);
             let mut trajectory = Trajectory::new(&flow, pair.law(), *start);
             let mut impacts = Impacts(0);
             (0..HORIZON).for_each(|_| trajectory.advance_period(&mut impacts).unwrap());
@@ -209,7 +201,8 @@ fn exponents_through_closed_chatter_agree() {
             assert_eq!(Class::Periodic { period: record.period }, truth.class, "{at}");
             assert!((record.impacts_per_period - truth.impacts_per_period).abs() < 1e-9, "{at}");
             assert_eq!(record.word().as_ref(), Some(&truth.word), "{at}");
-            assert!((record.lyapunov - truth.lyapunov).abs() < 5e-3, "{at}");
+            let error = (record.lyapunov - truth.lyapunov).abs();
+            assert!(error < bar([1.3e-7, 3.4e-13], precision), "{at}: {error:.2e}");
         }
     }
 }
@@ -233,8 +226,11 @@ fn a_graze_is_neither_missed_nor_made_up() {
             let truth = reference(&grazing, start, 2)[0];
             for precision in Precision::ALL {
                 let record = run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
-                let error = apart(&record.strobe, &truth);
-                assert!(error < bar(precision), "{precision:?}, {hair} {sign}: {error:.2e}");
+                let error = apart(record.strobe, truth);
+                assert!(
+                    error < bar([1.7e-6, 2.7e-15], precision),
+                    "{precision:?}, {hair} {sign}: {error:.2e}"
+                );
                 if sign < 0.0 {
                     assert_eq!(record.impacts_per_period, 0.0, "{precision:?}: an impact made up");
                 }
@@ -243,34 +239,21 @@ fn a_graze_is_neither_missed_nor_made_up() {
     }
 }
 
-fn table() -> Vec<(GearPair, bool)> {
-    let mut reader = csv::Reader::from_path("tests/data/cells.csv").unwrap();
-    reader
-        .records()
-        .map(|row| {
-            let row = row.unwrap();
-            (pair(row[0].parse().unwrap(), row[1].parse().unwrap()), &row[2] == "periodic")
-        })
-        .collect()
-}
-
 /// Every row of the independent program's table: from rest over a short horizon, and the
 /// periodic ones after a long transient.
 #[test]
 fn every_row_of_the_table_agrees() {
-    let rows = table();
-    assert_eq!(rows.len(), 40);
-    let all: Vec<_> = rows.iter().map(|&(pair, _)| (pair, REST)).collect();
-    check(&all, 4, bar);
-    let periodic: Vec<_> =
-        rows.iter().filter(|(_, periodic)| *periodic).map(|&(pair, _)| (pair, REST)).collect();
-    check(&periodic, 300, bar);
+    let from_rest = |row: &Row| (row.pair(), REST);
+    let rows = rows();
+    check(&rows.iter().map(from_rest).collect::<Vec<_>>(), 4, [1.3e-4, 1.2e-13]);
+    let periodic: Vec<_> = rows.iter().filter(|row| !row.is_chaotic()).map(from_rest).collect();
+    check(&periodic, 300, [2.9e-5, 1.3e-13]);
 }
 
 /// Batch size, dispatch length and workgroup size change nothing, to the bit.
 #[test]
 fn results_do_not_depend_on_how_the_work_is_cut() {
-    let cells: Vec<_> = table().into_iter().map(|(pair, _)| (pair, REST)).collect();
+    let cells: Vec<_> = rows().iter().map(|row| (row.pair(), REST)).collect();
     for precision in Precision::ALL {
         let mut gpu = open(precision);
         let everything = LaneSettings { periods: 80, transient_periods: 20, ..LaneSettings::default() };

@@ -1,16 +1,22 @@
 //! What a lane gives depends on its own cell alone: properties over random cells, batches,
 //! dispatch lengths and workgroups.
 
+mod common;
+
+use std::cell::RefCell;
+
+use common::{REST, gpu, paper};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{Gpu, Lane, LaneSettings, Precision};
 use rattlemap::model::{GearPair, Law, Oscillator, State};
+use rattlemap::record::Record;
 
 /// A cell anywhere in the plane, stiff or soft, with a start that may lie beyond a wall.
 fn cell() -> impl Strategy<Value = (GearPair, State)> {
     let pair = (0.0..=1.0, 1.0..12.0, 100.0..3000.0, prop_oneof![Just(0.0), 1e-4..0.1])
-        .prop_map(|(e, omega, k, mesh_speed)| GearPair { omega, k, mesh_speed, ..GearPair::paper(e) });
-    let start = prop_oneof![Just([0.0; 4]), prop::array::uniform4(-0.6..0.6)];
+        .prop_map(|(e, omega, k, mesh_speed)| GearPair { k, mesh_speed, ..paper(e, omega) });
+    let start = prop_oneof![Just(REST), prop::array::uniform4(-0.6..0.6)];
     (pair, start)
 }
 
@@ -30,12 +36,12 @@ fn cut() -> impl Strategy<Value = Cut> {
 }
 
 fn records(
-    gpu: &mut Gpu,
+    device: &mut Gpu,
     (flows, laws): (&[Oscillator], &[Law]),
     lanes: &[Lane],
     settings: &LaneSettings,
-) -> Vec<rattlemap::record::Record> {
-    pollster::block_on(gpu.run(flows, laws, lanes, settings)).unwrap()
+) -> Vec<Record> {
+    pollster::block_on(device.run(flows, laws, lanes, settings)).unwrap()
 }
 
 /// Every field of every record, to the bit, whatever the batch size, the dispatch length, the
@@ -43,16 +49,12 @@ fn records(
 #[test]
 fn records_do_not_depend_on_how_the_work_is_cut() {
     for precision in Precision::ALL {
-        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
         let mut runner = TestRunner::new(ProptestConfig { cases: 10, ..ProptestConfig::default() });
-        let gpu = std::cell::RefCell::new(&mut gpu);
+        let device = RefCell::new(gpu::open(precision));
         let cases = (prop::collection::vec(cell(), 24), cut(), any::<bool>(), any::<bool>());
         runner
             .run(&cases, |(cells, cut, early_stop, exponent)| {
-                let flows: Vec<_> = cells.iter().map(|(pair, _)| pair.oscillator().unwrap()).collect();
-                let laws: Vec<_> = cells.iter().map(|(pair, _)| pair.law()).collect();
-                let lane = |(i, &(_, start)): (u32, &(GearPair, State))| Lane { flow: i, law: i, start };
-                let mut lanes: Vec<_> = (0..).zip(&cells).map(lane).collect();
+                let (flows, laws, mut lanes) = gpu::lanes(&cells);
                 // Long enough for chaos to be called, and for cycles to be read in vain.
                 let budget = LaneSettings {
                     periods: 60,
@@ -62,13 +64,13 @@ fn records_do_not_depend_on_how_the_work_is_cut() {
                     ..LaneSettings::default()
                 };
                 let settings = LaneSettings { exponent_from: 10, early_stop, exponent, ..budget };
-                let gpu = &mut *gpu.borrow_mut();
-                let mut whole = records(gpu, (&flows, &laws), &lanes, &settings);
+                let device = &mut device.borrow_mut();
+                let mut whole = records(device, (&flows, &laws), &lanes, &settings);
                 lanes.rotate_left(cut.turn);
                 whole.rotate_left(cut.turn);
                 let Cut { batch, trips, workgroup, .. } = cut;
                 let settings = LaneSettings { batch: Some(batch), trips, workgroup, ..settings };
-                prop_assert_eq!(records(gpu, (&flows, &laws), &lanes, &settings), whole);
+                prop_assert_eq!(records(device, (&flows, &laws), &lanes, &settings), whole);
                 Ok(())
             })
             .unwrap();
@@ -79,40 +81,33 @@ fn records_do_not_depend_on_how_the_work_is_cut() {
 /// grown meanwhile, give what they give together; with short rounds and one variant, as on hardware of their own, too.
 #[test]
 fn records_do_not_depend_on_when_lanes_are_begun() {
-    let pairs: Vec<GearPair> = (0..60u32)
-        .map(|i| GearPair {
-            omega: 1.0 + f64::from(i * 37 % 60) / 6.0,
-            ..GearPair::paper(f64::from(i * 23 % 60) / 60.0)
-        })
-        .collect();
-    let flows: Vec<_> = pairs.iter().map(|pair| pair.oscillator().unwrap()).collect();
-    let laws: Vec<_> = pairs.iter().map(|pair| pair.law()).collect();
-    let lanes: Vec<(u32, Lane)> =
-        (0..60).map(|i| (1000 + i, Lane { flow: i, law: i, start: [0.0; 4] })).collect();
+    let pair = |i: u32| paper(f64::from(i * 23 % 60) / 60.0, 1.0 + f64::from(i * 37 % 60) / 6.0);
+    let cells: Vec<_> = (0..60).map(|i| (pair(i), REST)).collect();
+    let (flows, laws, together) = gpu::lanes(&cells);
+    let lanes: Vec<(u32, Lane)> = (1000..).zip(together.iter().copied()).collect();
     let settings = LaneSettings { trips: 500, ..LaneSettings::default() };
     for (precision, is_dedicated) in
         [(Precision::F32, false), (Precision::F64, false), (Precision::F32, true)]
     {
-        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+        let mut device = gpu::open(precision);
         if is_dedicated {
-            gpu.drive_as_dedicated();
+            device.drive_as_dedicated();
         }
-        let together: Vec<Lane> = lanes.iter().map(|&(_, lane)| lane).collect();
-        let expected = records(&mut gpu, (&flows, &laws), &together, &settings);
-        let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
-        let mut pool = pollster::block_on(gpu.pool(&settings)).unwrap();
+        let expected = records(&mut device, (&flows, &laws), &together, &settings);
+        let tables = pollster::block_on(device.load(&flows, &laws, None)).unwrap();
+        let mut pool = pollster::block_on(device.pool(&settings)).unwrap();
         let mut ended = Vec::new();
         // Five are begun first, then more than the pool has slots for, then as many as have ended.
         for (from, to, left) in [(0, 5, 3), (5, 9, 6), (9, 40, 12), (40, 48, 10), (48, 60, 1), (60, 60, 0)] {
-            pollster::block_on(gpu.begin(&mut pool, &tables, &lanes[from..to])).unwrap();
-            let some = pollster::block_on(gpu.advance(&mut pool, &tables, left)).unwrap();
+            pollster::block_on(device.begin(&mut pool, &tables, &lanes[from..to])).unwrap();
+            let some = pollster::block_on(device.advance(&mut pool, &tables, left)).unwrap();
             // Short rounds lose patience before.
             let is_enough = pool.under_way() <= left || (is_dedicated && !some.is_empty());
             assert!(is_enough, "{} of {left} are left", pool.under_way());
             ended.extend(some);
             assert_eq!(ended.len() + pool.under_way(), to);
         }
-        assert!(pollster::block_on(gpu.advance(&mut pool, &tables, 0)).unwrap().is_empty());
+        assert!(pollster::block_on(device.advance(&mut pool, &tables, 0)).unwrap().is_empty());
         assert_eq!(pool.under_way(), 0);
         ended.sort_by_key(|(number, _)| *number);
         let numbers: Vec<u32> = ended.iter().map(|(number, _)| *number).collect();

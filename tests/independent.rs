@@ -21,7 +21,7 @@ const TOLERANCE: f64 = 1e-12;
 const LONGEST_STEP: f64 = 0.1;
 
 /// Agreement asked of every leg, relative to the larger of 1 and the largest entry. What
-/// limits it is rounding in the hundreds of steps of DOP853: the worst leg is off by `2e-13`.
+/// limits it is rounding in the hundreds of steps of DOP853: the worst leg is off by `3.1e-13`.
 const AGREEMENT: f64 = 1e-12;
 
 /// How far a sampled solution may stray beyond a wall: accuracy of the dense output.
@@ -181,7 +181,8 @@ fn every_leg_ends_where_dop853_does() {
         assert!(off < AGREEMENT, "{what}: off by {off:.2e} in {leg:#?}");
     });
     println!("{count} legs, worst departure {worst:.2e}");
-    assert!(count > 1000, "only {count} legs");
+    // Of 2,824: rounding decides how many impacts chaos has.
+    assert!(count > 2700, "only {count} legs");
 }
 
 #[test]

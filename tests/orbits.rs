@@ -1,15 +1,11 @@
 //! Deciding what a motion is, where that is not straightforward.
 
-use rattlemap::flow::Flow;
+mod common;
+
+use common::{REST, flow_of, paper as cell};
 use rattlemap::model::{GearPair, State};
 use rattlemap::orbit::{Class, Orbit, Settings, Status, analyse};
 use rattlemap::reference::Trajectory;
-
-const REST: State = [0.0; 4];
-
-fn cell(e: f64, omega: f64) -> GearPair {
-    GearPair { omega, ..GearPair::paper(e) }
-}
 
 fn orbit(pair: &GearPair) -> Orbit {
     analyse(pair, REST, &Settings::default())
@@ -17,7 +13,7 @@ fn orbit(pair: &GearPair) -> Orbit {
 
 /// State at half a period after the strobe, mirrored: a point of the twin at phase 0.
 fn twin(pair: &GearPair, strobe: State) -> State {
-    let flow = Flow::new(&pair.oscillator().unwrap());
+    let flow = flow_of(pair);
     let mut half = Trajectory::new(&flow, pair.law(), strobe);
     half.advance_to(0.5 * flow.period, &mut ()).unwrap();
     half.state().map(|value| -value)
@@ -137,7 +133,7 @@ fn chaos_of_a_pair_without_supports_is_seen() {
         let orbit = analyse(&pair, REST, &settings);
         assert_eq!(orbit.class, Class::Chaotic, "{pair:?}");
         // Two motions themselves, a hair apart: their gaps part company.
-        let flow = Flow::new(&pair.oscillator().unwrap());
+        let flow = flow_of(&pair);
         let gap = |hair: f64| {
             let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, hair, 0.0, 0.0]);
             (0..200).for_each(|_| trajectory.advance_period(&mut ()).unwrap());

@@ -1,12 +1,14 @@
 //! Every published fact of the paper, to its printed digits (omega = 5.6, Table 1, from rest).
 
-use rattlemap::flow::Flow;
-use rattlemap::model::{GearPair, Side, State};
-use rattlemap::orbit::{Class, EventKind, Orbit, Settings, Status, analyse};
-use rattlemap::reference::{Happening, Trajectory};
-use rattlemap::stability::pitchfork;
+mod common;
 
-const REST: State = [0.0; 4];
+use common::{REST, apart, flow_of, paper};
+use rattlemap::model::{GearPair, Side, State};
+use rattlemap::orbit::{Class, EventKind, Orbit, Settings, Status, analyse, measure};
+use rattlemap::plan::Plan;
+use rattlemap::reference::{Happening, Trajectory};
+use rattlemap::scene::{Purpose, Scene};
+use rattlemap::stability::pitchfork;
 
 fn orbit(e: f64) -> Orbit {
     analyse(&GearPair::paper(e), REST, &Settings::default())
@@ -15,7 +17,7 @@ fn orbit(e: f64) -> Orbit {
 /// The event nearest to time `t` on the trajectory from rest: time, and states.
 fn event_near(e: f64, t: f64) -> (f64, EventKind, Side, State, State) {
     let pair = GearPair::paper(e);
-    let flow = Flow::new(&pair.oscillator().unwrap());
+    let flow = flow_of(&pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
     let mut met: Vec<Happening> = Vec::new();
     while (trajectory.period() as f64) * flow.period < t + 1.0 {
@@ -73,8 +75,8 @@ fn e_006_meshes_on_both_sides() {
     assert_state(after, ["0.1184", "6.3427", "-0.3816", "6.5333"]);
     // The state is still 2e-4 away from its limit.
     let end = orbit.events.iter().find(|e| e.kind == EventKind::MeshEnd && e.side == Side::Right).unwrap();
-    let apart = (0..4).map(|i| (end.before[i] - after[i]).abs()).fold(0.0, f64::max);
-    assert!((1e-4..4e-4).contains(&apart), "{apart}");
+    let left = apart(end.before, after);
+    assert!((1e-4..4e-4).contains(&left), "{left}");
 }
 
 #[test]
@@ -104,8 +106,19 @@ fn the_pitchfork_lies_at_05419() {
 }
 
 #[test]
-fn orbits_next_to_the_pitchfork_are_decided_quickly() {
-    let started = std::time::Instant::now();
+fn orbits_next_to_the_pitchfork_are_decided_early() {
+    let axis =
+        |name, min, max| format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = 2\n");
+    let text = axis("e", 0.541, 0.543) + &axis("omega", 5.6, 6.0);
+    let plan = Plan::new(&Scene::parse(&text, "pitchfork", &[], Purpose::Map).unwrap());
+    for (id, e, symmetric) in [(0, 0.541, true), (1, 0.543, false)] {
+        let pair = plan.gear_pair(id);
+        let measured = measure(&flow_of(&pair), pair.law(), REST, plan.budget());
+        let periods = measured.periods_run + measured.periods_beside;
+        assert_eq!((measured.period, measured.symmetric), (Some(1), Some(symmetric)), "{e}");
+        // Measured 101 and 38, of 528 to wait for.
+        assert!(periods < 200, "{e}: {periods}");
+    }
     for (e, symmetric) in [(0.541, true), (0.543, false)] {
         let orbit = orbit(e);
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e}");
@@ -114,7 +127,6 @@ fn orbits_next_to_the_pitchfork_are_decided_quickly() {
         assert!(re.hypot(im) < 1.0, "{e}: {re} {im}");
         assert_eq!(orbit.status, Status::Slow, "decided by Newton, not by waiting");
     }
-    assert!(started.elapsed().as_secs_f64() < 1.0);
 }
 
 #[test]
@@ -147,9 +159,7 @@ fn the_window_holds_period_4_and_above_it_period_2() {
 #[test]
 fn the_contact_free_response_ends_the_impacting_ones() {
     for (omega, impacts) in [(9.8, true), (10.1, false), (12.0, false)] {
-        let mut pair = GearPair::paper(0.5);
-        pair.omega = omega;
-        let orbit = analyse(&pair, REST, &Settings::default());
+        let orbit = analyse(&paper(0.5, omega), REST, &Settings::default());
         assert_eq!(orbit.impacts_per_period > 0.0, impacts, "{omega}");
     }
 }

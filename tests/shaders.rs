@@ -2,6 +2,7 @@
 //! memory as the host's do.
 
 use std::mem::{offset_of, size_of};
+use std::sync::LazyLock;
 
 use naga::back::{hlsl, msl, spv};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
@@ -53,176 +54,206 @@ macro_rules! same_layout {
     }};
 }
 
+/// Everything, the class alone, and what lies between.
+fn variants(precision: Precision) -> [Variant; 11] {
+    let everything = Variant::of(precision);
+    let class = Variant { word: false, mesh: false, symmetry: false, ..everything };
+    [
+        Variant { keep: true, ..everything },
+        Variant { growth: false, ..everything },
+        Variant { exponent: false, growth: false, ..everything },
+        Variant { workgroup: 256, keep: true, ..class },
+        Variant { growth: false, ..class },
+        Variant { chatter: false, keep: true, ..everything },
+        Variant { chatter: false, growth: false, ..class },
+        Variant { workgroup: 32, exponent: false, growth: false, ..class },
+        Variant { symmetry: true, ..class },
+        Variant { mesh: true, keep: true, ..class },
+        Variant { word: true, growth: false, ..class },
+    ]
+}
+
+/// Every variant, parsed and validated once for all tests, with the size of its numbers.
+static MODULES: LazyLock<Vec<(usize, naga::Module)>> = LazyLock::new(|| {
+    let variants = Precision::ALL.map(|precision| variants(precision).map(|variant| (precision, variant)));
+    variants.concat().into_iter().map(|(precision, variant)| (precision.bytes(), module(variant).0)).collect()
+});
+
 #[test]
-fn every_variant_is_valid_and_lies_as_the_host_says() {
-    for precision in Precision::ALL {
-        let everything = Variant::of(precision);
-        let class = Variant { word: false, mesh: false, symmetry: false, ..everything };
-        for variant in [
-            Variant { keep: true, ..everything },
-            Variant { growth: false, ..everything },
-            Variant { exponent: false, growth: false, ..everything },
-            Variant { workgroup: 256, keep: true, ..class },
-            Variant { growth: false, ..class },
-            Variant { chatter: false, keep: true, ..everything },
-            Variant { chatter: false, growth: false, ..class },
-            Variant { workgroup: 32, exponent: false, growth: false, ..class },
-            Variant { symmetry: true, ..class },
-            Variant { mesh: true, keep: true, ..class },
-            Variant { word: true, growth: false, ..class },
-        ] {
-            let (module, _) = &module(variant);
-            let real = precision.bytes();
-            same_layout!(
-                module,
-                layout::Domain,
-                real,
-                8,
-                [step, gap_row, x_row, energy, growth, angle, turn_half, turn_sin, share, substeps]
-            );
-            same_layout!(
-                module,
-                layout::Flow,
-                real,
-                8,
-                [domains, walls, kick, h, closing, steady, reach, decay]
-            );
-            same_layout!(module, layout::Law, real, 8, [restitution, mesh_speed]);
-            same_layout!(
-                module,
-                layout::Motion,
-                real,
-                8,
-                [
-                    q,
-                    phasor,
-                    theta,
-                    bound,
-                    bend,
-                    mesh_part,
-                    block_growth,
-                    growth_sum,
-                    growth_squares,
-                    anchor,
-                    home,
-                    position_scale,
-                    rate_scale,
-                    cycle_growth,
-                    tangents,
-                    vector
-                ]
-            );
-            same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);
-            same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index, refused]);
-            same_layout!(module, layout::Reading, real, 8, [strobe, growth, growth_error, mesh_fraction]);
-            same_layout!(
-                module,
-                layout::Finding,
-                4,
-                4,
-                [
-                    valid,
-                    slot,
-                    status,
-                    period,
-                    periods_run,
-                    impacts,
-                    counted,
-                    symmetric,
-                    word_length,
-                    hash_low,
-                    hash_high,
-                    word
-                ]
-            );
-            same_layout!(
-                module,
-                layout::Settings,
-                4,
-                4,
-                [
-                    slots,
-                    rostered,
-                    fresh,
-                    periods,
-                    longest,
-                    chaos_from,
-                    chaos_errors,
-                    trips,
-                    passes_per_period,
-                    events_per_period,
-                    row,
-                    transient_periods,
-                    growth_from,
-                    exponent_from,
-                    exponent_block,
-                    max_period,
-                    early_stop,
-                    ended
-                ]
-            );
-            same_layout!(
-                module,
-                layout::Tally,
-                4,
-                4,
-                [
-                    step,
-                    cut,
-                    mode,
-                    origin,
-                    order,
-                    period,
-                    status,
-                    passes_in_period,
-                    events_in_period,
-                    impacts,
-                    events,
-                    mesh_right,
-                    mesh_left,
-                    mesh_whole,
-                    grazes,
-                    stage,
-                    to_read,
-                    has_read,
-                    cycle,
-                    tries,
-                    counted_from,
-                    tangent_count,
-                    grows,
-                    blocks,
-                    block_periods,
-                    anchor_period,
-                    window,
-                    candidate,
-                    streak,
-                    known_lags,
-                    settled,
-                    word_length,
-                    hash_low,
-                    hash_high,
-                    recent,
-                    on_strobe,
-                    mirror,
-                    apart,
-                    apart_before,
-                    refinements,
-                    branch,
-                    branch_period,
-                    home_mode,
-                    home_origin,
-                    divisor,
-                    divisor_apart,
-                    vain,
-                    asked,
-                    refuted,
-                    off,
-                    distances,
-                    last_distances,
-                    word
-                ]
-            );
-        }
+fn every_variant_is_valid() {
+    assert_eq!(MODULES.len(), 22);
+}
+
+#[test]
+fn constants_lie_as_the_host_says() {
+    for (real, module) in &*MODULES {
+        same_layout!(
+            module,
+            layout::Domain,
+            *real,
+            8,
+            [step, gap_row, x_row, energy, growth, angle, turn_half, turn_sin, share, substeps]
+        );
+        same_layout!(
+            module,
+            layout::Flow,
+            *real,
+            8,
+            [domains, walls, kick, h, closing, steady, reach, decay]
+        );
+        same_layout!(module, layout::Law, *real, 8, [restitution, mesh_speed]);
+        same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);
+        same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index, refused]);
+    }
+}
+
+#[test]
+fn settings_lie_as_the_host_says() {
+    for (_, module) in &*MODULES {
+        same_layout!(
+            module,
+            layout::Settings,
+            4,
+            4,
+            [
+                slots,
+                rostered,
+                fresh,
+                periods,
+                longest,
+                chaos_from,
+                chaos_errors,
+                trips,
+                passes_per_period,
+                events_per_period,
+                row,
+                transient_periods,
+                growth_from,
+                exponent_from,
+                exponent_block,
+                max_period,
+                early_stop,
+                ended
+            ]
+        );
+    }
+}
+
+#[test]
+fn what_a_lane_carries_lies_as_the_host_says() {
+    for (real, module) in &*MODULES {
+        same_layout!(
+            module,
+            layout::Motion,
+            *real,
+            8,
+            [
+                q,
+                phasor,
+                theta,
+                bound,
+                bend,
+                mesh_part,
+                block_growth,
+                growth_sum,
+                growth_squares,
+                anchor,
+                home,
+                position_scale,
+                rate_scale,
+                cycle_growth,
+                tangents,
+                vector
+            ]
+        );
+        same_layout!(
+            module,
+            layout::Tally,
+            4,
+            4,
+            [
+                step,
+                cut,
+                mode,
+                origin,
+                order,
+                period,
+                status,
+                passes_in_period,
+                events_in_period,
+                impacts,
+                events,
+                mesh_right,
+                mesh_left,
+                mesh_whole,
+                grazes,
+                stage,
+                to_read,
+                has_read,
+                cycle,
+                tries,
+                counted_from,
+                tangent_count,
+                grows,
+                blocks,
+                block_periods,
+                anchor_period,
+                window,
+                candidate,
+                streak,
+                known_lags,
+                settled,
+                word_length,
+                hash_low,
+                hash_high,
+                recent,
+                on_strobe,
+                mirror,
+                apart,
+                apart_before,
+                refinements,
+                branch,
+                branch_period,
+                home_mode,
+                home_origin,
+                divisor,
+                divisor_apart,
+                vain,
+                asked,
+                refuted,
+                off,
+                distances,
+                last_distances,
+                word
+            ]
+        );
+    }
+}
+
+#[test]
+fn what_a_lane_hands_back_lies_as_the_host_says() {
+    for (real, module) in &*MODULES {
+        same_layout!(module, layout::Reading, *real, 8, [strobe, growth, growth_error, mesh_fraction]);
+        same_layout!(
+            module,
+            layout::Finding,
+            4,
+            4,
+            [
+                valid,
+                slot,
+                status,
+                period,
+                periods_run,
+                impacts,
+                counted,
+                symmetric,
+                word_length,
+                hash_low,
+                hash_high,
+                word
+            ]
+        );
     }
 }
 

@@ -2,18 +2,20 @@
 //!
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
+mod common;
+
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use assert_cmd::Command;
+use common::{REST, apart, gpu};
 use rattlemap::bifurcation;
 use rattlemap::classify::classify;
 use rattlemap::coexistence::attractors;
-use rattlemap::engine::{Cpu, Engine, Fake, Gpu};
+use rattlemap::engine::{Cpu, Engine, Fake};
 use rattlemap::flow::Flow;
-use rattlemap::gpu::{self, AdapterChoice, Precision};
-use rattlemap::model::REST;
+use rattlemap::gpu::Precision;
 use rattlemap::orbit::{Class, Status, analyse};
 use rattlemap::plan::{Cell, Plan};
 use rattlemap::record::{Record, valid};
@@ -66,8 +68,7 @@ fn on_cpu(plan: &Plan) -> Vec<Record> {
 }
 
 fn on_lanes(plan: &Plan, precision: Precision) -> Vec<Record> {
-    let device = pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::default())).unwrap();
-    swept(plan, &mut Engine::Gpu(Box::new(pollster::block_on(Gpu::new(plan, device)).unwrap())))
+    swept(plan, &mut gpu::engine(plan, precision))
 }
 
 /// Period of a cell; 0 where there is none.
@@ -279,8 +280,7 @@ fn attractors_are_told_apart_by_their_states() {
     // Contact-free motion is one attractor, however far from it a run ends.
     let far = later(11.0, 0.5, REST, 6, 0.0);
     let near = later(11.0, 0.5, REST, 200, 0.0);
-    let apart = (0..4).map(|i| (far[i] - near[i]).abs()).fold(0.0, f64::max);
-    assert!(apart > 0.1, "{far:?} {near:?}");
+    assert!(apart(far, near) > 0.1, "{far:?} {near:?}");
     assert_eq!(counted(11.0, 0.5, &[cycle(1, far), cycle(1, near)]), 1);
 }
 

@@ -49,7 +49,8 @@ struct Cell {
     what: &'static str,
     pair: GearPair,
     periods: u64,
-    /// Agreement asked, relative to the norm of the matrix.
+    /// Agreement asked, relative to the norm of the matrix: four or five times what was measured, since the
+    /// differences' rounding, which limits it, is another on another processor. The worst came to 1.8e-8.
     agreement: f64,
 }
 
@@ -79,40 +80,42 @@ fn check(cell: &Cell) {
 #[test]
 fn tangents_are_derivatives_of_the_strobe_map() {
     for cell in [
-        cell("contact-free", 0.5, 11.0, 3, 1e-8),
-        cell("one impact per side", 0.56, 5.6, 1, 1e-7),
-        cell("one impact per side, two periods", 0.56, 5.6, 2, 1e-7),
-        cell("one impact per side", 0.2, 7.5, 1, 1e-7),
-        cell("elastic impacts", 1.0, 5.6, 1, 1e-7),
-        cell("eight impacts", 0.56, 3.4, 1, 1e-7),
-        cell("meshing on both sides", 0.0, 5.6, 1, 1e-7),
-        cell("meshing on both sides, two periods", 0.0, 5.6, 2, 1e-7),
-        cell("meshing on both sides", 0.0, 1.5, 1, 1e-7),
-        cell("meshing and impacts", 0.06, 5.6, 1, 1e-7),
-        cell("meshing near resonance", 0.0, 4.2, 1, 1e-7),
-        cell("chatter into meshing", 0.2, 2.5, 1, 1e-7),
-        cell("chatter into meshing", 0.56, 1.5, 1, 1e-7),
-        cell("chaos, one period", 0.72, 4.2, 1, 1e-6),
-        cell("chaos, one period", 0.72, 5.6, 1, 1e-6),
+        cell("contact-free", 0.5, 11.0, 3, 1.5e-9),
+        cell("one impact per side", 0.56, 5.6, 1, 5e-9),
+        cell("one impact per side, two periods", 0.56, 5.6, 2, 1.5e-8),
+        cell("one impact per side", 0.2, 7.5, 1, 5e-9),
+        cell("elastic impacts", 1.0, 5.6, 1, 4e-9),
+        cell("eight impacts", 0.56, 3.4, 1, 2.5e-9),
+        cell("meshing on both sides", 0.0, 5.6, 1, 9e-9),
+        cell("meshing on both sides, two periods", 0.0, 5.6, 2, 3e-8),
+        cell("meshing on both sides", 0.0, 1.5, 1, 2.5e-8),
+        cell("meshing and impacts", 0.06, 5.6, 1, 7e-9),
+        cell("meshing near resonance", 0.0, 4.2, 1, 6e-8),
+        cell("chatter into meshing", 0.2, 2.5, 1, 1e-8),
+        cell("chatter into meshing", 0.56, 1.5, 1, 3.5e-8),
+        cell("chaos, one period", 0.72, 4.2, 1, 6e-8),
+        cell("chaos, one period", 0.72, 5.6, 1, 5e-9),
     ] {
         check(&cell);
     }
 }
 
-/// An infinite series of impacts, closed in one jump. It leaves out what tangents do during
-/// the jump, which lasts up to `1e-4` in units of the fastest rate.
+/// An infinite series of impacts, closed in one jump that lasts up to `1e-4` in units of the fastest
+/// rate: tangents are right up to its square. (2e-7 at most, which is the differences' own; 1e-4 if they
+/// are right in the first order alone.)
 #[test]
 fn tangents_survive_the_closing_of_a_chatter_series() {
     for (e, omega) in [(0.2, 1.5), (0.5, 1.5), (0.2, 2.5), (0.5, 1.0)] {
         let pair = GearPair { mesh_speed: 0.0, ..paper(e, omega) };
-        check(&Cell { what: "infinite chatter", pair, periods: 1, agreement: 5e-4 });
+        check(&Cell { what: "infinite chatter", pair, periods: 1, agreement: 1e-6 });
     }
 }
 
 /// Period by period or all at once, the monodromy matrix is the same product.
 #[test]
 fn tangents_compose() {
-    for (e, omega) in [(0.56, 5.6), (0.0, 5.6), (0.2, 2.5)] {
+    // Measured 3.8e-16, 3.5e-16 and 2.4e-14.
+    for (e, omega, agreement) in [(0.56, 5.6, 2e-15), (0.0, 5.6, 2e-15), (0.2, 2.5, 1e-13)] {
         let pair = paper(e, omega);
         let flow = flow_of(&pair);
         let y = strobe(&flow, &pair, REST, 60).expect("an ordinary cell");
@@ -125,7 +128,7 @@ fn tangents_compose() {
         }
         let (whole, _) = carried(&flow, &pair, y, 5);
         let off = (product - whole).norm() / whole.norm();
-        assert!(off < 1e-11, "e = {e}, omega = {omega}: off by {off:.1e}");
+        assert!(off < agreement, "e = {e}, omega = {omega}: off by {off:.1e}");
     }
 }
 

@@ -2,12 +2,15 @@
 //!
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use common::gpu::open;
 use rattlemap::engine::{Cpu, Engine};
-use rattlemap::gpu::{AdapterChoice, Gpu, LaneSettings, Precision};
+use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::orbit::Status;
 use rattlemap::output::{Identity, RECORDS, RecordFile};
 use rattlemap::plan::Plan;
@@ -47,7 +50,7 @@ fn every_mismatch_of_the_lanes_is_explained() {
     let plan = Plan::new(&scene(15, 14));
     let ids: Vec<u32> = (0..plan.cell_count() as u32).collect();
     for precision in Precision::ALL {
-        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap();
+        let mut gpu = open(precision);
         let settings = LaneSettings::default();
         let records = pollster::block_on(run_lanes(&mut gpu, &plan, &[], &ids, &settings)).unwrap();
         let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };

@@ -7,7 +7,7 @@
 mod planted;
 mod short_cells;
 
-use planted::{Spoil, stays_unexplained};
+use planted::Said;
 use rattlemap::classify::classify;
 use rattlemap::engine::{Cpu, Engine};
 use rattlemap::flow::Flow;
@@ -58,16 +58,14 @@ fn what_is_left_open_has_the_averages_of_its_motion() {
     let plan = cell("beside").plan();
     let strobe = [0.02114208840430365, -3.151288327627767e-5, 0.021121863275766373, 0.005357128477331726];
     let record = open([38.375, 0.43264836072921753], strobe, 64);
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::Border)));
-    let planted: [(&str, Spoil); 6] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::Border).but_not_with(&[
         ("more meshing", |record| record.mesh_fraction += 0.1),
         ("less meshing", |record| record.mesh_fraction -= 0.1),
         ("none", |record| record.mesh_fraction = 0.0),
         ("more impacts", |record| record.impacts_per_period += 2.0),
         ("fewer impacts", |record| record.impacts_per_period -= 2.0),
         ("impacts that are not whole", |record| record.impacts_per_period += 0.01),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }
 
 /// Chatter of a thousand impacts over three periods, which scatters: whole impacts may be those of any one period.
@@ -76,12 +74,10 @@ fn what_scatters_has_averages_within_its_scatter() {
     let plan = cells("turned", 2)[1].plan();
     let strobe = [3.2311919986095745, -8.109986223597144, 3.2310774326324463, -8.167506568329685];
     let record = open([482.0, 0.21997125446796417], strobe, 64);
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
-    let planted: [(&str, Spoil); 2] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::UndecidedInBudget).but_not_with(&[
         ("meshing", |record| record.mesh_fraction += 0.5),
         ("impacts that are not whole", |record| record.impacts_per_period += 0.01),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }
 
 /// Tangents of these grow in proportion to time, or not at all.
@@ -98,21 +94,21 @@ fn neutral_motion_is_no_chaos_in_anybodys_blocks() {
         let plan = Cell(parameters, start).plan();
         let record = lane(&plan, Precision::F64);
         assert_eq!(classify(&record), Class::Undecided, "{record:?}");
-        let chaos: Spoil = |record| {
-            record.status = Status::Ok.code();
-            (record.lyapunov, record.lyapunov_error) = (0.4, 0.01);
-        };
-        let weak: Spoil = |record| {
-            record.status = Status::Ok.code();
-            (record.lyapunov, record.lyapunov_error) = (0.02, 0.002);
-        };
-        let cap: Spoil = |record| record.status = Status::CapEvents.code();
-        let cycle: Spoil = |record| {
-            (record.status, record.period) = (Status::Ok.code(), 1);
-            (record.lyapunov, record.lyapunov_error) = (-0.3, 0.0);
-        };
-        let planted = [("chaos", chaos), ("weak chaos", weak), ("too many events", cap), ("a cycle", cycle)];
-        stays_unexplained(&plan, record, Precision::F64, &planted);
+        Said(&plan, Precision::F64, record).but_not_with(&[
+            ("chaos", |record| {
+                record.status = Status::Ok.code();
+                (record.lyapunov, record.lyapunov_error) = (0.4, 0.01);
+            }),
+            ("weak chaos", |record| {
+                record.status = Status::Ok.code();
+                (record.lyapunov, record.lyapunov_error) = (0.02, 0.002);
+            }),
+            ("too many events", |record| record.status = Status::CapEvents.code()),
+            ("a cycle", |record| {
+                (record.status, record.period) = (Status::Ok.code(), 1);
+                (record.lyapunov, record.lyapunov_error) = (-0.3, 0.0);
+            }),
+        ]);
     }
 }
 
@@ -123,13 +119,11 @@ fn lanes_that_may_stop_early_count_before_the_transient_is_over() {
     let plan = plan_at(0.7480314960629921, 1.0, MORE_PERIODS);
     let strobe = [1.2445701956748962, -0.08700716515500079, 0.7460595965385437, 0.2017984370626537];
     let record = open([101_761.0 / 1917.0, 0.29894429445266724], strobe, 2112);
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
-    let planted: [(&str, Spoil); 3] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::UndecidedInBudget).but_not_with(&[
         ("meshing", |record| record.mesh_fraction += 1e-3),
         ("impacts", |record| record.impacts_per_period += 0.5),
         ("counted too long", |record| record.impacts_per_period = 106_861.0 / 2013.0),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }
 
 /// Bands of chaos a hundred-thousandth of the motion wide, with 68 or 70 impacts a period: rounding holds a lane in a
@@ -143,14 +137,12 @@ fn what_is_not_resolved_has_the_averages_of_any_period() {
         open([68.99825479930192, 0.05525544658303261], strobe, 2112),
         [0.04426941373598075, 0.0002834432499675276],
     );
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
-    let planted: [(&str, Spoil); 4] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::UndecidedInBudget).but_not_with(&[
         ("more impacts", |record| record.impacts_per_period += 2.0),
         ("fewer impacts", |record| record.impacts_per_period -= 2.0),
         ("meshing", |record| record.mesh_fraction += 1e-2),
         ("exponent", |record| record.lyapunov = 0.06),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
     // Double precision resolves them.
     assert_eq!(explanation(&plan, record, Precision::F64), Ok(None));
 }
@@ -170,15 +162,13 @@ fn a_point_that_is_not_resolved_may_be_left_out() {
         lyapunov: -0.20000232699814274,
         ..averages
     };
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::BelowResolution)));
-    let planted: [(&str, Spoil); 5] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::BelowResolution).but_not_with(&[
         ("another period", |record| record.period = 5),
         ("impacts", |record| record.impacts_per_period += 1.0 / 6.0),
         ("exponent", |record| record.lyapunov *= 1.5),
         ("meshing", |record| record.mesh_fraction += 1e-3),
         ("word", |record| record.word_length = 127),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
     assert_eq!(explanation(&plan, record, Precision::F64), Ok(None));
 }
 
@@ -192,16 +182,14 @@ fn weak_chaos_beside_a_cycle_may_be_left_open() {
         open([14.016483516483516, 0.0], strobe, 2112),
         [0.053449972824758, 0.019188195534138718],
     );
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
-    let planted: [(&str, Spoil); 4] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::UndecidedInBudget).but_not_with(&[
         ("impacts", |record| record.impacts_per_period += 1.0),
         ("meshing", |record| record.mesh_fraction += 1e-3),
         ("another exponent", |record| record.lyapunov = -0.1),
         ("a cycle", |record| {
             (record.period, record.status, record.lyapunov_error) = (1, Status::Ok.code(), 0.0);
         }),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }
 
 /// The reference calls a motion chaos that ends on a cycle in time; a lane that is there by its last period
@@ -232,11 +220,10 @@ fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
         for strobe in [chaos.strobe, beside, ends.strobe.map(|x| 1.5 * x), [0.0; 4]] {
             assert_eq!(why(open(strobe)), Ok(None), "{strobe:?}");
         }
-        let planted: [(&str, Spoil); 3] = [
+        Said(&plan, Precision::F32, near).but_not_with(&[
             ("meshing", |record| record.mesh_fraction += 0.5),
             ("impacts", |record| record.impacts_per_period += 20.0),
             ("impacts that are not whole", |record| record.impacts_per_period += 1e-4),
-        ];
-        stays_unexplained(&plan, near, Precision::F32, &planted);
+        ]);
     }
 }

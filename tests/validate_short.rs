@@ -7,7 +7,7 @@
 mod planted;
 mod short_cells;
 
-use planted::{Spoil, stays_unexplained};
+use planted::{Said, Spoil};
 use rattlemap::classify::classify;
 use rattlemap::gpu::Precision;
 use rattlemap::orbit::{Class, Status};
@@ -56,8 +56,7 @@ fn weak_chaos_is_the_references_own_in_the_lanes_blocks() {
         let plan = cell.plan();
         let record = lane(&plan, Precision::F64);
         assert_eq!(classify(&record), Class::Chaotic, "{record:?}");
-        assert_eq!(explanation(&plan, record, Precision::F64), Ok(Some(Explanation::UndecidedInBudget)));
-        let planted: [(&str, Spoil); 5] = [
+        Said(&plan, Precision::F64, record).is_explained_by(Explanation::UndecidedInBudget).but_not_with(&[
             ("twice the exponent", |record| record.lyapunov *= 2.0),
             ("half of it, surely", |record| {
                 (record.lyapunov, record.lyapunov_error) = (0.4 * record.lyapunov, 1e-3)
@@ -65,8 +64,7 @@ fn weak_chaos_is_the_references_own_in_the_lanes_blocks() {
             ("impacts", |record| record.impacts_per_period = 3.0 * record.impacts_per_period + 1.0),
             ("meshing", |record| record.mesh_fraction += 0.3),
             ("a cycle", |record| record.period = 3),
-        ];
-        stays_unexplained(&plan, record, Precision::F64, &planted);
+        ]);
     }
 }
 
@@ -82,8 +80,7 @@ fn a_gear_at_rest_is_left_open_or_read_before_it_rests() {
     let plan = resting[0].plan();
     let strobe = [3.814697265625e-6, -6.128394468276759e-5, -32.48056411743164, 0.0004625712948321023];
     let record = read([1, 62], [-0.27800948812364285, 0.0, 1.0], strobe, false, "");
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::Unsettled)));
-    let planted: [(&str, Spoil); 6] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::Unsettled).but_not_with(&[
         ("period", |record| record.period = 2),
         ("exponent", |record| record.lyapunov *= 1.3),
         ("meshing", |record| record.mesh_fraction -= 0.2),
@@ -93,8 +90,7 @@ fn a_gear_at_rest_is_left_open_or_read_before_it_rests() {
             (record.period, record.status) = (0, Status::Ok.code());
             (record.lyapunov, record.lyapunov_error) = (0.4, 0.01);
         }),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }
 
 /// Unforced, of two gears without supports, one at rest on the other.
@@ -116,7 +112,7 @@ fn too_many_events_are_rounding_or_chaos_or_a_fault() {
         (record.status, record.period, record.periods_run) = (Status::CapEvents.code(), 0, 0);
         record.strobe = [0.0, -0.19, 0.0, -0.15];
     };
-    stays_unexplained(&plan, record, Precision::F64, &[("too early", early)]);
+    Said(&plan, Precision::F64, record).but_not_with(&[("too early", early)]);
     // Elastic impacts on a wall that the load presses to: six thousand in a period, and slower ones, of which
     // there are more, if the strobe cuts a flight that is shallower than the gap rounds by.
     let plan = cell("elastic").plan();
@@ -128,7 +124,7 @@ fn too_many_events_are_rounding_or_chaos_or_a_fault() {
     cut(&mut record);
     assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::EngineCap)));
     // The gap of a lane in f64 tells where it is.
-    stays_unexplained(&plan, lane(&plan, Precision::F64), Precision::F64, &[("cut", cut)]);
+    Said(&plan, Precision::F64, lane(&plan, Precision::F64)).but_not_with(&[("cut", cut)]);
     // One at rest, whose teeth meet once or twice in a period: a lane once met ten thousand times there.
     let stuck: Spoil = |record| {
         (record.status, record.period, record.periods_run) = (Status::CapEvents.code(), 0, 59);
@@ -136,13 +132,13 @@ fn too_many_events_are_rounding_or_chaos_or_a_fault() {
             [1.7857179045677185e-5, -0.01238123487995892, -0.014012660831212997, -0.01238123487995892];
     };
     let plan = cell("balanced").plan();
-    stays_unexplained(&plan, lane(&plan, Precision::F32), Precision::F32, &[("stuck", stuck)]);
+    Said(&plan, Precision::F32, lane(&plan, Precision::F32)).but_not_with(&[("stuck", stuck)]);
     // The paper's chaos has some ten events in a period.
     let pair = [2.0, 1.0, 0.6, 0.6, 30.0, 20.0, 1.0, 1000.0, 50.0, 5.6, 0.5, 0.65, 0.01];
     let plan = Cell(pair, [0.0; 4]).plan();
     for precision in Precision::ALL {
         let cap: Spoil = |record| (record.status, record.period) = (Status::CapEvents.code(), 0);
-        stays_unexplained(&plan, lane(&plan, precision), precision, &[("chaos", cap)]);
+        Said(&plan, precision, lane(&plan, precision)).but_not_with(&[("chaos", cap)]);
     }
 }
 
@@ -154,14 +150,12 @@ fn rounding_at_every_step_moves_averages_so_far_and_no_farther() {
     let strobe = [-4.385066010057926, 0.0003937658188243164, -4.426164150238037, -0.0010572705951204606];
     let numbers = [-0.06981998599024421, 14.0, 0.9890092611312866];
     let record = read([1, 11], numbers, strobe, true, "135555555462222222");
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::BelowResolution)));
-    let planted: [(&str, Spoil); 4] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::BelowResolution).but_not_with(&[
         ("meshing", |record| record.mesh_fraction -= 0.01),
         ("exponent", |record| record.lyapunov *= 1.3),
         ("impacts", |record| record.impacts_per_period += 2.0),
         ("period", |record| record.period = 2),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }
 
 /// The same, over so many steps that the turning of cos and sin drifts.
@@ -186,16 +180,15 @@ fn a_phase_that_drifts_moves_averages_so_far_and_no_farther() {
     for (cell, (record, why)) in cells("drifting", 2).iter().zip(said) {
         let plan = cell.plan();
         assert_eq!(explanation(&plan, record, Precision::F32), why, "{record:?}");
-        let planted: [(&str, Spoil); 4] = [
+        Said(&plan, Precision::F32, record).but_not_with(&[
             ("meshing", |record| record.mesh_fraction += 5e-4),
             ("exponent", |record| record.lyapunov *= 0.3),
             ("impacts", |record| record.impacts_per_period += 2.0),
             ("period", |record| record.period = 2),
-        ];
-        stays_unexplained(&plan, record, Precision::F32, &planted);
+        ]);
         // In double precision nothing drifts so far.
         let less: Spoil = |record| record.mesh_fraction -= 6e-5;
-        stays_unexplained(&plan, lane(&plan, Precision::F64), Precision::F64, &[("meshing", less)]);
+        Said(&plan, Precision::F64, lane(&plan, Precision::F64)).but_not_with(&[("meshing", less)]);
     }
 }
 
@@ -206,18 +199,16 @@ fn a_multiple_of_a_period_is_rounding_or_a_fault() {
     let strobe = [-0.382703754134804, -0.04117705911263004, -0.0029109478928148746, -0.03884491365725024];
     let numbers = [-0.2761038212990315, 2.0, 0.9986684322357178];
     let record = read([2, 10], numbers, strobe, false, "135462135462");
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::BelowResolution)));
-    let planted: [(&str, Spoil); 4] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::BelowResolution).but_not_with(&[
         ("another period", |record| record.period = 3),
         ("exponent", |record| record.lyapunov *= 0.5),
         ("impacts", |record| record.impacts_per_period += 1.0),
         ("meshing", |record| record.mesh_fraction -= 1e-3),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
     let record = lane(&plan, Precision::F64);
     assert_eq!(classify(&record), Class::Periodic { period: 1 }, "{record:?}");
     let twice: Spoil = |record| record.period = 2;
-    stays_unexplained(&plan, record, Precision::F64, &[("period", twice)]);
+    Said(&plan, Precision::F64, record).but_not_with(&[("period", twice)]);
 }
 
 /// Meshing that ends where next to nothing presses, and chatter of a thousand impacts: there rounding on the
@@ -242,13 +233,12 @@ fn rounding_at_events_moves_averages_so_far_and_no_farther() {
         let plan = cell.plan();
         let why = explanation(&plan, record, Precision::F32);
         assert_eq!(why, Ok(Some(Explanation::BelowResolution)), "{record:?}");
-        let planted: [(&str, Spoil); 4] = [
+        Said(&plan, Precision::F32, record).but_not_with(&[
             ("meshing", |record| record.mesh_fraction += 0.01),
             ("exponent", |record| record.lyapunov = 2.0),
             ("impacts", |record| record.impacts_per_period += 2.0),
             ("period", |record| record.period = 2),
-        ];
-        stays_unexplained(&plan, record, Precision::F32, &planted);
+        ]);
     }
 }
 
@@ -267,8 +257,7 @@ fn numbers_that_are_rounded_once_for_all_make_chaos_or_meshing() {
         valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH | valid::STROBE,
         ..Record::default()
     };
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::BelowResolution)));
-    let planted: [(&str, Spoil); 3] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::BelowResolution).but_not_with(&[
         ("twice the exponent", |record| {
             record.status = Status::Ok.code();
             (record.lyapunov, record.lyapunov_error) = (0.5, 0.02);
@@ -278,14 +267,13 @@ fn numbers_that_are_rounded_once_for_all_make_chaos_or_meshing() {
             (record.lyapunov, record.lyapunov_error, record.impacts_per_period) = (0.2, 0.03, 8.0);
         }),
         ("a cycle", |record| (record.period, record.status) = (3, Status::Ok.code())),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
     // In double precision nothing of the kind is in reach.
     let chaos: Spoil = |record| {
         record.status = Status::Ok.code();
         (record.lyapunov, record.lyapunov_error, record.impacts_per_period) = (0.2, 0.03, 4.0);
     };
-    stays_unexplained(&plan, lane(&plan, Precision::F64), Precision::F64, &[("chaos", chaos)]);
+    Said(&plan, Precision::F64, lane(&plan, Precision::F64)).but_not_with(&[("chaos", chaos)]);
 
     let plan = elastic.plan();
     let record = read(
@@ -295,13 +283,11 @@ fn numbers_that_are_rounded_once_for_all_make_chaos_or_meshing() {
         true,
         "#a6e32c9d1a7de18e/372",
     );
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::BelowResolution)));
-    let planted: [(&str, Spoil); 3] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::BelowResolution).but_not_with(&[
         ("meshing", |record| record.mesh_fraction -= 0.01),
         ("impacts", |record| record.impacts_per_period += 20.0),
         ("period", |record| record.period = 2),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }
 
 /// Beside an unsymmetric cycle a symmetric one, whose averages rounding moves further than bars are wide: in single
@@ -322,17 +308,16 @@ fn another_cycle_may_be_read_where_every_step_rounds() {
         let why = explanation(&plan, record, precision);
         assert_eq!(why, Ok(Some(Explanation::CoexistingAttractor)), "{record:?}");
         let meshes = Record { mesh_fraction: record.mesh_fraction + more, ..record };
-        let planted: [(&str, Spoil); 4] = [
+        Said(&plan, precision, record).but_not_with(&[
             ("exponent", |record| record.lyapunov = 1.5),
             ("impacts", |record| record.impacts_per_period += 2.0),
             ("another word", |record| (record.word[0], record.word_hash) = (record.word[0] ^ 8, 0)),
             ("another period", |record| record.period = 2),
-        ];
-        stays_unexplained(&plan, record, precision, &planted);
-        stays_unexplained(&plan, meshes, precision, &[("meshing", |_| ())]);
+        ]);
+        Said(&plan, precision, meshes).but_not_with(&[("meshing", |_| ())]);
     }
     let elsewhere: Spoil = |record| record.strobe = record.strobe.map(|x| 1.2 * x);
-    stays_unexplained(&plan, rounded, Precision::F32, &[("another place", elsewhere)]);
+    Said(&plan, Precision::F32, rounded).but_not_with(&[("another place", elsewhere)]);
 }
 
 /// Strobes in the dip at the start of meshing, where a state does not tell that the teeth mesh. The lane is there
@@ -351,13 +336,11 @@ fn a_cycle_whose_strobe_is_in_a_dip_is_read_there() {
         valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH | valid::STROBE,
         ..Record::default()
     };
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::Unsettled)));
-    let planted: [(&str, Spoil); 5] = [
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::Unsettled).but_not_with(&[
         ("meshing", |record| record.mesh_fraction += 0.01),
         ("exponent", |record| record.lyapunov *= 3.0),
         ("impacts", |record| record.impacts_per_period += 0.4),
         ("period", |record| record.period = 10),
         ("another place", |record| record.strobe = record.strobe.map(|x| 1.2 * x)),
-    ];
-    stays_unexplained(&plan, record, Precision::F32, &planted);
+    ]);
 }

@@ -180,6 +180,11 @@ impl LinearFlow {
         &self.gap_rates[0]
     }
 
+    /// The row of the second displacement's acceleration on `a`.
+    pub(crate) fn second_acceleration_row(&self) -> [f64; 7] {
+        std::array::from_fn(|j| self.generator[(3, j)])
+    }
+
     /// The fundamental matrix `exp(A tau)` in gap coordinates.
     pub fn fundamental(&self, tau: f64) -> Matrix4<f64> {
         Matrix4::identity() + self.departure(tau).fixed_view::<4, 4>(0, 0)

@@ -4,7 +4,7 @@ use super::reading::Reading;
 use super::recurrence::{Candidate, Metric, candidates};
 use super::{Class, Orbit, Settings, Status};
 use crate::flow::Flow;
-use crate::model::{GearPair, Law, State};
+use crate::model::{GearPair, Law, Quiet, State};
 use crate::reference::{Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap};
 use crate::word::Word;
@@ -121,6 +121,9 @@ impl Analysis<'_> {
         for _ in 0..self.settings.transient_periods {
             self.advance(&mut trajectory)?;
         }
+        if let Some(orbit) = self.quiet(&trajectory)? {
+            return Ok(orbit);
+        }
         let mut length = self.settings.observed_periods.max(2);
         let last = length.max(LONGEST_WINDOW);
         loop {
@@ -140,6 +143,18 @@ impl Analysis<'_> {
             }
             length = length.saturating_mul(2).min(last);
         }
+    }
+
+    /// Contact-free motion that has no event to come: its steady response, which is known, where the
+    /// forcing is so fast that little of the transient is gone after a period.
+    fn quiet(&self, trajectory: &Trajectory<'_, 0>) -> Result<Option<Orbit>, Stop> {
+        let is_certain =
+            |quiet: &&Quiet| trajectory.meshing().is_none() && quiet.is_certain(trajectory.state());
+        let Some(quiet) = self.flow.quiet().filter(is_certain) else { return Ok(None) };
+        let steady = Trajectory::new(self.flow, self.law, quiet.steady());
+        let newton = &mut Newton::default();
+        let cycle = self.maps(1).into_iter().find_map(|map| newton.refine(&steady, map));
+        cycle.map(|cycle| self.periodic(&steady, &cycle, 0.0)).transpose()
     }
 
     /// Whether nearby motions separate for good: by more than a departure from an unstable
@@ -199,7 +214,7 @@ impl Analysis<'_> {
             let newton = &mut Newton::default();
             let Some(cycle) = newton.refine(trajectory, map) else { continue };
             let Some(cycle) = self.smallest(newton, trajectory, cycle, &window.metric) else { continue };
-            if cycle.spectral_radius() < 1.0
+            if cycle.attracts()
                 && let Some(distance) = self.approach(trajectory, &cycle, &window.metric)?
             {
                 return self.periodic(trajectory, &cycle, distance).map(Some);

@@ -239,13 +239,13 @@ impl<'a> Watch<'a> {
                     continue;
                 };
                 // One that repels does so at any of its periods.
-                if cycle.spectral_radius() >= 1.0 {
+                if !cycle.attracts() {
                     self.searched.note(map, &cycle);
                     continue;
                 }
                 let Some(cycle) = self.analysis.smallest(newton, seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
-                if cycle.spectral_radius() < 1.0 && distance < NEAR {
+                if cycle.attracts() && distance < NEAR {
                     // The next look will tell whether it is being approached.
                     self.approaches = true;
                     let at = self.strobes.len() - 1;

@@ -1,9 +1,12 @@
-//! Helpers that the proofs of the reference share.
+//! Helpers that proofs of the reference and of the lanes share.
 #![allow(dead_code, reason = "every test file compiles this module and uses a part of it")]
 
 use rattlemap::flow::{DomainKind, Flow};
 use rattlemap::model::{GearPair, Side, State};
 use rattlemap::reference::{EventKind, Happening, Stop, Trajectory, Work};
+
+pub(crate) mod gpu;
+pub(crate) mod table;
 
 /// At rest in the middle of the gap.
 pub(crate) const REST: State = [0.0; 4];
@@ -86,12 +89,17 @@ pub(crate) fn legs(flow: &Flow, pair: &GearPair, from: State, skip: u64, periods
     legs
 }
 
-/// Largest difference of two states, in units of the larger of 1 and their largest entry.
+/// Largest difference of two states.
+pub(crate) fn apart(a: State, b: State) -> f64 {
+    let differences = a.iter().zip(&b).map(|(x, y)| (x - y).abs());
+    // `f64::max` would swallow a NaN.
+    differences.fold(0.0, |m: f64, d| if d.is_nan() || d > m { d } else { m })
+}
+
+/// The same in units of the larger of 1 and their largest entry.
 pub(crate) fn departure(a: State, b: State) -> f64 {
     let scale = a.iter().chain(&b).fold(1.0f64, |m, x| m.max(x.abs()));
-    let difference = a.iter().zip(&b).map(|(x, y)| (x - y).abs());
-    // `f64::max` would swallow a NaN.
-    difference.fold(0.0, |m: f64, d| if d.is_nan() || d > m { d } else { m }) / scale
+    apart(a, b) / scale
 }
 
 /// The other wall's name for a flight.

@@ -3,23 +3,34 @@
 use rattlemap::gpu::Precision;
 use rattlemap::plan::Plan;
 use rattlemap::record::Record;
+use rattlemap::validate::Explanation;
 
 use crate::short_cells::explanation;
 
 /// Changes a record.
 pub(crate) type Spoil = fn(&mut Record);
 
-/// None of these errors has an explanation.
-#[track_caller]
-pub(crate) fn stays_unexplained(
-    plan: &Plan,
-    record: Record,
-    precision: Precision,
-    planted: &[(&str, Spoil)],
-) {
-    for (what, spoil) in planted {
-        let mut wrong = record;
-        spoil(&mut wrong);
-        assert_eq!(explanation(plan, wrong, precision), Ok(None), "{what}: {wrong:?}");
+/// What a lane says of a plan's first cell.
+#[derive(Clone, Copy)]
+pub(crate) struct Said<'a>(pub(crate) &'a Plan, pub(crate) Precision, pub(crate) Record);
+
+impl Said<'_> {
+    /// It differs from the reference, for this reason.
+    #[track_caller]
+    pub(crate) fn is_explained_by(self, why: Explanation) -> Self {
+        let Said(plan, precision, record) = self;
+        assert_eq!(explanation(plan, record, precision), Ok(Some(why)), "{record:?}");
+        self
+    }
+
+    /// With any of these errors it has no explanation.
+    #[track_caller]
+    pub(crate) fn but_not_with(self, planted: &[(&str, Spoil)]) {
+        let Said(plan, precision, record) = self;
+        for (what, spoil) in planted {
+            let mut wrong = record;
+            spoil(&mut wrong);
+            assert_eq!(explanation(plan, wrong, precision), Ok(None), "{what}: {wrong:?}");
+        }
     }
 }
