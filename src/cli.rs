@@ -241,27 +241,6 @@ pub(crate) enum EngineChoice {
     Cpu,
 }
 
-impl Map {
-    /// The command that goes on with this run.
-    pub(crate) fn resume_command(&self) -> String {
-        let quoted =
-            |text: String| if text.contains([' ', '"', '*', '$', '[']) { format!("'{text}'") } else { text };
-        let mut words = vec!["rattlemap map".to_owned(), quoted(self.run.scene.display().to_string())];
-        if let Some(out) = &self.run.out {
-            words.push(format!("--out {}", quoted(out.display().to_string())));
-        }
-        if let Some(engine) =
-            self.engine.engine.to_possible_value().filter(|_| self.engine.engine != EngineChoice::Auto)
-        {
-            words.push(format!("--engine {}", engine.get_name()));
-        }
-        words.extend(self.engine.precision.map(|precision| format!("--precision {}", precision.name())));
-        words.extend(self.run.set.iter().map(|set| format!("--set {}", quoted(set.clone()))));
-        words.push("--resume".to_owned());
-        words.join(" ")
-    }
-}
-
 /// One motion: its class, word, exponent, multipliers and every event on the cycle
 ///
 /// Starts at phase 0, lets the transient pass and reads what the motion settles on. A periodic
@@ -279,12 +258,15 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
     pub(crate) start: Option<State>,
 
-    /// Forcing periods to observe, 2 or more; cycles of up to half as many are found (at most 64)
+    /// Forcing periods of the first look at the motion, 2 or more. No limit: while it is undecided, looks of
+    /// twice the length follow, up to 32768 periods or this many, each after up to 50 periods in which a
+    /// tangent vector turns. Cycles of up to half as many are found (at most 64)
     #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
           value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     pub(crate) periods: u32,
 
-    /// Forcing periods to let pass first, 1 or more
+    /// Forcing periods to let pass before the first look, 1 or more. All of them are integrated, and what
+    /// is undecided after the first look goes on
     #[arg(long, value_name = "N", default_value_t = Settings::default().transient_periods,
           value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     pub(crate) transient: u32,

@@ -1,6 +1,7 @@
 //! `rattlemap devices`: what there is to compute on, and what a map would take.
 
-use rattlemap::gpu::{self, AdapterReport};
+use rattlemap::gpu::{self, AdapterChoice, AdapterReport};
+use rattlemap::output::print;
 use rattlemap::plan::Plan;
 use rattlemap::scene::{Purpose, Scene};
 
@@ -14,32 +15,36 @@ const MAIN_MAP: &str = include_str!("../scenes/e_omega.toml");
 /// Prints the processor, the adapters, and the choice of `--engine auto` on the main map.
 pub(crate) fn run() -> Result<(), Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    println!("cpu: event-driven reference, {threads} threads");
-    println!("  precision   f64");
+    print(&format!("cpu: event-driven reference, {threads} threads"))?;
+    print("  precision   f64")?;
     let adapters = pollster::block_on(gpu::adapters());
     for adapter in &adapters {
-        print(adapter);
+        print_adapter(adapter)?;
     }
     if adapters.is_empty() {
-        println!("no graphics adapter; a software one comes with Mesa (Debian: mesa-vulkan-drivers)");
+        let mesa = || "a software one comes with Mesa (Debian: mesa-vulkan-drivers)".to_owned();
+        print(&format!(
+            "no graphics adapter; {}",
+            gpu::narrowed_by(&AdapterChoice::default()).unwrap_or_else(mesa)
+        ))?;
     }
     let scene = Scene::parse(MAIN_MAP, "e_omega", &[], Purpose::Map)?;
     let plan = Plan::new(&scene);
     let auto = EngineOptions { engine: EngineChoice::Auto, precision: None };
     let chosen = engine_choice::open(&plan, &auto)?;
     let (engine, precision) = (chosen.engine.name(), chosen.engine.precision());
-    println!("auto takes {engine} ({precision}) for the main map: {}", chosen.why);
+    print(&format!("auto takes {engine} ({precision}) for the main map: {}", chosen.why))?;
     Ok(())
 }
 
-fn print(adapter: &AdapterReport) {
+fn print_adapter(adapter: &AdapterReport) -> anyhow::Result<()> {
     let AdapterReport { info, precisions, largest_binding, most_lanes } = adapter;
     let names: Vec<&str> = precisions.iter().map(|precision| precision.name()).collect();
     let kind = if gpu::is_hardware(info) { "hardware" } else { "software" };
-    println!("gpu: {}", gpu::describe(info));
-    println!("  kind        {kind} ({:?})", info.device_type);
-    println!("  interface   {:?}, {}", info.backend, gpu::interface_rank(info));
-    println!("  precision   {}", names.join(", "));
-    println!("  binding     {:.1} GiB", *largest_binding as f64 / f64::from(1 << 30));
-    println!("  batch       up to {most_lanes} lanes");
+    print(&format!("gpu: {}", gpu::describe(info)))?;
+    print(&format!("  kind        {kind} ({:?})", info.device_type))?;
+    print(&format!("  interface   {:?}, {}", info.backend, gpu::interface_rank(info)))?;
+    print(&format!("  precision   {}", names.join(", ")))?;
+    print(&format!("  binding     {:.1} GiB", *largest_binding as f64 / f64::from(1 << 30)))?;
+    print(&format!("  batch       up to {most_lanes} lanes"))
 }

@@ -104,6 +104,15 @@ impl Engine<'_> {
         }
     }
 
+    /// The least and the most free steps that lanes take per forcing period, over all flows that they
+    /// can carry; none where there is no grid.
+    pub fn steps_per_period(&self) -> Option<[u32; 2]> {
+        match self {
+            Engine::Gpu(gpu) => gpu.steps_per_period(),
+            Engine::Cpu(_) | Engine::Fake(_) => None,
+        }
+    }
+
     /// Cells that may be begun now: more would be refused for want of memory.
     pub fn room(&self) -> usize {
         match self {

@@ -75,7 +75,11 @@ fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, Failu
     }
     let cpu = |why| Chosen { engine: Engine::Cpu(Cpu::new(plan)), why };
     match best {
-        None => Ok(cpu(format!("no graphics adapter with {}", wanted.name()))),
+        None => {
+            let narrowed =
+                gpu::narrowed_by(&choice).map_or(String::new(), |narrowed| format!("; {narrowed}"));
+            Ok(cpu(format!("no graphics adapter with {}{narrowed}", wanted.name())))
+        }
         // The reference needs no driver.
         Some(best) if gpu::is_hardware(&best.info) => Ok(open_gpu(plan, wanted).map_or_else(
             |failure| cpu(failure.to_string()),

@@ -6,6 +6,8 @@ use anyhow::anyhow;
 use rattlemap::output::{FolderError, RecordFileError};
 use rattlemap::scene::SceneError;
 
+use crate::say;
+
 /// A command that did not do what was asked.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -18,7 +20,7 @@ pub(crate) enum Failure {
 impl Failure {
     /// Says on stderr what went wrong, causes included, and returns the exit code.
     pub(crate) fn report(&self) -> ExitCode {
-        eprintln!("error: {self}");
+        say::note(format_args!("error: {self}"));
         ExitCode::from(match self {
             Failure::Usage(_) => 2,
             Failure::Run(_) => 1,

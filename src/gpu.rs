@@ -32,7 +32,9 @@ use std::collections::HashMap;
 
 pub(crate) use averaging::Averaging;
 pub use constants::{Constants, STEP_ANGLE};
-pub use device::{AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware};
+pub use device::{
+    AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
+};
 pub use error::GpuError;
 pub use pool::Pool;
 pub use shader::{Precision, Variant, WORKGROUP};

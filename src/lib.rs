@@ -10,6 +10,8 @@
 //! ([`mod@validate`]). Over one axis it is a bifurcation diagram ([`bifurcation`]). All of it is
 //! written down ([`output`]); [`mod@bench`] measures it.
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "output goes where the caller says")]
+
 mod fused;
 pub mod limits;
 mod random;

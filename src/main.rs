@@ -1,5 +1,7 @@
 //! The commands, each a pipeline: ask, check, compute, write.
 
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "these panic where nobody listens: see `say`")]
+
 mod bench_command;
 mod capacity;
 mod cli;
@@ -8,6 +10,7 @@ mod engine_choice;
 mod error;
 mod map_command;
 mod progress;
+mod say;
 mod scene_file;
 mod validate_command;
 

@@ -1,21 +1,22 @@
 //! `rattlemap map`: a scene into a folder, resumable at every batch.
 
-use std::ops::ControlFlow;
-use std::process;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+mod interrupt;
+mod resume_command;
+mod summary;
 
-use anyhow::{Context, anyhow};
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use anyhow::anyhow;
 use rattlemap::coexistence;
 use rattlemap::engine::Engine;
 use rattlemap::gpu::Precision;
 use rattlemap::orbit::Class;
-use rattlemap::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
-use rattlemap::plan::{Plan, count_classes};
+use rattlemap::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError, unfinished};
+use rattlemap::plan::Plan;
 use rattlemap::record::Record;
-use rattlemap::scene::{Purpose, Scene};
-use rattlemap::schedule::{Refined, Schedule};
+use rattlemap::scene::{Purpose, Scene, Steps};
+use rattlemap::schedule::Schedule;
 use rattlemap::sweep::{self, SweepError};
 
 use crate::capacity;
@@ -23,31 +24,39 @@ use crate::cli::{EngineChoice, EngineOptions, Map};
 use crate::engine_choice::{self, Chosen};
 use crate::error::{Failure, fail_if};
 use crate::progress::Progress;
-use crate::scene_file;
-
-/// Exit code after a second Ctrl-C, as shells count it.
-const KILLED: i32 = 130;
+use crate::{say, scene_file};
+use interrupt::Interrupt;
+use resume_command::resume_command;
+use summary::summary;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
     capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
+    let interrupt = Interrupt::listen(ask.run.quiet)?;
     let folder = open_folder(ask)?;
     let plan = Plan::new(&scene);
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;
     if !ask.run.quiet && !why.is_empty() {
-        eprintln!("{} ({}): {why}", engine.name(), engine.precision());
+        say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
+    }
+    let lane_grid = engine.steps_per_period();
+    if let (false, Some(raised)) = (ask.run.quiet, raised_steps(&scene, lane_grid)) {
+        say::note(raised);
     }
     let mut work = Work::new(&plan);
-    let mut file = open_records(ask, &folder, &scene, &mut work, &engine)?;
-    let resumed_cells = file.count();
-    let clock = Instant::now();
-    let unit = unit(&plan);
-    let progress = Progress::new(work.schedule.expected(), resumed_cells, unit, ask.run.quiet);
-    integrate(ask, &mut work, &mut engine, &mut file, &progress)?;
+    let mut kept = open_records(ask, &folder, &scene, &mut work, &engine)?;
+    let resumed_cells = kept.file.count();
+    let total = work.schedule.expected();
+    let progress = match plan.refine() {
+        Some(_) => Progress::of_at_least(total, resumed_cells, unit(&plan), ask.run.quiet),
+        None => Progress::new(total, resumed_cells, unit(&plan), ask.run.quiet),
+    };
+    integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
+    let Kept { elapsed_before, clock, .. } = kept;
     let elapsed = clock.elapsed();
     let attractors = coexistence::attractors(&plan, &records);
     let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
@@ -59,7 +68,9 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         precision,
         device: &device,
         elapsed,
+        elapsed_before,
         resumed_cells,
+        lane_grid,
         refined: refined.clone(),
     };
     let files = output::map::write(&folder, &cells, &run)?;
@@ -102,23 +113,52 @@ fn engine_of(ask: &Map, folder: &Folder) -> EngineOptions {
 }
 
 /// The record file, and what it holds already, by run.
-fn open_records(
+fn open_records<'f>(
     ask: &Map,
-    folder: &Folder,
+    folder: &'f Folder,
     scene: &Scene,
     work: &mut Work<'_>,
     engine: &Engine<'_>,
-) -> Result<RecordFile, Failure> {
+) -> Result<Kept<'f>, Failure> {
     let path = folder.path().join(RECORDS);
     let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
-    let file = if ask.resume && path.is_file() {
+    let (file, elapsed_before) = if ask.resume && path.is_file() {
         let Work { schedule, records, .. } = work;
-        RecordFile::resume(&path, &identity, |batch| sweep::replay(schedule, records, batch))?
+        let file = RecordFile::resume(&path, &identity, |batch| sweep::replay(schedule, records, batch))?;
+        if let Some(damage) = file.damage() {
+            let (path, count, unit) = (path.display(), file.count(), unit(work.plan));
+            say::note(format_args!(
+                "warning: {path}: {damage} and are dropped; {count} {unit} are kept, the others computed again"
+            ));
+        }
+        (file, unfinished::elapsed(folder))
     } else {
-        RecordFile::create(&path, &identity)?
+        (RecordFile::create(&path, &identity)?, Duration::ZERO)
     };
+    // The manifest, which may have that time, too, goes next.
+    if elapsed_before.is_zero() {
+        unfinished::clear(folder)?;
+    } else {
+        unfinished::keep_elapsed(folder, elapsed_before)?;
+    }
     output::map::clear(folder)?;
-    Ok(file)
+    Ok(Kept { file, folder, elapsed_before, clock: Instant::now() })
+}
+
+/// What outlives a run that is interrupted.
+struct Kept<'f> {
+    file: RecordFile,
+    folder: &'f Folder,
+    /// How long earlier runs integrated, and since when this one has.
+    elapsed_before: Duration,
+    clock: Instant,
+}
+
+impl Kept<'_> {
+    fn keep(&mut self, batch: &[(u32, Record)]) -> anyhow::Result<()> {
+        self.file.append(batch)?;
+        unfinished::keep_elapsed(self.folder, self.elapsed_before + self.clock.elapsed())
+    }
 }
 
 /// What is to be done, and what has been.
@@ -140,21 +180,24 @@ fn integrate(
     ask: &Map,
     work: &mut Work<'_>,
     engine: &mut Engine<'_>,
-    file: &mut RecordFile,
+    kept: &mut Kept<'_>,
     progress: &Progress,
+    interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let stop = stop_on_interrupt(ask.run.quiet)?;
     let Work { plan, schedule, records } = work;
-    let swept = pollster::block_on(sweep::run(plan, schedule, engine, records, |batch, known| {
-        file.append(batch)?;
-        progress.report(file.count(), known);
-        let stopped = stop.load(Ordering::Relaxed);
-        Ok(if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
-    }));
+    let keep = |batch: &[(u32, Record)], known| {
+        kept.keep(batch)?;
+        progress.report(kept.file.count(), known);
+        Ok(if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    };
+    let swept = match interrupt.begin() {
+        true => pollster::block_on(sweep::run(plan, schedule, engine, records, keep)),
+        false => Ok(false),
+    };
     let go_on = || {
-        let (done, total, unit) = (file.count(), plan.run_count(), unit(plan));
+        let (done, total, unit) = (kept.file.count(), plan.run_count(), unit(plan));
         let most = if plan.refine().is_some() { "at most " } else { "" };
-        format!("{done} of {most}{total} {unit} are kept; go on with: {}", ask.resume_command())
+        format!("{done} of {most}{total} {unit} are kept; go on with: {}", resume_command(ask))
     };
     match swept {
         Ok(true) => Ok(()),
@@ -164,82 +207,17 @@ fn integrate(
     }
 }
 
-/// A flag that the first Ctrl-C raises; the second one ends the process at once, which the
-/// record file survives, too.
-fn stop_on_interrupt(quiet: bool) -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if raised.swap(true, Ordering::Relaxed) {
-            process::exit(KILLED);
-        }
-        if !quiet {
-            eprintln!("stopping as soon as some cells have ended; Ctrl-C again ends at once");
-        }
-    })
-    .context("cannot listen for Ctrl-C")?;
-    Ok(stop)
-}
-
 /// What is counted while a map is made.
 pub(crate) fn unit(plan: &Plan) -> &'static str {
     if plan.start_count() > 1 { "runs" } else { "cells" }
 }
 
-/// What was done, how fast, and what came out.
-fn summary(cells: &Cells<'_>, run: &output::map::Run<'_>, lane_steps: Option<u64>, seconds: f64) -> String {
-    let (count, [columns, rows]) = (cells.runs(), cells.counts());
-    let unit = if count > columns * rows { "runs" } else { "cells" };
-    let integrated = run.refined.as_ref().map_or(count, |refined| refined.integrated);
-    let integrating = run.elapsed.as_secs_f64().max(1e-9);
-    let here = (integrated - run.resumed_cells) as f64;
-    let periods = cells.periods() as f64 * here / integrated as f64;
-    let [periodic, chaotic, undecided, failed] = count_classes(cells.classes());
-    let resumed = match run.resumed_cells {
-        0 => String::new(),
-        cells => format!(", {cells} of them before"),
-    };
-    let per_step = lane_steps.filter(|&steps| steps > 0).map_or(String::new(), |steps| {
-        format!(", {} ns per lane-step", rounded(1e9 * integrating / steps as f64))
-    });
-    let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
-    format!(
-        "{integrated} {unit}{resumed} on {} ({}) in {integrating:.3} s: {:.0} {unit}/s, {:.0} lane-periods/s\
-         {per_step}; outputs {:.3} s\n{refined}\
-         {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
-        run.engine,
-        run.precision,
-        here / integrating,
-        periods / integrating,
-        seconds - integrating,
-    )
-}
-
-/// Three significant digits.
-fn rounded(x: f64) -> String {
-    let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{x:.digits$}")
-}
-
-/// How much an adaptive map left out, and what the audit says of it.
-fn refinement(refined: &Refined, count: usize) -> String {
-    let share = 100.0 * refined.integrated as f64 / count as f64;
-    let audit = refined.audits.last().map_or(String::new(), |audit| {
-        let [low, high] = audit.interval().map(|rate| 100.0 * rate);
-        let (wrong, sampled, rate) = (audit.wrong, audit.sampled, 100.0 * audit.rate());
-        let words = match (audit.wrong_words, audit.words) {
-            (_, 0) => String::new(),
-            (wrong, words) => format!(", and {wrong} of {words} filled words"),
-        };
-        let failed = if audit.rate() > refined.max_error {
-            let allowed = 100.0 * refined.max_error;
-            format!(", more than the {allowed:.2} % of refine.max_error, but refine.rounds lets no block be halved again")
-        } else {
-            String::new()
-        };
-        format!(
-            "; audit: {wrong} of {sampled} filled cells wrong, {rate:.2} % (95 %: {low:.2} to {high:.2} %){words}{failed}"
-        )
-    });
-    format!("{share:.1} % of {count} cells integrated, the others filled{audit}\n")
+/// What is to be said where lanes take more steps than the scene asks for.
+fn raised_steps(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Option<String> {
+    let Steps::PerPeriod(asked) = scene.integration().steps_per_period else { return None };
+    let [least, most] = lane_grid.filter(|&[_, most]| most > asked)?;
+    let taken = if least == most { most.to_string() } else { format!("{least} to {most}") };
+    Some(format!(
+        "integration.steps_per_period = {asked} is raised to {taken}: lanes need as many, and an even number"
+    ))
 }

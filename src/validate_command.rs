@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow};
 use rattlemap::coexistence;
 use rattlemap::gpu::{self, AdapterChoice, Gpu, Precision};
 use rattlemap::output::map::{MANIFEST, Made, write_validation};
-use rattlemap::output::{Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError};
+use rattlemap::output::{Cells, Extent, Folder, Identity, RECORDS, RecordFile, RecordFileError};
 use rattlemap::plan::Plan;
 use rattlemap::record::Record;
 use rattlemap::scene::{Purpose, Scene, Steps};
@@ -20,6 +20,7 @@ use crate::cli::Validate;
 use crate::error::Failure;
 use crate::map_command::unit;
 use crate::progress::Progress;
+use crate::say;
 
 /// What a manifest has to say.
 #[derive(Deserialize)]
@@ -49,10 +50,15 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         is_lane: manifest.engine == "gpu",
     };
     let sample = validate::sample(&plan, &records, ask.samples as usize, ask.seed);
+    let count = sample.picks.len();
+    let tell = |what: &str| (!ask.quiet).then(|| say::note(format_args!("{what}")));
+    if subject.is_lane {
+        tell(&format!("running the lanes of {count} cells again over a few periods"));
+    }
     let Again { source, device, note } = states(&subject, &scene, &manifest, &sample)?;
-    let progress = Progress::new(sample.picks.len(), 0, "cells replayed", ask.quiet);
-    let validation =
-        validate::replay(&subject, &sample, source, &|done| progress.report(done, sample.picks.len()));
+    tell(&format!("replaying {count} cells on the reference"));
+    let progress = Progress::new(count, 0, "cells replayed", ask.quiet);
+    let validation = validate::replay(&subject, &sample, source, &|done| progress.report(done, count));
     let attractors = coexistence::attractors(&plan, &records);
     let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
@@ -123,18 +129,32 @@ fn read_records(
     let mut records = vec![Record::default(); plan.run_count()];
     let take = |batch: &[(u32, Record)]| sweep::replay(&mut schedule, &mut records, batch);
     let again = "make the map again with `rattlemap map SCENE --force`";
-    let done = RecordFile::read(&path, &identity, take).map_err(|error| match error {
-        RecordFileError::OtherRun { path, differences } => {
-            anyhow!("{} does not belong to the {MANIFEST} beside it: {differences}; {again}", path.display())
-        }
-        RecordFileError::Damaged { path, at, what } => {
-            anyhow!("{} is damaged at byte {at}: {what}; {again}", path.display())
-        }
-        other => other.into(),
-    })?;
+    let go_on = "`rattlemap map SCENE --resume` keeps them and computes the others";
+    let Extent { count, damage, .. } =
+        RecordFile::read(&path, &identity, take).map_err(|error| match error {
+            RecordFileError::OtherRun { path, differences } => {
+                anyhow!(
+                    "{} does not belong to the {MANIFEST} beside it: {differences}; {again}",
+                    path.display()
+                )
+            }
+            RecordFileError::Damaged { path, at, what } => {
+                anyhow!("{} is damaged at byte {at}: {what}; {again}", path.display())
+            }
+            other => other.into(),
+        })?;
     if !schedule.is_finished() {
-        let cells = schedule.expected();
-        return Err(anyhow!("{} holds {done} of {cells} {}; {again}", path.display(), unit(plan)));
+        let (cells, unit) = (schedule.expected(), unit(plan));
+        let damage = damage.map_or(String::new(), |damage| format!("{damage}: "));
+        return Err(anyhow!("{}: {damage}{count} of {cells} {unit} are there; {go_on}", path.display()));
+    }
+    // Nothing is missing: it stands behind the last cell.
+    if let Some(damage) = damage {
+        say::note(format_args!(
+            "warning: {}: {damage}; all {count} {} are there",
+            path.display(),
+            unit(plan)
+        ));
     }
     let refined = schedule.finish(&mut records);
     Ok((records, refined))

@@ -288,3 +288,9 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
     run(&["--force", "--set", "outputs.files=[\"csv\"]"]).success();
     assert_eq!(file_names(&out), ["bifurcation.csv", "manifest.json", "notes.txt"]);
 }
+
+#[test]
+fn orbit_help_says_that_periods_are_no_limit() {
+    let run = rattlemap(&folder()).args(["orbit", "--help"]).assert();
+    run.success().stdout(says(&["No limit", "All of them are integrated"]));
+}

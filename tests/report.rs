@@ -302,3 +302,41 @@ fn a_validated_page_works_in_a_browser() {
     }
     assert_eq!((&said["stays"], &said["zoomed"]), (&json!("6, 8"), &json!(true)));
 }
+
+/// An adaptive map, of which chaos is filled, too.
+const ADAPTIVE: [&str; 5] = [
+    "axis.0.count=81",
+    "axis.1.count=65",
+    "refine.minimum_grid=8",
+    "refine.max_error=0.05",
+    "refine.rounds=2",
+];
+
+/// Chooses a filled cell of chaos and an integrated one, and keeps what is read out of each.
+const CHOOSE: &str = r#"hovered = said.hovered = null;
+  for (const [code, name] of map.sources.entries()) {
+    const id = values.source.findIndex((source, id) => source === code && map.classes[values.class[id]] === "chaotic");
+    choose({ i: id % columns, j: Math.floor(id / columns) });
+    said[name] = ["source", "periods run", "exponent", "impacts per period", "meshing"]
+      .map((label) => fact(label).replace("\u00b1", "+-").replace("\u2013", "none"));
+  }"#;
+
+/// Nobody measured them, and the page must not look as if somebody had.
+#[test]
+fn filled_cells_say_so() {
+    let report = Report::new();
+    assert_eq!(report.data()["values"]["source"], Value::Null, "every cell was integrated");
+    let sets = ADAPTIVE.map(|set| ["--set", set]).concat();
+    report.run(&[&["map", "s.toml", "--quiet", "--out", "o", "--force"], &sets[..]].concat());
+    let (data, table) = (report.data(), report.table());
+    let sources = unpacked(&data["values"]["source"]);
+    assert!(sources.iter().zip(&table).all(|(&code, row)| data["sources"][usize::from(code)] == row[14]));
+    let Some(said) = report.visited(CHOOSE) else { return };
+    let facts = |source: &str| -> [String; 5] { serde_json::from_value(said[source].clone()).unwrap() };
+    let [filled, integrated] = ["filled", "integrated"].map(facts);
+    assert_eq!(filled[..2], ["filled", "0"]);
+    assert_eq!(integrated[0], "integrated");
+    assert!(filled[2..].iter().all(|fact| fact.ends_with(", interpolated")), "{said}");
+    assert!(integrated[2..].iter().all(|fact| !fact.contains("interpolated")), "{said}");
+    assert!(integrated[2].contains("+-") && !filled[2].contains("+-"), "{said}");
+}

@@ -279,7 +279,7 @@ fn planted_records_fail_the_validation_by_name() {
         batch.iter().for_each(|&(id, record)| records[id as usize] = record);
         true
     });
-    assert_eq!(count.unwrap(), 576);
+    assert_eq!(count.unwrap().count, 576);
     let wrong = plant(&mut records);
     let spoilt: Vec<(u32, Record)> = (0..).zip(records).collect();
     RecordFile::create(&path, &identity).unwrap().append(&spoilt).unwrap();

@@ -18,6 +18,7 @@ use super::{cores, processor};
 use crate::capacity;
 use crate::cli::{EngineChoice, Engines};
 use crate::error::Failure;
+use crate::say;
 
 /// Side of the map on which operations are counted.
 const COUNTED_SIDE: u32 = 24;
@@ -145,7 +146,7 @@ fn peak_of(ask: &Engines, engine: &Engine) -> Option<f64> {
 
 fn say(ask: &Engines, text: &str) {
     if !ask.run.quiet {
-        eprintln!("{text}");
+        say::note(text);
     }
 }
 

@@ -11,6 +11,7 @@ use rattlemap::output::Folder;
 use crate::cli::Stability;
 use crate::error::Failure;
 use crate::progress::Progress;
+use crate::say;
 
 /// Decides every random cell: whoever runs this meets the same ones.
 const SEED: u64 = 1;
@@ -28,7 +29,7 @@ pub(crate) fn run(ask: &Stability) -> Result<(), Failure> {
     let made = output::Made { size: name, seed: SEED, device: &device, elapsed: clock.elapsed() };
     let files = output::write(&folder, &report, &made)?;
     if !ask.run.quiet {
-        eprintln!("{}: {}", folder.path().display(), files.join(", "));
+        say::note(format_args!("{}: {}", folder.path().display(), files.join(", ")));
     }
     match report.verdicts.iter().filter(|verdict| !verdict.holds).count() {
         0 => Ok(()),
@@ -58,8 +59,8 @@ impl Watch for Teller {
         // Held, so that lines do not mix with progress.
         let work = self.work.lock().expect("nobody panics while telling");
         match &*work {
-            Some((_, progress)) if !self.quiet => progress.suspend(|| eprintln!("{what}")),
-            _ => eprintln!("{what}"),
+            Some((_, progress)) if !self.quiet => progress.suspend(|| say::note(what)),
+            _ => say::note(what),
         }
     }
 
@@ -69,7 +70,7 @@ impl Watch for Teller {
         let line = format!("{:<10} {mark}: {}", verdict.part, verdict.sentence);
         match done {
             Some((_, progress)) if !self.quiet => progress.finish(&line),
-            _ if !self.quiet || !verdict.holds => eprintln!("{line}"),
+            _ if !self.quiet || !verdict.holds => say::note(line),
             _ => {}
         }
     }

@@ -2,8 +2,10 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::EngineError;
-use crate::gpu::{self, FOLLOWED_MESH_SPEED, GpuError, Lane, LaneSettings, Pool, Tables};
+use crate::gpu::{self, Constants, FOLLOWED_MESH_SPEED, GpuError, Lane, LaneSettings, Pool, Tables};
 use crate::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use crate::scene::Steps;
@@ -80,6 +82,14 @@ impl<'p> Gpu<'p> {
     /// Free steps of all lanes so far.
     pub(super) fn steps(&self) -> u64 {
         self.steps
+    }
+
+    /// The least and the most free steps per forcing period, over all flows that lanes can carry.
+    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
+        let steps = |flow| Constants::steps(&self.plan.oscillator(flow), self.settings.steps_per_period);
+        let all =
+            (0..self.plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
+        all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])
     }
 
     /// Cells that may be begun now.

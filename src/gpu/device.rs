@@ -7,6 +7,10 @@ use super::layout::{Motion, Tally};
 use super::rhythm::Rhythm;
 use super::{Gpu, GpuError, Precision};
 
+/// What narrows the adapters down in the environment: the first is wgpu's own.
+const BACKEND: &str = "WGPU_BACKEND";
+const ADAPTER_NAME: &str = "WGPU_ADAPTER_NAME";
+
 /// Which adapter to take.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AdapterChoice {
@@ -61,7 +65,7 @@ impl AdapterChoice {
 
     /// The adapter that the environment names by `WGPU_ADAPTER_NAME`, else the best.
     pub fn from_environment() -> AdapterChoice {
-        AdapterChoice { name: std::env::var("WGPU_ADAPTER_NAME").ok().filter(|name| !name.is_empty()) }
+        AdapterChoice { name: std::env::var(ADAPTER_NAME).ok().filter(|name| !name.is_empty()) }
     }
 }
 
@@ -207,6 +211,20 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
     Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: None, rhythm, watcher: None })
 }
 
+/// What in the environment narrows the adapters down, as far as `choice` heeds it, and what to do about it; none
+/// if nothing does.
+pub fn narrowed_by(choice: &AdapterChoice) -> Option<String> {
+    let value = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let backend = value(BACKEND).map(|value| (BACKEND, value, "give vulkan, metal or dx12"));
+    let named = choice.name.clone().filter(|name| value(ADAPTER_NAME).as_ref() == Some(name));
+    let named =
+        named.map(|value| (ADAPTER_NAME, value, "give part of a name that `rattlemap devices` lists"));
+    let sentence =
+        |(name, value, remedy)| format!("the environment has {name}={value}: unset it, or {remedy}");
+    let list: Vec<String> = backend.into_iter().chain(named).map(sentence).collect();
+    (!list.is_empty()).then(|| list.join("; "))
+}
+
 fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
     let mut wanted = match precision {
         Precision::F32 => String::from("at all"),
@@ -223,7 +241,9 @@ fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter
         })
         .collect();
     let found = if list.is_empty() { String::from("none") } else { list.join(", ") };
-    GpuError::NoAdapter { wanted, found }
+    let remedy = narrowed_by(choice)
+        .unwrap_or_else(|| String::from("install a Vulkan driver (Debian: mesa-vulkan-drivers)"));
+    GpuError::NoAdapter { wanted, remedy, found }
 }
 
 fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::BindGroupLayout {

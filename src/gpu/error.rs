@@ -4,13 +4,12 @@
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
     /// No adapter fits.
-    #[error(
-        "no graphics adapter {wanted}; install a Vulkan driver (Debian: mesa-vulkan-drivers) or use the CPU engine. \
-         Found: {found}"
-    )]
+    #[error("no graphics adapter {wanted}; {remedy}, or use the CPU engine. Found: {found}")]
     NoAdapter {
         /// What was asked for.
         wanted: String,
+        /// What may give one.
+        remedy: String,
         /// What there is.
         found: String,
     },

@@ -160,9 +160,10 @@ impl<'a> Cells<'a> {
             class: asks_class.then_some(class),
             period: (asks_class && periodic).then_some(record.period),
             lyapunov,
-            // The exponent of a cycle comes from its multipliers: there is no average.
+            // The exponent of a cycle comes from its multipliers: there is no average. Nor is there one
+            // of a filled cell, whose exponent nobody measured.
             lyapunov_error: lyapunov
-                .filter(|_| !periodic && record.lyapunov_error.is_finite())
+                .filter(|_| !periodic && !is_filled && record.lyapunov_error.is_finite())
                 .map(|_| record.lyapunov_error),
             impacts_per_period: asked(Quantity::Impacts, valid::IMPACTS, record.impacts_per_period),
             mesh_fraction: asked(Quantity::Mesh, valid::MESH, record.mesh_fraction),

@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::validation_json::ValidationObject;
-use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest, report};
+use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest, report, unfinished};
 use crate::scene::Format;
 use crate::validate::Validation;
 
@@ -54,6 +54,7 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Resul
     files.extend(pictures?);
     files.push(MANIFEST.to_owned());
     folder.write_json(MANIFEST, &map_manifest::map(cells, run, &files))?;
+    unfinished::clear(folder)?;
     Ok(files)
 }
 

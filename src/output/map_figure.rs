@@ -27,6 +27,11 @@ const ROW: f64 = 33.0;
 const PATCH: (f64, f64) = (34.0, 20.0);
 const BAR_WIDTH: f64 = 34.0;
 const BAR_HEIGHT: f64 = 260.0;
+/// Room for a bar's name, and between it and the entries above.
+const BAR_HEAD: f64 = 44.0;
+const ABOVE_BAR: f64 = 26.0;
+/// Height of a picture's inside at least.
+const LOWEST: f64 = 700.0;
 
 /// Draws a layer as a PNG.
 ///
@@ -34,8 +39,21 @@ const BAR_HEIGHT: f64 = 260.0;
 /// A file that cannot be written, by name.
 pub(super) fn write(path: &Path, cells: &Cells<'_>, layer: &Layer) -> Result<()> {
     let [width, height] = cells.counts().map(side);
-    let size = (LEFT + width + GAP + BESIDE, TOP + height.max(700.0) + BELOW);
+    let inside = height.max(legend_height(layer)).max(LOWEST);
+    let size = (LEFT + width + GAP + BESIDE, TOP + inside + BELOW);
     save_figure(path, (size.0 as u32, size.1 as u32), |canvas| draw(canvas, cells, layer, [width, height]))
+}
+
+/// Height of what stands beside the map: entries, then the bar.
+fn legend_height(layer: &Layer) -> f64 {
+    let entries = ROW * layer.entries.len() as f64;
+    layer.bar.as_ref().map_or(entries, |_| bar_top(layer) + BAR_HEAD + BAR_HEIGHT)
+}
+
+/// Where the bar begins, below the legend's top.
+fn bar_top(layer: &Layer) -> f64 {
+    let entries = ROW * layer.entries.len() as f64;
+    if layer.entries.is_empty() { 0.0 } else { entries + ABOVE_BAR }
 }
 
 /// Pixels for a number of cells.
@@ -54,14 +72,11 @@ fn draw(canvas: &Canvas<'_>, cells: &Cells<'_>, layer: &Layer, [width, height]: 
     let [x, y] = [0, 1].map(|i| axis(&scene.axes()[i]));
     Frame { rect, x, y }.draw_axes(canvas, true)?;
     let left = rect.right + GAP;
-    let mut top = draw_entries(canvas, layer, (left, TOP), cells)?;
-    if let Some(bar) = &layer.bar {
-        if !layer.entries.is_empty() {
-            top += 26.0;
-        }
-        draw_bar(canvas, bar, (left, top))?;
+    draw_entries(canvas, layer, (left, TOP), cells)?;
+    match &layer.bar {
+        Some(bar) => draw_bar(canvas, bar, (left, TOP + bar_top(layer))),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Where cells start and how long they run: what a map means depends on it.
@@ -103,13 +118,13 @@ fn rgb([r, g, b]: [u8; 3]) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-/// Draws a list of colours with their names and shares; returns where it ends.
+/// Draws a list of colours with their names and shares.
 fn draw_entries(
     canvas: &Canvas<'_>,
     layer: &Layer,
     (left, top): (f64, f64),
     cells: &Cells<'_>,
-) -> Result<f64> {
+) -> Result<()> {
     let total: usize = cells.counts().iter().product();
     let right = left + BESIDE - GAP - 20.0;
     for (row, entry) in layer.entries.iter().enumerate() {
@@ -123,7 +138,7 @@ fn draw_entries(
         canvas.text(&text, (left + PATCH.0 + 14.0, y), SMALL, Align::Left, DARK)?;
         canvas.text(&share, (right, y), SMALL, Align::Right, DARK)?;
     }
-    Ok(top + ROW * layer.entries.len() as f64)
+    Ok(())
 }
 
 fn share(entry: &Entry, total: usize) -> String {
@@ -137,10 +152,55 @@ fn share(entry: &Entry, total: usize) -> String {
 
 fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64)) -> Result<()> {
     canvas.text(bar.label, (left, top + 12.0), SMALL, Align::Left, DARK)?;
-    let top = top + 44.0;
+    let top = top + BAR_HEAD;
     let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
     canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row])?;
     canvas.outline(rect, 1.0)?;
     let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact("", bar.low, bar.high) };
     frame.draw_scale(canvas)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Plan;
+    use crate::record::Record;
+    use crate::scene::Purpose;
+
+    const LOW: [u8; 3] = [1, 2, 3];
+    const HIGH: [u8; 3] = [4, 5, 6];
+
+    /// Of a map that is lower than its legend, the whole bar is in the picture.
+    #[test]
+    fn long_legends_make_room_for_themselves() {
+        let text = "[[axis]]\nparameter = 'e'\nmin = 0.0\nmax = 1.0\ncount = 8\n\
+                    [[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 12.0\ncount = 600\n";
+        let scene = Scene::parse(text, "s", &[], Purpose::Map).unwrap();
+        let plan = Plan::new(&scene);
+        let records = vec![Record::default(); plan.run_count()];
+        let cells = Cells::new(&scene, &plan, &records);
+        let dir = tempfile::tempdir().unwrap();
+        for count in [0, 1, 21, 60] {
+            let entry = |n: usize| Entry { color: [200; 3], text: format!("period {n}"), cells: 1 };
+            let bar = Bar { label: "exponent", colors: vec![LOW, [120; 3], HIGH], low: 0.0, high: 1.0 };
+            let layer = Layer {
+                name: "map",
+                short: "map",
+                title: "a map",
+                indices: vec![0; records.len()],
+                palette: vec![[255; 3]],
+                entries: (0..count).map(entry).collect(),
+                bar: Some(bar),
+            };
+            let path = dir.path().join("map.png");
+            write(&path, &cells, &layer).unwrap();
+            let picture = image::open(&path).unwrap().to_rgb8();
+            let pixels = |color: [u8; 3]| picture.pixels().filter(|pixel| pixel.0 == color).count();
+            // Each of three colours has a third of the bar, less the outline.
+            let least = (BAR_WIDTH - 4.0) * (BAR_HEIGHT / 3.0 - 4.0);
+            for color in [LOW, HIGH] {
+                assert!(pixels(color) as f64 > least, "{count} entries: {} of {least}", pixels(color));
+            }
+        }
+    }
 }

@@ -37,10 +37,14 @@ pub struct Run<'a> {
     pub precision: &'a str,
     /// What it ran on.
     pub device: &'a str,
-    /// Time spent integrating in this run; less than the whole where it was resumed.
+    /// Time spent integrating in this run.
     pub elapsed: Duration,
+    /// And in those that it went on from.
+    pub elapsed_before: Duration,
     /// Cells of an earlier run that this one went on from.
     pub resumed_cells: usize,
+    /// The least and the most free steps that lanes take per forcing period; none where there is no grid.
+    pub lane_grid: Option<[u32; 2]>,
     /// How an adaptive map went.
     pub refined: Option<Refined>,
 }
@@ -69,6 +73,7 @@ pub(super) struct Manifest<'a> {
     attractors: Option<BTreeMap<u8, usize>>,
     periods: u64,
     codes: Codes,
+    /// Of all runs that the map took.
     elapsed_seconds: f64,
     resumed_cells: usize,
     refinement: Option<RefinementObject>,
@@ -77,7 +82,11 @@ pub(super) struct Manifest<'a> {
 
 #[derive(Serialize)]
 struct IntegrationObject {
+    /// As the scene asks; null for as many as the motion needs.
     steps_per_period: Option<u32>,
+    /// As lanes took them, over all flows; null on the CPU.
+    least_steps_used: Option<u32>,
+    most_steps_used: Option<u32>,
     transient_periods: u32,
     observed_periods: u32,
     early_stop: bool,
@@ -147,7 +156,7 @@ pub(super) fn map<'a>(cells: &Cells<'a>, run: &Run<'a>, files: &'a [String]) -> 
         axes: scene.axes().iter().map(AxisObject::from).collect(),
         parameters: Parameters::of_scene(scene),
         start: start(scene),
-        integration: integration(scene),
+        integration: integration(scene, run.lane_grid),
         quantities: scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect(),
         cells: cells.counts().iter().product(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
@@ -155,20 +164,22 @@ pub(super) fn map<'a>(cells: &Cells<'a>, run: &Run<'a>, files: &'a [String]) -> 
         attractors: cells.attractors().map(tally),
         periods: cells.periods(),
         codes: codes(),
-        elapsed_seconds: run.elapsed.as_secs_f64(),
+        elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,
         refinement: run.refined.as_ref().map(RefinementObject::from),
         files,
     }
 }
 
-fn integration(scene: &Scene) -> IntegrationObject {
+fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> IntegrationObject {
     let settings = scene.integration();
     IntegrationObject {
         steps_per_period: match settings.steps_per_period {
             Steps::Auto => None,
             Steps::PerPeriod(steps) => Some(steps),
         },
+        least_steps_used: lane_grid.map(|[least, _]| least),
+        most_steps_used: lane_grid.map(|[_, most]| most),
         transient_periods: settings.transient_periods,
         observed_periods: settings.observed_periods,
         early_stop: settings.early_stop,

@@ -1,9 +1,6 @@
 //! One orbit on the terminal and in its folder: `orbit.json` and figures.
 
 use std::fs;
-use std::io::{ErrorKind, Write};
-
-use anyhow::Context;
 
 use super::orbit_json::to_json;
 use super::orbit_summary::summary;
@@ -26,11 +23,7 @@ const JSON: &str = "orbit.json";
 /// If stdout cannot be written, unless its reader has closed it.
 pub fn print(pair: &GearPair, orbit: &Orbit, json: bool) -> anyhow::Result<()> {
     let text = if json { to_json(pair, orbit)? } else { summary(pair, orbit) };
-    match writeln!(std::io::stdout(), "{}", text.trim_end()) {
-        // A reader that has seen enough, `head` say, is no reason to leave the rest undone.
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        written => written.context("cannot write to stdout"),
-    }
+    super::print(&text)
 }
 
 /// Writes the orbit and, unless it failed, its figures. Returns the number of files.

@@ -8,18 +8,23 @@
 //! then per batch: cells before it u64   cells u32   crc32 u32 (over all else)   ids u32 each   records
 //! ```
 //!
-//! A run that is killed while it writes leaves a torn last batch; it is cut off and
-//! computed again.
+//! A run that is killed while it writes leaves a torn last batch. A disk may do worse, anywhere.
+//! Batches are good up to the first one that is not; what follows is cut off and computed again.
+
+mod reader;
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use fs4::fs_std::FileExt;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+pub use reader::{Damage, Extent};
+
 use crate::record::{RECORD_VERSION, Record};
+use reader::Reader;
 
 /// Its name in a map's folder.
 pub const RECORDS: &str = "records.bin";
@@ -28,8 +33,6 @@ const MAGIC: [u8; 8] = *b"RTLMAP\0\x02";
 const BATCH_HEAD: usize = 16;
 const RECORD: usize = size_of::<Record>();
 const ID: usize = size_of::<u32>();
-/// Batches above this are no batches of ours.
-const MOST_CELLS: u32 = 1 << 24;
 
 const _: () = assert!(cfg!(target_endian = "little"), "records are written as they lie in memory");
 
@@ -50,7 +53,7 @@ pub enum RecordFileError {
         /// What differs, with both values.
         differences: String,
     },
-    /// The file cannot be trusted.
+    /// It does not say whose records it holds, or holds what no run of this version asks for.
     #[error("--resume: {} is damaged at byte {at}: {what}; start anew with --force", .path.display())]
     Damaged {
         /// The file.
@@ -105,10 +108,9 @@ impl Identity {
     /// # Errors
     /// [`RecordFileError`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Identity, RecordFileError> {
-        let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
-        let file = File::open(path).map_err(io)?;
-        let length = file.metadata().map_err(io)?.len();
-        Reader { input: BufReader::new(&file), path, at: 0, length }.identity()
+        let file =
+            File::open(path).map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?;
+        Reader::new(&file, path)?.identity()
     }
 
     /// The engine's name.
@@ -152,6 +154,7 @@ pub struct RecordFile {
     file: File,
     path: PathBuf,
     count: usize,
+    damage: Option<Damage>,
 }
 
 impl RecordFile {
@@ -170,15 +173,14 @@ impl RecordFile {
         head.extend(crc32fast::hash(&identity).to_le_bytes());
         head.extend(identity);
         file.set_len(0).and_then(|()| file.write_all(&head)).and_then(|()| file.sync_all()).map_err(io)?;
-        Ok(RecordFile { file, path: path.to_owned(), count: 0 })
+        Ok(RecordFile { file, path: path.to_owned(), count: 0, damage: None })
     }
 
-    /// Opens the file of an interrupted run; `take` gets every batch that is whole, ids with their
-    /// records, and says whether the run asks for them. A torn last batch is
-    /// cut off.
+    /// Opens the file of an interrupted run; `take` gets every batch that is good, ids with their
+    /// records, and says whether the run asks for them. What follows the first damage is cut off.
     ///
     /// # Errors
-    /// [`RecordFileError`] if the file is another run's, damaged, in use or unreadable.
+    /// [`RecordFileError`] if the file is another run's, has no readable header, is in use or unreadable.
     pub fn resume(
         path: &Path,
         identity: &Identity,
@@ -186,29 +188,33 @@ impl RecordFile {
     ) -> Result<RecordFile, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         let mut file = lock(OpenOptions::new().read(true).write(true).open(path).map_err(io)?, path)?;
-        let (done, end) = Reader::open(&file, path, identity)?.batches(take)?;
+        let Extent { count, end, damage } = Reader::open(&file, path, identity)?.batches(take)?;
         file.set_len(end).and_then(|()| file.seek(SeekFrom::End(0))).map_err(io)?;
-        Ok(RecordFile { file, path: path.to_owned(), count: done })
+        Ok(RecordFile { file, path: path.to_owned(), count, damage })
     }
 
-    /// Reads a file and leaves it alone; `take` is as for [`RecordFile::resume`]. Returns how many
-    /// records were read.
+    /// Reads a file and leaves it alone; `take` is as for [`RecordFile::resume`].
     ///
     /// # Errors
-    /// [`RecordFileError`] if the file is another run's, damaged or unreadable.
+    /// [`RecordFileError`] if the file is another run's, has no readable header or is unreadable.
     pub fn read(
         path: &Path,
         identity: &Identity,
         take: impl FnMut(&[(u32, Record)]) -> bool,
-    ) -> Result<usize, RecordFileError> {
+    ) -> Result<Extent, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         let file = File::open(path).map_err(io)?;
-        Ok(Reader::open(&file, path, identity)?.batches(take)?.0)
+        Reader::open(&file, path, identity)?.batches(take)
     }
 
     /// Records that the file holds.
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// What was cut off when the file was opened, if anything was.
+    pub fn damage(&self) -> Option<&Damage> {
+        self.damage.as_ref()
     }
 
     /// Appends the next batch, ids with their records, and sees it onto the disk.
@@ -244,113 +250,4 @@ fn checksum(before: &[u8], cells: &[u8], body: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     [before, cells, body].into_iter().for_each(|part| hasher.update(part));
     hasher.finalize()
-}
-
-struct Reader<'a> {
-    input: BufReader<&'a File>,
-    path: &'a Path,
-    at: u64,
-    length: u64,
-}
-
-impl<'a> Reader<'a> {
-    /// At the first batch of a file, which must be the run's that `identity` names.
-    fn open(file: &'a File, path: &'a Path, identity: &Identity) -> Result<Reader<'a>, RecordFileError> {
-        let length =
-            file.metadata().map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?.len();
-        let mut reader = Reader { input: BufReader::new(file), path, at: 0, length };
-        let differences = reader.identity()?.differences(identity);
-        if !differences.is_empty() {
-            return Err(RecordFileError::OtherRun { path: path.to_owned(), differences });
-        }
-        Ok(reader)
-    }
-
-    fn take(&mut self, buffer: &mut [u8]) -> Result<(), RecordFileError> {
-        let path = self.path;
-        self.input
-            .read_exact(buffer)
-            .map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?;
-        self.at += buffer.len() as u64;
-        Ok(())
-    }
-
-    fn left(&self) -> u64 {
-        self.length - self.at
-    }
-
-    fn damaged(&self, at: u64, what: &'static str) -> RecordFileError {
-        RecordFileError::Damaged { path: self.path.to_owned(), at, what }
-    }
-
-    fn identity(&mut self) -> Result<Identity, RecordFileError> {
-        let mut head = [0; 16];
-        if self.left() < 16 {
-            return Err(self.damaged(0, "its header is incomplete"));
-        }
-        self.take(&mut head)?;
-        if head[..8] != MAGIC {
-            return Err(self.damaged(0, "it is no record file of this version"));
-        }
-        let length = u32_at(&head, 8);
-        if self.left() < u64::from(length) {
-            return Err(self.damaged(16, "its header is incomplete"));
-        }
-        let mut identity = vec![0; length as usize];
-        self.take(&mut identity)?;
-        if crc32fast::hash(&identity) != u32_at(&head, 12) {
-            return Err(self.damaged(16, "its header does not match the checksum"));
-        }
-        serde_json::from_slice(&identity).map_err(|_| self.damaged(16, "its header cannot be read"))
-    }
-
-    /// Reads batches up to the end or a torn last one; returns the number of records and the
-    /// length of what is whole.
-    fn batches(
-        &mut self,
-        mut take: impl FnMut(&[(u32, Record)]) -> bool,
-    ) -> Result<(usize, u64), RecordFileError> {
-        let mut done = 0;
-        let mut body = Vec::new();
-        while self.left() >= BATCH_HEAD as u64 {
-            let start = self.at;
-            let mut head = [0; BATCH_HEAD];
-            self.take(&mut head)?;
-            let cells = u32_at(&head, 8);
-            let bytes = u64::from(cells) * (ID + RECORD) as u64;
-            if bytes > self.left() {
-                // A batch this long may be torn, or its length may be wrong.
-                let plausible = cells <= MOST_CELLS && head[..8] == (done as u64).to_le_bytes();
-                return if plausible {
-                    Ok((done, start))
-                } else {
-                    Err(self.damaged(start, "a batch that cannot be"))
-                };
-            }
-            body.resize(bytes as usize, 0);
-            self.take(&mut body)?;
-            if checksum(&head[..8], &head[8..12], &body) != u32_at(&head, 12) {
-                // A batch is torn only if nothing follows it.
-                let torn = self.left() == 0;
-                return if torn {
-                    Ok((done, start))
-                } else {
-                    Err(self.damaged(start, "a batch does not match its checksum"))
-                };
-            }
-            let (ids, records) = body.split_at(cells as usize * ID);
-            let ids = ids.chunks_exact(ID).map(|id| u32_at(id, 0));
-            let batch: Vec<(u32, Record)> =
-                ids.zip(bytemuck::pod_collect_to_vec::<u8, Record>(records)).collect();
-            if head[..8] != (done as u64).to_le_bytes() || !take(&batch) {
-                return Err(self.damaged(start, "a batch is out of place"));
-            }
-            done += cells as usize;
-        }
-        Ok((done, self.at))
-    }
-}
-
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }

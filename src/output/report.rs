@@ -16,7 +16,7 @@ use flate2::write::GzEncoder;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cells::{Cells, Row};
+use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
@@ -43,6 +43,7 @@ struct Data<'a> {
     values: serde_json::Map<String, serde_json::Value>,
     classes: [&'static str; 4],
     statuses: Vec<&'static str>,
+    sources: Vec<&'static str>,
     words: Vec<String>,
     /// What became of an adaptive map.
     refinement: Option<RefinementObject>,
@@ -115,6 +116,7 @@ pub(super) fn write(
         values: values(cells, words)?,
         classes: names::CLASSES,
         statuses: Status::ALL.iter().map(|&status| names::status(status)).collect(),
+        sources: SOURCES.iter().map(|&source| names::source(source)).collect(),
         words: words.map_or(Vec::new(), |words| words.list.iter().map(|(text, _)| text.clone()).collect()),
         refinement: cells.refinement().map(RefinementObject::from),
         validation,
@@ -176,6 +178,9 @@ fn values(
     }
     if cells.asks(Quantity::Symmetric) {
         list.push(("symmetric", bytes(|row| row.symmetric.map_or(u8::MAX, u8::from))));
+    }
+    if cells.refinement().is_some() {
+        list.push(("source", bytes(|row| row.source as u8)));
     }
     if let Some(counts) = cells.attractors() {
         list.push(("attractors", packed("u8", counts)));

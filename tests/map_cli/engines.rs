@@ -26,6 +26,10 @@ fn lanes_give_the_same_files_and_classes() {
         let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
         assert_eq!(manifest["engine"], "gpu");
         assert_eq!(manifest["precision"], precision);
+        let integration = &manifest["integration"];
+        let [least, most] =
+            ["least_steps_used", "most_steps_used"].map(|name| integration[name].as_u64().unwrap());
+        assert!(integration["steps_per_period"].is_null() && least >= 8 && most > least, "{integration}");
         let device = manifest["device"].as_str().unwrap();
         assert!(device.contains('(') && device.contains(';'), "no driver in {device}");
     }
@@ -70,4 +74,53 @@ fn devices_says_what_there_is_and_what_auto_takes() {
     let hardware = || says(&["a hardware GPU"]);
     let run = map(&folder, &["--engine", "auto", "--out", "few"]);
     run.success().stderr(says(&["cpu (f64): no hardware GPU, and soon done: "]).or(hardware()));
+}
+
+/// What was asked for stays; what was done is said beside it.
+#[test]
+fn steps_that_are_too_few_are_raised_aloud() {
+    let folder = folder();
+    let steps = |engine: &str, steps: u32, out: &str| {
+        let set = format!("integration.steps_per_period={steps}");
+        let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--set", &set];
+        let run = map(&folder, &[&["--engine", engine, "--out", out], &few[..]].concat()).success();
+        let manifest = fs::read_to_string(folder.path().join(out).join("manifest.json")).unwrap();
+        let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+        (String::from_utf8_lossy(&run.get_output().stderr).into_owned(), manifest["integration"].clone())
+    };
+    let (said, integration) = steps("gpu", 1, "few");
+    let [least, most] =
+        ["least_steps_used", "most_steps_used"].map(|name| integration[name].as_u64().unwrap());
+    assert_eq!(integration["steps_per_period"], 1);
+    assert!(8 <= least && least < most, "{integration}");
+    let raised = format!("integration.steps_per_period = 1 is raised to {least} to {most}: ");
+    assert!(said.contains(&raised), "{said}");
+    let (said, integration) = steps("gpu", 400, "many");
+    assert_eq!(
+        (&integration["least_steps_used"], &integration["most_steps_used"]),
+        (&400.into(), &400.into())
+    );
+    assert!(!said.contains("raised"), "{said}");
+    let (said, integration) = steps("cpu", 1, "cpu");
+    assert!(integration["most_steps_used"].is_null() && !said.contains("raised"), "{integration} {said}");
+}
+
+/// The environment is named where it is what leaves no adapter.
+#[test]
+fn an_environment_that_leaves_no_adapter_is_named() {
+    let folder = folder();
+    let refused = |variable: &str, value: &str, remedy: &str| {
+        let mut run = command(&folder, &["map", "s.toml", "--engine", "gpu"]);
+        let set = format!("the environment has {variable}={value}: unset it, or give {remedy}");
+        run.env(variable, value).assert().code(2).stderr(says(&[&set]));
+    };
+    refused("WGPU_BACKEND", "foo", "vulkan, metal or dx12");
+    refused("WGPU_BACKEND", "gl", "vulkan, metal or dx12");
+    refused("WGPU_ADAPTER_NAME", "no such thing", "part of a name");
+    let mut devices = command(&folder, &["devices"]);
+    devices
+        .env("WGPU_BACKEND", "foo")
+        .assert()
+        .success()
+        .stdout(says(&["WGPU_BACKEND=foo", "auto takes cpu"]));
 }

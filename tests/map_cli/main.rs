@@ -1,16 +1,17 @@
 //! `rattlemap map` as scripts see it: files of the contract, refusals, resumption.
 
+mod adaptive;
 mod engines;
+mod interrupts;
+mod records;
+mod streams;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command as Process, Stdio};
-use std::time::Duration;
 
 use assert_cmd::Command;
 use predicates::prelude::*;
-use rattlemap::output::{Identity, RecordFile};
-use rattlemap::record::Record;
 use tempfile::TempDir;
 
 const SCENE: &str = r#"title = "A <small> map"
@@ -210,155 +211,6 @@ fn what_is_not_asked_for_is_empty_and_not_written() {
         assert!([4, 5, 6, 7, 8, 10, 11].iter().all(|&field| row[field].is_empty()), "{row:?}");
         assert!(!row[9].is_empty() && row[14] == "integrated", "{row:?}");
     }
-}
-
-/// Every file of `SAME` in a folder.
-fn bytes(out: &Path) -> Vec<Vec<u8>> {
-    SAME.iter().map(|name| fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))).collect()
-}
-
-/// Cuts the one batch of a short run's record file into five, as a longer run would have left them.
-fn cut_into_batches(path: &Path) {
-    let identity = Identity::read(path).unwrap();
-    let mut all = Vec::new();
-    let take = |batch: &[(u32, Record)]| {
-        all.extend_from_slice(batch);
-        true
-    };
-    RecordFile::read(path, &identity, take).unwrap();
-    let mut file = RecordFile::create(path, &identity).unwrap();
-    all.chunks(all.len().div_ceil(5)).for_each(|batch| file.append(batch).unwrap());
-}
-
-#[test]
-fn torn_files_are_resumed_to_the_same_bytes() {
-    let folder = folder();
-    map(&folder, &["--quiet", "--out", "whole"]).success();
-    let whole = folder.path().join("whole");
-    cut_into_batches(&whole.join("records.bin"));
-    let (expected, records) = (bytes(&whole), fs::read(whole.join("records.bin")).unwrap());
-    let cut = folder.path().join("cut");
-    fs::create_dir(&cut).unwrap();
-    // From inside the last batch back to the header's end.
-    let head = 16 + u32::from_le_bytes(records[8..12].try_into().unwrap()) as usize;
-    for length in [records.len() - 1, records.len() / 2, head + 100, head + 3, head] {
-        fs::write(cut.join("records.bin"), &records[..length]).unwrap();
-        map(&folder, &["--quiet", "--out", "cut", "--resume"]).success();
-        assert!(bytes(&cut) == expected, "cut to {length} of {} bytes", records.len());
-    }
-    // A finished run only writes its files again.
-    fs::remove_file(cut.join("map.png")).unwrap();
-    map(&folder, &["--out", "cut", "--resume"]).success().stderr(says(&["320 cells, 320 of them before"]));
-    assert!(bytes(&cut) == expected);
-}
-
-/// Starts a run that takes a while, and gives it `delay` milliseconds once its records have
-/// begun.
-fn interrupted(folder: &TempDir, arguments: &[&str], delay: u64, signal: &str) -> (Option<i32>, String) {
-    let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"))
-        .current_dir(folder.path())
-        .args(["map", "s.toml", "--out", "cut"])
-        .args(arguments)
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let records: PathBuf = folder.path().join("cut/records.bin");
-    while !records.exists() {
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    std::thread::sleep(Duration::from_millis(delay));
-    Process::new("kill").args([signal, &run.id().to_string()]).status().unwrap();
-    let mut said = String::new();
-    std::io::Read::read_to_string(run.stderr.as_mut().unwrap(), &mut said).unwrap();
-    (run.wait().unwrap().code(), said)
-}
-
-#[cfg(unix)]
-#[test]
-fn killed_runs_are_resumed_to_the_same_bytes() {
-    let slow = ["--set", "integration.early_stop=false"];
-    for (engine, longest) in
-        [(&["--engine", "cpu"][..], 300), (&["--engine", "gpu", "--precision", "f64"], 2500)]
-    {
-        let folder = folder();
-        let arguments = [engine, &slow].concat();
-        map(&folder, &[&arguments[..], &["--quiet", "--out", "whole"]].concat()).success();
-        let expected = bytes(&folder.path().join("whole"));
-        for signal in ["-KILL", "-INT", "-KILL"] {
-            let delay = moment() % longest;
-            let (code, said) = interrupted(&folder, &arguments, delay, signal);
-            if signal == "-INT" && code != Some(0) {
-                assert_eq!(code, Some(1), "{said}");
-                let go_on = format!(
-                    "of 320 cells are kept; go on with: rattlemap map s.toml --out cut {} \
-                     --set integration.early_stop=false --resume",
-                    engine.join(" ")
-                );
-                assert!(said.trim_end().ends_with(&go_on), "{said}");
-            }
-            // Without an engine it goes on with the one that it began with.
-            let go_on = [&["map", "s.toml"], &slow[..], &["--quiet", "--out", "cut", "--resume"]].concat();
-            command(&folder, &go_on).assert().success();
-            let cut = folder.path().join("cut");
-            assert!(bytes(&cut) == expected, "{engine:?}: {signal} after {delay} ms");
-            fs::remove_dir_all(cut).unwrap();
-        }
-    }
-}
-
-/// A number that no two runs share.
-fn moment() -> u64 {
-    u64::from(std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().subsec_micros())
-}
-
-#[test]
-fn records_of_another_run_are_refused() {
-    let folder = folder();
-    let few = ["--quiet", "--set", "axis.0.count=4", "--set", "axis.1.count=3"];
-    map(&folder, &few).success();
-    let records = folder.path().join("out/s/records.bin");
-    let before = fs::read(&records).unwrap();
-    let cases: [(&[&str], &[&str]); 3] = [
-        (&["--set", "axis.0.max=0.9"], &["`axis.0.max` was 1.0, now 0.9"]),
-        (
-            &["--set", "F=51", "--set", "start.policy=state", "--set", "start.state=[0,0,0,1]"],
-            &["`parameters.F` was 50.0, now 51.0", "`start` was rest, now state [0.0, 0.0, 0.0, 1.0]"],
-        ),
-        (&["--set", "outputs.quantities=[\"class\"]"], &["`outputs.quantities` was [class, lyapunov,"]),
-    ];
-    for (sets, parts) in cases {
-        let run = map(&folder, &[&few[..], sets, &["--resume"]].concat());
-        run.code(2).stdout("").stderr(says(parts).and(says(&["out/s/records.bin", "--force"])));
-    }
-    let other_version = String::from_utf8_lossy(&before).contains(env!("CARGO_PKG_VERSION"));
-    assert!(other_version && fs::read(&records).unwrap() == before, "the records were touched");
-    // Title and kinds of file may change.
-    map(&folder, &[&few[..], &["--set", "title=Other", "--resume"]].concat()).success();
-}
-
-#[test]
-fn damaged_records_are_refused() {
-    let folder = folder();
-    map(&folder, &["--quiet"]).success();
-    let path = folder.path().join("out/s/records.bin");
-    cut_into_batches(&path);
-    let good = fs::read(&path).unwrap();
-    let head = 16 + u32::from_le_bytes(good[8..12].try_into().unwrap()) as usize;
-    for (at, part) in [
-        (0, "damaged at byte 0: it is no record file of this version"),
-        (20, "damaged at byte 16: its header does not match the checksum"),
-        (head + 200, "a batch does not match its checksum; start anew with --force"),
-        (head, "a batch does not match its checksum"),
-    ] {
-        let mut bad = good.clone();
-        bad[at] ^= 0x10;
-        fs::write(&path, bad).unwrap();
-        map(&folder, &["--resume"]).code(2).stdout("").stderr(says(&["records.bin is damaged", part]));
-    }
-    fs::write(&path, &good[..10]).unwrap();
-    map(&folder, &["--resume"]).code(2).stderr(says(&["its header is incomplete"]));
-    map(&folder, &["--quiet", "--force"]).success();
-    assert!(fs::read(&path).unwrap()[..head] == good[..head]);
 }
 
 #[test]

@@ -208,7 +208,9 @@ impl<'a> Bench<'a> {
             precision: self.engine.precision(),
             device: self.engine.device(),
             elapsed: Duration::from_secs_f64(run.times.running()),
+            elapsed_before: Duration::ZERO,
             resumed_cells: 0,
+            lane_grid: None,
             refined: None,
         };
         map::write(self.folder, &cells, &made)?;

@@ -178,16 +178,20 @@ function facts({ i, j }) {
   const exponent = number("lyapunov");
   const symmetric = { 0: "no", 1: "yes" }[at("symmetric")];
   const word = map.words?.[at("word")];
+  const source = map.sources[at("source")];
+  // Of a filled cell nothing was measured.
+  const between = (text) => (text !== undefined && source === "filled" ? `${text}, interpolated` : text);
   return [
     [map.axes[0].parameter, a], [map.axes[1].parameter, b],
     ["class", kind === "periodic" ? `period ${at("period")}` : kind],
-    ["exponent", error && exponent ? `${exponent} \u00b1 ${error}` : exponent],
-    ["impacts per period", number("impacts_per_period")],
-    ["meshing", number("mesh_fraction")],
+    ["exponent", between(error && exponent ? `${exponent} \u00b1 ${error}` : exponent)],
+    ["impacts per period", between(number("impacts_per_period"))],
+    ["meshing", between(number("mesh_fraction"))],
     ["symmetric", symmetric],
     ["word", word === "" ? "no events" : word],
     ...(values.attractors ? [["attractors found", at("attractors")]] : []),
     ["status", map.statuses[at("status")]],
+    ...(values.source ? [["source", source]] : []),
     ["periods run", at("periods_run")],
     ["cell", `${i}, ${j}`],
   ];

@@ -1,0 +1,196 @@
+//! `records.bin`: torn, damaged and foreign ones, and what is kept of them.
+
+use rattlemap::output::{Identity, RecordFile};
+use rattlemap::record::Record;
+
+use super::*;
+
+/// Every file of `SAME` in a folder.
+pub(super) fn bytes(out: &Path) -> Vec<Vec<u8>> {
+    SAME.iter().map(|name| fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))).collect()
+}
+
+/// Cuts the one batch of a short run's record file into five, as a longer run would have left them.
+fn cut_into_batches(path: &Path) {
+    let identity = Identity::read(path).unwrap();
+    let mut all = Vec::new();
+    let take = |batch: &[(u32, Record)]| {
+        all.extend_from_slice(batch);
+        true
+    };
+    RecordFile::read(path, &identity, take).unwrap();
+    let mut file = RecordFile::create(path, &identity).unwrap();
+    all.chunks(all.len().div_ceil(5)).for_each(|batch| file.append(batch).unwrap());
+}
+
+#[test]
+fn torn_files_are_resumed_to_the_same_bytes() {
+    let folder = folder();
+    map(&folder, &["--quiet", "--out", "whole"]).success();
+    let whole = folder.path().join("whole");
+    cut_into_batches(&whole.join("records.bin"));
+    let (expected, records) = (bytes(&whole), fs::read(whole.join("records.bin")).unwrap());
+    let cut = folder.path().join("cut");
+    fs::create_dir(&cut).unwrap();
+    // From inside the last batch back to the header's end.
+    let head = 16 + u32::from_le_bytes(records[8..12].try_into().unwrap()) as usize;
+    for length in [records.len() - 1, records.len() / 2, head + 100, head + 3, head] {
+        fs::write(cut.join("records.bin"), &records[..length]).unwrap();
+        map(&folder, &["--quiet", "--out", "cut", "--resume"]).success();
+        assert!(bytes(&cut) == expected, "cut to {length} of {} bytes", records.len());
+    }
+    // A finished run only writes its files again.
+    fs::remove_file(cut.join("map.png")).unwrap();
+    map(&folder, &["--out", "cut", "--resume"]).success().stderr(says(&["320 cells, 320 of them before"]));
+    assert!(bytes(&cut) == expected);
+}
+
+#[test]
+fn records_of_another_run_are_refused() {
+    let folder = folder();
+    let few = ["--quiet", "--set", "axis.0.count=4", "--set", "axis.1.count=3"];
+    map(&folder, &few).success();
+    let records = folder.path().join("out/s/records.bin");
+    let before = fs::read(&records).unwrap();
+    let cases: [(&[&str], &[&str]); 3] = [
+        (&["--set", "axis.0.max=0.9"], &["`axis.0.max` was 1.0, now 0.9"]),
+        (
+            &["--set", "F=51", "--set", "start.policy=state", "--set", "start.state=[0,0,0,1]"],
+            &["`parameters.F` was 50.0, now 51.0", "`start` was rest, now state [0.0, 0.0, 0.0, 1.0]"],
+        ),
+        (&["--set", "outputs.quantities=[\"class\"]"], &["`outputs.quantities` was [class, lyapunov,"]),
+    ];
+    for (sets, parts) in cases {
+        let run = map(&folder, &[&few[..], sets, &["--resume"]].concat());
+        run.code(2).stdout("").stderr(says(parts).and(says(&["out/s/records.bin", "--force"])));
+    }
+    let other_version = String::from_utf8_lossy(&before).contains(env!("CARGO_PKG_VERSION"));
+    assert!(other_version && fs::read(&records).unwrap() == before, "the records were touched");
+    // Title and kinds of file may change.
+    map(&folder, &[&few[..], &["--set", "title=Other", "--resume"]].concat()).success();
+}
+
+/// Where batches begin, and where the last one ends.
+fn ends(records: &[u8]) -> Vec<usize> {
+    let u32_at = |at: usize| u32::from_le_bytes(records[at..at + 4].try_into().unwrap()) as usize;
+    let mut ends = vec![16 + u32_at(8)];
+    while ends.last().is_some_and(|&end| end < records.len()) {
+        let at = ends[ends.len() - 1];
+        ends.push(at + 16 + u32_at(at + 8) * (4 + 160));
+    }
+    ends
+}
+
+/// Damage behind good batches, or among them, costs what follows it and nothing else.
+#[test]
+fn good_records_before_damage_are_kept() {
+    let folder = folder();
+    map(&folder, &["--quiet", "--out", "whole"]).success();
+    let whole = folder.path().join("whole");
+    cut_into_batches(&whole.join("records.bin"));
+    let (expected, records) = (bytes(&whole), fs::read(whole.join("records.bin")).unwrap());
+    let ends = ends(&records);
+    assert_eq!((ends.len(), ends[5]), (6, records.len()));
+    let flipped = |at: usize| {
+        let mut bad = records.clone();
+        bad[at] ^= 0x10;
+        bad
+    };
+    let noise: Vec<u8> = (0..1000u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    let with_tail = |batches: usize, tail: &[u8]| [&records[..ends[batches]], tail].concat();
+    let cut = folder.path().join("cut");
+    fs::create_dir(&cut).unwrap();
+    let cases = [
+        (with_tail(3, &[0; 1000]), 3, "1000 bytes from"),
+        (with_tail(3, &noise), 3, "1000 bytes from"),
+        (with_tail(5, &[0; 7]), 5, "7 bytes from"),
+        (with_tail(2, &records[ends[2]..ends[3] - 1]), 2, "a batch is cut short"),
+        (with_tail(2, &records[ends[1]..]), 2, "a batch is out of place"),
+        (flipped(ends[0] + 200), 0, "a batch does not match its checksum"),
+        (flipped(ends[3]), 3, "a batch does not match its checksum"),
+        (flipped(ends[4] + 11), 4, "a batch is cut short"),
+    ];
+    for (bad, batches, part) in cases {
+        fs::write(cut.join("records.bin"), bad).unwrap();
+        let (at, kept) =
+            (format!("from byte {} on", ends[batches]), format!("{} cells are kept", 64 * batches));
+        let run = map(&folder, &["--out", "cut", "--resume"]).success();
+        run.stderr(says(&["warning: cut/records.bin", part, &at, &kept]));
+        assert!(bytes(&cut) == expected, "{part}, {batches} batches");
+        assert!(fs::read(cut.join("records.bin")).unwrap()[..ends[batches]] == records[..ends[batches]]);
+    }
+}
+
+#[test]
+fn a_finished_map_with_a_damaged_record_says_how_to_mend_it() {
+    let folder = folder();
+    map(&folder, &["--quiet"]).success();
+    let path = folder.path().join("out/s/records.bin");
+    let good = fs::read(&path).unwrap();
+    let mut bad = good.clone();
+    bad[good.len() - 50] ^= 1;
+    fs::write(&path, bad).unwrap();
+    let validate = |quiet: &[&str]| {
+        let arguments = [&["validate", "out/s", "--samples", "8"], quiet].concat();
+        command(&folder, &arguments).assert()
+    };
+    validate(&[]).code(2).stderr(says(&["a batch does not match its checksum", "--resume"]));
+    map(&folder, &["--resume", "--quiet"]).success();
+    validate(&["--quiet"]).success().stderr("");
+    // What stands behind the last cell is no reason to refuse.
+    fs::write(&path, [&good[..], &[0; 100]].concat()).unwrap();
+    validate(&["--quiet"]).success().stderr(says(&[
+        "warning",
+        "100 bytes from byte",
+        "all 320 cells are there",
+    ]));
+}
+
+#[test]
+fn records_without_a_readable_header_are_refused() {
+    let folder = folder();
+    map(&folder, &["--quiet"]).success();
+    let path = folder.path().join("out/s/records.bin");
+    let good = fs::read(&path).unwrap();
+    let head = 16 + u32::from_le_bytes(good[8..12].try_into().unwrap()) as usize;
+    for (at, part) in [
+        (0, "damaged at byte 0: it is no record file of this version"),
+        (20, "damaged at byte 16: its header does not match the checksum"),
+    ] {
+        let mut bad = good.clone();
+        bad[at] ^= 0x10;
+        fs::write(&path, bad).unwrap();
+        let run = map(&folder, &["--resume"]).code(2).stdout("");
+        run.stderr(says(&["records.bin is damaged", part, "start anew with --force"]));
+    }
+    fs::write(&path, &good[..10]).unwrap();
+    map(&folder, &["--resume"]).code(2).stderr(says(&["its header is incomplete"]));
+    map(&folder, &["--quiet", "--force"]).success();
+    assert!(fs::read(&path).unwrap()[..head] == good[..head]);
+}
+
+/// The time that a map took is that of all its runs.
+#[test]
+fn elapsed_time_adds_up() {
+    let folder = folder();
+    let few = ["--quiet", "--set", "axis.0.count=4", "--set", "axis.1.count=3"];
+    map(&folder, &few).success();
+    let out = folder.path().join("out/s");
+    let manifest = out.join("manifest.json");
+    let elapsed = || {
+        let text = fs::read_to_string(&manifest).unwrap();
+        serde_json::from_str::<serde_json::Value>(&text).unwrap()["elapsed_seconds"].as_f64().unwrap()
+    };
+    let resume = || map(&folder, &[&few[..], &["--resume"]].concat()).success();
+    let first = elapsed();
+    resume();
+    assert!(first > 0.0 && elapsed() >= first, "{first} {}", elapsed());
+    // An unfinished run has no manifest, and says it elsewhere.
+    fs::remove_file(&manifest).unwrap();
+    fs::write(out.join("unfinished.json"), "{\"elapsed_seconds\": 1000.0}").unwrap();
+    resume();
+    assert!((1000.0..1100.0).contains(&elapsed()), "{}", elapsed());
+    assert!(!out.join("unfinished.json").exists());
+    map(&folder, &[&few[..], &["--force"]].concat()).success();
+    assert!(elapsed() < 100.0, "{}", elapsed());
+}
