@@ -174,6 +174,9 @@ pub struct Orbit {
     pub cycle_periods: u32,
     /// The forcing period `T`.
     pub forcing_period: f64,
+    /// Forcing periods that the motion was followed for, from its start through all looks at it; searches
+    /// beside it are not among them.
+    pub periods_run: u64,
 }
 
 /// One point of a densely sampled trajectory.

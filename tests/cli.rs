@@ -28,7 +28,7 @@ fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
 /// Asserts that a parsed `orbit --json` object has exactly the fields of the contract.
 fn assert_orbit_fields(orbit: &serde_json::Value) {
     let fields = "class e events floquet impacts_per_period lyapunov lyapunov_error mesh_fraction omega \
-                  parameters period status strobe symmetric word";
+                  parameters period periods_run status strobe symmetric word";
     assert_eq!(keys(orbit), fields);
     for event in orbit["events"].as_array().expect("events is a list") {
         assert_eq!(keys(event), "after before kind side t t_mod_period");
@@ -206,6 +206,8 @@ fn orbit_json_has_the_fields_of_the_contract() {
     assert_eq!(orbit["word"], "36");
     assert_eq!(orbit["lyapunov_error"], serde_json::Value::Null);
     assert_eq!(orbit["events"].as_array().unwrap().len(), 2);
+    // The transient, a turning tangent vector, one look.
+    assert_eq!(orbit["periods_run"], 400 + 50 + 128);
 }
 
 #[test]

@@ -47,6 +47,7 @@ fn orbit(events: Vec<Event>) -> Orbit {
         events,
         cycle_periods: 1,
         forcing_period: PERIOD,
+        periods_run: 0,
     }
 }
 

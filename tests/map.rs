@@ -245,6 +245,9 @@ fn slow_cells_hold_up_nobody() {
     }
 }
 
+/// When cells under way end, and which.
+type Ends = BTreeSet<(u32, u32)>;
+
 /// Periods until the last of an adaptive map's cells has ended, on a device that runs as many side by side as there
 /// are: if records are taken up one by one, once half of what is under way has ended, as the sweep does, and once
 /// all has; and if a device is looked at every 64 periods, while the next 64 are under way, and what has ended is taken
@@ -262,7 +265,7 @@ fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_oft
     integrated.sort_unstable();
     let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();
     // `wait` says when what has ended by then is taken up, from when each of those under way will.
-    let periods = |wait: &dyn Fn(u32, &BTreeSet<(u32, u32)>) -> u32| {
+    let periods = |wait: &dyn Fn(u32, &Ends) -> u32| {
         let mut schedule = Schedule::new(&plan);
         let mut records = vec![Record::default(); plan.cell_count()];
         let (mut now, mut under_way) = (0, BTreeSet::new());
@@ -281,7 +284,7 @@ fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_oft
         assert_eq!(asked, integrated);
         now
     };
-    let end = |under_way: &BTreeSet<(u32, u32)>, n: usize| under_way.iter().nth(n).unwrap().0;
+    let end = |under_way: &Ends, n: usize| under_way.iter().nth(n).unwrap().0;
     let singly = periods(&|_, under_way| end(under_way, 0));
     let by_halves = periods(&|_, under_way| end(under_way, (under_way.len() - 1) / 2));
     let in_rounds = periods(&|_, under_way| end(under_way, under_way.len() - 1));

@@ -67,7 +67,9 @@ pub fn analyse_over(pair: &GearPair, start: State, settings: &Settings, shown_pe
 /// [`analyse_over`] on a flow that is at hand: maps share one among many cells.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, shown_periods: u32) -> Orbit {
     let analysis = Analysis { flow, law, settings, shown_periods };
-    analysis.run(start).unwrap_or_else(|stop| failed(status_of(stop), start, flow.period))
+    let mut periods_run = 0;
+    let run = analysis.run(start, &mut periods_run);
+    Orbit { periods_run, ..run.unwrap_or_else(|stop| failed(status_of(stop), start, flow.period)) }
 }
 
 pub(crate) fn status_of(stop: Stop) -> Status {
@@ -95,6 +97,7 @@ fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
         events: Vec::new(),
         cycle_periods: 0,
         forcing_period,
+        periods_run: 0,
     }
 }
 
@@ -116,10 +119,12 @@ pub(super) struct Analysis<'a> {
 }
 
 impl Analysis<'_> {
-    fn run(&self, start: State) -> Result<Orbit, Stop> {
+    /// Counts in `periods_run` how long the motion is followed.
+    fn run(&self, start: State, periods_run: &mut u64) -> Result<Orbit, Stop> {
         let mut trajectory = Trajectory::new(self.flow, self.law, start);
         for _ in 0..self.settings.transient_periods {
             self.advance(&mut trajectory)?;
+            *periods_run += 1;
         }
         if let Some(orbit) = self.quiet(&trajectory)? {
             return Ok(orbit);
@@ -127,7 +132,7 @@ impl Analysis<'_> {
         let mut length = self.settings.observed_periods.max(2);
         let last = length.max(LONGEST_WINDOW);
         loop {
-            let window = self.observe(&mut trajectory, length)?;
+            let window = self.observe(&mut trajectory, length, periods_run)?;
             let found = candidates(&window.strobes, &window.metric, self.settings.max_period);
             for candidate in &found {
                 if let Some(orbit) = self.confirm(&trajectory, &window, candidate)? {
@@ -174,11 +179,17 @@ impl Analysis<'_> {
     }
 
     /// Watches strobe states, the exponent and the averages for `length` periods.
-    fn observe(&self, trajectory: &mut Trajectory<'_, 0>, length: u32) -> Result<Window, Stop> {
+    fn observe(
+        &self,
+        trajectory: &mut Trajectory<'_, 0>,
+        length: u32,
+        periods_run: &mut u64,
+    ) -> Result<Window, Stop> {
         let mut carrier = trajectory.carrying([FRESH_TANGENT]);
         let mut exponent = Exponent::default();
         for _ in 0..TANGENT_PERIODS.min(length) {
             self.advance(&mut carrier)?;
+            *periods_run += 1;
             exponent.renormalise(&mut carrier);
         }
         exponent.forget();
@@ -186,6 +197,7 @@ impl Analysis<'_> {
         let mut strobes = vec![carrier.state()];
         for _ in 0..length {
             self.advance(&mut carrier)?;
+            *periods_run += 1;
             exponent.renormalise(&mut carrier);
             strobes.push(carrier.state());
         }
@@ -330,6 +342,7 @@ impl Analysis<'_> {
             events: reading.events,
             cycle_periods: cycle.period,
             forcing_period: self.flow.period,
+            periods_run: 0,
         })
     }
 
@@ -356,6 +369,7 @@ impl Analysis<'_> {
             events: reading.events,
             cycle_periods: self.shown_periods,
             forcing_period: self.flow.period,
+            periods_run: 0,
         })
     }
 }

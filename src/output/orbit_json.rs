@@ -23,6 +23,8 @@ struct OrbitObject<'a> {
     impacts_per_period: f64,
     mesh_fraction: f64,
     status: &'static str,
+    /// Forcing periods that the motion was followed for.
+    periods_run: u64,
     strobe: State,
     events: Vec<EventObject>,
 }
@@ -70,6 +72,7 @@ pub(super) fn to_json(pair: &GearPair, orbit: &Orbit) -> serde_json::Result<Stri
         impacts_per_period: orbit.impacts_per_period,
         mesh_fraction: orbit.mesh_fraction,
         status: names::status(orbit.status),
+        periods_run: orbit.periods_run,
         strobe: orbit.strobe,
         events: orbit.events.iter().map(EventObject::from).collect(),
     })

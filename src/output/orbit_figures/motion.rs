@@ -138,6 +138,7 @@ mod tests {
             events,
             cycle_periods: 1,
             forcing_period: 2.0,
+            periods_run: 0,
         }
     }
 
