@@ -203,8 +203,12 @@ fn field_name(field: Field) -> &'static str {
         Field::Word => "word",
         Field::Symmetric => "symmetric",
         Field::Exponent => "lyapunov",
+        Field::ExponentError => "lyapunov_error",
         Field::Impacts => "impacts_per_period",
         Field::Mesh => "mesh_fraction",
+        Field::Status => "status",
+        Field::Periods => "periods_run",
+        Field::Kept => "valid",
         Field::State => "state",
     }
 }
@@ -216,7 +220,8 @@ fn meaning(explanation: Explanation) -> &'static str {
             "the engine's caps ended the cell, as its status says, and it does need more"
         }
         Explanation::UndecidedInBudget => {
-            "one side does not decide within the periods allowed; with more of them both say the same"
+            "one side does not decide within the periods allowed; on the reference the motion settles too late for that, or \
+             grows too little"
         }
         Explanation::CoexistingAttractor => {
             "another attractor of the same cell: the reference stays on it when started on the map's last state"

@@ -2,17 +2,18 @@
 
 use super::Subject;
 use super::answer::{Answer, Bars, Field};
+use super::reading::counts;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::classify::classify;
 use crate::flow::Flow;
 use crate::gpu::Precision;
 use crate::model::{GearPair, Law, Side, State};
-use crate::orbit::{Budget, Class, Measured, analyse_flow, measure};
+use crate::orbit::{Budget, Class, Measured, Scatter, analyse_flow, measure};
 use crate::random::Random;
 use crate::record::{Record, valid};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::StrobeMap;
+use crate::stability::{Exponent, FRESH_TANGENT, StrobeMap};
 
 /// Parameters and starts moved by this much, relatively, are the same within rounding of a
 /// lane. Some roundings of a precision: errors gather over the steps of a period.
@@ -68,7 +69,7 @@ impl<'a> Case<'a> {
             is_lane: subject.is_lane,
             truth: Answer::from(&measured),
             measured,
-            bars: Bars::new(subject.precision, flow.period),
+            bars: Bars::new(subject.precision, flow.period, &budget),
             flow,
         }
     }
@@ -80,7 +81,29 @@ impl<'a> Case<'a> {
 
     /// What the reference says of another start when it may take the time it needs.
     pub(super) fn at_leisure(&self, start: State) -> Answer {
-        Answer::from(&analyse_flow(&self.flow, self.law, start, &self.budget.settings, 1))
+        let orbit = analyse_flow(&self.flow, self.law, start, &self.budget.settings, 1);
+        let is_cycle = matches!(orbit.class, Class::Periodic { .. } | Class::Failed);
+        let mut answer = Answer::from(&orbit);
+        if let (false, Some((error, scatter))) = (is_cycle, self.scatter(orbit.strobe)) {
+            (answer.exponent, answer.scatter) = (Some([orbit.lyapunov, error]), Some(scatter));
+        }
+        answer
+    }
+
+    /// How averages over the observed periods scatter on the way from a state: the exponent's standard error, and the
+    /// others.
+    fn scatter(&self, from: State) -> Option<(f64, Scatter)> {
+        let mut motion = Trajectory::<0>::new(&self.flow, self.law, from).carrying([FRESH_TANGENT]);
+        let mut exponent = Exponent::default();
+        let mut met = vec![counts(&motion)];
+        let observed = self.budget.settings.observed_periods;
+        for _ in 0..observed {
+            motion.advance_period(&mut ()).ok()?;
+            exponent.renormalise(&mut motion);
+            met.push(counts(&motion));
+        }
+        let (_, error) = exponent.estimate(self.flow.period);
+        Some((error, Scatter::of(&met, observed, self.flow.period)))
     }
 
     /// The pair with one parameter moved to either side by this much, relatively.

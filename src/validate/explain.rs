@@ -8,11 +8,13 @@ use super::answer::{Answer, Difference, Field};
 use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
 use super::explanation::Explanation;
 use super::lane_growth::{rare_chaos, weak_chaos};
+use super::left_open::is_open_by_its_figures;
 use super::limits::{
     flip, held, is_shaken, is_spent, late, leaves_chaos_open, longer, rest, scattered, undecided_chaos,
     within_scatter,
 };
 use super::on_the_way::{has_averages_ahead, has_averages_on_the_way};
+use super::reached::is_reached;
 use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
 use super::unsettled::unsettled;
@@ -43,6 +45,10 @@ const MOST_RUNS: u64 = 1000;
 /// The explanation of a cell's differences: of its states and of its answer, if both differ.
 pub(super) fn explain(case: &Case<'_>, differences: &[Difference]) -> Option<Explanation> {
     let (states, answers): (Vec<_>, Vec<_>) = differences.iter().partition(|d| d.field == Field::State);
+    // No rounding makes a lane go on beyond its periods.
+    if answers.iter().any(|difference| difference.field == Field::Periods) {
+        return None;
+    }
     let of_states = (!states.is_empty()).then(|| explain_states(case));
     let of_answers = (!answers.is_empty()).then(|| explain_answer(case));
     match (of_answers, of_states) {
@@ -83,7 +89,8 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rare_cap,
     ];
     // A record without a period claims averages all the same.
-    CHECKS.iter().find_map(|check| check(case)).filter(|_| has_averages_on_the_way(case))
+    let is_claimed = || is_open_by_its_figures(case) && has_averages_on_the_way(case);
+    CHECKS.iter().find_map(|check| check(case)).filter(|_| is_claimed())
 }
 
 fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
@@ -145,7 +152,7 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         _ => None,
     };
     let is_left_open = || {
-        let is_too_weak = leaves_chaos_open(case, &case.standing(from).ok()?, &answer)?;
+        let is_too_weak = leaves_chaos_open(case, &answer)?;
         Some(is_too_weak && has_averages_ahead(case))
     };
     let same = case.is_the_records(&answer)
@@ -154,7 +161,9 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         || unresolved(case, from, &answer) == Some(true)
         || read_rounded(case, from, &answer) == Some(true)
         || is_left_open() == Some(true);
-    same.then_some(match classify(case.record) {
+    // On the cell's own attractor it needs no other reason to be there.
+    let is_its_own = answer.class == case.truth.class && answer.word == case.truth.word;
+    (same && (is_its_own || is_reached(case, &answer))).then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
     })

@@ -6,6 +6,7 @@
 //! is rounded as a lane's is, it gives a record's chaos or shows that there was none.
 
 use super::answer::Answer;
+use super::averages::UNSURE;
 use super::case::Case;
 use super::explanation::Explanation;
 use super::lane_model::LaneModel;
@@ -28,16 +29,19 @@ const RUNS: u64 = 16;
 /// And where nothing else gives the record's answer: one or two of a hundred may do as a lane did.
 const MOST_RUNS: u64 = 1000;
 
-/// The record says chaotic where the reference, averaged in its own way, decides nothing.
+/// Neither side is on a cycle, and the reference, averaged in its own way, has another class or other averages.
 ///
 /// The reference's own motion, averaged as a lane would, gives the record's answer: neither had
 /// the periods to tell what is chaos in the end. Or one that starts within rounding does, or one
 /// that is rounded at every step: then what it met on the way was decided by rounding.
 pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
-    let lane = AsLane::of_weak_chaos(case)?;
+    let is_open = |class| matches!(class, Class::Chaotic | Class::Undecided);
+    let classes = [classify(case.record), case.truth.class];
+    let lane = AsLane::new(case).filter(|_| case.is_lane && classes.into_iter().all(is_open))?;
     let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
     if same(lane.answer(case.start)) {
-        return Some(Explanation::UndecidedInBudget);
+        let are_chaos = classes == [Class::Chaotic; 2];
+        return Some(if are_chaos { Explanation::Chaos } else { Explanation::UndecidedInBudget });
     }
     let nudged = (0..8).map(|k| case.nudged_start(k)).chain(case.scattered_starts(STARTS));
     if nudged.map(|start| lane.answer(start)).any(same) {
@@ -111,9 +115,6 @@ impl Watched for Rounded<'_, 1> {
         [impacts, meshing_time, self.trajectory().work().events as f64]
     }
 }
-
-/// Standard errors of eight blocks differ by less than this factor, 99 times of 100.
-const UNSURE: f64 = 3.0;
 
 /// What is the same for all motions of a cell.
 struct AsLane<'c, 'a> {

@@ -410,7 +410,8 @@ function table(caption, heads, lines, numbers = []) {
 
 const STRATA = { uniform: "from all cells", border: "at a border of classes" };
 const FIELDS = { class: "class", period: "period", word: "word, up to mirror image", symmetric: "symmetry",
-  lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing",
+  lyapunov: "exponent", lyapunov_error: "the exponent's error", impacts_per_period: "impacts per period",
+  mesh_fraction: "time in meshing", status: "status", periods_run: "periods integrated", valid: "fields kept",
   state: "state, within the error budget" };
 
 function stateText({ check, ...states }, samples) {

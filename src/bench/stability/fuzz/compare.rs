@@ -2,7 +2,7 @@
 
 use super::super::cells::EngineName;
 use super::super::lanes::Start;
-use super::{SETTINGS, Told, each, lane_settings};
+use super::{SETTINGS, Told, budget, each, lane_settings};
 use crate::bench::stability::Watch;
 use crate::classify::classify;
 use crate::gpu::Precision;
@@ -55,7 +55,7 @@ pub(super) fn all(
 ) -> Comparison {
     let differs = |&i: &usize| {
         let period = std::f64::consts::TAU / cells[i].0.omega;
-        !disagreements(&truth[i], &records[i], precision, period).is_empty()
+        !disagreements(&truth[i], &records[i], precision, period, &budget()).is_empty()
     };
     let is_silent = |&i: &usize| {
         classify(&records[i]) == Class::Undecided && records[i].periods_run >= lane_settings().periods

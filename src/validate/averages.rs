@@ -1,0 +1,89 @@
+//! Are two averages those of the same motion, where it is on no cycle?
+//!
+//! Both sides average the motion over different stretches, and after some periods of chaos over different
+//! motions of one kind. How far such averages scatter is measured on the reference ([`Scatter`]): standard errors
+//! from block means. What a record says of its own error widens no bar beyond what the reference's is; it is
+//! compared itself.
+
+use super::answer::{Answer, Bars, Compared, Field, Value, compared};
+use crate::orbit::Scatter;
+use crate::record::{Record, valid};
+
+/// Standard errors by which two averages of the same motion may differ.
+const SAME_ERRORS: f64 = 5.0;
+
+/// What two exponents may differ by beside that, per forcing period: standard errors from 16 blocks are
+/// themselves uncertain, and tangents are measured in other units.
+const EXPONENT_FLOOR: f64 = 0.01;
+
+/// Standard errors of eight blocks differ by less than this factor, 99 times of 100.
+pub(super) const UNSURE: f64 = 3.0;
+
+/// What standard errors may differ by beside that, per forcing period.
+const ERROR_FLOOR: f64 = 0.002;
+
+/// Where the averaging begins and ends decides on so many impacts, and on a period's meshing.
+const IMPACTS_AT_ENDS: f64 = 2.0;
+const PERIODS_AT_ENDS: f64 = 1.0;
+
+/// The standard error that an exponent would have over the record's periods, from one over `periods`.
+pub(super) fn error_over(record: &Record, bars: &Bars, error: f64, periods: u32) -> f64 {
+    let own = record.periods_run.saturating_sub(bars.exponent_from).max(1);
+    error * (f64::from(periods.max(1)) / f64::from(own)).sqrt()
+}
+
+/// Whether an exponent is the record's: within standard errors of the reference's making.
+pub(super) fn is_same_exponent(
+    record: &Record,
+    bars: &Bars,
+    [theirs, error]: [f64; 2],
+    periods: u32,
+) -> bool {
+    let likely = error_over(record, bars, error, periods);
+    let own = record.lyapunov_error.min(UNSURE * likely);
+    let bar = SAME_ERRORS * error.hypot(own) + EXPONENT_FLOOR / bars.forcing_period;
+    (record.lyapunov - theirs).abs() <= bar
+}
+
+/// Whether the record's standard error may be that of the reference's motion.
+pub(super) fn is_same_error(record: &Record, bars: &Bars, error: f64, periods: u32) -> bool {
+    let likely = error_over(record, bars, error, periods);
+    let (own, floor) = (record.lyapunov_error, ERROR_FLOOR / bars.forcing_period);
+    own <= UNSURE * likely + floor && likely <= UNSURE * own + floor
+}
+
+impl Answer {
+    /// Compares averages of motion that both sides say is on no cycle.
+    pub(super) fn compare_averages(&self, record: &Record, bars: &Bars, list: &mut Vec<Compared>) {
+        let Some(Scatter { exponent_periods, periods, errors }) = self.scatter else { return };
+        let has = |bit| record.valid & bit != 0;
+        if let (true, Some([theirs, error])) = (has(valid::LYAPUNOV), self.exponent)
+            && error.is_finite()
+        {
+            let same = is_same_exponent(record, bars, [theirs, error], exponent_periods);
+            list.push(compared(Field::Exponent, same, || numbers(record.lyapunov, theirs)));
+            let same = is_same_error(record, bars, error, exponent_periods);
+            list.push(compared(Field::ExponentError, same, || numbers(record.lyapunov_error, error)));
+        }
+        let averages = [
+            (
+                Field::Impacts,
+                valid::IMPACTS,
+                record.impacts_per_period,
+                self.impacts_per_period,
+                IMPACTS_AT_ENDS,
+            ),
+            (Field::Mesh, valid::MESH, record.mesh_fraction, self.mesh_fraction, PERIODS_AT_ENDS),
+        ];
+        for ((field, bit, ours, theirs, at_ends), error) in averages.into_iter().zip(errors) {
+            if let (true, Some(theirs), true) = (has(bit), theirs, error.is_finite()) {
+                let bar = SAME_ERRORS * error.hypot(error) + at_ends / f64::from(periods.max(1));
+                list.push(compared(field, (ours - theirs).abs() <= bar, || numbers(ours, theirs)));
+            }
+        }
+    }
+}
+
+fn numbers(ours: f64, theirs: f64) -> (Value, Value) {
+    (Value::Number(ours), Value::Number(theirs))
+}
