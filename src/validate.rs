@@ -27,6 +27,7 @@ mod rounded;
 mod rounding;
 mod same_cycle;
 mod sample;
+mod spread;
 pub mod states;
 mod unsettled;
 
@@ -42,7 +43,7 @@ pub use states::{Quantiles, StateCheck, StateSource};
 use crate::gpu::Precision;
 use crate::orbit::{Budget, Measured};
 use crate::plan::Plan;
-use crate::record::Record;
+use crate::record::{Record, valid};
 use answer::{Answer, Bars, Compared};
 use case::Case;
 use states::Errors;
@@ -90,6 +91,12 @@ pub struct Mismatch {
 pub struct Validation {
     /// Seed of the sample.
     pub seed: u64,
+    /// Runs of the map: one per cell and start.
+    pub runs: usize,
+    /// Those that were filled from their neighbours and never integrated; none of them is replayed.
+    pub filled: usize,
+    /// Whether cells have several starts.
+    pub has_starts: bool,
     /// Cells by stratum.
     pub strata: Vec<StratumCount>,
     /// Cells compared, by field.
@@ -104,6 +111,11 @@ impl Validation {
     /// Cells that were replayed.
     pub fn sampled(&self) -> usize {
         self.strata.iter().map(|stratum| stratum.sampled).sum()
+    }
+
+    /// What is counted.
+    pub fn counted(&self) -> &'static str {
+        if self.has_starts { "runs" } else { "cells" }
     }
 
     /// Mismatches without an explanation.
@@ -183,6 +195,9 @@ pub fn replay(
     mismatches.sort_by_key(|mismatch| mismatch.id);
     Validation {
         seed: sample.seed,
+        runs: subject.records.len(),
+        filled: subject.records.iter().filter(|record| record.valid & valid::FILLED != 0).count(),
+        has_starts: subject.plan.start_count() > 1,
         strata: sample.strata.clone(),
         agreement: agreement.to_vec(),
         states: errors.check(source),

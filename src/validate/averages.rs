@@ -22,10 +22,6 @@ pub(super) const UNSURE: f64 = 3.0;
 /// What standard errors may differ by beside that, per forcing period.
 const ERROR_FLOOR: f64 = 0.002;
 
-/// Where the averaging begins and ends decides on so many impacts, and on a period's meshing.
-const IMPACTS_AT_ENDS: f64 = 2.0;
-const PERIODS_AT_ENDS: f64 = 1.0;
-
 /// The standard error that an exponent would have over the record's periods, from one over `periods`.
 pub(super) fn error_over(record: &Record, bars: &Bars, error: f64, periods: u32) -> f64 {
     let own = record.periods_run.saturating_sub(bars.exponent_from).max(1);
@@ -40,7 +36,7 @@ pub(super) fn is_same_exponent(
     periods: u32,
 ) -> bool {
     let likely = error_over(record, bars, error, periods);
-    let own = record.lyapunov_error.min(UNSURE * likely);
+    let own = record.lyapunov_error.min(likely);
     let bar = SAME_ERRORS * error.hypot(own) + EXPONENT_FLOOR / bars.forcing_period;
     (record.lyapunov - theirs).abs() <= bar
 }
@@ -66,21 +62,24 @@ impl Answer {
             list.push(compared(Field::ExponentError, same, || numbers(record.lyapunov_error, error)));
         }
         let averages = [
-            (
-                Field::Impacts,
-                valid::IMPACTS,
-                record.impacts_per_period,
-                self.impacts_per_period,
-                IMPACTS_AT_ENDS,
-            ),
-            (Field::Mesh, valid::MESH, record.mesh_fraction, self.mesh_fraction, PERIODS_AT_ENDS),
+            (Field::Impacts, valid::IMPACTS, record.impacts_per_period, self.impacts_per_period),
+            (Field::Mesh, valid::MESH, record.mesh_fraction, self.mesh_fraction),
         ];
-        for ((field, bit, ours, theirs, at_ends), error) in averages.into_iter().zip(errors) {
+        for ((field, bit, ours, theirs), error) in averages.into_iter().zip(errors) {
             if let (true, Some(theirs), true) = (has(bit), theirs, error.is_finite()) {
-                let bar = SAME_ERRORS * error.hypot(error) + at_ends / f64::from(periods.max(1));
+                let bar = SAME_ERRORS * error.hypot(error) + at_ends(field) / f64::from(periods.max(1));
                 list.push(compared(field, (ours - theirs).abs() <= bar, || numbers(ours, theirs)));
             }
         }
+    }
+}
+
+/// What the ends of an averaged stretch decide on: so many impacts, and a period's meshing.
+pub(super) fn at_ends(field: Field) -> f64 {
+    match field {
+        Field::Impacts => 2.0,
+        Field::Mesh => 1.0,
+        _ => 0.0,
     }
 }
 

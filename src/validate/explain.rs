@@ -14,9 +14,10 @@ use super::limits::{
     within_scatter,
 };
 use super::on_the_way::{has_averages_ahead, has_averages_on_the_way};
-use super::reached::is_reached;
+use super::reached::is_where_it_may_be;
 use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
+use super::spread::{are_of_one_class, spread};
 use super::unsettled::unsettled;
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings, Precision};
@@ -89,7 +90,11 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rare_cap,
     ];
     // A record without a period claims averages all the same.
-    let is_claimed = || is_open_by_its_figures(case) && has_averages_on_the_way(case);
+    let is_claimed =
+        || is_open_by_its_figures(case) && has_averages_on_the_way(case) && is_where_it_may_be(case);
+    if are_of_one_class(case) {
+        return spread(case).or_else(|| other_attractor(case)).filter(|_| is_claimed());
+    }
     CHECKS.iter().find_map(|check| check(case)).filter(|_| is_claimed())
 }
 
@@ -161,9 +166,7 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         || unresolved(case, from, &answer) == Some(true)
         || read_rounded(case, from, &answer) == Some(true)
         || is_left_open() == Some(true);
-    // On the cell's own attractor it needs no other reason to be there.
-    let is_its_own = answer.class == case.truth.class && answer.word == case.truth.word;
-    (same && (is_its_own || is_reached(case, &answer))).then_some(match classify(case.record) {
+    same.then_some(match classify(case.record) {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
     })

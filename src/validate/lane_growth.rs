@@ -29,19 +29,16 @@ const RUNS: u64 = 16;
 /// And where nothing else gives the record's answer: one or two of a hundred may do as a lane did.
 const MOST_RUNS: u64 = 1000;
 
-/// Neither side is on a cycle, and the reference, averaged in its own way, has another class or other averages.
+/// The record says chaotic where the reference, averaged in its own way, decides nothing.
 ///
 /// The reference's own motion, averaged as a lane would, gives the record's answer: neither had
 /// the periods to tell what is chaos in the end. Or one that starts within rounding does, or one
 /// that is rounded at every step: then what it met on the way was decided by rounding.
 pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
-    let is_open = |class| matches!(class, Class::Chaotic | Class::Undecided);
-    let classes = [classify(case.record), case.truth.class];
-    let lane = AsLane::new(case).filter(|_| case.is_lane && classes.into_iter().all(is_open))?;
+    let lane = AsLane::of_weak_chaos(case)?;
     let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
     if same(lane.answer(case.start)) {
-        let are_chaos = classes == [Class::Chaotic; 2];
-        return Some(if are_chaos { Explanation::Chaos } else { Explanation::UndecidedInBudget });
+        return Some(Explanation::UndecidedInBudget);
     }
     let nudged = (0..8).map(|k| case.nudged_start(k)).chain(case.scattered_starts(STARTS));
     if nudged.map(|start| lane.answer(start)).any(same) {
@@ -117,14 +114,14 @@ impl Watched for Rounded<'_, 1> {
 }
 
 /// What is the same for all motions of a cell.
-struct AsLane<'c, 'a> {
+pub(super) struct AsLane<'c, 'a> {
     case: &'c Case<'a>,
     model: LaneModel,
     averaging: Averaging,
 }
 
 impl<'c, 'a> AsLane<'c, 'a> {
-    fn new(case: &'c Case<'a>) -> Option<Self> {
+    pub(super) fn new(case: &'c Case<'a>) -> Option<Self> {
         let model = LaneModel::new(case)?;
         let averaging = Averaging::new(case.budget.periods(), case.budget.exponent_from());
         Some(AsLane { case, model, averaging })
@@ -137,7 +134,7 @@ impl<'c, 'a> AsLane<'c, 'a> {
     }
 
     /// The reference from `start`.
-    fn answer(&self, start: State) -> Option<Answer> {
+    pub(super) fn answer(&self, start: State) -> Option<Answer> {
         let bare = self.case.after(start, self.averaging.growth_from).ok()?;
         self.average(&mut bare.carrying([self.model.constants.to_state(FRESH)]))
     }

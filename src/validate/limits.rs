@@ -136,20 +136,21 @@ fn is_left_open(
     period: u32,
 ) -> Option<Explanation> {
     let unrest = case.unrest(stands, period);
-    // It is off the cycle, and so is the cell's own motion then.
-    let is_off = || unrest > UNSETTLED && is_as_far(case, period, unrest);
     // Or as close as rounding, which the cycle amplifies, lets it come.
     let is_kept_off = case.is_lane && unrest > rest(case.precision);
     let trembles = || is_kept_off && is_shaken(case, stands, period) == Some(true);
     // Or rounding hides from it that the cycle attracts.
     let doubts = || case.is_lane && may_repel(case, stands, truth) == Some(true);
-    let because = if is_off() {
+    let because = if unrest > UNSETTLED {
         Explanation::UndecidedInBudget
     } else if trembles() || doubts() {
         Explanation::BelowResolution
     } else {
         return None;
     };
+    if unrest > rest(case.precision) && !is_as_far(case, period, unrest) {
+        return None;
+    }
     let settles = case.at_leisure(stands.state()).class == truth.class;
     settles.then_some(because)
 }

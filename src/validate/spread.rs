@@ -1,0 +1,110 @@
+//! Both sides say the same of motion that is on no cycle, but for its averages: do these scatter as much on the
+//! reference itself?
+//!
+//! A record's average has to lie between those of motions that start within rounding of the cell's own, over the
+//! reference's periods or over the lane's. To let each of many motions claim what lies within standard errors of its
+//! own would find one for any record.
+
+use super::answer::{Answer, Field};
+use super::averages::{at_ends, error_over};
+use super::case::Case;
+use super::explanation::Explanation;
+use super::lane_growth::AsLane;
+use super::on_the_way::has_averages_on_the_way;
+use crate::classify::classify;
+use crate::orbit::{Class, measure};
+use crate::record::valid;
+
+/// Starts that are tried, beside those along coordinates.
+const STARTS: usize = 256;
+
+/// Why averages differ; none where the sides are not of one class, or on a cycle.
+pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
+    let because = match case.truth.class {
+        Class::Chaotic => Explanation::Chaos,
+        _ => Explanation::UndecidedInBudget,
+    };
+    let compared = case.truth.compare(case.record, &case.bars);
+    let open: Vec<Field> =
+        compared.iter().filter(|(_, differs)| differs.is_some()).map(|&(field, _)| field).collect();
+    // Stretches of one motion that decides nothing differ, too, and a lane may have averaged a few periods only.
+    let are_counts = open.iter().all(|field| [Field::Impacts, Field::Mesh].contains(field));
+    if case.truth.class == Class::Undecided && are_counts && has_averages_on_the_way(case) {
+        return Some(because);
+    }
+    let mut ranges: Vec<(Field, Range)> =
+        open.iter().map(|&field| (field, Range::about(ours(case, field), margin(case, field)))).collect();
+    let as_lane = AsLane::new(case).filter(|_| case.is_lane);
+    let starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
+    for start in starts.chain(case.scattered_starts(STARTS)) {
+        let measured = Answer::from(&measure(&case.flow, case.law, start, &case.budget));
+        let averaged = as_lane.as_ref().and_then(|lane| lane.answer(start));
+        for answer in [Some(measured), averaged].into_iter().flatten() {
+            if answer.class.index() == case.truth.class.index() {
+                ranges.iter_mut().for_each(|(field, range)| range.meets(theirs(case, &answer, *field)));
+            }
+        }
+        if ranges.iter().all(|(_, range)| range.holds()) {
+            return Some(because);
+        }
+    }
+    None
+}
+
+/// Whether only averages can differ.
+pub(super) fn are_of_one_class(case: &Case<'_>) -> bool {
+    let classes = [classify(case.record), case.truth.class];
+    [Class::Chaotic, Class::Undecided].iter().any(|class| classes == [*class; 2])
+}
+
+fn ours(case: &Case<'_>, field: Field) -> f64 {
+    match field {
+        Field::Exponent => case.record.lyapunov,
+        Field::ExponentError => case.record.lyapunov_error,
+        Field::Impacts => case.record.impacts_per_period,
+        _ => case.record.mesh_fraction,
+    }
+}
+
+fn theirs(case: &Case<'_>, answer: &Answer, field: Field) -> Option<f64> {
+    let exponent = answer.exponent.filter(|_| case.record.valid & valid::LYAPUNOV != 0);
+    match field {
+        Field::Exponent => exponent.map(|[value, _]| value),
+        Field::ExponentError => {
+            let periods = answer.scatter?.exponent_periods;
+            exponent.map(|[_, error]| error_over(case.record, &case.bars, error, periods))
+        }
+        Field::Impacts => answer.impacts_per_period,
+        _ => answer.mesh_fraction,
+    }
+}
+
+/// Where an average begins and ends is chance.
+fn margin(case: &Case<'_>, field: Field) -> f64 {
+    let periods = case.truth.scatter.map_or(1, |scatter| scatter.periods);
+    at_ends(field) / f64::from(periods.max(1))
+}
+
+/// Whether a number lies between others.
+struct Range {
+    ours: f64,
+    margin: f64,
+    lies_above: bool,
+    lies_below: bool,
+}
+
+impl Range {
+    fn about(ours: f64, margin: f64) -> Range {
+        Range { ours, margin, lies_above: false, lies_below: false }
+    }
+
+    fn meets(&mut self, theirs: Option<f64>) {
+        let Some(theirs) = theirs else { return };
+        self.lies_above |= theirs - self.margin <= self.ours;
+        self.lies_below |= theirs + self.margin >= self.ours;
+    }
+
+    fn holds(&self) -> bool {
+        self.lies_above && self.lies_below
+    }
+}
