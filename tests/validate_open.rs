@@ -123,7 +123,7 @@ fn lanes_that_may_stop_early_count_before_the_transient_is_over() {
     let plan = plan_at(0.7480314960629921, 1.0, MORE_PERIODS);
     let strobe = [1.2445701956748962, -0.08700716515500079, 0.7460595965385437, 0.2017984370626537];
     let record = open([101_761.0 / 1917.0, 0.29894429445266724], strobe, 2112);
-    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::UndecidedInBudget)));
+    assert_eq!(explanation(&plan, record, Precision::F32), Ok(Some(Explanation::BelowResolution)));
     let planted: [(&str, Spoil); 3] = [
         ("meshing", |record| record.mesh_fraction += 1e-3),
         ("impacts", |record| record.impacts_per_period += 0.5),

@@ -22,10 +22,21 @@ pub(super) const UNSURE: f64 = 3.0;
 /// What standard errors may differ by beside that, per forcing period.
 const ERROR_FLOOR: f64 = 0.002;
 
+/// Forcing periods that the record's averages may span at most: all since exponents began, or fewer where a lane
+/// began anew, as far as its impacts are whole over them.
+pub(super) fn counted(record: &Record, bars: &Bars) -> u32 {
+    let longest = record.periods_run.saturating_sub(bars.exponent_from).max(1);
+    let is_whole = |periods: &u32| {
+        let impacts = record.impacts_per_period * f64::from(*periods);
+        (impacts - impacts.round()).abs() <= bars.impacts * f64::from(*periods)
+    };
+    let shortest = (1..=longest).find(is_whole).filter(|_| record.valid & valid::IMPACTS != 0);
+    shortest.map_or(longest, |shortest| longest / shortest * shortest)
+}
+
 /// The standard error that an exponent would have over the record's periods, from one over `periods`.
 pub(super) fn error_over(record: &Record, bars: &Bars, error: f64, periods: u32) -> f64 {
-    let own = record.periods_run.saturating_sub(bars.exponent_from).max(1);
-    error * (f64::from(periods.max(1)) / f64::from(own)).sqrt()
+    error * (f64::from(periods.max(1)) / f64::from(counted(record, bars))).sqrt()
 }
 
 /// Whether an exponent is the record's: within standard errors of the reference's making.
@@ -68,9 +79,18 @@ impl Answer {
         for ((field, bit, ours, theirs), error) in averages.into_iter().zip(errors) {
             if let (true, Some(theirs), true) = (has(bit), theirs, error.is_finite()) {
                 let bar = SAME_ERRORS * error.hypot(error) + at_ends(field) / f64::from(periods.max(1));
+                let bar = bar.min(most(field, ours.max(theirs)));
                 list.push(compared(field, (ours - theirs).abs() <= bar, || numbers(ours, theirs)));
             }
         }
+    }
+}
+
+/// No bar is wider, however few periods there are to measure scatter on.
+fn most(field: Field, average: f64) -> f64 {
+    match field {
+        Field::Impacts => 0.25 * average + 0.3,
+        _ => 0.1,
     }
 }
 

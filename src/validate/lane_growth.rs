@@ -16,7 +16,7 @@ use super::states::unit_roundoff;
 use crate::classify::classify;
 use crate::gpu::Averaging;
 use crate::model::State;
-use crate::orbit::{CHAOS_ERRORS, Class};
+use crate::orbit::{CHAOS_ERRORS, Class, Scatter};
 use crate::reference::{Stop, Trajectory};
 
 /// Lane units in which a fresh tangent vector points nowhere in particular.
@@ -29,13 +29,16 @@ const RUNS: u64 = 16;
 /// And where nothing else gives the record's answer: one or two of a hundred may do as a lane did.
 const MOST_RUNS: u64 = 1000;
 
-/// The record says chaotic where the reference, averaged in its own way, decides nothing.
+/// The record says chaotic where the reference, averaged in its own way, decides nothing, or the other way round.
 ///
 /// The reference's own motion, averaged as a lane would, gives the record's answer: neither had
 /// the periods to tell what is chaos in the end. Or one that starts within rounding does, or one
 /// that is rounded at every step: then what it met on the way was decided by rounding.
 pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
-    let lane = AsLane::of_weak_chaos(case)?;
+    let classes = (classify(case.record), case.truth.class);
+    let is_left_open = case.is_lane && classes == (Class::Undecided, Class::Chaotic);
+    let left_open = || if is_left_open { AsLane::new(case) } else { None };
+    let lane = AsLane::of_weak_chaos(case).or_else(left_open)?;
     let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
     if same(lane.answer(case.start)) {
         return Some(Explanation::UndecidedInBudget);
@@ -180,12 +183,13 @@ impl<'c, 'a> AsLane<'c, 'a> {
         let [impacts, meshing, events] = [0, 1, 2].map(|i| (after[i] - before[i]) / growth.len() as f64);
         let (surely, rounding) = (mean - CHAOS_ERRORS * error, unit_roundoff(self.case.precision));
         let grows = surely > 0.0 && self.averaging.outgrows(surely, growth.len(), events, rounding);
-        let period = self.case.flow.period;
+        let (period, exponent_periods) = (self.case.flow.period, growth.len() as u32);
         Some(Answer {
             class: if grows { Class::Chaotic } else { Class::Undecided },
             exponent: Some([mean / period, error / period]),
             impacts_per_period: Some(impacts),
             mesh_fraction: Some(meshing / period),
+            scatter: self.case.truth.scatter.map(|scatter| Scatter { exponent_periods, ..scatter }),
             ..self.case.truth.clone()
         })
     }

@@ -5,6 +5,7 @@
 //! (`chaos.wgsl`). So a record that decides nothing must fail one of these by its own figures; whether the
 //! motion rests or lingers is seen on the reference.
 
+use super::averages::counted;
 use super::case::Case;
 use super::rounding::whole_units;
 use super::states::unit_roundoff;
@@ -31,8 +32,7 @@ pub(super) fn is_open_by_its_figures(case: &Case<'_>) -> bool {
         return true;
     }
     let averaging = Averaging::new(case.budget.periods(), case.budget.exponent_from());
-    let counted =
-        record.periods_run.saturating_sub(averaging.exponent_from) / averaging.block * averaging.block;
+    let counted = counted(record, &case.bars) / averaging.block * averaging.block;
     let surely = (record.lyapunov - CHAOS_ERRORS * record.lyapunov_error) * case.flow.period;
     let own = case.after(case.start, record.periods_run);
     let events = own.map_or(0.0, |own| own.work().events as f64 / f64::from(record.periods_run.max(1)));

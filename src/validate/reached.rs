@@ -24,6 +24,10 @@ const RUNS: u64 = 64;
 /// A lane takes no step of Newton's method that is longer, relative to the motion (`REACH` in the shaders).
 const REACH: f64 = 3e-2;
 
+/// Periods in which steps are tried, and of cycles where the record has none.
+const STEPPING: u32 = 528;
+const SHORT: u32 = 4;
+
 /// Whether the record's motion was at last where the cell's own may be: from there the reference comes to its own
 /// attractor, within the budget or in the end, or to one that the cell's start leads to.
 pub(super) fn is_where_it_may_be(case: &Case<'_>) -> bool {
@@ -74,17 +78,21 @@ fn ends_of_rounded<'c>(case: &'c Case<'_>) -> Option<impl Iterator<Item = State>
     }))
 }
 
-/// Where steps of Newton's method for the record's period lead from the cell's own motion.
+/// Where steps of Newton's method lead from the cell's own motion: for the record's period, or for short ones where it
+/// has none.
 fn steps_to(case: &Case<'_>) -> Vec<State> {
-    let Class::Periodic { period } = classify(case.record) else { return Vec::new() };
+    let periods = match classify(case.record) {
+        Class::Periodic { period } => period..=period,
+        _ => 1..=SHORT.min(case.budget.settings.max_period),
+    };
     let mut motion = Trajectory::<0>::new(&case.flow, case.law, case.start);
     let mut steps = Vec::new();
-    for _ in 0..case.record.periods_run {
+    for _ in 0..case.record.periods_run.min(STEPPING) {
         if motion.advance_period(&mut ()).is_err() {
             break;
         }
-        let limit = case.limit(&motion, period).filter(|limit| case.apart(&motion.state(), limit) < REACH);
-        steps.extend(limit);
+        let limits = periods.clone().filter_map(|period| case.limit(&motion, period));
+        steps.extend(limits.filter(|limit| case.apart(&motion.state(), limit) < REACH));
     }
     steps
 }

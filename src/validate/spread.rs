@@ -15,8 +15,14 @@ use crate::classify::classify;
 use crate::orbit::{Class, measure};
 use crate::record::valid;
 
-/// Starts that are tried, beside those along coordinates.
-const STARTS: usize = 256;
+/// Starts that are tried, beside those along coordinates: of a map's many averages some are rare.
+const STARTS: usize = 2048;
+
+/// After so many, only what lies near those that were met can still lie between them:
+const FIRST_STARTS: usize = 128;
+
+/// no farther off than this share of what they span.
+const NEARLY: f64 = 1.0;
 
 /// Why averages differ; none where the sides are not of one class, or on a cycle.
 pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
@@ -36,7 +42,7 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
         open.iter().map(|&field| (field, Range::about(ours(case, field), margin(case, field)))).collect();
     let as_lane = AsLane::new(case).filter(|_| case.is_lane);
     let starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
-    for start in starts.chain(case.scattered_starts(STARTS)) {
+    for (tried, start) in starts.chain(case.scattered_starts(STARTS)).enumerate() {
         let measured = Answer::from(&measure(&case.flow, case.law, start, &case.budget));
         let averaged = as_lane.as_ref().and_then(|lane| lane.answer(start));
         for answer in [Some(measured), averaged].into_iter().flatten() {
@@ -46,6 +52,9 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
         }
         if ranges.iter().all(|(_, range)| range.holds()) {
             return Some(because);
+        }
+        if tried == FIRST_STARTS && !ranges.iter().all(|(_, range)| range.is_near()) {
+            return None;
         }
     }
     None
@@ -89,22 +98,26 @@ fn margin(case: &Case<'_>, field: Field) -> f64 {
 struct Range {
     ours: f64,
     margin: f64,
-    lies_above: bool,
-    lies_below: bool,
+    least: f64,
+    most: f64,
 }
 
 impl Range {
     fn about(ours: f64, margin: f64) -> Range {
-        Range { ours, margin, lies_above: false, lies_below: false }
+        Range { ours, margin, least: f64::INFINITY, most: f64::NEG_INFINITY }
     }
 
     fn meets(&mut self, theirs: Option<f64>) {
         let Some(theirs) = theirs else { return };
-        self.lies_above |= theirs - self.margin <= self.ours;
-        self.lies_below |= theirs + self.margin >= self.ours;
+        (self.least, self.most) = (self.least.min(theirs), self.most.max(theirs));
     }
 
     fn holds(&self) -> bool {
-        self.lies_above && self.lies_below
+        self.least - self.margin <= self.ours && self.ours <= self.most + self.margin
+    }
+
+    fn is_near(&self) -> bool {
+        let reach = self.margin + NEARLY * (self.most - self.least);
+        self.least - reach <= self.ours && self.ours <= self.most + reach
     }
 }
