@@ -101,6 +101,8 @@ pub(super) struct Bars {
     pub(super) forcing_period: f64,
     /// The period from which exponents accumulate.
     pub(super) exponent_from: u32,
+    /// Forcing periods that cells are observed for.
+    pub(super) observed_periods: u32,
 }
 
 impl Bars {
@@ -109,8 +111,16 @@ impl Bars {
             Precision::F32 => (4e-3, 1e-2, 2e-5),
             Precision::F64 => (1e-3, 1e-5, 1e-6),
         };
-        let exponent_from = budget.exponent_from();
-        Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period, exponent_from }
+        let (exponent_from, observed_periods) = (budget.exponent_from(), budget.settings.observed_periods);
+        Bars {
+            multiplier,
+            no_multiplier,
+            mesh,
+            impacts: 1e-9,
+            forcing_period,
+            exponent_from,
+            observed_periods,
+        }
     }
 }
 

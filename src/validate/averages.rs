@@ -6,7 +6,8 @@
 //! compared itself.
 
 use super::answer::{Answer, Bars, Compared, Field, Value, compared};
-use crate::orbit::Scatter;
+use crate::classify::classify;
+use crate::orbit::{Class, Scatter};
 use crate::record::{Record, valid};
 
 /// Standard errors by which two averages of the same motion may differ.
@@ -22,21 +23,37 @@ pub(super) const UNSURE: f64 = 3.0;
 /// What standard errors may differ by beside that, per forcing period.
 const ERROR_FLOOR: f64 = 0.002;
 
-/// Forcing periods that the record's averages may span at most: all since exponents began, or fewer where a lane
-/// began anew, as far as its impacts are whole over them.
-pub(super) fn counted(record: &Record, bars: &Bars) -> u32 {
+/// The fewest forcing periods over which the record's impacts are whole, and the most that its averages may span: a
+/// lane may have begun anew.
+fn counted_between(record: &Record, bars: &Bars) -> [u32; 2] {
     let longest = record.periods_run.saturating_sub(bars.exponent_from).max(1);
     let is_whole = |periods: &u32| {
         let impacts = record.impacts_per_period * f64::from(*periods);
         (impacts - impacts.round()).abs() <= bars.impacts * f64::from(*periods)
     };
     let shortest = (1..=longest).find(is_whole).filter(|_| record.valid & valid::IMPACTS != 0);
-    shortest.map_or(longest, |shortest| longest / shortest * shortest)
+    [shortest.unwrap_or(1), longest]
 }
 
-/// The standard error that an exponent would have over the record's periods, from one over `periods`.
+/// As many as they may span at most.
+pub(super) fn counted(record: &Record, bars: &Bars) -> u32 {
+    let [shortest, longest] = counted_between(record, bars);
+    longest / shortest * shortest
+}
+
+/// The standard error that an exponent would have over the record's periods, from one over `periods`. A lane that
+/// decides nothing may have begun anew, but for as long as cells are observed: then its own error is the best guess
+/// of how many periods it means.
 pub(super) fn error_over(record: &Record, bars: &Bars, error: f64, periods: u32) -> f64 {
-    error * (f64::from(periods.max(1)) / f64::from(counted(record, bars))).sqrt()
+    let [shortest, longest] = counted_between(record, bars);
+    let mut own = f64::from(longest / shortest * shortest);
+    if classify(record) == Class::Undecided {
+        let guess = f64::from(periods) * (error / record.lyapunov_error).powi(2);
+        let multiple = (guess / f64::from(shortest)).round().max(1.0) * f64::from(shortest);
+        let least = f64::from(bars.observed_periods).min(own);
+        own = if multiple.is_finite() { multiple.clamp(least, own) } else { own };
+    }
+    error * (f64::from(periods.max(1)) / own).sqrt()
 }
 
 /// Whether an exponent is the record's: within standard errors of the reference's making.

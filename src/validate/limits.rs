@@ -94,8 +94,9 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
         (Class::Undecided, Class::Periodic { .. }) if case.truth.status == Status::Slow => {
             let Class::Periodic { period } = case.truth.class else { return None };
             let settles = || case.at_leisure(from).class == case.truth.class;
-            let is_own = is_as_far(case, period, case.unrest(&stands, period));
-            (is_own && settles()).then_some(Explanation::UndecidedInBudget)
+            let is_own = || is_as_far(case, period, case.unrest(&stands, period));
+            is_left_open(case, &stands, &case.truth, period)
+                .or_else(|| (is_own() && settles()).then_some(Explanation::UndecidedInBudget))
         }
         (Class::Undecided, Class::Periodic { period }) => {
             let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;
@@ -141,9 +142,11 @@ fn is_left_open(
     let trembles = || is_kept_off && is_shaken(case, stands, period) == Some(true);
     // Or rounding hides from it that the cycle attracts.
     let doubts = || case.is_lane && may_repel(case, stands, truth) == Some(true);
-    let because = if unrest > UNSETTLED {
+    let because = if trembles() {
+        Explanation::BelowResolution
+    } else if unrest > UNSETTLED {
         Explanation::UndecidedInBudget
-    } else if trembles() || doubts() {
+    } else if doubts() {
         Explanation::BelowResolution
     } else {
         return None;

@@ -1,9 +1,10 @@
 //! Both sides say the same of motion that is on no cycle, but for its averages: do these scatter as much on the
 //! reference itself?
 //!
-//! A record's average has to lie between those of motions that start within rounding of the cell's own, over the
-//! reference's periods or over the lane's. To let each of many motions claim what lies within standard errors of its
-//! own would find one for any record.
+//! A record's average has to be one of those of motions that start within rounding of the cell's own, over the
+//! reference's periods or over the lane's: within five standard deviations of their mean, or between the least and
+//! the greatest of very many. To let each of many motions claim what lies within standard errors of its own would
+//! find one for any record.
 
 use super::answer::{Answer, Field};
 use super::averages::{at_ends, error_over};
@@ -18,11 +19,15 @@ use crate::record::valid;
 /// Starts that are tried, beside those along coordinates: of a map's many averages some are rare.
 const STARTS: usize = 2048;
 
-/// After so many, only what lies near those that were met can still lie between them:
+/// So many give a mean and a standard deviation. After them, only what lies near those that were met can still lie
+/// between them:
 const FIRST_STARTS: usize = 128;
 
 /// no farther off than this share of what they span.
 const NEARLY: f64 = 1.0;
+
+/// Standard deviations by which one average may differ from their mean, as averages may from each other.
+const DEVIATIONS: f64 = 5.0;
 
 /// Why averages differ; none where the sides are not of one class, or on a cycle.
 pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
@@ -39,7 +44,7 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
         return Some(because);
     }
     let mut ranges: Vec<(Field, Range)> =
-        open.iter().map(|&field| (field, Range::about(ours(case, field), margin(case, field)))).collect();
+        open.iter().map(|&field| (field, Range::about(case, field))).collect();
     let as_lane = AsLane::new(case).filter(|_| case.is_lane);
     let starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
     for (tried, start) in starts.chain(case.scattered_starts(STARTS)).enumerate() {
@@ -53,8 +58,13 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
         if ranges.iter().all(|(_, range)| range.holds()) {
             return Some(because);
         }
-        if tried == FIRST_STARTS && !ranges.iter().all(|(_, range)| range.is_near()) {
-            return None;
+        if tried == FIRST_STARTS {
+            if ranges.iter().all(|(_, range)| range.holds() || range.is_likely()) {
+                return Some(because);
+            }
+            if !ranges.iter().all(|(_, range)| range.is_near()) {
+                return None;
+            }
         }
     }
     None
@@ -94,30 +104,50 @@ fn margin(case: &Case<'_>, field: Field) -> f64 {
     at_ends(field) / f64::from(periods.max(1))
 }
 
-/// Whether a number lies between others.
+/// An average of the record, and those that were met.
 struct Range {
     ours: f64,
     margin: f64,
-    least: f64,
-    most: f64,
+    met: Vec<f64>,
+    /// Standard errors scatter by factors.
+    is_factor: bool,
 }
 
 impl Range {
-    fn about(ours: f64, margin: f64) -> Range {
-        Range { ours, margin, least: f64::INFINITY, most: f64::NEG_INFINITY }
+    fn about(case: &Case<'_>, field: Field) -> Range {
+        let is_factor = field == Field::ExponentError;
+        Range { ours: ours(case, field), margin: margin(case, field), met: Vec::new(), is_factor }
     }
 
     fn meets(&mut self, theirs: Option<f64>) {
-        let Some(theirs) = theirs else { return };
-        (self.least, self.most) = (self.least.min(theirs), self.most.max(theirs));
+        self.met.extend(theirs.filter(|theirs| theirs.is_finite()));
+    }
+
+    fn ends(&self) -> [f64; 2] {
+        [
+            self.met.iter().copied().fold(f64::INFINITY, f64::min),
+            self.met.iter().copied().fold(-f64::INFINITY, f64::max),
+        ]
     }
 
     fn holds(&self) -> bool {
-        self.least - self.margin <= self.ours && self.ours <= self.most + self.margin
+        let [least, most] = self.ends();
+        least - self.margin <= self.ours && self.ours <= most + self.margin
     }
 
     fn is_near(&self) -> bool {
-        let reach = self.margin + NEARLY * (self.most - self.least);
-        self.least - reach <= self.ours && self.ours <= self.most + reach
+        let [least, most] = self.ends();
+        let reach = self.margin + NEARLY * (most - least);
+        least - reach <= self.ours && self.ours <= most + reach
+    }
+
+    fn is_likely(&self) -> bool {
+        let scale = |x: f64| if self.is_factor { x.max(f64::MIN_POSITIVE).ln() } else { x };
+        let count = self.met.len() as f64;
+        let mean = self.met.iter().map(|&x| scale(x)).sum::<f64>() / count;
+        let variance = self.met.iter().map(|&x| (scale(x) - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        // Of a few there is no deviation to speak of.
+        2 * self.met.len() > FIRST_STARTS
+            && (scale(self.ours) - mean).abs() <= DEVIATIONS * variance.sqrt() + self.margin
     }
 }
