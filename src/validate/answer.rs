@@ -4,11 +4,14 @@ use serde::Serialize;
 
 use crate::classify::classify;
 use crate::engine::measured_record;
-use crate::gpu::Precision;
+use crate::gpu::{Averaging, Precision};
 use crate::orbit::{Budget, Class, Measured, Orbit, Scatter, Status};
 use crate::plan::Needs;
 use crate::record::{Record, Spelling, valid, word_hash};
 use crate::word::Word;
+
+/// Blocks whose means give lanes a standard error, at least (`FEWEST_BLOCKS` in the shaders).
+const FEWEST_BLOCKS: u32 = 6;
 
 /// What is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -101,8 +104,8 @@ pub(super) struct Bars {
     pub(super) forcing_period: f64,
     /// The period from which exponents accumulate.
     pub(super) exponent_from: u32,
-    /// Forcing periods that cells are observed for.
-    pub(super) observed_periods: u32,
+    /// Forcing periods that an exponent with a standard error is averaged over at least.
+    pub(super) least_counted: u32,
 }
 
 impl Bars {
@@ -111,16 +114,9 @@ impl Bars {
             Precision::F32 => (4e-3, 1e-2, 2e-5),
             Precision::F64 => (1e-3, 1e-5, 1e-6),
         };
-        let (exponent_from, observed_periods) = (budget.exponent_from(), budget.settings.observed_periods);
-        Bars {
-            multiplier,
-            no_multiplier,
-            mesh,
-            impacts: 1e-9,
-            forcing_period,
-            exponent_from,
-            observed_periods,
-        }
+        let exponent_from = budget.exponent_from();
+        let least_counted = FEWEST_BLOCKS * Averaging::new(budget.periods(), exponent_from).block;
+        Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period, exponent_from, least_counted }
     }
 }
 

@@ -6,8 +6,7 @@
 //! compared itself.
 
 use super::answer::{Answer, Bars, Compared, Field, Value, compared};
-use crate::classify::classify;
-use crate::orbit::{Class, Scatter};
+use crate::orbit::Scatter;
 use crate::record::{Record, valid};
 
 /// Standard errors by which two averages of the same motion may differ.
@@ -41,18 +40,19 @@ pub(super) fn counted(record: &Record, bars: &Bars) -> u32 {
     longest / shortest * shortest
 }
 
-/// The standard error that an exponent would have over the record's periods, from one over `periods`. A lane that
-/// decides nothing may have begun anew, but for as long as cells are observed: then its own error is the best guess
-/// of how many periods it means.
+/// The standard error that an exponent would have over the record's periods, from one over `periods`. A lane that was
+/// sent on from a cycle which repels began anew, and does not tell when: then its own error is the best guess of how
+/// many periods it means, among those over which its impacts are whole.
 pub(super) fn error_over(record: &Record, bars: &Bars, error: f64, periods: u32) -> f64 {
     let [shortest, longest] = counted_between(record, bars);
-    let mut own = f64::from(longest / shortest * shortest);
-    if classify(record) == Class::Undecided {
-        let guess = f64::from(periods) * (error / record.lyapunov_error).powi(2);
-        let multiple = (guess / f64::from(shortest)).round().max(1.0) * f64::from(shortest);
-        let least = f64::from(bars.observed_periods).min(own);
-        own = if multiple.is_finite() { multiple.clamp(least, own) } else { own };
-    }
+    let most = f64::from(longest / shortest * shortest);
+    let guess = f64::from(periods) * (error / record.lyapunov_error).powi(2);
+    let multiple = (guess / f64::from(shortest)).round().max(1.0) * f64::from(shortest);
+    let own = if multiple.is_finite() {
+        multiple.clamp(f64::from(bars.least_counted).min(most), most)
+    } else {
+        most
+    };
     error * (f64::from(periods.max(1)) / own).sqrt()
 }
 

@@ -17,7 +17,7 @@ use crate::orbit::{Class, measure};
 use crate::record::valid;
 
 /// Starts that are tried, beside those along coordinates: of a map's many averages some are rare.
-const STARTS: usize = 2048;
+const STARTS: usize = 16_384;
 
 /// So many give a mean and a standard deviation. After them, only what lies near those that were met can still lie
 /// between them:
@@ -48,9 +48,11 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
     let as_lane = AsLane::new(case).filter(|_| case.is_lane);
     let starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
     for (tried, start) in starts.chain(case.scattered_starts(STARTS)).enumerate() {
-        let measured = Answer::from(&measure(&case.flow, case.law, start, &case.budget));
+        // Many of the reference's own tell no more of a lane.
+        let is_first = tried <= FIRST_STARTS || as_lane.is_none();
+        let measured = is_first.then(|| Answer::from(&measure(&case.flow, case.law, start, &case.budget)));
         let averaged = as_lane.as_ref().and_then(|lane| lane.answer(start));
-        for answer in [Some(measured), averaged].into_iter().flatten() {
+        for answer in [measured, averaged].into_iter().flatten() {
             if answer.class.index() == case.truth.class.index() {
                 ranges.iter_mut().for_each(|(field, range)| range.meets(theirs(case, &answer, *field)));
             }
@@ -135,19 +137,23 @@ impl Range {
         least - self.margin <= self.ours && self.ours <= most + self.margin
     }
 
+    /// The scale on which it scatters evenly.
+    fn scale(&self, x: f64) -> f64 {
+        if self.is_factor { x.max(f64::MIN_POSITIVE).ln() } else { x }
+    }
+
     fn is_near(&self) -> bool {
-        let [least, most] = self.ends();
+        let [least, most] = self.ends().map(|end| self.scale(end));
         let reach = self.margin + NEARLY * (most - least);
-        least - reach <= self.ours && self.ours <= most + reach
+        least - reach <= self.scale(self.ours) && self.scale(self.ours) <= most + reach
     }
 
     fn is_likely(&self) -> bool {
-        let scale = |x: f64| if self.is_factor { x.max(f64::MIN_POSITIVE).ln() } else { x };
         let count = self.met.len() as f64;
-        let mean = self.met.iter().map(|&x| scale(x)).sum::<f64>() / count;
-        let variance = self.met.iter().map(|&x| (scale(x) - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let mean = self.met.iter().map(|&x| self.scale(x)).sum::<f64>() / count;
+        let variance = self.met.iter().map(|&x| (self.scale(x) - mean).powi(2)).sum::<f64>() / (count - 1.0);
         // Of a few there is no deviation to speak of.
         2 * self.met.len() > FIRST_STARTS
-            && (scale(self.ours) - mean).abs() <= DEVIATIONS * variance.sqrt() + self.margin
+            && (self.scale(self.ours) - mean).abs() <= DEVIATIONS * variance.sqrt() + self.margin
     }
 }
