@@ -324,10 +324,11 @@ pub(crate) struct Bifurcation {
 
 /// How right a finished map is: cells of it, replayed on the reference
 ///
-/// Draws a sample (half of it from all cells, a quarter at class borders, the rest from every kind
-/// of status other than ok), replays it on the event-driven reference within the map's own budget
-/// and compares class, period, word, symmetry, exponent and averages; lanes of a graphics device
-/// are also run again over a few periods, and their states compared in units of an error budget.
+/// Draws a sample (half of it from all integrated cells, a quarter at class borders, the rest from
+/// every kind of status other than ok; what an adaptive map has filled is left to its audit),
+/// replays it on the event-driven reference within the map's own budget and compares class, period,
+/// word, symmetry, exponent and averages; lanes of a graphics device are also run again over a few
+/// periods, and their states compared in units of an error budget.
 /// Every mismatch is explained by a check (a coexisting attractor, chaos, a border, grazing, a
 /// budget too short) or counts as unexplained: then the exit code is 1. Writes validation.json and
 /// a section of report.html.

@@ -13,12 +13,14 @@ mod cell;
 mod prospects;
 mod reading;
 mod recurrence;
+mod scatter;
 mod trace;
 
 pub(crate) use analysis::status_of;
 pub use analysis::{CHAOS_ERRORS, analyse, analyse_flow, analyse_over};
 pub use budget::Budget;
 pub use cell::{Measured, measure};
+pub use scatter::Scatter;
 pub use trace::trace;
 
 use crate::model::{Side, State};

@@ -12,7 +12,7 @@ mod newton;
 mod unit_circle;
 
 pub use exponent::Exponent;
-pub(crate) use exponent::FRESH_TANGENT;
+pub(crate) use exponent::{FRESH_TANGENT, standard_error};
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 pub use newton::{pitchfork, refine};
 

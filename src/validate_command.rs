@@ -213,10 +213,13 @@ fn summary(validation: &Validation) -> String {
     let states = match &validation.states {
         StateCheck::Lanes { cells, above_budget, units, .. } => {
             let worst = units.map_or(0.0, |units| units.worst);
-            format!("states of {cells} lanes: worst error {worst:.2} budgets, {above_budget} above one")
+            format!(
+                "states of {}: worst error {worst:.2} budgets, {above_budget} above one",
+                plural(*cells, "lane")
+            )
         }
         StateCheck::Replay { cells, identical, .. } => {
-            format!("states of {identical} of {cells} cells the same to the bit")
+            format!("states of {identical} of {cells} {} the same to the bit", validation.counted())
         }
         StateCheck::Skipped { reason } => format!("states not compared: {reason}"),
     };
@@ -225,13 +228,26 @@ fn summary(validation: &Validation) -> String {
         .filter(|&explanation| validation.explained_by(explanation) > 0)
         .map(|explanation| format!("{} {}", validation.explained_by(explanation), explanation.name()))
         .collect();
+    let filled = match validation.filled {
+        0 => String::new(),
+        filled => format!("; {filled} of {} were filled, not integrated, and not replayed", validation.runs),
+    };
     let explained = if kinds.is_empty() { String::new() } else { format!(" ({})", kinds.join(", ")) };
     format!(
-        "{} cells replayed: {} mismatches{explained}, {} unexplained; {states}",
-        validation.sampled(),
-        validation.mismatches.len(),
+        "{} replayed: {}{explained}, {} unexplained; {states}{filled}",
+        plural(validation.sampled(), validation.counted().trim_end_matches('s')),
+        plural(validation.mismatches.len(), "mismatch"),
         validation.unexplained()
     )
+}
+
+fn plural(count: usize, one: &str) -> String {
+    let ending = match one {
+        _ if count == 1 => "",
+        _ if one.ends_with("ch") => "es",
+        _ => "s",
+    };
+    format!("{count} {one}{ending}")
 }
 
 /// Cells that a message names; the file has all.
@@ -252,9 +268,12 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), Failu
         .collect();
     let more = if count > NAMED { ", ..." } else { "" };
     Err(Failure::Run(anyhow!(
-        "{count} of {} cells differ from the reference without an explanation: cells {}{more}; {} lists them, \
+        "{count} of {} {} {} from the reference without an explanation: {} {}{more}; {} lists them, \
          each with the command that replays it",
         validation.sampled(),
+        validation.counted(),
+        if count == 1 { "differs" } else { "differ" },
+        if named.len() == 1 { "cell" } else { "cells" },
         named.join(", "),
         dir.join("validation.json").display()
     )))

@@ -200,7 +200,7 @@ fn samples_have_their_strata_and_repeat() {
     ids.dedup();
     assert_eq!(ids.len(), 400, "a cell was drawn twice");
     let count =
-        |wanted| drawn.strata.iter().find(|s| s.stratum == wanted).map(|s| (s.cells, s.sampled)).unwrap();
+        |wanted| drawn.strata.iter().find(|s| s.stratum == wanted).map(|s| (s.runs, s.sampled)).unwrap();
     let borders = drawn.picks.iter().filter(|pick| pick.stratum == Stratum::Border);
     assert!(borders.clone().all(|pick| [9, 10, 24, 25].contains(&(pick.id % 40))));
     assert_eq!(count(Stratum::Border), (160, 100));

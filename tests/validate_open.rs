@@ -119,7 +119,7 @@ fn lanes_that_may_stop_early_count_before_the_transient_is_over() {
     let plan = plan_at(0.7480314960629921, 1.0, MORE_PERIODS);
     let strobe = [1.2445701956748962, -0.08700716515500079, 0.7460595965385437, 0.2017984370626537];
     let record = open([101_761.0 / 1917.0, 0.29894429445266724], strobe, 2112);
-    Said(&plan, Precision::F32, record).is_explained_by(Explanation::UndecidedInBudget).but_not_with(&[
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::BelowResolution).but_not_with(&[
         ("meshing", |record| record.mesh_fraction += 1e-3),
         ("impacts", |record| record.impacts_per_period += 0.5),
         ("counted too long", |record| record.impacts_per_period = 106_861.0 / 2013.0),
@@ -196,7 +196,9 @@ fn weak_chaos_beside_a_cycle_may_be_left_open() {
 /// may be left open on it, and nowhere else.
 #[test]
 fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
-    for (e, omega) in [(0.6088, 3.4487), (0.8789, 5.6876)] {
+    // The first one attracts from close by only.
+    let settling = Some(Explanation::UndecidedInBudget);
+    for (e, omega, settles_from_there) in [(0.6088, 3.4487, None), (0.8789, 5.6876, settling)] {
         let plan = plan_at(e, omega, "");
         let cells = plan.cells(0..1);
         let chaos = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&cells)).unwrap()[0];
@@ -207,8 +209,11 @@ fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
         let averages = [ends.impacts_per_period, ends.mesh_fraction];
         let open = |strobe| open(averages, strobe, 528);
         let why = |record| explanation(&plan, record, Precision::F32);
+        // The cycle amplifies rounding by some hundreds.
         let near = open(ends.strobe.map(|x| x * (1.0 + 1e-4)));
-        assert_eq!(why(near), Ok(Some(Explanation::UndecidedInBudget)), "{:?}", ends.class);
+        assert_eq!(why(near), Ok(Some(Explanation::BelowResolution)), "{:?}", ends.class);
+        let farther = open(ends.strobe.map(|x| x * (1.0 + 1e-3)));
+        assert_eq!(why(farther), Ok(settles_from_there), "{:?}", ends.class);
         // A cycle of the same period that repels, which chaos passes.
         let flow = Flow::new(&pair.oscillator().unwrap());
         let mut passing: Trajectory<'_> = Trajectory::new(&flow, pair.law(), chaos.strobe);

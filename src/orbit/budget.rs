@@ -48,6 +48,12 @@ impl Budget {
         self.settings.transient_periods.saturating_add(self.settings.observed_periods)
     }
 
+    /// Forcing periods of a cell that takes longest.
+    pub fn longest(&self) -> u32 {
+        let more = if self.early_stop { self.undecided_periods } else { 0 };
+        self.periods().saturating_add(more)
+    }
+
     /// The period from which the exponent accumulates.
     pub fn exponent_from(&self) -> u32 {
         let from = if self.shows_exponent { SHOWN_EXPONENT_FROM } else { EXPONENT_FROM };

@@ -9,6 +9,7 @@ use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, status_of};
 use super::approach::{LINEAR_CYCLES, is_linear};
 use super::prospects::{Searched, contraction, departs};
 use super::recurrence::{Metric, NEAR, candidates, lingering};
+use super::scatter::Scatter;
 use super::{Budget, Orbit, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
@@ -49,6 +50,8 @@ pub struct Measured {
     pub impacts_per_period: f64,
     /// Fraction of time spent meshing, over the same.
     pub mesh_fraction: f64,
+    /// What these averages are uncertain by; none for a cycle.
+    pub scatter: Option<Scatter>,
     /// Whether the cycle is its own mirror image.
     pub symmetric: Option<bool>,
     /// The cycle's word.
@@ -114,8 +117,7 @@ struct Watch<'a> {
 impl<'a> Watch<'a> {
     fn run(&mut self, start: State) -> Result<Measured, Stop> {
         let budget = self.budget.periods();
-        let more = if self.budget.early_stop { self.budget.undecided_periods } else { 0 };
-        let last = budget.saturating_add(more);
+        let last = self.budget.longest();
         let exponent_from = self.budget.exponent_from();
         let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
         let mut look = if self.budget.early_stop { FIRST_LOOK.min(budget) } else { last };
@@ -191,6 +193,7 @@ impl<'a> Watch<'a> {
             lyapunov: flow.quiet().map(|quiet| [quiet.exponent(), 0.0]),
             impacts_per_period: 0.0,
             mesh_fraction: 0.0,
+            scatter: None,
             symmetric: flow.mirror_symmetric().then_some(true),
             word: Some(Word::default()),
             strobe: self.strobes[self.strobes.len() - 1],
@@ -322,6 +325,7 @@ impl<'a> Watch<'a> {
             lyapunov: Some([orbit.lyapunov, 0.0]),
             impacts_per_period: orbit.impacts_per_period,
             mesh_fraction: orbit.mesh_fraction,
+            scatter: None,
             symmetric: orbit.symmetric,
             word: Some(orbit.word),
             strobe,
@@ -344,6 +348,7 @@ impl<'a> Watch<'a> {
         // Banded chaos lingers at a cycle for ever, but no departure lasts through such growth.
         let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let lingered = lingering(averaged, &Metric::of(window, self.analysis.flow), max_period);
+        let averaged_counts = &self.counts[self.budget.exponent_from() as usize..];
         let is_departure = |rate: f64| rate * lingered as f64 * period < DEPARTURE;
         let is_neutral =
             |rate: f64| rate * averaged.len().saturating_sub(1) as f64 * period <= self.neutral_growth();
@@ -355,6 +360,7 @@ impl<'a> Watch<'a> {
             lyapunov: lyapunov.map(|(mean, error)| [mean, error]),
             impacts_per_period: impacts / span,
             mesh_fraction: meshing_time / (span * period),
+            scatter: Some(Scatter::of(averaged_counts, settings.observed_periods, period)),
             symmetric: None,
             word: None,
             strobe: self.strobes[self.strobes.len() - 1],
@@ -378,6 +384,7 @@ impl<'a> Watch<'a> {
             lyapunov: None,
             impacts_per_period: 0.0,
             mesh_fraction: 0.0,
+            scatter: None,
             symmetric: None,
             word: None,
             strobe: self.strobes[self.strobes.len() - 1],

@@ -22,6 +22,12 @@ pub(super) struct ValidationObject {
     device: String,
     seed: u64,
     cells: usize,
+    /// What all numbers but `cells` count: runs if cells have several starts.
+    counted: &'static str,
+    runs: usize,
+    /// Only these are replayed: the others were filled from their neighbours.
+    integrated: usize,
+    filled: usize,
     samples: usize,
     strata: Vec<StratumObject>,
     agreement: BTreeMap<&'static str, AgreementObject>,
@@ -35,7 +41,7 @@ pub(super) struct ValidationObject {
 #[derive(Serialize)]
 struct StratumObject {
     name: String,
-    cells: usize,
+    runs: usize,
     sampled: usize,
 }
 
@@ -53,13 +59,13 @@ enum StatesObject {
         device: String,
         same_device: bool,
         horizon_periods: u32,
-        cells: usize,
+        compared: usize,
         above_budget: usize,
         budgets: Option<QuantilesObject>,
         absolute: Option<QuantilesObject>,
     },
     Replay {
-        cells: usize,
+        compared: usize,
         identical: usize,
         absolute: Option<QuantilesObject>,
     },
@@ -110,7 +116,7 @@ impl ValidationObject {
     ) -> ValidationObject {
         let strata = validation.strata.iter().map(|stratum| StratumObject {
             name: stratum_name(stratum.stratum),
-            cells: stratum.cells,
+            runs: stratum.runs,
             sampled: stratum.sampled,
         });
         let agreement = validation.agreement.iter().map(|field| {
@@ -129,6 +135,10 @@ impl ValidationObject {
             device: made.device.to_owned(),
             seed: validation.seed,
             cells: cells.counts().iter().product(),
+            counted: validation.counted(),
+            runs: validation.runs,
+            integrated: validation.runs - validation.filled,
+            filled: validation.filled,
             samples: validation.sampled(),
             strata: strata.collect(),
             agreement: agreement.collect(),
@@ -168,13 +178,13 @@ impl StatesObject {
                 device: again.unwrap_or(made_on).to_owned(),
                 same_device: again.is_none_or(|again| again == made_on),
                 horizon_periods: HORIZON,
-                cells: *cells,
+                compared: *cells,
                 above_budget: *above_budget,
                 budgets: object(units),
                 absolute: object(absolute),
             },
             StateCheck::Replay { cells, identical, absolute } => {
-                StatesObject::Replay { cells: *cells, identical: *identical, absolute: object(absolute) }
+                StatesObject::Replay { compared: *cells, identical: *identical, absolute: object(absolute) }
             }
             StateCheck::Skipped { reason } => StatesObject::Skipped { reason: reason.clone() },
         }
@@ -203,8 +213,12 @@ fn field_name(field: Field) -> &'static str {
         Field::Word => "word",
         Field::Symmetric => "symmetric",
         Field::Exponent => "lyapunov",
+        Field::ExponentError => "lyapunov_error",
         Field::Impacts => "impacts_per_period",
         Field::Mesh => "mesh_fraction",
+        Field::Status => "status",
+        Field::Periods => "periods_run",
+        Field::Kept => "valid",
         Field::State => "state",
     }
 }
@@ -216,10 +230,12 @@ fn meaning(explanation: Explanation) -> &'static str {
             "the engine's caps ended the cell, as its status says, and it does need more"
         }
         Explanation::UndecidedInBudget => {
-            "one side does not decide within the periods allowed; with more of them both say the same"
+            "one side does not decide within the periods allowed; on the reference the motion settles too late for that, or \
+             grows too little"
         }
         Explanation::CoexistingAttractor => {
-            "another attractor of the same cell: the reference stays on it when started on the map's last state"
+            "another attractor of the same cell: the reference stays on it when started on the map's last state, and \
+             comes to it from the cell's start moved within rounding"
         }
         Explanation::Chaos => {
             "a chaotic transient outlives the periods allowed, or averages over chaos scatter as much on the \
@@ -238,7 +254,7 @@ fn meaning(explanation: Explanation) -> &'static str {
         }
         Explanation::BelowResolution => {
             "lanes cannot resolve it: one period is a multiple of the other and the cycles are as near to each other, \
-             or rounding of the tangents moves the exponent that far"
+             or rounding moves the exponent that far or keeps the motion from settling"
         }
         Explanation::NearGrazing => "an event grazes more nearly than the precision resolves",
     }

@@ -48,16 +48,22 @@ impl Exponent {
             return (f64::NAN, f64::INFINITY);
         }
         let mean = self.growth.iter().sum::<f64>() / n as f64;
-        let block = n / BLOCKS;
-        if block == 0 {
-            return (mean / forcing_period, f64::INFINITY);
-        }
-        let means: Vec<f64> = self.growth[n - block * BLOCKS..]
-            .chunks(block)
-            .map(|chunk| chunk.iter().sum::<f64>() / block as f64)
-            .collect();
-        let centre = means.iter().sum::<f64>() / BLOCKS as f64;
-        let variance = means.iter().map(|m| (m - centre).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
-        (mean / forcing_period, (variance / BLOCKS as f64).sqrt() / forcing_period)
+        (mean / forcing_period, standard_error(&self.growth) / forcing_period)
     }
+}
+
+/// The standard error of the mean of consecutive values, from the means of 16 blocks, of the last ones if their number is
+/// no multiple of that; infinite for fewer than 16 values.
+pub(crate) fn standard_error(values: &[f64]) -> f64 {
+    let block = values.len() / BLOCKS;
+    if block == 0 {
+        return f64::INFINITY;
+    }
+    let means: Vec<f64> = values[values.len() - block * BLOCKS..]
+        .chunks(block)
+        .map(|chunk| chunk.iter().sum::<f64>() / block as f64)
+        .collect();
+    let centre = means.iter().sum::<f64>() / BLOCKS as f64;
+    let variance = means.iter().map(|m| (m - centre).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
+    (variance / BLOCKS as f64).sqrt()
 }

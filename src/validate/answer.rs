@@ -4,24 +4,14 @@ use serde::Serialize;
 
 use crate::classify::classify;
 use crate::engine::measured_record;
-use crate::gpu::Precision;
-use crate::orbit::{Class, Measured, Orbit, Status};
+use crate::gpu::{Averaging, Precision};
+use crate::orbit::{Budget, Class, Measured, Orbit, Scatter, Status};
 use crate::plan::Needs;
 use crate::record::{Record, Spelling, valid, word_hash};
 use crate::word::Word;
 
-/// Standard errors by which two averages of the same chaos may differ.
-const SAME_CHAOS_ERRORS: f64 = 5.0;
-
-/// What two exponents of the same chaos may differ by beside that, per forcing period:
-/// standard errors from 16 blocks are themselves uncertain.
-const CHAOS_FLOOR: f64 = 0.01;
-
-/// Impacts per period over chaos may differ by this share and this number, mesh fractions by
-/// this much.
-const CHAOS_SHARE: f64 = 0.25;
-const CHAOS_IMPACTS: f64 = 0.3;
-const CHAOS_MESH: f64 = 0.1;
+/// Blocks whose means give lanes a standard error, at least (`FEWEST_BLOCKS` in the shaders).
+const FEWEST_BLOCKS: u32 = 6;
 
 /// What is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -34,26 +24,38 @@ pub enum Field {
     Word,
     /// Whether the cycle is its own mirror image, where the period agrees.
     Symmetric,
-    /// The exponent: by the largest multiplier of cycles, within standard errors in chaos.
+    /// The exponent: by the largest multiplier of cycles, within standard errors otherwise.
     Exponent,
-    /// Impacts per forcing period of a cycle.
+    /// The exponent's standard error, where both sides are on no cycle.
+    ExponentError,
+    /// Impacts per forcing period.
     Impacts,
-    /// Fraction of time a cycle spends meshing.
+    /// Fraction of time spent meshing.
     Mesh,
-    /// The state after a few periods, in units of the error budget.
+    /// How the integration ended.
+    Status,
+    /// Forcing periods integrated.
+    Periods,
+    /// Which fields the record has.
+    Kept,
+    /// The state: after a few periods, in units of the error budget, or at the end.
     State,
 }
 
 impl Field {
     /// Every field, in the order in which they are told.
-    pub const ALL: [Field; 8] = [
+    pub const ALL: [Field; 12] = [
         Field::Class,
         Field::Period,
         Field::Word,
         Field::Symmetric,
         Field::Exponent,
+        Field::ExponentError,
         Field::Impacts,
         Field::Mesh,
+        Field::Status,
+        Field::Periods,
+        Field::Kept,
         Field::State,
     ];
 }
@@ -99,16 +101,22 @@ pub(super) struct Bars {
     pub(super) mesh: f64,
     pub(super) impacts: f64,
     /// The forcing period.
-    forcing_period: f64,
+    pub(super) forcing_period: f64,
+    /// The period from which exponents accumulate.
+    pub(super) exponent_from: u32,
+    /// Forcing periods that an exponent with a standard error is averaged over at least.
+    pub(super) least_counted: u32,
 }
 
 impl Bars {
-    pub(super) fn new(precision: Precision, forcing_period: f64) -> Bars {
+    pub(super) fn new(precision: Precision, forcing_period: f64, budget: &Budget) -> Bars {
         let (multiplier, no_multiplier, mesh) = match precision {
             Precision::F32 => (4e-3, 1e-2, 2e-5),
             Precision::F64 => (1e-3, 1e-5, 1e-6),
         };
-        Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period }
+        let exponent_from = budget.exponent_from();
+        let least_counted = FEWEST_BLOCKS * Averaging::new(budget.periods(), exponent_from).block;
+        Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period, exponent_from, least_counted }
     }
 }
 
@@ -121,6 +129,8 @@ pub(super) struct Answer {
     pub(super) exponent: Option<[f64; 2]>,
     pub(super) impacts_per_period: Option<f64>,
     pub(super) mesh_fraction: Option<f64>,
+    /// What averages are uncertain by; averages without it are those of a cycle, or not compared.
+    pub(super) scatter: Option<Scatter>,
     pub(super) symmetric: Option<bool>,
     pub(super) word: Option<Word>,
 }
@@ -133,6 +143,7 @@ impl From<&Measured> for Answer {
             exponent: measured.lyapunov,
             impacts_per_period: Some(measured.impacts_per_period),
             mesh_fraction: Some(measured.mesh_fraction),
+            scatter: measured.scatter,
             symmetric: measured.symmetric,
             word: measured.word.clone(),
         }
@@ -148,6 +159,7 @@ impl From<&Orbit> for Answer {
             exponent: Some([orbit.lyapunov, orbit.lyapunov_error.unwrap_or(0.0)]),
             impacts_per_period: Some(orbit.impacts_per_period),
             mesh_fraction: Some(orbit.mesh_fraction),
+            scatter: None,
             symmetric: orbit.symmetric,
             word: is_cycle.then(|| orbit.word.clone()),
         }
@@ -173,7 +185,9 @@ impl Answer {
                     self.compare_cycle(record, f64::from(ours), bars, &mut list);
                 }
             }
-            (Class::Chaotic, Class::Chaotic) => self.compare_chaos(record, bars, &mut list),
+            (Class::Chaotic, Class::Chaotic) | (Class::Undecided, Class::Undecided) => {
+                self.compare_averages(record, bars, &mut list);
+            }
             _ => {}
         }
         list
@@ -223,30 +237,9 @@ impl Answer {
             }
         }
     }
-
-    fn compare_chaos(&self, record: &Record, bars: &Bars, list: &mut Vec<Compared>) {
-        let has = |bit| record.valid & bit != 0;
-        let mut compare = |field, ours: f64, theirs: f64, bar: f64| {
-            let shown = || (Value::Number(ours), Value::Number(theirs));
-            list.push(compared(field, (ours - theirs).abs() <= bar, shown));
-        };
-        if let (true, Some([theirs, error])) = (has(valid::LYAPUNOV), self.exponent) {
-            let bar =
-                SAME_CHAOS_ERRORS * error.hypot(record.lyapunov_error) + CHAOS_FLOOR / bars.forcing_period;
-            compare(Field::Exponent, record.lyapunov, theirs, bar);
-        }
-        // Averages over chaos have no error of their own; these are far beyond their scatter.
-        if let (true, Some(theirs)) = (has(valid::IMPACTS), self.impacts_per_period) {
-            let bar = CHAOS_SHARE * theirs.max(record.impacts_per_period) + CHAOS_IMPACTS;
-            compare(Field::Impacts, record.impacts_per_period, theirs, bar);
-        }
-        if let (true, Some(theirs)) = (has(valid::MESH), self.mesh_fraction) {
-            compare(Field::Mesh, record.mesh_fraction, theirs, CHAOS_MESH);
-        }
-    }
 }
 
-fn compared(field: Field, same: bool, shown: impl FnOnce() -> (Value, Value)) -> Compared {
+pub(super) fn compared(field: Field, same: bool, shown: impl FnOnce() -> (Value, Value)) -> Compared {
     let differs = (!same).then(|| {
         let (record, reference) = shown();
         Difference { field, record, reference }

@@ -2,17 +2,18 @@
 
 use super::Subject;
 use super::answer::{Answer, Bars, Field};
+use super::reading::counts;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::classify::classify;
 use crate::flow::Flow;
 use crate::gpu::Precision;
-use crate::model::{GearPair, Law, Side, State};
-use crate::orbit::{Budget, Class, Measured, analyse_flow, measure};
+use crate::model::{GearPair, Law, Parameter, Side, State};
+use crate::orbit::{Budget, Class, Measured, Scatter, analyse_flow, measure};
 use crate::random::Random;
 use crate::record::{Record, valid};
 use crate::reference::{Stop, Trajectory};
-use crate::stability::StrobeMap;
+use crate::stability::{Exponent, FRESH_TANGENT, StrobeMap};
 
 /// Parameters and starts moved by this much, relatively, are the same within rounding of a
 /// lane. Some roundings of a precision: errors gather over the steps of a period.
@@ -25,6 +26,9 @@ pub(super) fn rounding(precision: Precision) -> f64 {
 
 /// No rounding moves the meshing speed by more than this share.
 const MOST_OF_MESH_SPEED: f64 = 0.01;
+
+/// Parameters are drawn from a stream of their own.
+const OF_PARAMETERS: u64 = 0x7061_7261_6d65_7465;
 
 /// A motion this far from where it was a cycle ago, relative to its size, is not on the cycle.
 pub(super) const ELSEWHERE: f64 = 1e-2;
@@ -44,13 +48,29 @@ pub(super) struct Case<'a> {
     pub(super) lane: Option<&'a Record>,
     pub(super) precision: Precision,
     pub(super) is_lane: bool,
+    /// Cells among which it is compared.
+    pub(super) among: usize,
     pub(super) measured: Measured,
     pub(super) truth: Answer,
     pub(super) bars: Bars,
 }
 
+/// A cell that is the same within rounding.
+pub(super) struct Nearby {
+    pub(super) flow: Box<Flow>,
+    pub(super) law: Law,
+    pub(super) start: State,
+}
+
+impl Nearby {
+    /// What the reference measures of it.
+    pub(super) fn measured(&self, budget: &Budget) -> Measured {
+        measure(&self.flow, self.law, self.start, budget)
+    }
+}
+
 impl<'a> Case<'a> {
-    pub(super) fn new(subject: &Subject<'a>, id: u32, lane: Option<&'a Record>) -> Case<'a> {
+    pub(super) fn new(subject: &Subject<'a>, id: u32, lane: Option<&'a Record>, among: usize) -> Case<'a> {
         let plan = subject.plan;
         let cell = plan.cell(id);
         let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
@@ -66,9 +86,10 @@ impl<'a> Case<'a> {
             lane,
             precision: subject.precision,
             is_lane: subject.is_lane,
+            among,
             truth: Answer::from(&measured),
             measured,
-            bars: Bars::new(subject.precision, flow.period),
+            bars: Bars::new(subject.precision, flow.period, &budget),
             flow,
         }
     }
@@ -80,19 +101,35 @@ impl<'a> Case<'a> {
 
     /// What the reference says of another start when it may take the time it needs.
     pub(super) fn at_leisure(&self, start: State) -> Answer {
-        Answer::from(&analyse_flow(&self.flow, self.law, start, &self.budget.settings, 1))
+        let orbit = analyse_flow(&self.flow, self.law, start, &self.budget.settings, 1);
+        let is_cycle = matches!(orbit.class, Class::Periodic { .. } | Class::Failed);
+        let mut answer = Answer::from(&orbit);
+        if let (false, Some((error, scatter))) = (is_cycle, self.scatter(orbit.strobe)) {
+            (answer.exponent, answer.scatter) = (Some([orbit.lyapunov, error]), Some(scatter));
+        }
+        answer
+    }
+
+    /// How averages over the observed periods scatter on the way from a state: the exponent's standard error, and the
+    /// others.
+    fn scatter(&self, from: State) -> Option<(f64, Scatter)> {
+        let mut motion = Trajectory::<0>::new(&self.flow, self.law, from).carrying([FRESH_TANGENT]);
+        let mut exponent = Exponent::default();
+        let mut met = vec![counts(&motion)];
+        let observed = self.budget.settings.observed_periods;
+        for _ in 0..observed {
+            motion.advance_period(&mut ()).ok()?;
+            exponent.renormalise(&mut motion);
+            met.push(counts(&motion));
+        }
+        let (_, error) = exponent.estimate(self.flow.period);
+        Some((error, Scatter::of(&met, observed, self.flow.period)))
     }
 
     /// The pair with one parameter moved to either side by this much, relatively.
     pub(super) fn nudged_pairs(&self, amount: f64) -> impl Iterator<Item = GearPair> + '_ {
-        // Leaving speeds carry the rounding of the whole motion's velocity.
-        let speed = self.units(&self.record.strobe)[1] / self.law.mesh_speed.max(f64::MIN_POSITIVE);
         GearPair::PARAMETERS.iter().flat_map(move |parameter| {
-            let amount = if parameter.name == "mesh_speed" {
-                (amount * speed.clamp(1.0, 1e4)).min(MOST_OF_MESH_SPEED)
-            } else {
-                amount
-            };
+            let amount = self.share_of(parameter, amount);
             [amount, -amount].into_iter().filter_map(move |relative| {
                 let mut pair = self.pair;
                 let value = pair.get(parameter.name).ok()?;
@@ -100,6 +137,16 @@ impl<'a> Case<'a> {
                 Some(pair)
             })
         })
+    }
+
+    /// By how much of itself a parameter moves where motion moves by `amount`.
+    fn share_of(&self, parameter: &Parameter, amount: f64) -> f64 {
+        if parameter.name != "mesh_speed" {
+            return amount;
+        }
+        // Leaving speeds carry the rounding of the whole motion's velocity.
+        let speed = self.units(&self.record.strobe)[1] / self.law.mesh_speed.max(f64::MIN_POSITIVE);
+        (amount * speed.clamp(1.0, 1e4)).min(MOST_OF_MESH_SPEED)
     }
 
     /// Answers within the budget for starts and parameters that are the same within rounding.
@@ -115,10 +162,27 @@ impl<'a> Case<'a> {
         starts.chain(parameters)
     }
 
-    /// Answers within the budget for random starts that are the same within rounding.
+    /// Answers within the budget for random cells that are the same within rounding.
     pub(super) fn scattered(&self, count: usize) -> impl Iterator<Item = Answer> + '_ {
-        let starts = self.scattered_starts(count);
-        starts.map(move |start| Answer::from(&measure(&self.flow, self.law, start, &self.budget)))
+        self.scattered_cells(count).map(|cell| Answer::from(&cell.measured(&self.budget)))
+    }
+
+    /// Random starts, each with random parameters of its own, that are the same within rounding: contact that
+    /// lasts forgets where a motion began.
+    pub(super) fn scattered_cells(&self, count: usize) -> impl Iterator<Item = Nearby> + '_ {
+        let mut random = Random::new(u64::from(self.record.periods_run) ^ OF_PARAMETERS);
+        self.scattered_starts(count).filter_map(move |start| {
+            let mut pair = self.pair;
+            for parameter in GearPair::PARAMETERS {
+                let share = self.share_of(parameter, rounding(self.precision)) * (2.0 * random.unit() - 1.0);
+                // At the end of its range a parameter stays where it is.
+                let _ = pair
+                    .get(parameter.name)
+                    .and_then(|value| pair.set(parameter.name, value * (1.0 + share)));
+            }
+            let flow = Box::new(Flow::new(&pair.oscillator().ok()?));
+            Some(Nearby { flow, law: pair.law(), start })
+        })
     }
 
     /// Random starts that are the same within rounding.

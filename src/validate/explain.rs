@@ -5,6 +5,7 @@
 //! share of cells that is allowed to be wrong.
 
 use super::answer::{Answer, Difference, Field};
+use super::averages::is_other_chaos;
 use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
 use super::explanation::Explanation;
 use super::lane_growth::{rare_chaos, weak_chaos};
@@ -13,8 +14,11 @@ use super::limits::{
     within_scatter,
 };
 use super::on_the_way::{has_averages_ahead, has_averages_on_the_way};
+use super::own_figures::agrees_with_its_figures;
+use super::reached::is_where_it_may_be;
 use super::rounding::{self, at_rest, rounded_cycle};
 use super::same_cycle::{same_cycle, within_reach};
+use super::spread::{are_of_one_class, spread};
 use super::unsettled::unsettled;
 use crate::classify::{classify, status};
 use crate::gpu::{Constants, LaneSettings, Precision};
@@ -43,6 +47,10 @@ const MOST_RUNS: u64 = 1000;
 /// The explanation of a cell's differences: of its states and of its answer, if both differ.
 pub(super) fn explain(case: &Case<'_>, differences: &[Difference]) -> Option<Explanation> {
     let (states, answers): (Vec<_>, Vec<_>) = differences.iter().partition(|d| d.field == Field::State);
+    // No rounding makes a lane go on beyond its periods.
+    if answers.iter().any(|difference| difference.field == Field::Periods) {
+        return None;
+    }
     let of_states = (!states.is_empty()).then(|| explain_states(case));
     let of_answers = (!answers.is_empty()).then(|| explain_answer(case));
     match (of_answers, of_states) {
@@ -83,7 +91,12 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rare_cap,
     ];
     // A record without a period claims averages all the same.
-    CHECKS.iter().find_map(|check| check(case)).filter(|_| has_averages_on_the_way(case))
+    let is_claimed =
+        || agrees_with_its_figures(case) && has_averages_on_the_way(case) && is_where_it_may_be(case);
+    if are_of_one_class(case) {
+        return spread(case).or_else(|| another_of_its_class(case)).filter(|_| is_claimed());
+    }
+    CHECKS.iter().find_map(|check| check(case)).filter(|_| is_claimed())
 }
 
 fn engine_cap(case: &Case<'_>) -> Option<Explanation> {
@@ -145,7 +158,7 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         _ => None,
     };
     let is_left_open = || {
-        let is_too_weak = leaves_chaos_open(case, &case.standing(from).ok()?, &answer)?;
+        let is_too_weak = leaves_chaos_open(case, &answer)?;
         Some(is_too_weak && has_averages_ahead(case))
     };
     let same = case.is_the_records(&answer)
@@ -158,6 +171,12 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         Class::Undecided => Explanation::UndecidedInBudget,
         _ => Explanation::CoexistingAttractor,
     })
+}
+
+/// The same of motion that is on no cycle: other chaos, not the same averaged anew.
+fn another_of_its_class(case: &Case<'_>) -> Option<Explanation> {
+    let is_other = || Some(is_other_chaos(&case.truth, &case.at_leisure(case.strobe()?)));
+    (case.truth.class != Class::Chaotic || is_other() == Some(true)).then(|| other_attractor(case))?
 }
 
 /// Whether it is the record's cycle, read where every step rounds.

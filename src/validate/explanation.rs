@@ -8,11 +8,12 @@ pub enum Explanation {
     EngineCap,
     /// The reference does not decide within the budget, but gives the record's answer when it
     /// may take longer; or the record says `undecided`, and the motion settles too late or
-    /// grows too little for it to say more, or rounding, which the cycle amplifies, keeps a lane
-    /// from seeing it settle, be it that the reference is still in chaos that ends on that cycle.
+    /// grows too little for it to say more, be it that the reference is still in chaos that ends on
+    /// a cycle; or neither side decides, and the motion averaged in the lane's way gives the record.
     UndecidedInBudget,
     /// The reference, started on the record's own strobe state, has the record's class,
-    /// period, word, exponent and averages: another attractor of the same cell.
+    /// period, word, exponent and averages: another attractor of the same cell. And the cell's own
+    /// start leads there within rounding, which a lane from any other start could not say.
     CoexistingAttractor,
     /// Chaos: a transient of one side outlives the budget, or averages over it scatter as
     /// much on the reference itself when its start moves within rounding.
@@ -32,7 +33,8 @@ pub enum Explanation {
     /// record's period, a divisor of its own; or rounding keeps the lane that much off the cycle,
     /// in a pattern whose period is a multiple; or the steps of a cycle round by more than lanes
     /// tell a symmetric one from an unsymmetric one by; or rounding of the tangents alone moves
-    /// the exponent that far, from one that repels to one that attracts if need be.
+    /// the exponent that far, from one that repels to one that attracts if need be; or rounding, which
+    /// the cycle amplifies, keeps a lane from ever seeing it settle, however long it runs.
     BelowResolution,
     /// Lanes call a cycle symmetric that is its own mirror image to 2.5e-4 of its size; this one
     /// is, but not quite.

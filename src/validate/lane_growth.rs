@@ -6,6 +6,7 @@
 //! is rounded as a lane's is, it gives a record's chaos or shows that there was none.
 
 use super::answer::Answer;
+use super::averages::UNSURE;
 use super::case::Case;
 use super::explanation::Explanation;
 use super::lane_model::LaneModel;
@@ -13,9 +14,10 @@ use super::reading::counts;
 use super::rounded::Rounded;
 use super::states::unit_roundoff;
 use crate::classify::classify;
+use crate::flow::Flow;
 use crate::gpu::Averaging;
-use crate::model::State;
-use crate::orbit::{CHAOS_ERRORS, Class};
+use crate::model::{Law, State};
+use crate::orbit::{CHAOS_ERRORS, Class, Scatter};
 use crate::reference::{Stop, Trajectory};
 
 /// Lane units in which a fresh tangent vector points nowhere in particular.
@@ -28,13 +30,16 @@ const RUNS: u64 = 16;
 /// And where nothing else gives the record's answer: one or two of a hundred may do as a lane did.
 const MOST_RUNS: u64 = 1000;
 
-/// The record says chaotic where the reference, averaged in its own way, decides nothing.
+/// The record says chaotic where the reference, averaged in its own way, decides nothing, or the other way round.
 ///
 /// The reference's own motion, averaged as a lane would, gives the record's answer: neither had
 /// the periods to tell what is chaos in the end. Or one that starts within rounding does, or one
 /// that is rounded at every step: then what it met on the way was decided by rounding.
 pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
-    let lane = AsLane::of_weak_chaos(case)?;
+    let classes = (classify(case.record), case.truth.class);
+    let is_left_open = case.is_lane && classes == (Class::Undecided, Class::Chaotic);
+    let left_open = || if is_left_open { AsLane::new(case) } else { None };
+    let lane = AsLane::of_weak_chaos(case).or_else(left_open)?;
     let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
     if same(lane.answer(case.start)) {
         return Some(Explanation::UndecidedInBudget);
@@ -112,18 +117,15 @@ impl Watched for Rounded<'_, 1> {
     }
 }
 
-/// Standard errors of eight blocks differ by less than this factor, 99 times of 100.
-const UNSURE: f64 = 3.0;
-
 /// What is the same for all motions of a cell.
-struct AsLane<'c, 'a> {
+pub(super) struct AsLane<'c, 'a> {
     case: &'c Case<'a>,
     model: LaneModel,
     averaging: Averaging,
 }
 
 impl<'c, 'a> AsLane<'c, 'a> {
-    fn new(case: &'c Case<'a>) -> Option<Self> {
+    pub(super) fn new(case: &'c Case<'a>) -> Option<Self> {
         let model = LaneModel::new(case)?;
         let averaging = Averaging::new(case.budget.periods(), case.budget.exponent_from());
         Some(AsLane { case, model, averaging })
@@ -136,8 +138,14 @@ impl<'c, 'a> AsLane<'c, 'a> {
     }
 
     /// The reference from `start`.
-    fn answer(&self, start: State) -> Option<Answer> {
-        let bare = self.case.after(start, self.averaging.growth_from).ok()?;
+    pub(super) fn answer(&self, start: State) -> Option<Answer> {
+        self.answer_of(&self.case.flow, self.case.law, start)
+    }
+
+    /// That of a cell that is the same within rounding.
+    pub(super) fn answer_of(&self, flow: &Flow, law: Law, start: State) -> Option<Answer> {
+        let mut bare = Trajectory::<0>::new(flow, law, start);
+        (0..self.averaging.growth_from).try_for_each(|_| bare.advance_period(&mut ())).ok()?;
         self.average(&mut bare.carrying([self.model.constants.to_state(FRESH)]))
     }
 
@@ -182,12 +190,13 @@ impl<'c, 'a> AsLane<'c, 'a> {
         let [impacts, meshing, events] = [0, 1, 2].map(|i| (after[i] - before[i]) / growth.len() as f64);
         let (surely, rounding) = (mean - CHAOS_ERRORS * error, unit_roundoff(self.case.precision));
         let grows = surely > 0.0 && self.averaging.outgrows(surely, growth.len(), events, rounding);
-        let period = self.case.flow.period;
+        let (period, exponent_periods) = (self.case.flow.period, growth.len() as u32);
         Some(Answer {
             class: if grows { Class::Chaotic } else { Class::Undecided },
             exponent: Some([mean / period, error / period]),
             impacts_per_period: Some(impacts),
             mesh_fraction: Some(meshing / period),
+            scatter: self.case.truth.scatter.map(|scatter| Scatter { exponent_periods, ..scatter }),
             ..self.case.truth.clone()
         })
     }

@@ -1,8 +1,12 @@
 //! What a lane cannot tell within its precision, or within its budget.
 
 use super::answer::Answer;
+use super::averages::{is_same_error, is_same_exponent};
 use super::case::{Case, ELSEWHERE, rounding};
 use super::explanation::Explanation;
+use super::lane_model::LaneModel;
+use super::own_figures::is_open_by_its_figures;
+use super::rounded::Rounded;
 use super::rounding::moved_by_rounding;
 use super::same_cycle::{may_repel, within_reach};
 use crate::classify::classify;
@@ -19,8 +23,11 @@ const UNSETTLED: f64 = 1e-4;
 /// Periods in which motion leaves what repels it, however closely it passes.
 const STAYING_PERIODS: u32 = 400;
 
-/// A motion this close to where it was some periods ago may be lingering at a cycle.
-const LINGERING: f64 = 0.03;
+/// A lane may be so many times as far off its cycle as the reference is: where an approach ends is chance.
+const AS_FAR: f64 = 8.0;
+
+/// Motions that are rounded at every step, to see how far off they are.
+const ROUNDED_RUNS: u64 = 8;
 
 /// Periods that lanes take to confirm a period: three windows of the longest they look for.
 const CONFIRMATION_WINDOWS: u32 = 3;
@@ -46,7 +53,11 @@ pub(super) fn undecided_chaos(case: &Case<'_>) -> Option<Explanation> {
     let [theirs, error] = case.truth.exponent?;
     let [ours, own] = [case.record.lyapunov, case.record.lyapunov_error];
     let is_weak = ours <= 2.0 * CHAOS_ERRORS * own;
-    if is_weak && (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own) {
+    let periods = case.truth.scatter?.exponent_periods;
+    if is_weak
+        && is_same_error(case.record, &case.bars, error, periods)
+        && (ours - theirs).abs() <= CHAOS_ERRORS * error.hypot(own)
+    {
         return Some(Explanation::UndecidedInBudget);
     }
     case.nudged().any(|answer| answer.class == Class::Chaotic).then_some(Explanation::Chaos)
@@ -81,20 +92,24 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
         _ if !is_spent(case) => None,
         // The reference, too, is still on its way, to a cycle that is reached from here as well.
         (Class::Undecided, Class::Periodic { .. }) if case.truth.status == Status::Slow => {
-            let settles = case.at_leisure(from).class == case.truth.class;
-            settles.then_some(Explanation::UndecidedInBudget)
+            let Class::Periodic { period } = case.truth.class else { return None };
+            let settles = || case.at_leisure(from).class == case.truth.class;
+            let is_own = || is_as_far(case, period, case.unrest(&stands, period));
+            is_left_open(case, &stands, &case.truth, period)
+                .or_else(|| (is_own() && settles()).then_some(Explanation::UndecidedInBudget))
         }
         (Class::Undecided, Class::Periodic { period }) => {
             let confirming = CONFIRMATION_WINDOWS * case.budget.settings.max_period;
             let began = case.record.periods_run.saturating_sub(confirming);
             let late = wanders_within_rounding(case, began, period, UNSETTLED);
-            (late || is_left_open(case, &stands, &case.truth, period))
-                .then_some(Explanation::UndecidedInBudget)
+            let on_time = || is_left_open(case, &stands, &case.truth, period);
+            if late { Some(Explanation::UndecidedInBudget) } else { on_time() }
         }
         (Class::Undecided, Class::Chaotic) => {
-            let is_over = || has_left_chaos(case, &stands) == Some(true);
-            let explains = leaves_chaos_open(case, &stands, &case.truth)? || is_over();
-            explains.then_some(Explanation::UndecidedInBudget)
+            if leaves_chaos_open(case, &case.truth)? {
+                return Some(Explanation::UndecidedInBudget);
+            }
+            has_left_chaos(case, &stands)
         }
         _ => None,
     }
@@ -102,43 +117,72 @@ pub(super) fn late(case: &Case<'_>) -> Option<Explanation> {
 
 /// Whether the record is undecided with the exponent of the chaos that `truth` describes: too weak to be told in its
 /// budget, or where the motion lingers at some cycle.
-pub(super) fn leaves_chaos_open(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer) -> Option<bool> {
+pub(super) fn leaves_chaos_open(case: &Case<'_>, truth: &Answer) -> Option<bool> {
     if classify(case.record) != Class::Undecided || truth.class != Class::Chaotic || !is_spent(case) {
         return Some(false);
     }
-    let [theirs, error] = truth.exponent?;
-    let (ours, bar) = (case.record.lyapunov, 5.0 * error.hypot(case.record.lyapunov_error));
-    let known = case.record.valid & valid::LYAPUNOV != 0 && (ours - theirs).abs() <= bar;
-    let is_weak = ours <= CHAOS_ERRORS * case.record.lyapunov_error;
-    let lags = case.budget.settings.max_period / 2;
-    let lingers = || (1..=lags).any(|lag| case.unrest(stands, lag) < LINGERING);
-    Some(known && (is_weak || lingers()))
+    let (exponent, periods) = (truth.exponent?, truth.scatter?.exponent_periods);
+    let known = case.record.valid & valid::LYAPUNOV != 0
+        && is_same_exponent(case.record, &case.bars, exponent, periods)
+        && is_same_error(case.record, &case.bars, exponent[1], periods);
+    Some(known && is_open_by_its_figures(case))
 }
 
-/// Whether the reference goes on from where the lane was at last to the cycle that `truth` describes, and
-/// the lane could not see it settle there.
-fn is_left_open(case: &Case<'_>, stands: &Trajectory<'_>, truth: &Answer, period: u32) -> bool {
-    // It is off the cycle.
-    let is_off = || case.unrest(stands, period) > UNSETTLED;
+/// Why a lane could not see its motion settle, if the reference goes on from where it was at last to the cycle that
+/// `truth` describes: there was no time left, or rounding hides it.
+fn is_left_open(
+    case: &Case<'_>,
+    stands: &Trajectory<'_>,
+    truth: &Answer,
+    period: u32,
+) -> Option<Explanation> {
+    let unrest = case.unrest(stands, period);
     // Or as close as rounding, which the cycle amplifies, lets it come.
-    let trembles = || {
-        let is_kept_off = case.is_lane && case.unrest(stands, period) > rest(case.precision);
-        is_kept_off && is_shaken(case, stands, period) == Some(true)
-    };
+    let is_kept_off = case.is_lane && unrest > rest(case.precision);
+    let trembles = || is_kept_off && is_shaken(case, stands, period) == Some(true);
     // Or rounding hides from it that the cycle attracts.
     let doubts = || case.is_lane && may_repel(case, stands, truth) == Some(true);
-    let settles = || case.at_leisure(stands.state()).class == truth.class;
-    (is_off() || trembles() || doubts()) && settles()
+    let because = if trembles() {
+        Explanation::BelowResolution
+    } else if unrest > UNSETTLED {
+        Explanation::UndecidedInBudget
+    } else if doubts() {
+        Explanation::BelowResolution
+    } else {
+        return None;
+    };
+    if unrest > rest(case.precision) && !is_as_far(case, period, unrest) {
+        return None;
+    }
+    let settles = case.at_leisure(stands.state()).class == truth.class;
+    settles.then_some(because)
+}
+
+/// Whether the reference, after the record's periods, is about as far off its cycle of `period` as `unrest`: from the
+/// start, from one that is the same within rounding, or rounded at every step. Where the record says that
+/// its motion was is no evidence alone.
+fn is_as_far(case: &Case<'_>, period: u32, unrest: f64) -> bool {
+    let is_far = |own: &Trajectory<'_>| AS_FAR * case.unrest(own, period) >= unrest;
+    let mut starts = std::iter::once(case.start).chain((0..8).map(|k| case.nudged_start(k)));
+    starts.any(|start| case.after(start, case.record.periods_run).is_ok_and(|own| is_far(&own)))
+        || LaneModel::new(case).filter(|_| case.is_lane).is_some_and(|model| {
+            let start: Trajectory<'_> = Trajectory::new(&model.flow, model.law, model.start(case.start));
+            (0..ROUNDED_RUNS).any(|run| {
+                let mut motion = Rounded::new(&start, &model, run);
+                let ran = (0..case.record.periods_run).try_for_each(|_| motion.advance_period(&mut ()));
+                ran.is_ok() && is_far(motion.trajectory())
+            })
+        })
 }
 
 /// The reference's own chaos is a transient: in the end it is on a cycle, and the lane was left open near one
 /// of that period where the motion stays, which a cycle that repels would not let it.
-fn has_left_chaos(case: &Case<'_>, stands: &Trajectory<'_>) -> Option<bool> {
+fn has_left_chaos(case: &Case<'_>, stands: &Trajectory<'_>) -> Option<Explanation> {
     let settled = case.at_leisure(case.start);
     let Class::Periodic { period } = settled.class else { return None };
     let stays = |cycles| case.unrest(stands, cycles * period) < ELSEWHERE;
     let is_near = stays(1) && stays(STAYING_PERIODS.div_ceil(period));
-    Some(is_near && is_left_open(case, stands, &settled, period))
+    if is_near { is_left_open(case, stands, &settled, period) } else { None }
 }
 
 /// Periods that a cell may take whatever becomes of it.
@@ -240,7 +284,7 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
         SCATTERS.iter().flat_map(|times| case.nudged_pairs(times * scatter)).map(answer).collect();
     if ours == Class::Undecided {
         let is_another = |answer: &Answer| answer.class != case.truth.class || answer.word != case.truth.word;
-        return answers.iter().any(is_another).then_some(Explanation::UndecidedInBudget);
+        return answers.iter().any(is_another).then_some(Explanation::BelowResolution);
     }
     let lies_between = |ours: f64, of: fn(&Answer) -> Option<f64>| {
         let known = || answers.iter().chain([&case.truth]).filter_map(of);

@@ -9,7 +9,7 @@ use crate::record::{Record, valid};
 /// Why a cell is in the sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stratum {
-    /// Drawn from all cells.
+    /// Drawn from all runs that were integrated.
     Uniform,
     /// One of its four neighbours has another class or period.
     Border,
@@ -31,9 +31,9 @@ pub struct Pick {
 pub struct StratumCount {
     /// Which.
     pub stratum: Stratum,
-    /// Cells of the map that belong to it.
-    pub cells: usize,
-    /// Cells drawn for it.
+    /// Integrated runs of the map that belong to it.
+    pub runs: usize,
+    /// Runs drawn for it.
     pub sampled: usize,
 }
 
@@ -46,11 +46,13 @@ pub struct Sample {
     pub picks: Vec<Pick>,
     /// The same by stratum.
     pub strata: Vec<StratumCount>,
+    /// Cells among which these are compared: of many, averages may be as rare as one in so many.
+    pub among: usize,
 }
 
-/// Draws `size` cells, or all if there are fewer: half of them from all cells, a quarter at
-/// class borders, the rest shared equally among the statuses other than `ok`. What a stratum
-/// is short of is drawn from all cells. The same map, size and seed give the same sample.
+/// Draws `size` runs, or all if there are fewer: half of them from all that were integrated, a
+/// quarter at class borders, the rest shared equally among the statuses other than `ok`. What a
+/// stratum is short of is drawn from all. The same map, size and seed give the same sample.
 pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample {
     let mut draw = Draw { random: Random::new(seed), taken: vec![false; records.len()], picks: Vec::new() };
     // Filled cells were never integrated: the audit of an adaptive map looks after them.
@@ -74,12 +76,12 @@ pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample
     }
     let missing = size - draw.picks.len();
     draw.from(&all, missing, Stratum::Uniform);
-    counts.insert(0, (Stratum::Uniform, records.len()));
+    counts.insert(0, (Stratum::Uniform, all.len()));
 
     let sampled = |stratum| draw.picks.iter().filter(|pick| pick.stratum == stratum).count();
     let strata =
-        counts.into_iter().map(|(stratum, cells)| StratumCount { stratum, cells, sampled: sampled(stratum) });
-    Sample { seed, strata: strata.collect(), picks: draw.picks }
+        counts.into_iter().map(|(stratum, runs)| StratumCount { stratum, runs, sampled: sampled(stratum) });
+    Sample { seed, strata: strata.collect(), among: draw.picks.len(), picks: draw.picks }
 }
 
 struct Draw {

@@ -99,7 +99,7 @@ pub(crate) fn explanation(
     records[0] = record;
     let subject = Subject { plan, records: &records, precision, is_lane: true };
     let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
-    let sample = Sample { seed: 0, picks, strata: Vec::new() };
+    let sample = Sample { seed: 0, picks, strata: Vec::new(), among: 1 };
     let validation = replay(&subject, &sample, StateSource::None(String::new()), &|_| ());
     validation.mismatches.first().map(|mismatch| mismatch.explanation).ok_or(())
 }

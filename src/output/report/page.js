@@ -412,25 +412,26 @@ function table(caption, heads, lines, numbers = []) {
   return box;
 }
 
-const STRATA = { uniform: "from all cells", border: "at a border of classes" };
+const STRATA = { uniform: "from all that were integrated", border: "at a border of classes" };
 const FIELDS = { class: "class", period: "period", word: "word, up to mirror image", symmetric: "symmetry",
-  lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing",
+  lyapunov: "exponent", lyapunov_error: "the exponent's error", impacts_per_period: "impacts per period",
+  mesh_fraction: "time in meshing", status: "status", periods_run: "periods integrated", valid: "fields kept",
   state: "state, within the error budget" };
 
-function stateText({ check, ...states }, samples) {
+function stateText({ check, ...states }, samples, one) {
   if (check === "skipped") return `States were not compared: ${states.reason}.`;
   if (check === "replay") {
     return "The map was made by the reference itself, so this replay shows that the records are what they were, "
       + `not that the reference is right: the last states of ${states.identical} of `
-      + `${count(states.cells, "cell")} are the same to the last bit`
+      + `${count(states.compared, one)} are the same to the last bit`
       + (states.absolute ? `, the largest difference is ${short(states.absolute.worst)}.` : ".");
   }
   const where = states.same_device ? "" : ` on ${states.device}, not on the map's own device,`;
   return `The lanes were run again${where} over ${states.horizon_periods} forcing periods and their states compared with the `
     + "reference's. The budget is what rounding may amount to by an estimate made beforehand, from the precision, the "
     + `number of steps and the growth of small errors along the motion: ${states.above_budget} of `
-    + `${count(states.cells, "cell")} are above it`
-    + (states.cells < samples ? `; in the other ${samples - states.cells} the budget is as large as the motion, or the cell failed.` : ".");
+    + `${count(states.compared, one)} are above it`
+    + (states.compared < samples ? `; in the other ${samples - states.compared} the budget is as large as the motion, or the lane failed.` : ".");
 }
 
 function explained(found) {
@@ -453,25 +454,26 @@ function explained(found) {
 }
 
 function tellValidation(found) {
+  const one = found.counted.replace(/s$/, "");
   const section = byId("validation");
   document.body.classList.add("validated");
   section.hidden = false;
   const agreed = found.samples - found.mismatched;
   const verdict = found.unexplained === 0
-    ? `${agreed} of ${count(found.samples, "replayed cell")} agree with the reference; `
+    ? `${agreed} of ${count(found.samples, `replayed ${one}`)} agree with the reference; `
       + (found.mismatched === 0 ? "none differs." : `${count(found.mismatched, "differs", "differ")}, each for a reason that a check has shown.`)
-    : `${found.unexplained} of ${count(found.samples, "replayed cell")} differ from the reference and no check shows why: `
+    : `${found.unexplained} of ${count(found.samples, `replayed ${one}`)} differ from the reference and no check shows why: `
       + "do not trust the map there.";
   byId("validated").hidden = false;
   byId("verdict").textContent = found.unexplained === 0
-    ? `${count(found.samples, "cell")} replayed on the reference: ${found.mismatched === 0 ? "all agree" : `${found.mismatched} differ, all explained`}.`
-    : `${found.unexplained} of ${count(found.samples, "replayed cell")} differ without an explanation.`;
+    ? `${count(found.samples, one)} replayed on the reference: ${found.mismatched === 0 ? "all agree" : `${found.mismatched} differ, all explained`}.`
+    : `${found.unexplained} of ${count(found.samples, `replayed ${one}`)} differ without an explanation.`;
   byId("details").addEventListener("click", () => section.scrollIntoView({ behavior: "smooth" }));
   const tables = element("div");
   tables.id = "tables";
   tables.append(
-    table("Cells replayed", ["", "replayed", "in the map"], found.strata.map(({ name, sampled, cells }) =>
-      ({ cells: [STRATA[name] ?? name.replace(/^status (.*)/, "with status $1"), sampled, cells] })), [1, 2]),
+    table(`Replayed ${found.counted}`, ["", "replayed", "in the map"], found.strata.map(({ name, sampled, runs }) =>
+      ({ cells: [STRATA[name] ?? name.replace(/^status (.*)/, "with status $1"), sampled, runs] })), [1, 2]),
     table("Agreement", ["", "compared", "agree"], Object.keys(FIELDS).filter((name) => found.agreement[name]?.compared)
       .map((name) => ({ cells: [FIELDS[name], found.agreement[name].compared, found.agreement[name].agreeing] })), [1, 2]),
   );
@@ -483,16 +485,17 @@ function tellValidation(found) {
   }
   const reasons = found.explanations.filter(({ mismatches }) => mismatches > 0);
   if (reasons.length) {
-    tables.append(table("Why cells differ", ["", "cells", ""], reasons.map(({ name, mismatches, meaning }) =>
+    tables.append(table("Why cells differ", ["", found.counted, ""], reasons.map(({ name, mismatches, meaning }) =>
       ({ cells: [name.replaceAll("_", " "), mismatches, meaning] })), [1]));
   }
   section.append(
     element("h2", "Validation"),
     element("p", verdict, found.unexplained ? "verdict bad" : "verdict"),
-    element("p", `A sample of ${found.samples} of ${found.cells} cells (seed ${found.seed}), made by the engine `
+    element("p", `A sample of ${found.samples} of ${found.integrated} integrated ${found.counted} (seed ${found.seed}), made by the engine `
       + `${found.engine} in ${found.precision} on ${found.device}, was computed again by the event-driven reference `
-      + "within the same number of periods."),
-    element("p", stateText(found.states, found.samples)), tables);
+      + "within the same number of periods."
+      + (found.filled ? ` The other ${found.filled} were filled from their neighbours: the audit looks after them.` : "")),
+    element("p", stateText(found.states, found.samples, one)), tables);
   if (found.mismatches.length) section.append(explained(found));
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::cells::EngineName;
 use super::super::lanes::Start;
-use super::{SETTINGS, Told, each, lane_settings};
+use super::{SETTINGS, Told, budget, each, lane_settings};
 use crate::bench::stability::Watch;
 use crate::classify::classify;
 use crate::gpu::Precision;
@@ -55,7 +55,7 @@ pub(super) fn all(
 ) -> Comparison {
     let differs = |&i: &usize| {
         let period = std::f64::consts::TAU / cells[i].0.omega;
-        !disagreements(&truth[i], &records[i], precision, period).is_empty()
+        !disagreements(&truth[i], &records[i], precision, period, &budget()).is_empty()
     };
     let is_silent = |&i: &usize| {
         classify(&records[i]) == Class::Undecided && records[i].periods_run >= lane_settings().periods
@@ -67,7 +67,7 @@ pub(super) fn all(
     let left = different.split_off(examined).len();
     let told = Told::new(watch, "lanes examined", examined);
     let examine = |&i: &usize| {
-        let mismatch = Cell::new(precision, cells[i], records[i]).examine();
+        let mismatch = Cell::new(precision, cells[i], records[i]).examine(cells.len());
         if let Some(Mismatch { engine, pair, start, differences, explanation: None }) = &mismatch {
             watch.found(&format!("unexplained: {} {pair:?} from {start:?}: {differences:?}", engine.name()));
         }
@@ -98,9 +98,10 @@ impl Cell {
         Subject { plan: &self.plan, records: &self.records, precision: self.precision, is_lane: true }
     }
 
-    fn examine(&self) -> Option<Mismatch> {
+    /// As one of so many.
+    fn examine(&self, among: usize) -> Option<Mismatch> {
         let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
-        let sample = Sample { seed: 0, picks, strata: Vec::new() };
+        let sample = Sample { seed: 0, picks, strata: Vec::new(), among };
         let validation = replay(&self.subject(), &sample, StateSource::None(String::new()), &|_| ());
         let mismatch = validation.mismatches.into_iter().next()?;
         Some(Mismatch {

@@ -1,0 +1,184 @@
+//! Both sides say the same of motion that is on no cycle, but for its averages: do these scatter as much on the
+//! reference itself?
+//!
+//! A record's average has to be one of those of motions that are the cell's own within rounding, over the
+//! reference's periods or over the lane's: within five standard deviations of their mean, or between the least and
+//! the greatest of very many. Where more cells are compared than motions are tried, some averages are rarer than one
+//! in so many, and the tail of what was met is continued. To let each of many motions claim what lies within
+//! standard errors of its own would find one for any record.
+
+use super::answer::{Answer, Field};
+use super::averages::{at_ends, error_over};
+use super::case::Case;
+use super::explanation::Explanation;
+use super::lane_growth::AsLane;
+use super::on_the_way::has_averages_on_the_way;
+use crate::classify::classify;
+use crate::orbit::Class;
+use crate::record::valid;
+
+/// Starts and parameters within rounding that are tried: of a map's many averages some are rare.
+const CELLS: usize = 16_384;
+
+/// So many give a mean and a standard deviation. After them, only what lies near those that were met can still lie
+/// between them:
+const FIRST_CELLS: usize = 128;
+
+/// no farther off than this share of what they span.
+const NEARLY: f64 = 1.0;
+
+/// The tail of what was met: one of so many.
+const TAIL: usize = 1000;
+
+/// An average may be rarer than that, if it is not expected in so many samples alike.
+const RARE: f64 = 0.1;
+
+/// Standard deviations by which one average may differ from their mean, as averages may from each other.
+const DEVIATIONS: f64 = 5.0;
+
+/// Why averages differ; none where the sides are not of one class, or on a cycle.
+pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
+    let because = match case.truth.class {
+        Class::Chaotic => Explanation::Chaos,
+        _ => Explanation::UndecidedInBudget,
+    };
+    let compared = case.truth.compare(case.record, &case.bars);
+    let open: Vec<Field> =
+        compared.iter().filter(|(_, differs)| differs.is_some()).map(|&(field, _)| field).collect();
+    // Stretches of one motion that decides nothing differ, too, and a lane may have averaged a few periods only.
+    let are_counts = open.iter().all(|field| [Field::Impacts, Field::Mesh].contains(field));
+    if case.truth.class == Class::Undecided && are_counts && has_averages_on_the_way(case) {
+        return Some(because);
+    }
+    let mut ranges: Vec<(Field, Range)> =
+        open.iter().map(|&field| (field, Range::about(case, field))).collect();
+    let as_lane = AsLane::new(case).filter(|_| case.is_lane);
+    for (tried, cell) in case.scattered_cells(CELLS).enumerate() {
+        // Many of the reference's own tell no more of a lane.
+        let is_first = tried <= FIRST_CELLS || as_lane.is_none();
+        let measured = is_first.then(|| Answer::from(&cell.measured(&case.budget)));
+        let averaged = as_lane.as_ref().and_then(|lane| lane.answer_of(&cell.flow, cell.law, cell.start));
+        for answer in [measured, averaged].into_iter().flatten() {
+            if answer.class.index() == case.truth.class.index() {
+                ranges.iter_mut().for_each(|(field, range)| range.meets(theirs(case, &answer, *field)));
+            }
+        }
+        if ranges.iter().all(|(_, range)| range.holds()) {
+            return Some(because);
+        }
+        if tried == FIRST_CELLS {
+            if ranges.iter().all(|(_, range)| range.holds() || range.is_likely()) {
+                return Some(because);
+            }
+            if !ranges.iter().all(|(_, range)| range.is_near()) {
+                return None;
+            }
+        }
+    }
+    let rare = RARE / case.among as f64;
+    ranges.iter_mut().all(|(_, range)| range.holds() || range.is_in_a_tail(rare)).then_some(because)
+}
+
+/// Whether only averages can differ.
+pub(super) fn are_of_one_class(case: &Case<'_>) -> bool {
+    let classes = [classify(case.record), case.truth.class];
+    [Class::Chaotic, Class::Undecided].iter().any(|class| classes == [*class; 2])
+}
+
+fn ours(case: &Case<'_>, field: Field) -> f64 {
+    match field {
+        Field::Exponent => case.record.lyapunov,
+        Field::ExponentError => case.record.lyapunov_error,
+        Field::Impacts => case.record.impacts_per_period,
+        _ => case.record.mesh_fraction,
+    }
+}
+
+fn theirs(case: &Case<'_>, answer: &Answer, field: Field) -> Option<f64> {
+    let exponent = answer.exponent.filter(|_| case.record.valid & valid::LYAPUNOV != 0);
+    match field {
+        Field::Exponent => exponent.map(|[value, _]| value),
+        Field::ExponentError => {
+            let periods = answer.scatter?.exponent_periods;
+            exponent.map(|[_, error]| error_over(case.record, &case.bars, error, periods))
+        }
+        Field::Impacts => answer.impacts_per_period,
+        _ => answer.mesh_fraction,
+    }
+}
+
+/// Where an average begins and ends is chance.
+fn margin(case: &Case<'_>, field: Field) -> f64 {
+    let periods = case.truth.scatter.map_or(1, |scatter| scatter.periods);
+    at_ends(field) / f64::from(periods.max(1))
+}
+
+/// An average of the record, and those that were met.
+struct Range {
+    ours: f64,
+    margin: f64,
+    met: Vec<f64>,
+    /// Standard errors scatter by factors.
+    is_factor: bool,
+}
+
+impl Range {
+    fn about(case: &Case<'_>, field: Field) -> Range {
+        let is_factor = field == Field::ExponentError;
+        Range { ours: ours(case, field), margin: margin(case, field), met: Vec::new(), is_factor }
+    }
+
+    fn meets(&mut self, theirs: Option<f64>) {
+        self.met.extend(theirs.filter(|theirs| theirs.is_finite()));
+    }
+
+    fn ends(&self) -> [f64; 2] {
+        [
+            self.met.iter().copied().fold(f64::INFINITY, f64::min),
+            self.met.iter().copied().fold(-f64::INFINITY, f64::max),
+        ]
+    }
+
+    fn holds(&self) -> bool {
+        let [least, most] = self.ends();
+        least - self.margin <= self.ours && self.ours <= most + self.margin
+    }
+
+    /// The scale on which it scatters evenly.
+    fn scale(&self, x: f64) -> f64 {
+        if self.is_factor { x.max(f64::MIN_POSITIVE).ln() } else { x }
+    }
+
+    fn is_near(&self) -> bool {
+        let [least, most] = self.ends().map(|end| self.scale(end));
+        let reach = self.margin + NEARLY * (most - least);
+        least - reach <= self.scale(self.ours) && self.scale(self.ours) <= most + reach
+    }
+
+    /// Whether it lies in a tail, if that falls exponentially, where no smaller share than `rare` is as far out.
+    fn is_in_a_tail(&mut self, rare: f64) -> bool {
+        let tail = self.met.len() / TAIL;
+        if tail == 0 {
+            return false;
+        }
+        self.met.sort_by(f64::total_cmp);
+        let scaled: Vec<f64> = self.met.iter().map(|&x| self.scale(x)).collect();
+        let (below, above) = (&scaled[..=tail], &scaled[scaled.len() - 1 - tail..]);
+        let [low, high] = [below[tail], above[0]];
+        // The mean of an exponential distribution is the length in which it falls by e.
+        let length =
+            |list: &[f64], from: f64| list.iter().map(|x| (x - from).abs()).sum::<f64>() / tail as f64;
+        let lengths = (tail as f64 / scaled.len() as f64 / rare).ln().max(0.0);
+        let ours = self.scale(self.ours);
+        low - lengths * length(below, low) <= ours && ours <= high + lengths * length(above, high)
+    }
+
+    fn is_likely(&self) -> bool {
+        let count = self.met.len() as f64;
+        let mean = self.met.iter().map(|&x| self.scale(x)).sum::<f64>() / count;
+        let variance = self.met.iter().map(|&x| (self.scale(x) - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        // Of a few there is no deviation to speak of.
+        2 * self.met.len() > FIRST_CELLS
+            && (self.scale(self.ours) - mean).abs() <= DEVIATIONS * variance.sqrt() + self.margin
+    }
+}
