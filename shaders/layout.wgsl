@@ -118,7 +118,7 @@ struct MotionNow {
     // Time spent meshing in parts of steps, in free steps, less the whole ones.
     mesh_part: Real,
     // Growth of the tangent vector, binary logarithms: of this block, the sum of the whole
-    // blocks, and of their squares.
+    // blocks, and of the squares of their deviations from the mean.
     block_growth: Real,
     growth_sum: Real,
     growth_squares: Real,

@@ -298,8 +298,11 @@ fn count_growth(growth: Real, periods: u32) {
     tally.block_periods += periods;
     if tally.block_periods >= settings.exponent_block {
         let whole = motion.block_growth * (Real(settings.exponent_block) / Real(tally.block_periods));
+        // Squares of deviations, by Welford's update: sums of squares would cancel where blocks are nearly alike.
+        let blocks = Real(tally.blocks);
+        let deviation = whole - motion.growth_sum / max(blocks, 1.0);
+        motion.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
         motion.growth_sum += whole;
-        motion.growth_squares += whole * whole;
         motion.block_growth = 0.0;
         tally.block_periods = 0u;
         tally.blocks += 1u;
@@ -312,7 +315,6 @@ const LN_2: Real = 0.6931471805599453;
 // from the means of blocks.
 fn mean_growth() -> vec2<Real> {
     let blocks = Real(tally.blocks);
-    let mean = motion.growth_sum / blocks;
-    let variance = max(motion.growth_squares / blocks - mean * mean, Real(0.0)) / (blocks - 1.0);
-    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(mean, sqrt(variance));
+    let variance = motion.growth_squares / (blocks * (blocks - 1.0));
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(motion.growth_sum / blocks, sqrt(variance));
 }

@@ -150,7 +150,7 @@ pub struct Motion {
     pub block_growth: f64,
     /// Sum of the whole blocks' growth.
     pub growth_sum: f64,
-    /// Sum of its squares.
+    /// Sum of the squares of their deviations from the mean.
     pub growth_squares: f64,
     /// Strobe state that later ones are compared with.
     pub anchor: [f64; 4],

@@ -91,8 +91,27 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rare_cap,
     ];
     // A record without a period claims averages all the same.
-    let is_claimed =
-        || agrees_with_its_figures(case) && has_averages_on_the_way(case) && is_where_it_may_be(case);
+    if std::env::var("DBG").is_ok() {
+        eprintln!("   truth {:?} {:?}", case.truth.class, case.truth.exponent);
+        for (k, check) in CHECKS.iter().enumerate() {
+            if let Some(x) = check(case) {
+                eprintln!("   check {k}: {x:?}");
+            }
+        }
+        eprintln!(
+            "   figures {} on_the_way {} where {} ",
+            agrees_with_its_figures(case),
+            has_averages_on_the_way(case),
+            is_where_it_may_be(case)
+        );
+        if let Some(s) = case.strobe() {
+            let a = case.at_leisure(s);
+            let b = case.at_leisure(case.start);
+            eprintln!("   leisure strobe {:?} start {:?}", a.class, b.class);
+        }
+    }
+    let is_there = || classify(case.record) == Class::Chaotic || is_where_it_may_be(case);
+    let is_claimed = || agrees_with_its_figures(case) && has_averages_on_the_way(case) && is_there();
     if are_of_one_class(case) {
         return spread(case).or_else(|| another_of_its_class(case)).filter(|_| is_claimed());
     }
@@ -167,10 +186,12 @@ fn other_attractor(case: &Case<'_>) -> Option<Explanation> {
         || unresolved(case, from, &answer) == Some(true)
         || read_rounded(case, from, &answer) == Some(true)
         || is_left_open() == Some(true);
-    same.then_some(match classify(case.record) {
-        Class::Undecided => Explanation::UndecidedInBudget,
-        _ => Explanation::CoexistingAttractor,
-    })
+    match classify(case.record) {
+        Class::Undecided => same.then_some(Explanation::UndecidedInBudget),
+        // Of chaos nothing else asks where it is.
+        Class::Chaotic => (same && is_where_it_may_be(case)).then_some(Explanation::CoexistingAttractor),
+        _ => same.then_some(Explanation::CoexistingAttractor),
+    }
 }
 
 /// The same of motion that is on no cycle: other chaos, not the same averaged anew.

@@ -23,11 +23,12 @@ use crate::reference::{Stop, Trajectory};
 /// Lane units in which a fresh tangent vector points nowhere in particular.
 const FRESH: [f64; 4] = [0.5; 4];
 
-/// Starts within rounding, and motions rounded at every step, that are tried.
-const STARTS: usize = 64;
+/// Cells within rounding, and motions rounded at every step, that are tried.
+const CELLS: usize = 64;
 const RUNS: u64 = 16;
 
-/// And where nothing else gives the record's answer: one or two of a hundred may do as a lane did.
+/// And where nothing else gives the record's answer: one of a hundred, or of a thousand, may do as a lane did.
+const MOST_CELLS: usize = 4000;
 const MOST_RUNS: u64 = 1000;
 
 /// The record says chaotic where the reference, averaged in its own way, decides nothing, or the other way round.
@@ -44,19 +45,23 @@ pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
     if same(lane.answer(case.start)) {
         return Some(Explanation::UndecidedInBudget);
     }
-    let nudged = (0..8).map(|k| case.nudged_start(k)).chain(case.scattered_starts(STARTS));
-    if nudged.map(|start| lane.answer(start)).any(same) {
+    let nudged = (0..8).map(|k| lane.answer(case.nudged_start(k)));
+    let scattered = case.scattered_cells(CELLS).map(|cell| lane.answer_of(&cell.flow, cell.law, cell.start));
+    if nudged.chain(scattered).any(same) {
         return Some(Explanation::Chaos);
     }
     (0..RUNS).map(|run| lane.rounded(run)).any(same).then_some(Explanation::BelowResolution)
 }
 
-/// The same of many more motions that are rounded at every step.
+/// The same of many more cells and motions.
 pub(super) fn rare_chaos(case: &Case<'_>) -> Option<Explanation> {
     let lane = AsLane::of_weak_chaos(case)?;
-    let same = |answer: Answer| is_the_records(case, &answer);
-    let mut runs = (RUNS..MOST_RUNS).filter_map(|run| lane.rounded(run));
-    runs.any(same).then_some(Explanation::BelowResolution)
+    let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
+    let cells = case.scattered_cells(MOST_CELLS).skip(CELLS);
+    if cells.map(|cell| lane.answer_of(&cell.flow, cell.law, cell.start)).any(same) {
+        return Some(Explanation::Chaos);
+    }
+    (RUNS..MOST_RUNS).map(|run| lane.rounded(run)).any(same).then_some(Explanation::BelowResolution)
 }
 
 /// Whether an average of few blocks is the record's, its standard error too.
@@ -175,10 +180,10 @@ impl<'c, 'a> AsLane<'c, 'a> {
     fn average(&self, motion: &mut impl Watched) -> Option<Answer> {
         let Averaging { growth_from, exponent_from, .. } = self.averaging;
         let mut growth = Vec::new();
-        let mut before = [0.0; 3];
+        let mut met = Vec::new();
         for period in growth_from + 1..=self.case.record.periods_run {
-            if period == exponent_from + 1 {
-                before = motion.counts();
+            if period > exponent_from {
+                met.push(motion.counts());
             }
             let of_period = self.growth(motion).ok()?;
             if period > exponent_from {
@@ -186,8 +191,10 @@ impl<'c, 'a> AsLane<'c, 'a> {
             }
         }
         let [mean, error] = self.averaging.estimate(&growth)?;
-        let after = motion.counts();
-        let [impacts, meshing, events] = [0, 1, 2].map(|i| (after[i] - before[i]) / growth.len() as f64);
+        met.push(motion.counts());
+        let [impacts, meshing, events] =
+            [0, 1, 2].map(|i| (met[growth.len()][i] - met[0][i]) / growth.len() as f64);
+        let counts: Vec<[f64; 2]> = met.iter().map(|&[impacts, meshing, _]| [impacts, meshing]).collect();
         let (surely, rounding) = (mean - CHAOS_ERRORS * error, unit_roundoff(self.case.precision));
         let grows = surely > 0.0 && self.averaging.outgrows(surely, growth.len(), events, rounding);
         let (period, exponent_periods) = (self.case.flow.period, growth.len() as u32);
@@ -196,7 +203,7 @@ impl<'c, 'a> AsLane<'c, 'a> {
             exponent: Some([mean / period, error / period]),
             impacts_per_period: Some(impacts),
             mesh_fraction: Some(meshing / period),
-            scatter: self.case.truth.scatter.map(|scatter| Scatter { exponent_periods, ..scatter }),
+            scatter: Some(Scatter::of(&counts, exponent_periods, period)),
             ..self.case.truth.clone()
         })
     }

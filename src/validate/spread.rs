@@ -20,12 +20,12 @@ use crate::record::valid;
 /// Starts and parameters within rounding that are tried: of a map's many averages some are rare.
 const CELLS: usize = 16_384;
 
-/// So many give a mean and a standard deviation. After them, only what lies near those that were met can still lie
-/// between them:
+/// So many give a mean and a standard deviation.
 const FIRST_CELLS: usize = 128;
 
-/// no farther off than this share of what they span.
-const NEARLY: f64 = 1.0;
+/// After so many, only what lies nearer to those that were met than this share of what they span can still lie
+/// between them: impacts of a long chatter are rare, and many.
+const NEARLY: [(usize, f64); 3] = [(FIRST_CELLS, 6.0), (1024, 2.0), (4096, 1.0)];
 
 /// The tail of what was met: one of so many.
 const TAIL: usize = 1000;
@@ -66,13 +66,12 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
         if ranges.iter().all(|(_, range)| range.holds()) {
             return Some(because);
         }
-        if tried == FIRST_CELLS {
-            if ranges.iter().all(|(_, range)| range.holds() || range.is_likely()) {
-                return Some(because);
-            }
-            if !ranges.iter().all(|(_, range)| range.is_near()) {
-                return None;
-            }
+        if tried == FIRST_CELLS && ranges.iter().all(|(_, range)| range.holds() || range.is_likely()) {
+            return Some(because);
+        }
+        let gate = NEARLY.iter().find(|(after, _)| *after == tried);
+        if gate.is_some_and(|&(_, share)| !ranges.iter().all(|(_, range)| range.is_near(share))) {
+            return None;
         }
     }
     let rare = RARE / case.among as f64;
@@ -149,9 +148,9 @@ impl Range {
         if self.is_factor { x.max(f64::MIN_POSITIVE).ln() } else { x }
     }
 
-    fn is_near(&self) -> bool {
+    fn is_near(&self, share: f64) -> bool {
         let [least, most] = self.ends().map(|end| self.scale(end));
-        let reach = self.margin + NEARLY * (most - least);
+        let reach = self.margin + share * (most - least);
         least - reach <= self.scale(self.ours) && self.scale(self.ours) <= most + reach
     }
 
