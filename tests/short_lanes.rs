@@ -10,6 +10,7 @@ use rattlemap::gpu::Precision;
 use rattlemap::orbit::{Class, Measured, measure};
 use rattlemap::plan::Plan;
 use rattlemap::record::{Record, valid};
+use rattlemap::validate::Explanation;
 use short_cells::{Cell, cell, cells, explanation, lane};
 
 /// The first cell of a plan on the reference.
@@ -92,7 +93,9 @@ fn a_gap_at_rest_is_let_go_once() {
     for precision in Precision::ALL {
         let record = lane(&plan, precision);
         assert_eq!(classify(&record), Class::Undecided, "{precision:?}: {record:?}");
-        assert_eq!(explanation(&plan, record, precision), Err(()), "{precision:?}: {record:?}");
+        // Its growth goes up and down: the means of two periods make four times the standard error of those of four.
+        let open = Ok(Some(Explanation::UndecidedInBudget));
+        assert_eq!(explanation(&plan, record, precision), open, "{precision:?}: {record:?}");
     }
 }
 
