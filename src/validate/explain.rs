@@ -91,25 +91,6 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         rare_cap,
     ];
     // A record without a period claims averages all the same.
-    if std::env::var("DBG").is_ok() {
-        eprintln!("   truth {:?} {:?}", case.truth.class, case.truth.exponent);
-        for (k, check) in CHECKS.iter().enumerate() {
-            if let Some(x) = check(case) {
-                eprintln!("   check {k}: {x:?}");
-            }
-        }
-        eprintln!(
-            "   figures {} on_the_way {} where {} ",
-            agrees_with_its_figures(case),
-            has_averages_on_the_way(case),
-            is_where_it_may_be(case)
-        );
-        if let Some(s) = case.strobe() {
-            let a = case.at_leisure(s);
-            let b = case.at_leisure(case.start);
-            eprintln!("   leisure strobe {:?} start {:?}", a.class, b.class);
-        }
-    }
     let is_there = || classify(case.record) == Class::Chaotic || is_where_it_may_be(case);
     let is_claimed = || agrees_with_its_figures(case) && has_averages_on_the_way(case) && is_there();
     if are_of_one_class(case) {

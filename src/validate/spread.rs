@@ -30,8 +30,8 @@ const NEARLY: [(usize, f64); 3] = [(FIRST_CELLS, 6.0), (1024, 2.0), (4096, 1.0)]
 /// The tail of what was met: one of so many.
 const TAIL: usize = 1000;
 
-/// An average may be rarer than that, if it is not expected in so many samples alike.
-const RARE: f64 = 0.1;
+/// An average may be as rare as is expected in one of so many maps alike; each cell has four averages, with two tails.
+const RARE: f64 = 0.01;
 
 /// Standard deviations by which one average may differ from their mean, as averages may from each other.
 const DEVIATIONS: f64 = 5.0;
