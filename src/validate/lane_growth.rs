@@ -23,12 +23,11 @@ use crate::reference::{Stop, Trajectory};
 /// Lane units in which a fresh tangent vector points nowhere in particular.
 const FRESH: [f64; 4] = [0.5; 4];
 
-/// Cells within rounding, and motions rounded at every step, that are tried.
-const CELLS: usize = 64;
+/// Starts within rounding, and motions rounded at every step, that are tried.
+const STARTS: usize = 64;
 const RUNS: u64 = 16;
 
-/// And where nothing else gives the record's answer: one of a hundred, or of a thousand, may do as a lane did.
-const MOST_CELLS: usize = 4000;
+/// And where nothing else gives the record's answer: one or two of a hundred may do as a lane did.
 const MOST_RUNS: u64 = 1000;
 
 /// The record says chaotic where the reference, averaged in its own way, decides nothing, or the other way round.
@@ -45,22 +44,17 @@ pub(super) fn weak_chaos(case: &Case<'_>) -> Option<Explanation> {
     if same(lane.answer(case.start)) {
         return Some(Explanation::UndecidedInBudget);
     }
-    let nudged = (0..8).map(|k| lane.answer(case.nudged_start(k)));
-    let scattered = case.scattered_cells(CELLS).map(|cell| lane.answer_of(&cell.flow, cell.law, cell.start));
-    if nudged.chain(scattered).any(same) {
+    let nudged = (0..8).map(|k| case.nudged_start(k)).chain(case.scattered_starts(STARTS));
+    if nudged.map(|start| lane.answer(start)).any(same) {
         return Some(Explanation::Chaos);
     }
     (0..RUNS).map(|run| lane.rounded(run)).any(same).then_some(Explanation::BelowResolution)
 }
 
-/// The same of many more cells and motions.
+/// The same of many more motions that are rounded at every step.
 pub(super) fn rare_chaos(case: &Case<'_>) -> Option<Explanation> {
     let lane = AsLane::of_weak_chaos(case)?;
     let same = |answer: Option<Answer>| answer.is_some_and(|answer| is_the_records(case, &answer));
-    let cells = case.scattered_cells(MOST_CELLS).skip(CELLS);
-    if cells.map(|cell| lane.answer_of(&cell.flow, cell.law, cell.start)).any(same) {
-        return Some(Explanation::Chaos);
-    }
     (RUNS..MOST_RUNS).map(|run| lane.rounded(run)).any(same).then_some(Explanation::BelowResolution)
 }
 
