@@ -3,13 +3,15 @@
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
 mod common;
+#[path = "common/computed.rs"]
+mod computed;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use common::gpu::open;
-use rattlemap::engine::{Cpu, Engine};
+use computed::computed;
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::orbit::Status;
 use rattlemap::output::{Identity, RECORDS, RecordFile};
@@ -145,17 +147,6 @@ fn plant(records: &mut [Record]) -> Vec<(u32, &'static str)> {
     }
     wrong.sort_unstable();
     wrong
-}
-
-/// Every record of a plan by the CPU engine, by id.
-fn computed(plan: &Plan) -> Vec<Record> {
-    let mut engine = Engine::Cpu(Cpu::new(plan));
-    let cells = plan.cells(0..plan.cell_count());
-    let mut records = vec![Record::default(); plan.cell_count()];
-    for (cell, record) in cells.iter().zip(pollster::block_on(engine.run(&cells)).unwrap()) {
-        records[cell.id as usize] = record;
-    }
-    records
 }
 
 #[test]

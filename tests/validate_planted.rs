@@ -1,8 +1,11 @@
 //! Faults that fill a whole map, planted in records that are right otherwise: each of them is found, and none
 //! is explained.
 
+#[path = "common/computed.rs"]
+mod computed;
+
+use computed::computed;
 use rattlemap::classify::classify;
-use rattlemap::engine::{Cpu, Engine};
 use rattlemap::gpu::Precision;
 use rattlemap::orbit::{Class, Status};
 use rattlemap::plan::Plan;
@@ -36,16 +39,6 @@ const ELSEWHERE: &str = "[start]\npolicy = 'state'\nstate = [0.4, 1.0, -0.2, -3.
 
 /// Too short for many cells to be decided.
 const SHORT: &str = "[integration]\ntransient_periods = 60\nobserved_periods = 32\nmax_period = 8";
-
-fn computed(plan: &Plan) -> Vec<Record> {
-    let mut engine = Engine::Cpu(Cpu::new(plan));
-    let cells = plan.cells(0..plan.cell_count());
-    let mut records = vec![Record::default(); plan.cell_count()];
-    for (cell, record) in cells.iter().zip(pollster::block_on(engine.run(&cells)).unwrap()) {
-        records[cell.id as usize] = record;
-    }
-    records
-}
 
 /// Validates all of a map by the CPU engine, or by lanes.
 fn validated(plan: &Plan, records: &[Record], is_lane: bool) -> Validation {
