@@ -131,7 +131,7 @@ fn judge_cycle() {
         tally.stage = STAGE_READING;
         return;
     }
-    let is_cycle = attracts && is_own() && is_on_cycle(keeps_domain(to), is_last);
+    let is_cycle = attracts && is_own() && is_on_cycle(to, is_last);
     if is_cycle && (!is_multiple() || is_refuted()) {
         tally.cycle = tally.candidate;
         return;
@@ -289,12 +289,22 @@ fn is_at_rest() -> bool {
     return tally.apart >= AT_REST && is_there;
 }
 
+// Roundings of the motion by which a fixed point may be misplaced, before it is amplified.
+const MISPLACED: Real = 8.0;
+
+// Whether a motion without events has its limit beyond the wall: it creeps out, however slowly.
+fn leaves(to: array<Real, 4>) -> bool {
+    let unsure = MISPLACED * ULP * motion.position_scale * Real(limit_of(1.0));
+    let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_DIP;
+    return may_leave && beyond(to) > unsure;
+}
+
 // Near, or as near as rounding lets it. What lies in another domain than the lane, as its derivative has
 // it, is no cycle that it comes to; and beside a graze only rest will do.
-fn is_on_cycle(is_within_domain: bool, is_last: bool) -> bool {
+fn is_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
     let is_blurred = (tally.vain >= VAIN || is_last) && tally.settled != 0u && exp2(-f32(tally.apart) / OCTAVE) < min(noise(), ON_CYCLE);
     // Whether it goes on with the same events is seen where Newton's method leads it, if there is time.
     let is_confirmed = !is_last || settings.early_stop == 0u || tally.refinements > 0u || away() <= REFINED;
-    let is_near = is_near_cycle() && is_within_domain && tally.grazes == 0u && is_confirmed;
-    return is_near || is_at_rest() || is_blurred;
+    let is_near = is_near_cycle() && keeps_domain(to) && tally.grazes == 0u && is_confirmed;
+    return is_near || ((is_at_rest() || is_blurred) && !leaves(to));
 }

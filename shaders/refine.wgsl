@@ -57,11 +57,16 @@ fn is_own() -> bool {
 
 // Whether the gap may be there in the present domain, at a phase that is no event's. Dips have no bounds.
 fn keeps_domain(to: array<Real, 4>) -> bool {
+    return tally.mode >= MODE_DIP || beyond(to) < 0.0;
+}
+
+// How far beyond the nearest end of the present domain the gap is there.
+fn beyond(to: array<Real, 4>) -> Real {
     if tally.mode == MODE_FREE {
-        return to[0] < walls[0] && to[0] > walls[1];
+        return max(to[0] - walls[0], walls[1] - to[0]);
     }
     let side = side_of(tally.mode);
-    return tally.mode >= MODE_DIP || sign_of(side) * (to[0] - walls[side]) > 0.0;
+    return sign_of(side) * (walls[side] - to[0]);
 }
 
 // Back to where the lane came from.

@@ -52,6 +52,16 @@ fn what_is_not_sure_is_not_claimed() {
     }
 }
 
+/// Contact that a damper lets relax towards a cycle beyond the wall: a lane that moves less in a period than single
+/// precision shows of its position knows its depth all the same.
+#[test]
+fn what_creeps_off_its_wall_is_not_at_rest() {
+    let plan = cell("creeping").plan();
+    assert_eq!(reference(&plan).period, None);
+    let record = lane(&plan, Precision::F32);
+    assert_eq!(classify(&record), Class::Undecided, "{record:?}");
+}
+
 /// A slow spiral to a symmetric cycle, and one to a cycle that is not quite: there it may be left open. On
 /// the paper's cycles, symmetric below a restitution of 0.5419, it is not.
 #[test]

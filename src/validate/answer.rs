@@ -10,9 +10,6 @@ use crate::plan::Needs;
 use crate::record::{Record, Spelling, valid, word_hash};
 use crate::word::Word;
 
-/// Blocks whose means give lanes a standard error, at least (`FEWEST_BLOCKS` in the shaders).
-const FEWEST_BLOCKS: u32 = 6;
-
 /// What is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Field {
@@ -115,7 +112,7 @@ impl Bars {
             Precision::F64 => (1e-3, 1e-5, 1e-6),
         };
         let exponent_from = budget.exponent_from();
-        let least_counted = FEWEST_BLOCKS * Averaging::new(budget.periods(), exponent_from).block;
+        let least_counted = Averaging::new(budget.periods(), exponent_from).fewest_periods();
         Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period, exponent_from, least_counted }
     }
 }
