@@ -11,7 +11,7 @@ use super::manifest::Head;
 use super::map_manifest::Made;
 use super::{names, replay};
 use crate::validate::states::HORIZON;
-use crate::validate::{Explanation, Field, Mismatch, Quantiles, StateCheck, Stratum, Validation, Value};
+use crate::validate::{Explanation, Mismatch, Quantiles, StateCheck, Stratum, Validation, Value};
 
 #[derive(Serialize)]
 pub(super) struct ValidationObject {
@@ -121,7 +121,7 @@ impl ValidationObject {
         });
         let agreement = validation.agreement.iter().map(|field| {
             let counts = AgreementObject { compared: field.compared, agreeing: field.agreeing };
-            (field_name(field.field), counts)
+            (field.field.name(), counts)
         });
         let explanations = Explanation::ALL.into_iter().map(|explanation| ExplanationObject {
             name: explanation.name(),
@@ -155,7 +155,7 @@ fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
     let row = cells.row(mismatch.id as usize);
     let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
     let differences = mismatch.differences.iter().map(|difference| DifferenceObject {
-        field: field_name(difference.field),
+        field: difference.field.name(),
         map: difference.record.clone(),
         reference: difference.reference.clone(),
     });
@@ -203,23 +203,6 @@ fn stratum_name(stratum: Stratum) -> String {
         Stratum::Uniform => "uniform".to_owned(),
         Stratum::Border => "border".to_owned(),
         Stratum::Status(status) => format!("status {}", names::status(status)),
-    }
-}
-
-fn field_name(field: Field) -> &'static str {
-    match field {
-        Field::Class => "class",
-        Field::Period => "period",
-        Field::Word => "word",
-        Field::Symmetric => "symmetric",
-        Field::Exponent => "lyapunov",
-        Field::ExponentError => "lyapunov_error",
-        Field::Impacts => "impacts_per_period",
-        Field::Mesh => "mesh_fraction",
-        Field::Status => "status",
-        Field::Periods => "periods_run",
-        Field::Kept => "valid",
-        Field::State => "state",
     }
 }
 

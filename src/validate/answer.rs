@@ -55,6 +55,24 @@ impl Field {
         Field::Kept,
         Field::State,
     ];
+
+    /// Its name in files, that of the record's field where there is one.
+    pub fn name(self) -> &'static str {
+        match self {
+            Field::Class => "class",
+            Field::Period => "period",
+            Field::Word => "word",
+            Field::Symmetric => "symmetric",
+            Field::Exponent => "lyapunov",
+            Field::ExponentError => "lyapunov_error",
+            Field::Impacts => "impacts_per_period",
+            Field::Mesh => "mesh_fraction",
+            Field::Status => "status",
+            Field::Periods => "periods_run",
+            Field::Kept => "valid",
+            Field::State => "state",
+        }
+    }
 }
 
 /// A value of one side.

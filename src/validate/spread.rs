@@ -27,8 +27,9 @@ const FIRST_CELLS: usize = 128;
 /// between them: impacts of a long chatter are rare, and many.
 const NEARLY: [(usize, f64); 3] = [(FIRST_CELLS, 6.0), (1024, 2.0), (4096, 1.0)];
 
-/// The tail of what was met: one of so many.
-const TAIL: usize = 1000;
+/// The tail of what was met: one of so many. The length in which it falls comes of 65 of 16,384; of 16, as a thousandth
+/// has, it is uncertain by a quarter, which at ten lengths is a factor of ten.
+const TAIL: usize = 250;
 
 /// An average may be as rare as is expected in one of so many maps alike; each cell has four averages, with two tails.
 const RARE: f64 = 0.01;

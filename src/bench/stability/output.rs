@@ -141,7 +141,7 @@ fn mismatches(path: &Path, mismatches: &[fuzz::Mismatch]) -> anyhow::Result<()> 
         let numbers = values.iter().chain(&mismatch.start).map(|number| format!("{number:?}"));
         let told = mismatch.differences.iter().map(|difference| {
             let side = |value| serde_json::to_string(value).unwrap_or_default().replace('"', "");
-            let field = format!("{:?}", difference.field).to_lowercase();
+            let field = difference.field.name();
             format!("{field}: {} for {}", side(&difference.record), side(&difference.reference))
         });
         let told: Vec<String> = told.collect();
