@@ -20,6 +20,9 @@ use crate::record::valid;
 /// Starts and parameters within rounding that are tried: of a map's many averages some are rare.
 const CELLS: usize = 16_384;
 
+/// And where what is rarer than that may do, and the tail of what was met is not known well enough to tell.
+const MOST_CELLS: usize = 65_536;
+
 /// So many give a mean and a standard deviation.
 const FIRST_CELLS: usize = 128;
 
@@ -27,9 +30,12 @@ const FIRST_CELLS: usize = 128;
 /// between them: impacts of a long chatter are rare, and many.
 const NEARLY: [(usize, f64); 3] = [(FIRST_CELLS, 6.0), (1024, 2.0), (4096, 1.0)];
 
-/// The tail of what was met: one of so many. The length in which it falls comes of 65 of 16,384; of 16, as a thousandth
-/// has, it is uncertain by a quarter, which at ten lengths is a factor of ten.
+/// The tail of what was met: one of so many. The length in which it falls comes of 65 of 16,384 and is uncertain by an
+/// eighth of itself, which at ten lengths is a factor of three.
 const TAIL: usize = 250;
+
+/// Standard errors of that length within which more cells are tried.
+const LENGTH_ERRORS: f64 = 2.0;
 
 /// An average may be as rare as is expected in one of so many maps alike; each cell has four averages, with two tails.
 const RARE: f64 = 0.01;
@@ -54,7 +60,9 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
     let mut ranges: Vec<(Field, Range)> =
         open.iter().map(|&field| (field, Range::about(case, field))).collect();
     let as_lane = AsLane::new(case).filter(|_| case.is_lane);
-    for (tried, cell) in case.scattered_cells(CELLS).enumerate() {
+    let rare = RARE / case.among as f64;
+    let unsure = if rare * (MOST_CELLS as f64) < 1.0 { LENGTH_ERRORS } else { 0.0 };
+    for (tried, cell) in case.scattered_cells(MOST_CELLS).enumerate() {
         // Many of the reference's own tell no more of a lane.
         let is_first = tried <= FIRST_CELLS || as_lane.is_none();
         let measured = is_first.then(|| Answer::from(&cell.measured(&case.budget)));
@@ -74,9 +82,20 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
         if gate.is_some_and(|&(_, share)| !ranges.iter().all(|(_, range)| range.is_near(share))) {
             return None;
         }
+        if tried == CELLS && are_likely(&mut ranges, rare, 0.0) {
+            return Some(because);
+        }
+        if tried == CELLS && !are_likely(&mut ranges, rare, unsure) {
+            return None;
+        }
     }
-    let rare = RARE / case.among as f64;
-    ranges.iter_mut().all(|(_, range)| range.holds() || range.is_in_a_tail(rare)).then_some(because)
+    are_likely(&mut ranges, rare, 0.0).then_some(because)
+}
+
+/// Whether all lie among those that were met or in their tails, where these may fall in a length that is more by so many
+/// of its standard errors.
+fn are_likely(ranges: &mut [(Field, Range)], rare: f64, errors: f64) -> bool {
+    ranges.iter_mut().all(|(_, range)| range.holds() || range.is_in_a_tail(rare, errors))
 }
 
 /// Whether only averages can differ.
@@ -118,6 +137,8 @@ struct Range {
     ours: f64,
     margin: f64,
     met: Vec<f64>,
+    /// The least and the greatest of them.
+    ends: [f64; 2],
     /// Standard errors scatter by factors.
     is_factor: bool,
 }
@@ -125,22 +146,18 @@ struct Range {
 impl Range {
     fn about(case: &Case<'_>, field: Field) -> Range {
         let is_factor = field == Field::ExponentError;
-        Range { ours: ours(case, field), margin: margin(case, field), met: Vec::new(), is_factor }
+        let ends = [f64::INFINITY, f64::NEG_INFINITY];
+        Range { ours: ours(case, field), margin: margin(case, field), met: Vec::new(), ends, is_factor }
     }
 
     fn meets(&mut self, theirs: Option<f64>) {
-        self.met.extend(theirs.filter(|theirs| theirs.is_finite()));
-    }
-
-    fn ends(&self) -> [f64; 2] {
-        [
-            self.met.iter().copied().fold(f64::INFINITY, f64::min),
-            self.met.iter().copied().fold(-f64::INFINITY, f64::max),
-        ]
+        let Some(theirs) = theirs.filter(|theirs| theirs.is_finite()) else { return };
+        self.met.push(theirs);
+        self.ends = [self.ends[0].min(theirs), self.ends[1].max(theirs)];
     }
 
     fn holds(&self) -> bool {
-        let [least, most] = self.ends();
+        let [least, most] = self.ends;
         least - self.margin <= self.ours && self.ours <= most + self.margin
     }
 
@@ -150,13 +167,13 @@ impl Range {
     }
 
     fn is_near(&self, share: f64) -> bool {
-        let [least, most] = self.ends().map(|end| self.scale(end));
+        let [least, most] = self.ends.map(|end| self.scale(end));
         let reach = self.margin + share * (most - least);
         least - reach <= self.scale(self.ours) && self.scale(self.ours) <= most + reach
     }
 
     /// Whether it lies in a tail, if that falls exponentially, where no smaller share than `rare` is as far out.
-    fn is_in_a_tail(&mut self, rare: f64) -> bool {
+    fn is_in_a_tail(&mut self, rare: f64, errors: f64) -> bool {
         let tail = self.met.len() / TAIL;
         if tail == 0 {
             return false;
@@ -168,7 +185,8 @@ impl Range {
         // The mean of an exponential distribution is the length in which it falls by e.
         let length =
             |list: &[f64], from: f64| list.iter().map(|x| (x - from).abs()).sum::<f64>() / tail as f64;
-        let lengths = (tail as f64 / scaled.len() as f64 / rare).ln().max(0.0);
+        let longer = 1.0 + errors / (tail as f64).sqrt();
+        let lengths = longer * (tail as f64 / scaled.len() as f64 / rare).ln().max(0.0);
         let ours = self.scale(self.ours);
         low - lengths * length(below, low) <= ours && ours <= high + lengths * length(above, high)
     }
