@@ -57,11 +57,8 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
     if case.truth.class == Class::Undecided && are_counts && has_averages_on_the_way(case) {
         return Some(because);
     }
-    let mut ranges: Vec<(Field, Range)> =
-        open.iter().map(|&field| (field, Range::about(case, field))).collect();
+    let mut spread = Spread::about(case, &open);
     let as_lane = AsLane::new(case).filter(|_| case.is_lane);
-    let rare = RARE / case.among as f64;
-    let unsure = if rare * (MOST_CELLS as f64) < 1.0 { LENGTH_ERRORS } else { 0.0 };
     for (tried, cell) in case.scattered_cells(MOST_CELLS).enumerate() {
         // Many of the reference's own tell no more of a lane.
         let is_first = tried <= FIRST_CELLS || as_lane.is_none();
@@ -69,33 +66,62 @@ pub(super) fn spread(case: &Case<'_>) -> Option<Explanation> {
         let averaged = as_lane.as_ref().and_then(|lane| lane.answer_of(&cell.flow, cell.law, cell.start));
         for answer in [measured, averaged].into_iter().flatten() {
             if answer.class.index() == case.truth.class.index() {
-                ranges.iter_mut().for_each(|(field, range)| range.meets(theirs(case, &answer, *field)));
+                spread.meets(case, &answer);
             }
         }
-        if ranges.iter().all(|(_, range)| range.holds()) {
-            return Some(because);
-        }
-        if tried == FIRST_CELLS && ranges.iter().all(|(_, range)| range.holds() || range.is_likely()) {
-            return Some(because);
-        }
-        let gate = NEARLY.iter().find(|(after, _)| *after == tried);
-        if gate.is_some_and(|&(_, share)| !ranges.iter().all(|(_, range)| range.is_near(share))) {
-            return None;
-        }
-        if tried == CELLS && are_likely(&mut ranges, rare, 0.0) {
-            return Some(because);
-        }
-        if tried == CELLS && !are_likely(&mut ranges, rare, unsure) {
-            return None;
+        if let Some(is_met) = spread.verdict(tried) {
+            return is_met.then_some(because);
         }
     }
-    are_likely(&mut ranges, rare, 0.0).then_some(because)
+    spread.is_in_tails(0.0).then_some(because)
 }
 
-/// Whether all lie among those that were met or in their tails, where these may fall in a length that is more by so many
-/// of its standard errors.
-fn are_likely(ranges: &mut [(Field, Range)], rare: f64, errors: f64) -> bool {
-    ranges.iter_mut().all(|(_, range)| range.holds() || range.is_in_a_tail(rare, errors))
+/// The averages of the record that differ, and how rare one of them may be.
+struct Spread {
+    ranges: Vec<(Field, Range)>,
+    rare: f64,
+}
+
+impl Spread {
+    fn about(case: &Case<'_>, open: &[Field]) -> Spread {
+        let ranges = open.iter().map(|&field| (field, Range::about(case, field))).collect();
+        Spread { ranges, rare: RARE / case.among as f64 }
+    }
+
+    fn meets(&mut self, case: &Case<'_>, answer: &Answer) {
+        self.ranges.iter_mut().for_each(|(field, range)| range.meets(theirs(case, answer, *field)));
+    }
+
+    fn all(&self, holds: impl Fn(&Range) -> bool) -> bool {
+        self.ranges.iter().all(|(_, range)| holds(range))
+    }
+
+    /// Whether they are averages of such motions, as soon as the motions `tried` tell.
+    fn verdict(&mut self, tried: usize) -> Option<bool> {
+        let gate = NEARLY.iter().find(|(after, _)| *after == tried);
+        if self.all(Range::holds)
+            || (tried == FIRST_CELLS && self.all(|range| range.holds() || range.is_likely()))
+        {
+            return Some(true);
+        }
+        if gate.is_some_and(|&(_, share)| !self.all(|range| range.is_near(share))) {
+            return Some(false);
+        }
+        if tried != CELLS {
+            return None;
+        }
+        // More cells show what is no rarer than one of them; this is about tails.
+        let errors = if self.rare * (MOST_CELLS as f64) < 1.0 { LENGTH_ERRORS } else { 0.0 };
+        let is_met = self.is_in_tails(0.0);
+        (is_met || !self.is_in_tails(errors)).then_some(is_met)
+    }
+
+    /// Whether all lie among those that were met or in their tails, where these may fall in a length that is more by
+    /// so many of its standard errors.
+    fn is_in_tails(&mut self, errors: f64) -> bool {
+        let rare = self.rare;
+        self.ranges.iter_mut().all(|(_, range)| range.holds() || range.is_in_a_tail(rare, errors))
+    }
 }
 
 /// Whether only averages can differ.
