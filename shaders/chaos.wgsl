@@ -12,7 +12,7 @@ const DOUBT: Real = 1.0;
 // have lasted through: beyond the ratio of the largest to the smallest distance.
 const DEPARTURE: Real = 40.0;
 
-// A standard error of fewer blocks is none: two are alike by chance, and would be called chaos.
+// A standard error of fewer blocks is none; short budgets would be called chaos by two.
 const FEWEST_BLOCKS: u32 = 6u;
 
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.

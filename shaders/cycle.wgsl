@@ -292,7 +292,7 @@ fn is_at_rest() -> bool {
 // Roundings of the motion by which a fixed point may be misplaced, before it is amplified.
 const MISPLACED: Real = 8.0;
 
-// Whether a motion without events has its limit beyond the wall: it creeps out, however slowly.
+// Whether a motion without events has its limit beyond the wall: it creeps out, by more than roundings in a period.
 fn leaves(to: array<Real, 4>) -> bool {
     let unsure = MISPLACED * ULP * motion.position_scale * Real(limit_of(1.0));
     let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_DIP;

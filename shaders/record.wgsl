@@ -30,7 +30,7 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         if tally.cycle > 0u {
             read_cycle(&reading, &finding);
-        } else if EXPONENT && tally.blocks >= FEWEST_BLOCKS {
+        } else if EXPONENT && tally.blocks > 1u {
             finding.valid |= VALID_LYAPUNOV;
             let growth = mean_growth();
             reading.growth = growth.x;
@@ -46,9 +46,8 @@ fn last_status() -> u32 {
         return tally.status;
     }
     if tally.has_read == 0u || tally.cycle == 0u {
-        let is_open = settings.max_period > 0u && tally.cycle == 0u && EXPONENT;
-        let is_chaos = tally.blocks >= FEWEST_BLOCKS && outgrows(CHAOS_ERRORS) && !departs(CHAOS_ERRORS);
-        return select(STATUS_OK, STATUS_SLOW, is_open && !is_chaos);
+        let is_open = settings.max_period > 0u && tally.cycle == 0u && EXPONENT && tally.blocks > 1u;
+        return select(STATUS_OK, STATUS_SLOW, is_open && (departs(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
     }
     if tally.grazes > 0u {
         return STATUS_NEAR_GRAZING;

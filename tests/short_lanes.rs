@@ -53,7 +53,7 @@ fn what_is_not_sure_is_not_claimed() {
 }
 
 /// Contact that a damper lets relax towards a cycle beyond the wall: a lane that moves less in a period than single
-/// precision shows of its position knows its depth all the same.
+/// precision shows of its position is asked where its derivative leads it.
 #[test]
 fn what_creeps_off_its_wall_is_not_at_rest() {
     let plan = cell("creeping").plan();

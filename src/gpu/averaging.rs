@@ -11,7 +11,7 @@ const EXPONENT_BLOCKS: u32 = 32;
 /// is too small.
 const SHORTEST_BLOCK: u32 = 4;
 
-/// A standard error of fewer blocks is none (`FEWEST_BLOCKS` in the shaders).
+/// Chaos is called early by this many blocks at least (`FEWEST_BLOCKS` in the shaders).
 const FEWEST_BLOCKS: u32 = 6;
 
 /// Chaos has to outgrow this power of time (`NEUTRAL_ORDER` in the shaders).
@@ -38,13 +38,13 @@ impl Averaging {
         }
     }
 
-    /// Periods without which there is no standard error.
+    /// Periods without which chaos is not called early.
     pub(crate) fn fewest_periods(&self) -> u32 {
         FEWEST_BLOCKS * self.block
     }
 
     /// Mean growth per period and its standard error from the means of whole blocks, the first ones
-    /// first (`mean_growth` in the shaders); none for fewer than six of them. `growth` holds the
+    /// first (`mean_growth` in the shaders); none for fewer than two of them. `growth` holds the
     /// logarithm of every period from `exponent_from` on.
     pub(crate) fn estimate(&self, growth: &[f64]) -> Option<[f64; 2]> {
         let block = self.block as usize;
@@ -53,7 +53,7 @@ impl Averaging {
         let count = means.len() as f64;
         let mean = means.iter().sum::<f64>() / count;
         let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / count;
-        (means.len() >= FEWEST_BLOCKS as usize).then(|| [mean, (variance / (count - 1.0)).sqrt()])
+        (means.len() > 1).then(|| [mean, (variance / (count - 1.0)).sqrt()])
     }
 
     /// Whether growth of so much per period, over `periods` of them, is more than neutral motion has
@@ -92,15 +92,15 @@ mod tests {
         // What goes up and down within a block is no error of the mean.
         let swings: Vec<f64> = (0..32).map(|n| if n % 2 == 0 { 3.0 } else { -2.0 }).collect();
         assert_eq!(averaging.estimate(&swings), Some([0.5, 0.0]));
-        // Block means 0 to 5; the last two periods are none.
-        let mut steps: Vec<f64> = (0..24).map(|n| f64::from(n / 4)).collect();
+        // Block means 0, 1, 2, 3; the last two periods are none.
+        let mut steps: Vec<f64> = (0..16).map(|n| f64::from(n / 4)).collect();
         steps.extend([100.0; 2]);
         let [mean, error] = averaging.estimate(&steps).unwrap();
         assert!(
-            (mean - 2.5).abs() < 1e-15 && (error - (17.5f64 / 30.0).sqrt()).abs() < 1e-15,
+            (mean - 1.5).abs() < 1e-15 && (error - (1.25f64 / 3.0).sqrt()).abs() < 1e-15,
             "{mean} {error}"
         );
-        assert_eq!(averaging.estimate(&[1.0; 23]), None);
+        assert_eq!(averaging.estimate(&[1.0; 7]), None);
     }
 
     #[test]

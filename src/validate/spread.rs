@@ -34,6 +34,9 @@ const NEARLY: [(usize, f64); 3] = [(FIRST_CELLS, 6.0), (1024, 2.0), (4096, 1.0)]
 /// eighth of itself, which at ten lengths is a factor of three.
 const TAIL: usize = 250;
 
+/// Of fewer it is not continued: the record's class is rare among these motions.
+const LEAST_TAIL: usize = 4;
+
 /// Standard errors of that length within which more cells are tried.
 const LENGTH_ERRORS: f64 = 2.0;
 
@@ -201,7 +204,7 @@ impl Range {
     /// Whether it lies in a tail, if that falls exponentially, where no smaller share than `rare` is as far out.
     fn is_in_a_tail(&mut self, rare: f64, errors: f64) -> bool {
         let tail = self.met.len() / TAIL;
-        if tail == 0 {
+        if tail < LEAST_TAIL {
             return false;
         }
         self.met.sort_by(f64::total_cmp);
