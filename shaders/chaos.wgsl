@@ -3,17 +3,8 @@
 // Periods over which averages are taken, at least, before chaos is called early.
 const LEAST_COUNTED: u32 = 32u;
 
-// Standard errors by which the exponent must exceed zero once the budget is spent.
-const CHAOS_ERRORS: Real = 3.0;
-// And those that cast doubt on a cycle that has not settled.
+// Standard errors that cast doubt on a cycle that has not settled.
 const DOUBT: Real = 1.0;
-
-// Growth of a tangent vector, natural logarithms, that no departure from an unstable cycle can
-// have lasted through: beyond the ratio of the largest to the smallest distance.
-const DEPARTURE: Real = 40.0;
-
-// A standard error of fewer blocks is none; short budgets would be called chaos by two.
-const FEWEST_BLOCKS: u32 = 6u;
 
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
@@ -41,8 +32,6 @@ fn grows(errors: Real) -> bool {
 // proportion to time, at a double root to its square. Chaos has to outgrow that, and what rounding makes
 // of it: a shear `1 s; d 1` with d = ULP where there should be none grows by sqrt(s ULP), s of one
 // event being 1 at most.
-const NEUTRAL_ORDER: f32 = 2.0;
-
 fn outgrows(errors: Real) -> bool {
     let growth = mean_growth();
     let periods = tally.blocks * settings.exponent_block;

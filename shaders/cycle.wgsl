@@ -4,8 +4,6 @@
 const ON_CYCLE: f32 = 1e-4;
 // A lane that rests on a cycle which repels is moved by so many times what counts as rest.
 const KICK: f32 = 8.0;
-// Newton's method is not asked again after it led nowhere so often.
-const VAIN: u32 = 2u;
 
 // The binary logarithm of a number near 1e-30 to 1e30, to the precision of its type: f64 has no
 // logarithm of its own. `ln m = 2 artanh((m - 1) / (m + 1))`, m within a factor of sqrt 2 of 1.

@@ -1,6 +1,6 @@
 // Everything that lies in buffers. The host's twins are in src/gpu/layout.rs; a test
 // compares the offsets. A struct holds either Reals or u32s alone, so that both precisions
-// have the same shape.
+// have the same shape. Constants that no shader declares come from src/gpu/rules.rs and shader.rs.
 
 // One linear domain in units of its own step: time tau = t / h, velocities per step.
 struct Domain {

@@ -21,9 +21,7 @@ fn is_bounded(size: Real) -> bool {
     return bitcast<u32>(size) < bitcast<u32>(HUGE);
 }
 
-// Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
-const RESOLVED: u32 = 60u;
-// And these are rounding itself: a motion this near to its last strobes is at rest.
+// Recurrence distances, in quarter octaves below 1, that are rounding itself: a motion this near to its last strobes is at rest.
 const AT_REST: u32 = 64u;
 // What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
 const NOISE: f32 = 4e-6;

@@ -22,9 +22,7 @@ fn is_bounded(size: Real) -> bool {
     return bitcast<u32>(f32(size * 1e-120)) < bitcast<u32>(single);
 }
 
-// Recurrence distances within rounding, in quarter octaves below 1: they need not shrink.
-const RESOLVED: u32 = 160u;
-// And these are rounding itself: a motion this near to its last strobes is at rest.
+// Recurrence distances, in quarter octaves below 1, that are rounding itself: a motion this near to its last strobes is at rest.
 const AT_REST: u32 = RESOLVED;
 // What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
 const NOISE: f32 = 1e-14;

@@ -1,9 +1,5 @@
 // Recurrence: does the lane come back to where it was, and ever nearer?
 
-// Distances are kept as quarter octaves below 1: 4 means half.
-const OCTAVE: f32 = 4.0;
-// Recurrences farther apart than 2^-6 of the motion are none.
-const NEAR: u32 = 24u;
 // A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
 // comes within 2^-12 of a cycle by chance.
 const SETTLED: f32 = 56.0;

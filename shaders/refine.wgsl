@@ -1,11 +1,5 @@
 // Newton's method on the strobe map: from a motion that approaches a cycle to the cycle.
 
-// Newton steps for one candidate.
-const REFINEMENTS: u32 = 5u;
-// The cycle must lie this close to the motion, relative to it: what contracts from farther off
-// may still have a fold of the strobe map before it.
-const REACH: f32 = 3e-2;
-
 // The monodromy matrix has been read along one candidate cycle from the anchor to the present
 // strobe. Moves the lane `to` where the linearised strobe map has its fixed point, to read on from
 // there; false where that brings it no closer or is no part of the motion.

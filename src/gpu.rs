@@ -19,6 +19,7 @@ mod pool;
 mod reading;
 mod rhythm;
 mod rounds;
+pub(crate) mod rules;
 mod self_test;
 mod shader;
 mod signal;

@@ -1,6 +1,8 @@
 //! How lanes average the growth of their tangent vector: in one place for those who set it and those
 //! who ask what it would say of another motion.
 
+use super::rules::{FEWEST_BLOCKS, NEUTRAL_ORDER};
+
 /// Periods in which the tangent vector turns into the direction of fastest growth.
 const ALIGNMENT: u32 = 50;
 
@@ -10,12 +12,6 @@ const EXPONENT_BLOCKS: u32 = 32;
 /// Periods of a block at least: neighbouring periods are alike, and a standard error made of them
 /// is too small.
 const SHORTEST_BLOCK: u32 = 4;
-
-/// Chaos is called early by this many blocks at least (`FEWEST_BLOCKS` in the shaders).
-const FEWEST_BLOCKS: u32 = 6;
-
-/// Chaos has to outgrow this power of time (`NEUTRAL_ORDER` in the shaders).
-const NEUTRAL_ORDER: f64 = 2.0;
 
 /// Which periods count, and in what blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

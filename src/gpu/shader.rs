@@ -1,7 +1,7 @@
 //! Shader variants: one source, put together from small files.
 
-use super::FOLLOWED_MESH_SPEED;
 use super::unroll::unroll;
+use super::{FOLLOWED_MESH_SPEED, rules};
 use crate::record::{WORD_SYMBOLS, valid};
 
 /// Precision of a variant.
@@ -110,12 +110,13 @@ impl Variant {
         let body = unroll(BODY, &names);
         let bits: String =
             VALID.iter().map(|(name, bits)| format!("const VALID_{name}: u32 = {bits}u;\n")).collect();
+        let rules = rules::declarations(self.precision);
         format!(
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
              const GROWTH: bool = {growth};\n\
              const WORD: bool = {word};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
              const CHATTER: bool = {chatter};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
-             const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{body}"
+             const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{rules}{body}"
         )
     }
 }

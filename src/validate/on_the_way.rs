@@ -8,9 +8,9 @@ use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
 use super::lane_model::LaneModel;
 use super::reading::counts;
 use super::rounded::Rounded;
-use super::unsettled::{NEWTON_STEPS, NEWTON_TRIES};
 use crate::classify::classify;
 use crate::gpu::Precision;
+use crate::gpu::rules::{REFINEMENTS, VAIN};
 use crate::model::State;
 use crate::orbit::Class;
 use crate::record::valid;
@@ -177,7 +177,7 @@ fn is_met(case: &Case<'_>, own: &[Course], ahead: &[Course], [shortest, longest]
         Class::Periodic { period } => period,
         _ => case.budget.settings.max_period,
     };
-    let behind = ((NEWTON_STEPS + 1) * NEWTON_TRIES * period) as usize;
+    let behind = ((REFINEMENTS + 1) * VAIN * period) as usize;
     (shortest..=longest).step_by(shortest).any(|length| {
         let latest = |course: &Course| course.counts.len().saturating_sub(1 + length + behind);
         let own = own.iter().flat_map(|course| stretches(course, length, latest(course), usize::MAX));

@@ -11,17 +11,12 @@ use super::case::Case;
 use super::rounding::whole_units;
 use super::states::unit_roundoff;
 use crate::classify::classify;
-use crate::gpu::{Averaging, Precision};
+use crate::gpu::Averaging;
+use crate::gpu::rules::{DEPARTURE, NEAR, distance, resolved};
 use crate::model::State;
 use crate::orbit::{CHAOS_ERRORS, Class};
 use crate::record::valid;
 use crate::reference::Trajectory;
-
-/// Recurrences farther apart are none (`NEAR` in the shaders).
-const NEAR: f64 = 0.015_625;
-
-/// Growth, as a logarithm, that no departure lasts through (`DEPARTURE`).
-const DEPARTURE: f64 = 40.0;
 
 /// A window of lags is so much of the time that has passed.
 const WINDOW_SHARE: u32 = 5;
@@ -59,16 +54,8 @@ pub(super) fn is_open_by_its_figures(case: &Case<'_>) -> bool {
     surely.is_nan()
         || surely <= 0.0
         || is_weak
-        || stays(case, resolved(case.precision))
-        || (may_depart && stays(case, NEAR))
-}
-
-/// Recurrences this close are rest (`RESOLVED` in the shaders).
-fn resolved(precision: Precision) -> f64 {
-    match precision {
-        Precision::F32 => 2f64.powi(-15),
-        Precision::F64 => 2f64.powi(-40),
-    }
+        || stays(case, distance(resolved(case.precision)))
+        || (may_depart && stays(case, distance(NEAR)))
 }
 
 /// Whether the motion comes back to within `near` at some lag and all its multiples in a window: from where the

@@ -11,6 +11,7 @@ use super::lane_model::LaneModel;
 use super::rounded::Rounded;
 use crate::classify::classify;
 use crate::flow::Flow;
+use crate::gpu::rules::REACH;
 use crate::model::State;
 use crate::orbit::{Class, measure};
 use crate::reference::Trajectory;
@@ -20,9 +21,6 @@ const STARTS: usize = 256;
 
 /// Motions that are rounded at every step.
 const RUNS: u64 = 64;
-
-/// A lane takes no step of Newton's method that is longer, relative to the motion (`REACH` in the shaders).
-const REACH: f64 = 3e-2;
 
 /// Periods in which steps are tried, and of cycles where the record has none.
 const STEPPING: u32 = 528;

@@ -113,9 +113,9 @@ impl Spread {
         if tried != CELLS {
             return None;
         }
-        // More cells show what is no rarer than one of them; this is about tails.
+        // More cells show what is no rarer than one of them; this is about tails. Either answer has to be sure.
         let errors = if self.rare * (MOST_CELLS as f64) < 1.0 { LENGTH_ERRORS } else { 0.0 };
-        let is_met = self.is_in_tails(0.0);
+        let is_met = self.is_in_tails(-errors);
         (is_met || !self.is_in_tails(errors)).then_some(is_met)
     }
 
@@ -227,5 +227,37 @@ impl Range {
         // Of a few there is no deviation to speak of.
         2 * self.met.len() > FIRST_CELLS
             && (self.scale(self.ours) - mean).abs() <= DEVIATIONS * variance.sqrt() + self.margin
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Averages that fall exponentially, by e in a length of 1, and a record's beyond nearly all of them.
+    fn verdict(ours: f64, rare: f64) -> Option<bool> {
+        let met: Vec<f64> = (0..CELLS).map(|k| -((k as f64 + 0.5) / CELLS as f64).ln()).collect();
+        let ends = [met[CELLS - 1], met[0]];
+        let range = Range { ours, margin: 0.0, met, ends, is_factor: false };
+        Spread { ranges: vec![(Field::Impacts, range)], rare }.verdict(CELLS)
+    }
+
+    #[test]
+    fn the_length_of_a_tail_decides_where_it_is_sure() {
+        // One of 250 is beyond 5.5; from there to one in 50,000 are 5.3 lengths, to one in 10^7 10.6.
+        assert_eq!(verdict(10.7, 2e-5), Some(true));
+        assert_eq!(verdict(11.1, 2e-5), Some(false));
+        // A quarter of these more or less are two standard errors of the length.
+        assert_eq!(verdict(13.0, 1e-7), Some(true));
+        assert_eq!(verdict(14.5, 1e-7), None);
+        assert_eq!(verdict(18.0, 1e-7), None);
+        assert_eq!(verdict(19.5, 1e-7), Some(false));
+    }
+
+    #[test]
+    fn what_was_met_is_nobodys_tail() {
+        let most = -(0.5 / CELLS as f64).ln();
+        assert_eq!(verdict(most, 0.5), Some(true));
+        assert_eq!(verdict(most + 1.0, 0.01), Some(false));
     }
 }

@@ -4,15 +4,10 @@ use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
 use super::explanation::Explanation;
 use super::rounding::{is_read_rounded, whole_units};
 use crate::classify::classify;
+use crate::gpu::rules::{REFINEMENTS, VAIN};
 use crate::model::State;
 use crate::orbit::Class;
 use crate::reference::Trajectory;
-
-/// Newton's steps that a lane may take (`REFINEMENTS` in the shaders).
-pub(super) const NEWTON_STEPS: u32 = 5;
-
-/// And how often it may set out in vain (`VAIN`).
-pub(super) const NEWTON_TRIES: u32 = 2;
 
 /// Forcing periods in which a motion that is about to rest is seen to stay.
 const STAYING_PERIODS: u32 = 1024;
@@ -33,7 +28,7 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
     let is_own = |own: Trajectory<'_>| apart(case, &own.state(), &stands.state()) < ELSEWHERE;
     let is_on_the_way = !is_open || case.after(case.start, case.record.periods_run).is_ok_and(is_own);
     let as_lanes =
-        (0..=NEWTON_STEPS).filter(|_| is_on_the_way).filter_map(|n| case.read_like_a_lane(period, n));
+        (0..=REFINEMENTS).filter(|_| is_on_the_way).filter_map(|n| case.read_like_a_lane(period, n));
     let mut readings = as_lanes.chain(case.read_as_is(&stands, period));
     let is_rounded = || {
         let own = is_on_the_way && is_read_on_the_way(case, period);
@@ -52,7 +47,7 @@ pub(super) fn unsettled(case: &Case<'_>) -> Option<Explanation> {
 /// Newton's method takes periods from a lane, and where it leads nowhere the lane goes on from where it was.
 fn is_read_on_the_way(case: &Case<'_>, period: u32) -> bool {
     let Some(last) = case.record.periods_run.checked_sub(period) else { return false };
-    (0..=(NEWTON_STEPS + 1) * NEWTON_TRIES * period).any(|back| {
+    (0..=(REFINEMENTS + 1) * VAIN * period).any(|back| {
         let from = last.checked_sub(back).and_then(|periods| case.after(case.start, periods).ok());
         let read = from.as_ref().and_then(|from| case.read_along(from, period));
         let (Some(from), Some(read)) = (from, read) else { return false };

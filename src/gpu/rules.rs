@@ -1,0 +1,56 @@
+//! Rules by which lanes judge their motion and which others have to know, too: validation asks what a lane would
+//! have said. Written once, here; the shaders are compiled with them.
+
+use super::Precision;
+use crate::orbit::CHAOS_ERRORS;
+
+/// Chaos is called early by this many blocks of growth at least: a standard error of fewer is none.
+pub(crate) const FEWEST_BLOCKS: u32 = 6;
+
+/// The power of time that chaos has to outgrow, since tangents of neutral motion grow, too: those of a free body, of a
+/// torus or of an undamped swing in proportion to time, at a double root to its square.
+pub(crate) const NEUTRAL_ORDER: f64 = 2.0;
+
+/// Growth of a tangent vector, as a natural logarithm, that no departure from an unstable cycle lasts through:
+/// beyond the ratio of the largest to the smallest distance.
+pub(crate) const DEPARTURE: f64 = 40.0;
+
+/// Distances are kept in so many parts of an octave below the size of the motion: 4 means half.
+pub(crate) const OCTAVE: u32 = 4;
+
+/// Recurrences farther apart than this are none, in parts of an octave: 2^-6 of the motion.
+pub(crate) const NEAR: u32 = 24;
+
+/// Steps of Newton's method that a lane takes to one cycle.
+pub(crate) const REFINEMENTS: u32 = 5;
+
+/// None of which is longer than this, relative to the motion: what contracts from farther off may still have a fold
+/// of the strobe map before it.
+pub(crate) const REACH: f64 = 3e-2;
+
+/// Searches in vain after which a lane asks it no more.
+pub(crate) const VAIN: u32 = 2;
+
+/// Recurrences within rounding, in parts of an octave: they need not shrink.
+pub(crate) const fn resolved(precision: Precision) -> u32 {
+    match precision {
+        Precision::F32 => 60,
+        Precision::F64 => 160,
+    }
+}
+
+/// The distance of so many parts of an octave, relative to the motion.
+pub(crate) fn distance(parts: u32) -> f64 {
+    (-f64::from(parts) / f64::from(OCTAVE)).exp2()
+}
+
+/// The rules as the shaders' constants.
+pub(super) fn declarations(precision: Precision) -> String {
+    let resolved = resolved(precision);
+    format!(
+        "const FEWEST_BLOCKS: u32 = {FEWEST_BLOCKS}u;\nconst NEUTRAL_ORDER: f32 = {NEUTRAL_ORDER:?};\n\
+         const CHAOS_ERRORS: Real = {CHAOS_ERRORS:?};\nconst DEPARTURE: Real = {DEPARTURE:?};\n\
+         const OCTAVE: f32 = f32({OCTAVE}u);\nconst NEAR: u32 = {NEAR}u;\nconst RESOLVED: u32 = {resolved}u;\n\
+         const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst VAIN: u32 = {VAIN}u;\n"
+    )
+}
