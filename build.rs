@@ -3,8 +3,10 @@
 use std::path::Path;
 use std::process::Command;
 
+/// What the program is made of.
+const SOURCES: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
+
 fn main() {
-    println!("cargo::rerun-if-changed=build.rs");
     let commit = commit().unwrap_or_else(|| "unknown".to_owned());
     println!("cargo::rustc-env=RATTLEMAP_COMMIT={commit}");
 }
@@ -23,7 +25,11 @@ fn commit() -> Option<String> {
             println!("cargo::rerun-if-changed={path}");
         }
     }
-    git(&["rev-parse", "HEAD"])
+    let commit = git(&["rev-parse", "HEAD"])?;
+    // What is built of other sources is not that commit's.
+    SOURCES.iter().for_each(|source| println!("cargo::rerun-if-changed={source}"));
+    let changes = git(&[&["status", "--porcelain", "--"], &SOURCES[..]].concat())?;
+    Some(if changes.is_empty() { commit } else { format!("{commit}-modified") })
 }
 
 fn git(arguments: &[&str]) -> Option<String> {

@@ -40,8 +40,8 @@ fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure
     let refuse = |what: &str, needed: u64, available: u64| {
         Err(Failure::Usage(anyhow!(
             "{map} needs about {} of {what}, and {} are free; lower axis.0.count or axis.1.count{}",
-            gigabytes(needed),
-            gigabytes(available),
+            bytes(needed),
+            bytes(available),
             match what {
                 "disk" => ", or name another disk with --out",
                 _ if cpu < available => ", or ask for --engine cpu, which needs less",
@@ -78,8 +78,10 @@ fn free_disk(out: &Path) -> Option<u64> {
     fs4::available_space(existing).ok()
 }
 
-fn gigabytes(bytes: u64) -> String {
-    format!("{:.1} GB", bytes as f64 / 1e9)
+fn bytes(count: u64) -> String {
+    let (unit, name) =
+        [(1e9, "GB"), (1e6, "MB")].into_iter().find(|&(unit, _)| count as f64 >= unit).unwrap_or((1e3, "kB"));
+    format!("{:.1} {name}", count as f64 / unit)
 }
 
 #[cfg(test)]

@@ -248,7 +248,20 @@ impl Gpu {
         laws: &[Law],
         steps_per_period: Option<u32>,
     ) -> Result<Tables, GpuError> {
-        Tables::new(self, flows, laws, steps_per_period).await
+        let constants = flows.iter().map(|flow| Constants::new(flow, steps_per_period)).collect();
+        self.load_derived(constants, laws).await
+    }
+
+    /// [`Gpu::load`] of constants that have been derived already, none for a flow that lanes cannot carry.
+    ///
+    /// # Errors
+    /// As [`Gpu::load`].
+    pub async fn load_derived(
+        &self,
+        constants: Vec<Option<Constants>>,
+        laws: &[Law],
+    ) -> Result<Tables, GpuError> {
+        Tables::new(self, constants, laws).await
     }
 
     /// [`Gpu::run`] on flows and laws that are loaded; the settings' `steps_per_period` is
@@ -286,7 +299,7 @@ impl Gpu {
     /// [`GpuError::WrongAnswer`] if the device computes something else, and what it refuses.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
         let LaneSettings { workgroup, exponent, word, mesh, symmetry, chatter, .. } = *settings;
-        let keep = !is_hardware(&self.info);
+        let keep = self.rhythm.keep;
         // Until they need it, lanes go on without the tangent vector where that pays.
         let growths: &[bool] = match (exponent, self.rhythm.late_tangent) {
             (false, _) => &[false],

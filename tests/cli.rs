@@ -91,7 +91,7 @@ fn empty_axis_is_refused() {
 fn scene_for_another_command_is_refused() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/e_omega.toml");
     let run = rattlemap(&folder()).args(["bifurcation", scene]).assert();
-    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 of them`", "needs 1 axis"]));
+    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 tables`", "needs 1 axis"]));
 }
 
 #[test]

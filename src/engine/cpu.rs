@@ -1,5 +1,7 @@
 //! The reference as an engine: one cell per task on all processor cores.
 
+use std::time::{Duration, Instant};
+
 use rayon::prelude::*;
 
 use super::flows::Flows;
@@ -7,6 +9,9 @@ use crate::flow::Flow;
 use crate::orbit::{Measured, measure};
 use crate::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
+
+/// Cells that have ended wait no longer than this for others to begin.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// The event-driven reference.
 pub struct Cpu<'p> {
@@ -31,8 +36,17 @@ impl<'p> Cpu<'p> {
 
     pub(super) fn advance(&mut self) -> Vec<(u32, Record)> {
         let cells = std::mem::take(&mut self.under_way);
-        // Cells differ a thousandfold in cost: no task holds more than one.
-        cells.par_iter().with_max_len(1).map(|cell| (cell.id, self.cell(cell))).collect()
+        let clock = Instant::now();
+        // Cells differ a thousandfold in cost: no task holds more than one, and where all are slow some are left.
+        let ended: Vec<Option<(u32, Record)>> = cells
+            .par_iter()
+            .with_max_len(1)
+            .enumerate()
+            .map(|(i, cell)| (i == 0 || clock.elapsed() < PATIENCE).then(|| (cell.id, self.cell(cell))))
+            .collect();
+        let left = cells.iter().zip(&ended).filter(|(_, ended)| ended.is_none());
+        self.under_way.extend(left.map(|(cell, _)| *cell));
+        ended.into_iter().flatten().collect()
     }
 
     fn cell(&self, cell: &Cell) -> Record {

@@ -157,9 +157,10 @@ impl<'p> Gpu<'p> {
     }
 
     async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
-        let flows: Vec<_> = flows.iter().map(|&flow| self.plan.oscillator(flow)).collect();
+        let steps = self.settings.steps_per_period;
+        let derive = |&flow: &u32| Constants::new(&self.plan.oscillator(flow), steps);
         let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
-        self.device.load(&flows, &laws, self.settings.steps_per_period).await
+        self.device.load_derived(flows.par_iter().map(derive).collect(), &laws).await
     }
 
     fn error(&self, error: GpuError, cells: usize) -> EngineError {

@@ -1,5 +1,7 @@
 //! Lanes under way on a device: each has a slot from its beginning to its record.
 
+use std::ops::Range;
+
 use super::device::{BEGIN, Pipelines, most_slots};
 use super::guard::guarded;
 use super::layout::Cell;
@@ -13,6 +15,9 @@ use super::transfer::reals;
 use super::{Gpu, GpuError, Lane, LaneSettings};
 use crate::orbit::Status;
 use crate::record::Record;
+
+/// Slots that are sent again lest there be one more transfer.
+const WIDEST_GAP: usize = 1024;
 
 /// Lanes under way on a device. They may be begun at any time, and their records come as they end: what is
 /// begun later does not wait for the slowest.
@@ -97,15 +102,13 @@ impl Pool {
             self.roster.push(slot);
         }
         let Some(buffers) = &self.buffers else { return Ok(()) };
-        let (lowest, highest) = (slots[slots.len() - 1] as usize, slots[0] as usize);
-        let (cells, starts) = (&self.cells[lowest..=highest], &self.starts[lowest..=highest]);
         let real = gpu.precision.bytes();
-        gpu.queue.write_buffer(
-            &buffers.cells,
-            (lowest * size_of::<Cell>()) as u64,
-            bytemuck::cast_slice(cells),
-        );
-        gpu.queue.write_buffer(&buffers.starts, (lowest * 4 * real) as u64, &reals(starts, gpu.precision));
+        for at in stretches(slots.iter().rev().map(|&slot| slot as usize)) {
+            let (of_cells, of_starts) = (at.start * size_of::<Cell>(), at.start * 4 * real);
+            let starts = reals(&self.starts[at.clone()], gpu.precision);
+            gpu.queue.write_buffer(&buffers.cells, of_cells as u64, bytemuck::cast_slice(&self.cells[at]));
+            gpu.queue.write_buffer(&buffers.starts, of_starts as u64, &starts);
+        }
         buffers.call(gpu, &self.roster, self.roster.len() - lanes.len(), &self.settings);
         let first = &gpu.pipelines[&self.variants[0]];
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -196,6 +199,18 @@ impl Pool {
     }
 }
 
+/// Stretches that hold all of these ascending slots, and no more than [`WIDEST_GAP`] others in a row.
+fn stretches(slots: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for slot in slots {
+        match found.last_mut() {
+            Some(last) if slot <= last.end + WIDEST_GAP => last.end = slot + 1,
+            _ => found.push(slot..slot + 1),
+        }
+    }
+    found
+}
+
 /// What a lane integrates, and where it starts in lane units.
 fn start(tables: &Tables, lane: &Lane) -> (Cell, [f64; 4]) {
     let cell = Cell { flow_index: lane.flow, law_index: lane.law, refused: Status::Ok.code() };
@@ -212,6 +227,17 @@ mod tests {
     use super::*;
     use crate::gpu::{AdapterChoice, Precision};
     use crate::model::GearPair;
+
+    #[test]
+    fn what_lies_together_is_sent_together() {
+        let far = WIDEST_GAP + 10;
+        assert_eq!(stretches([3, 4, 9].into_iter()), [3..10]);
+        assert_eq!(
+            stretches([0, far, far + WIDEST_GAP + 1, 5 * far].into_iter()),
+            [0..1, far..2 * far - 8, 5 * far..5 * far + 1]
+        );
+        assert!(stretches(std::iter::empty()).is_empty());
+    }
 
     #[test]
     fn a_lost_device_is_an_error_that_says_so() {

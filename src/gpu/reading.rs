@@ -48,5 +48,6 @@ fn set_word(record: &mut Record, finding: &Finding) {
     let symbol = |i: usize| {
         b'0' + ((finding.word[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8
     };
-    record.set_word(&Word::cyclic(&(0..length).map(symbol).collect::<Vec<_>>()));
+    let symbols: [u8; WORD_SYMBOLS] = std::array::from_fn(|i| if i < length { symbol(i) } else { 0 });
+    record.set_word(&Word::cyclic(&symbols[..length]));
 }

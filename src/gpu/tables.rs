@@ -38,13 +38,12 @@ impl Tables {
 
     pub(super) async fn new(
         gpu: &Gpu,
-        flows: &[Oscillator],
+        constants: Vec<Option<Constants>>,
         laws: &[Law],
-        steps_per_period: Option<u32>,
     ) -> Result<Tables, GpuError> {
-        let constants: Vec<_> = flows.iter().map(|flow| Constants::new(flow, steps_per_period)).collect();
-        let mut tables: Vec<Flow> = Vec::with_capacity(flows.len());
-        let mut shapes = Vec::with_capacity(flows.len());
+        let flows = constants.len();
+        let mut tables: Vec<Flow> = Vec::with_capacity(flows);
+        let mut shapes = Vec::with_capacity(flows);
         let mut phasors = Vec::new();
         for constants in &constants {
             match constants {
@@ -72,7 +71,7 @@ impl Tables {
         let allowed = gpu.device.limits().max_storage_buffer_binding_size;
         let needed = tables.len().max(phasors.len()) as u64;
         if needed > allowed {
-            return Err(GpuError::TooManyFlows { flows: flows.len(), needed, allowed });
+            return Err(GpuError::TooManyFlows { flows, needed, allowed });
         }
         let make = || Tables {
             flows: upload(gpu, "flows", &tables),
@@ -82,6 +81,6 @@ impl Tables {
             constants,
             law_count: laws.len(),
         };
-        guarded(gpu, "flows", flows.len(), make).await
+        guarded(gpu, "flows", flows, make).await
     }
 }

@@ -65,12 +65,7 @@ pub(super) fn read(root: &Section<'_>, wanted: usize, command: &str) -> Result<V
     let tables = list.list("a list of tables, [[axis]]")?;
     let mut axes = Vec::with_capacity(tables.len());
     for table in &tables {
-        let axis = read_one(table)?;
-        if let Some(i) = axes.iter().position(|a: &Axis| a.parameter.name == axis.parameter.name) {
-            let field = Section::open(table.node, &table.path, &FIELDS)?.require("parameter", EXAMPLE)?;
-            return Err(field.conflict(format!("axis {i} sweeps it already; name another parameter")));
-        }
-        axes.push(axis);
+        axes.push(read_one(table, &axes)?);
     }
     if axes.len() != wanted {
         let excess = tables.get(wanted).unwrap_or(&list);
@@ -84,16 +79,19 @@ pub(super) fn read(root: &Section<'_>, wanted: usize, command: &str) -> Result<V
 
 /// The place of the axis too many, with the number of axes as the value shown.
 fn count_node(at: &Node, count: usize) -> Node {
-    let shown = format!("{count} of them");
+    let shown = format!("{count} {}", if count == 1 { "table" } else { "tables" });
     Node { place: at.name_place.clone(), shown, value: Value::Other, ..at.clone() }
 }
 
-fn read_one(table: &Field<'_>) -> Result<Axis, SceneError> {
+fn read_one(table: &Field<'_>, before: &[Axis]) -> Result<Axis, SceneError> {
     let section = Section::open(table.node, &table.path, &FIELDS)?;
     let field = section.require("parameter", "name one of the model's parameters")?;
     let name = field.text()?;
     let names: Vec<&str> = GearPair::PARAMETERS.iter().map(|p| p.name).collect();
     let parameter = GearPair::parameter(name).map_err(|_| field.unknown_name(name, &names))?;
+    if let Some(i) = before.iter().position(|axis| axis.parameter.name == parameter.name) {
+        return Err(field.conflict(format!("axis {i} sweeps it already; name another parameter")));
+    }
     let requirement = parameter.range.requirement();
     let end = |which: &str| {
         let field = section.require(which, &format!("give a number, {requirement}"))?;

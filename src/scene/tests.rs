@@ -99,7 +99,7 @@ fn a_map_takes_two_axes_in_their_order() {
     let pair = scene.cell(&[3, 1]);
     assert_eq!((pair.e, pair.omega, pair.force), (1.0, 6.5, 50.0));
     let message = Scene::parse(GOOD, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
-    assert_says(&message, &["s.toml:7:", "axis = 1 of them", "`map` needs 2 axes"]);
+    assert_says(&message, &["s.toml:7:", "axis = 1 table", "`map` needs 2 axes"]);
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn missing_fields() {
     );
     assert_says(
         &parse("axis = []", &[]).unwrap_err().to_string(),
-        &["s.toml:1:1: `axis = 0 of them`", "needs 1 axis"],
+        &["s.toml:1:1: `axis = 0 tables`", "needs 1 axis"],
     );
     assert_says(&parse("", &[]).unwrap_err().to_string(), &["s.toml:1:1: `axis` is missing"]);
 }
@@ -242,7 +242,7 @@ fn values_that_contradict_each_other() {
     let two = format!("{GOOD}{SECOND_AXIS}");
     assert_says(
         &parse(&two, &[]).unwrap_err().to_string(),
-        &["s.toml:27:", "`axis = 2 of them` does not fit: `bifurcation` needs 1 axis"],
+        &["s.toml:27:", "`axis = 2 tables` does not fit: `bifurcation` needs 1 axis"],
     );
     let cases = [
         (
