@@ -4,7 +4,7 @@ mod common;
 
 use common::{REST, flow_of, paper as cell};
 use rattlemap::model::{GearPair, State};
-use rattlemap::orbit::{Class, Orbit, Settings, Status, analyse};
+use rattlemap::orbit::{Budget, Class, Orbit, Settings, Status, analyse, measure};
 use rattlemap::reference::Trajectory;
 
 fn orbit(pair: &GearPair) -> Orbit {
@@ -56,6 +56,54 @@ fn banded_chaos_beyond_a_grazing_is_chaos() {
         let orbit = orbit(&GearPair::paper(e));
         assert_eq!((orbit.class, orbit.status), (Class::Chaotic, Status::Ok), "{e}");
         assert!(orbit.lyapunov > 3.0 * orbit.lyapunov_error.unwrap(), "{e}");
+    }
+}
+
+/// A band of chaos, 1 % of the motion wide, beside a cycle that attracts: by chance it comes nearer to the cycle from
+/// one look to the next.
+#[test]
+fn a_band_of_chaos_beside_a_cycle_is_chaos() {
+    let narrow = GearPair {
+        m1: 1.5100944943278496,
+        m2: 2.2228992243566275,
+        r1: 1.166979760399095,
+        r2: 0.4475983236152271,
+        k1: 48.95640243390158,
+        k2: 81.18240655778291,
+        r: 0.0,
+        k: 4.550185120183626,
+        force: 8.916912390336938,
+        b: 0.01034097498992998,
+        mesh_speed: 0.00020785654785843188,
+        ..cell(0.28434052631578943, 0.89809)
+    };
+    for pair in [cell(0.698037, 5.960782), narrow] {
+        for transient_periods in [400, 700, 701] {
+            let settings = Settings { transient_periods, ..Settings::default() };
+            assert_eq!(analyse(&pair, REST, &settings).class, Class::Chaotic, "after {transient_periods}");
+        }
+    }
+    // Within the budget of a map, too.
+    let budget = Budget {
+        settings: Settings::default(),
+        early_stop: true,
+        undecided_periods: 1584,
+        exponent: true,
+        shows_exponent: true,
+    };
+    for pair in [cell(0.6980392156862745, 5.96078431372549), narrow] {
+        let measured = measure(&flow_of(&pair), pair.law(), REST, &budget);
+        assert_eq!(measured.period, None);
+    }
+}
+
+/// A multiplier of 0.99995 shrinks little within any look; the motion about it is linear.
+#[test]
+fn a_slow_approach_is_seen_however_long_the_transient() {
+    for transient_periods in [5000, 20_000] {
+        let settings = Settings { transient_periods, ..Settings::default() };
+        let orbit = analyse(&cell(0.7941176470588235, 3.3294117647058825), REST, &settings);
+        assert_eq!(orbit.class, Class::Periodic { period: 1 }, "after {transient_periods}");
     }
 }
 

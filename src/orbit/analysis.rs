@@ -1,5 +1,6 @@
 //! Deciding what a cell's motion is.
 
+use super::approach::{LINEAR_CYCLES, is_linear};
 use super::reading::Reading;
 use super::recurrence::{Candidate, Metric, candidates};
 use super::{Class, Orbit, Settings, Status};
@@ -302,7 +303,22 @@ impl Analysis<'_> {
             }
             last = now;
         }
-        Ok((last < ON_CYCLE || last < APPROACH * before).then_some(last))
+        if last < ON_CYCLE {
+            return Ok(Some(last));
+        }
+        // A band of chaos beside a cycle comes nearer to it by chance.
+        let mut strobes = vec![ahead.state()];
+        for _ in 0..LINEAR_CYCLES {
+            for _ in 0..cycle.period {
+                self.advance(&mut ahead)?;
+            }
+            strobes.push(ahead.state());
+        }
+        // A multiplier near 1 shrinks little; half of what it promises must be seen.
+        let promised = 1.0 - 0.5 * (1.0 - cycle.spectral_radius().powf(cycles));
+        let is_seen = last < APPROACH.max(promised) * before
+            && is_linear(cycle, |n| strobes[LINEAR_CYCLES - n], metric);
+        Ok(is_seen.then_some(last))
     }
 
     pub(super) fn periodic(

@@ -7,7 +7,7 @@
 use super::CHAOS_ERRORS;
 use super::analysis::{APPROACH, Analysis, DEPARTURE, ON_CYCLE, status_of};
 use super::approach::{LINEAR_CYCLES, is_linear};
-use super::prospects::{Searched, contraction, departs};
+use super::prospects::{Searched, contraction, departs, swings};
 use super::recurrence::{Metric, NEAR, candidates, lingering};
 use super::scatter::Scatter;
 use super::{Budget, Orbit, Status};
@@ -290,11 +290,20 @@ impl<'a> Watch<'a> {
         let before = distance(back);
         let nearer = present < APPROACH.max(promised) * before;
         let steady = (1..back).all(|k| distance(k) < 2.0 * before);
-        if nearer && steady {
+        if nearer && steady && (is_seen() || !self.grows_beside(found, metric)) {
             self.analysis.periodic(&found.seed, cycle, at_last).map(Some)
         } else {
             Ok(None)
         }
+    }
+
+    /// Whether a tangent vector has grown, while the motion was near the cycle, by more than it would about one
+    /// that attracts the motion: a band of chaos may lie beside a cycle, and come nearer to it by chance.
+    fn grows_beside(&self, found: &Found, metric: &Metric) -> bool {
+        let (period, now) = (found.cycle.period as usize, self.last_beside(found));
+        let is_near = |n: &usize| metric.distance(&self.strobes[now - n * period], &found.cycle.state) < NEAR;
+        let cycles = (0..=now / period).take_while(is_near).count();
+        swings(self.exponent.lately((cycles * period).min(self.exponent.periods())))
     }
 
     /// Whether the last cycles had the cycle's impacts: beyond a fold of the strobe map there may be

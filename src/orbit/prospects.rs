@@ -47,6 +47,11 @@ pub(super) fn departs(exponent: &Exponent, period: u32, is_last: bool) -> bool {
     growth.is_some_and(|growth| growth > cycles as f64 * LARGEST_MULTIPLIER.ln())
 }
 
+/// Whether growth, as a logarithm, is more than what a vector may stretch by about a cycle that attracts.
+pub(super) fn swings(growth: Option<f64>) -> bool {
+    growth.is_some_and(|growth| growth > LAST_CYCLES as f64 * LARGEST_MULTIPLIER.ln())
+}
+
 /// What earlier searches have shown.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Searched {

@@ -35,6 +35,11 @@ impl Exponent {
         Some(self.growth[from..].iter().sum())
     }
 
+    /// Periods whose growth has been collected.
+    pub(crate) fn periods(&self) -> usize {
+        self.growth.len()
+    }
+
     /// Forgets what was collected: the vector needs a while to turn to its direction.
     pub fn forget(&mut self) {
         self.growth.clear();
