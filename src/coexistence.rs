@@ -3,7 +3,8 @@
 //! Runs that end in chaos count as one attractor together: nothing in a record tells two chaotic
 //! attractors apart. Runs that end on a cycle are compared on the reference: two cycles are the
 //! same if the last strobe state of one lies on the other, within [`SAME`] of the motion's size,
-//! and one period divides the other (at a flip, noise makes a multiple of a period). Mirror twins
+//! and one period divides the other (at a flip, noise makes a multiple of a period). Newton's method
+//! shows where the cycle is that a run was still on its way to. Mirror twins
 //! count as one: where a symmetric cycle has split they always coexist, and that says nothing.
 //! Contact-free motion is one attractor however far it still is from it. Runs that are undecided
 //! or failed count for nothing.
@@ -21,10 +22,14 @@ use crate::orbit::Class;
 use crate::plan::Plan;
 use crate::record::Record;
 use crate::reference::{Stop, Trajectory};
+use crate::stability::{StrobeMap, refine};
 
 /// States this close, relative to the motion's size, lie on the same cycle. Engines confirm a
 /// period from as far away where the approach is slow.
 pub const SAME: f64 = 3e-2;
+
+/// And a cycle this close to a run's last state is the run's own: engines measure by the whole motion.
+const ITS_OWN: f64 = 2.0 * SAME;
 
 /// Attractors found per cell, by id; none if every cell has one start.
 ///
@@ -96,6 +101,12 @@ struct Seen {
 impl Seen {
     fn from(flow: &Flow, law: Law, strobe: State, period: u32) -> Seen {
         let mut seen = Seen { period, points: vec![strobe], last: strobe, is_quiet: false };
+        let cycle = refine(&Trajectory::new(flow, law, strobe), StrobeMap::Periods(period));
+        if let Some(cycle) = cycle.filter(|cycle| cycle.attracts())
+            && seen.distance(flow, &cycle.state, &strobe) < ITS_OWN
+        {
+            (seen.points, seen.last) = (vec![cycle.state], cycle.state);
+        }
         // A motion that stops here is known by the state that it had.
         let _: Result<(), Stop> = seen.run(flow, law);
         seen

@@ -231,6 +231,32 @@ fn later(omega: f64, e: f64, from: [f64; 4], periods: u32, turns: f64) -> [f64; 
     trajectory.state()
 }
 
+/// Slow spirals end up to twice the distance apart from which each is known to approach.
+#[test]
+fn runs_on_their_way_to_one_cycle_count_once() {
+    let plan = plan(&[
+        "m1=1.30072638416532",
+        "m2=4.370754723550304",
+        "r1=0.001309637638311873",
+        "r2=0.07709545638674745",
+        "k1=4.204001903728689",
+        "k2=7.0251062646692635",
+        "r=3.0416397939701008",
+        "k=65.82612236208861",
+        "F=12.56571991827156",
+        "b=0.10655138843791885",
+        "axis.0.min=5.6680510494800656",
+        "axis.1.min=0.34823049693762054",
+        "axis.1.max=0.5857070179215647",
+        "axis.0.max=5.7",
+        "axis.1.count=2",
+        "start.policy=rest",
+        "start.count=8",
+    ]);
+    let found = attractors(&plan, &on_cpu(&plan)).unwrap();
+    assert_eq!([found[0], found[2]], [1, 1]);
+}
+
 #[test]
 fn attractors_are_told_apart_by_their_states() {
     let (omega, e) = (5.6, 0.925);
