@@ -19,8 +19,8 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     } else if motion.q[0] < walls[1] {
         begin_beyond(SIDE_LEFT);
     }
-    motions[lane] = Motion(motion, array<Real, 16>(), FRESH);
-    tallies[lane] = Tally(tally, array<u32, 16>(), array<u32, 16>(), array<u32, 7>());
+    motions[lane] = Motion(motion, seen, array<Real, 16>(), FRESH);
+    tallies[lane] = Tally(tally, noted, array<u32, 16>(), array<u32, 16>(), array<u32, 7>());
 }
 
 // A start beyond a wall is meshing.

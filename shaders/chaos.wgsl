@@ -8,11 +8,11 @@ const DOUBT: Real = 1.0;
 
 // Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
 fn is_chaos() -> bool {
-    if tally.block_periods > 0u || tally.blocks < FEWEST_BLOCKS || tally.streak >= STREAK || tally.period < settings.chaos_from {
+    if noted.block_periods > 0u || noted.blocks < FEWEST_BLOCKS || noted.streak >= STREAK || tally.period < settings.chaos_from {
         return false;
     }
     // Averages that a cycle read in vain has interrupted begin anew.
-    if tally.period < tally.counted_from + LEAST_COUNTED && tally.period < settings.periods {
+    if tally.period < noted.counted_from + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
     let errors = select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods);
@@ -21,7 +21,7 @@ fn is_chaos() -> bool {
 
 // Whether the exponent exceeds zero by so many standard errors.
 fn grows(errors: Real) -> bool {
-    if !EXPONENT || tally.blocks < 2u {
+    if !EXPONENT || noted.blocks < 2u {
         return false;
     }
     let growth = mean_growth();
@@ -34,10 +34,10 @@ fn grows(errors: Real) -> bool {
 // event being 1 at most.
 fn outgrows(errors: Real) -> bool {
     let growth = mean_growth();
-    let periods = tally.blocks * settings.exponent_block;
+    let periods = noted.blocks * settings.exponent_block;
     let began = max(settings.exponent_from, 1u);
     let neutral = NEUTRAL_ORDER * log(f32(began + periods) / f32(began));
-    let events_per_period = Real(tally.events) / Real(max(tally.period - tally.counted_from, 1u));
+    let events_per_period = Real(tally.events) / Real(max(tally.period - noted.counted_from, 1u));
     let rounding = sqrt(events_per_period * events_per_period * ULP);
     return (growth.x - errors * growth.y - rounding) * Real(periods) > Real(neutral);
 }
@@ -46,11 +46,11 @@ fn outgrows(errors: Real) -> bool {
 fn departs(errors: Real) -> bool {
     // A lane that has just been sent on lingered. A single lag comes near by chance, its
     // multiples with it do not.
-    var lingers = tally.known_lags == 0u;
+    var lingers = noted.known_lags == 0u;
     var rests = false;
-    for (var lag = 1u; 2u * lag <= tally.known_lags && !rests; lag++) {
+    for (var lag = 1u; 2u * lag <= noted.known_lags && !rests; lag++) {
         var nearest = 255u;
-        for (var multiple = lag; multiple <= tally.known_lags && nearest >= NEAR; multiple += lag) {
+        for (var multiple = lag; multiple <= noted.known_lags && nearest >= NEAR; multiple += lag) {
             trips += 1u;
             nearest = min(nearest, last_distance_at(multiple));
         }
@@ -62,6 +62,6 @@ fn departs(errors: Real) -> bool {
         return true;
     }
     let growth = mean_growth();
-    let periods = Real(tally.blocks * settings.exponent_block);
+    let periods = Real(noted.blocks * settings.exponent_block);
     return lingers && (growth.x - errors * growth.y) * periods < DEPARTURE;
 }

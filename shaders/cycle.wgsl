@@ -109,29 +109,29 @@ fn judge_cycle() {
     let is_last = tally.period >= settings.longest;
     if !EXPONENT {
         // As near its start as at the end: a multiple of the period has been read.
-        if tally.divisor > 0u && tally.divisor_apart + 8u >= tally.apart && reads_divisor() {
+        if noted.divisor > 0u && noted.divisor_apart + 8u >= noted.apart && reads_divisor() {
             return;
         }
-        tally.cycle = tally.candidate;
+        noted.cycle = tally.candidate;
         return;
     }
     carry_vector();
-    motion.cycle_growth = spectral_growth();
+    seen.cycle_growth = spectral_growth();
     note_branch();
     let to = fixed_point();
-    tally.off = octaves(distance_between(strobe_state(), to));
-    let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    noted.off = octaves(distance_between(strobe_state(), to));
+    let attracts = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
     // Beside a graze the map has no derivative that tells where the cycle is.
-    let is_smooth = tally.grazes == 0u || tally.refinements > 0u;
+    let is_smooth = tally.grazes == 0u || noted.refinements > 0u;
     // And where rounding is amplified it throws the lane off: such cycles are waited for.
-    let helps = is_smooth && tally.vain < VAIN;
+    let helps = is_smooth && noted.vain < VAIN;
     if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine(to) {
         tally.stage = STAGE_READING;
         return;
     }
     let is_cycle = attracts && is_own() && is_on_cycle(to, is_last);
     if is_cycle && (!is_multiple() || is_refuted()) {
-        tally.cycle = tally.candidate;
+        noted.cycle = tally.candidate;
         return;
     }
     if is_cycle && reads_divisor() {
@@ -139,9 +139,9 @@ fn judge_cycle() {
     }
     // Where Newton's method has left the branch of the motion, a lane that goes back to where it set out
     // would set out once more, for ever.
-    let is_lost = tally.refinements > 0u && !is_own();
-    if attracts && !is_lost && tally.refinements > 0u {
-        tally.vain += 1u;
+    let is_lost = noted.refinements > 0u && !is_own();
+    if attracts && !is_lost && noted.refinements > 0u {
+        noted.vain += 1u;
     }
     give_up();
     if is_last {
@@ -152,17 +152,17 @@ fn judge_cycle() {
     } else {
         search_on();
     }
-    tally.asked = 0u;
+    noted.asked = 0u;
 }
 
 // Reads the divisor of the period, if there is time left.
 fn reads_divisor() -> bool {
-    if tally.period + tally.divisor > settings.longest {
+    if tally.period + noted.divisor > settings.longest {
         return false;
     }
-    tally.candidate = tally.divisor;
-    tally.asked = 1u;
-    tally.settled = 0u;
+    tally.candidate = noted.divisor;
+    noted.asked = 1u;
+    noted.settled = 0u;
     begin_reading();
     return true;
 }
@@ -170,47 +170,47 @@ fn reads_divisor() -> bool {
 // The cycle attracts, but is too far off: its recurrences count on.
 fn look_again() {
     tally.stage = STAGE_RUNNING;
-    tally.has_read = 0u;
-    tally.refuted = 0u;
+    noted.has_read = 0u;
+    noted.refuted = 0u;
     begin_counting();
     resume_growth();
-    begin_window(strobe_state(), tally.window);
+    begin_window(strobe_state(), noted.window);
 }
 
 // The exponent goes on; recurrence from scratch.
 fn search_on() {
     // Rounding may hold a lane on a cycle that repels for ever.
-    let repels = motion.cycle_growth > NEUTRAL * Real(tally.candidate);
-    if repels && tally.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
-        motion.q[1] += Real(KICK * exp2(-f32(AT_REST) / OCTAVE)) * motion.rate_scale;
+    let repels = seen.cycle_growth > NEUTRAL * Real(tally.candidate);
+    if repels && noted.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
+        motion.q[1] += Real(KICK * exp2(-f32(AT_REST) / OCTAVE)) * seen.rate_scale;
         motion.bound = 0.0;
         // What grew there was no chaos.
-        tally.blocks = 0u;
-        tally.block_periods = 0u;
+        noted.blocks = 0u;
+        noted.block_periods = 0u;
         motion.block_growth = 0.0;
-        motion.growth_sum = 0.0;
-        motion.growth_squares = 0.0;
+        seen.growth_sum = 0.0;
+        seen.growth_squares = 0.0;
     }
     tally.stage = STAGE_RUNNING;
-    tally.has_read = 0u;
-    tally.tries += 1u;
+    noted.has_read = 0u;
+    noted.tries += 1u;
     // One that attracts, and was not come near to, may be the cycle all the same.
-    let attracts = motion.cycle_growth < -NEUTRAL * Real(tally.candidate);
-    tally.refuted = select(0u, tally.candidate, tally.asked == 1u && !attracts);
+    let attracts = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    noted.refuted = select(0u, tally.candidate, noted.asked == 1u && !attracts);
     begin_counting();
     resume_growth();
-    tally.window = 0u;
+    noted.window = 0u;
     tally.candidate = 0u;
-    tally.streak = 0u;
-    tally.known_lags = 0u;
-    tally.settled = 0u;
+    noted.streak = 0u;
+    noted.known_lags = 0u;
+    noted.settled = 0u;
     tallies[lane].last_distances = array<u32, 16>();
 }
 
 // Whether the cycle closes earlier, as far as rounding and the lane's distance from it let one tell.
 fn is_multiple() -> bool {
-    let is_closed = tally.divisor_apart >= AT_REST || exp2(-f32(tally.divisor_apart) / OCTAVE) < 4.0 * away();
-    return tally.divisor > 0u && is_closed;
+    let is_closed = noted.divisor_apart >= AT_REST || exp2(-f32(noted.divisor_apart) / OCTAVE) < 4.0 * away();
+    return noted.divisor > 0u && is_closed;
 }
 
 // Quarter octaves by which the points of a multiple are farther apart than the lane is from it.
@@ -220,8 +220,8 @@ const ASUNDER: u32 = 12u;
 // been read elsewhere. A lane that comes to the divisor's own cycle from either side in turn is half as far
 // from it as its points seem to be apart.
 fn is_refuted() -> bool {
-    let is_asunder = tally.divisor_apart + ASUNDER <= tally.off;
-    return tally.refuted == tally.divisor && tally.divisor_apart < AT_REST && is_asunder;
+    let is_asunder = noted.divisor_apart + ASUNDER <= noted.off;
+    return noted.refuted == noted.divisor && noted.divisor_apart < AT_REST && is_asunder;
 }
 
 // What rounding moves the state by over a cycle at most, relative to the motion: every event rounds, and
@@ -235,7 +235,7 @@ fn noise() -> f32 {
 
 // What the cycle that was read amplifies, at most, relative to the motion.
 fn gain() -> Real {
-    let scales = array<Real, 4>(motion.position_scale, motion.rate_scale, motion.position_scale, motion.rate_scale);
+    let scales = array<Real, 4>(seen.position_scale, seen.rate_scale, seen.position_scale, seen.rate_scale);
     var most: Real = 1.0;
     for (var k = 0u; k < 16u; k++) {
         trips += 1u;
@@ -249,8 +249,8 @@ fn gain() -> Real {
 // derivative. A spiral comes near its last strobe before it comes near its cycle.
 fn away() -> f32 {
     // Rounding may hold a lane still before it is there.
-    let by_recurrence = limit_of(max(exp2(-f32(tally.apart) / OCTAVE), NOISE));
-    return select(by_recurrence, max(by_recurrence, exp2(-f32(tally.off) / OCTAVE)), EXPONENT);
+    let by_recurrence = limit_of(max(exp2(-f32(noted.apart) / OCTAVE), NOISE));
+    return select(by_recurrence, max(by_recurrence, exp2(-f32(noted.off) / OCTAVE)), EXPONENT);
 }
 
 // And if rounding is taken at its worst.
@@ -260,7 +260,7 @@ fn blur() -> f32 {
 
 // Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
 fn limit_of(d: f32) -> f32 {
-    let mu = select(0.0, exp2(f32(motion.cycle_growth)), EXPONENT);
+    let mu = select(0.0, exp2(f32(seen.cycle_growth)), EXPONENT);
     return d / max(1.0 - mu, 1e-6);
 }
 
@@ -273,18 +273,18 @@ fn is_near_cycle() -> bool {
 // that far for the state, and for the image it is compared with what the cycle makes of that.
 fn is_surely_unsymmetric() -> bool {
     let amplified = select(1.0, f32(gain()), EXPONENT);
-    return exp2(-f32(tally.mirror) / OCTAVE) > 2.0 * (1.0 + amplified) * max(blur(), ON_CYCLE);
+    return exp2(-f32(noted.mirror) / OCTAVE) > 2.0 * (1.0 + amplified) * max(blur(), ON_CYCLE);
 }
 
 // Whether it is nearer to it than lanes resolve, wherever about it the state and its image are.
 fn is_surely_symmetric() -> bool {
-    return is_near_cycle() && exp2(-f32(tally.mirror) / OCTAVE) + 2.0 * away() < MIRROR;
+    return is_near_cycle() && exp2(-f32(noted.mirror) / OCTAVE) + 2.0 * away() < MIRROR;
 }
 
 // Whether it moves no more, and not because it moves too slowly to show.
 fn is_at_rest() -> bool {
-    let is_there = !EXPONENT || exp2(-f32(tally.off) / OCTAVE) < max(ON_CYCLE, limit_of(noise()));
-    return tally.apart >= AT_REST && is_there;
+    let is_there = !EXPONENT || exp2(-f32(noted.off) / OCTAVE) < max(ON_CYCLE, limit_of(noise()));
+    return noted.apart >= AT_REST && is_there;
 }
 
 // Roundings of the motion by which a fixed point may be misplaced, before it is amplified.
@@ -292,7 +292,7 @@ const MISPLACED: Real = 8.0;
 
 // Whether a motion without events has its limit beyond the wall: it creeps out, by more than roundings in a period.
 fn leaves(to: array<Real, 4>) -> bool {
-    let unsure = MISPLACED * ULP * motion.position_scale * Real(limit_of(1.0));
+    let unsure = MISPLACED * ULP * seen.position_scale * Real(limit_of(1.0));
     let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_DIP;
     return may_leave && beyond(to) > unsure;
 }
@@ -300,9 +300,9 @@ fn leaves(to: array<Real, 4>) -> bool {
 // Near, or as near as rounding lets it. What lies in another domain than the lane, as its derivative has
 // it, is no cycle that it comes to; and beside a graze only rest will do.
 fn is_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
-    let is_blurred = (tally.vain >= VAIN || is_last) && tally.settled != 0u && exp2(-f32(tally.apart) / OCTAVE) < min(noise(), ON_CYCLE);
+    let is_blurred = (noted.vain >= VAIN || is_last) && noted.settled != 0u && exp2(-f32(noted.apart) / OCTAVE) < min(noise(), ON_CYCLE);
     // Whether it goes on with the same events is seen where Newton's method leads it, if there is time.
-    let is_confirmed = !is_last || settings.early_stop == 0u || tally.refinements > 0u || away() <= REFINED;
+    let is_confirmed = !is_last || settings.early_stop == 0u || noted.refinements > 0u || away() <= REFINED;
     let is_near = is_near_cycle() && keeps_domain(to) && tally.grazes == 0u && is_confirmed;
     return is_near || ((is_at_rest() || is_blurred) && !leaves(to));
 }

@@ -102,8 +102,11 @@ struct Settings {
     ended: u32,
 }
 
-// What a lane carries between dispatches: the motion. While it runs, numbers lie in
-// registers; arrays that are indexed stay in the buffer, or they would drag the rest along.
+// What a lane carries between dispatches. While it runs, `now` lies in registers: every step and event takes it. What
+// strobes have seen and noted is taken up at strobes alone, or it would be in the way of every step
+// (sweep.wgsl). Arrays that are indexed stay in the buffer, or they would drag the rest along.
+
+// The motion itself.
 struct MotionNow {
     // Gap (from the wall while meshing), its rate, x, its rate; rates per free step.
     q: array<Real, 4>,
@@ -117,9 +120,14 @@ struct MotionNow {
     bend: Real,
     // Time spent meshing in parts of steps, in free steps, less the whole ones.
     mesh_part: Real,
-    // Growth of the tangent vector, binary logarithms: of this block, the sum of the whole
-    // blocks, and of the squares of their deviations from the mean.
+    // Growth of the tangent vector in this block, binary logarithms.
     block_growth: Real,
+}
+
+// What strobes have seen of the motion.
+struct Seen {
+    // Growth of the tangent vector: the sum of the whole blocks, and of the squares of their
+    // deviations from the mean.
     growth_sum: Real,
     growth_squares: Real,
     // Strobe state that later ones are compared with; where the cycle is read, its start.
@@ -135,13 +143,14 @@ struct MotionNow {
 
 struct Motion {
     now: MotionNow,
+    seen: Seen,
     // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
     tangents: array<Real, 16>,
     // The one for the exponent while the matrix takes its place.
     vector: array<Real, 4>,
 }
 
-// What a lane carries between dispatches: the counting.
+// The counting.
 struct TallyNow {
     // Free steps since phase 0.
     step: u32,
@@ -169,30 +178,12 @@ struct TallyNow {
     grazes: u32,
     // STAGE_*.
     stage: u32,
-    // Periods of the cycle that are still to be read.
+    // The smallest lag that recurs and contracts, and periods of its cycle that are still to be read.
+    candidate: u32,
     to_read: u32,
-    // 1 once a cycle is being read or has been, and its period if it attracts.
-    has_read: u32,
-    cycle: u32,
-    // Cycles that were read in vain.
-    tries: u32,
-    // Period at which counting began.
-    counted_from: u32,
     // How many tangent vectors there are, and 1 for lanes of the variant that carries one for the exponent.
     tangent_count: u32,
     grows: u32,
-    // Blocks of the exponent, and periods in the present one.
-    blocks: u32,
-    block_periods: u32,
-    // Recurrence: when the anchor was taken, lags of this window, the smallest lag that
-    // recurs and contracts and for how many windows, lags that the last window held.
-    anchor_period: u32,
-    window: u32,
-    candidate: u32,
-    streak: u32,
-    known_lags: u32,
-    // 1 if the candidate's limit is near.
-    settled: u32,
     // The word: how many symbols, and a rotation-invariant hash.
     word_length: u32,
     hash_low: u32,
@@ -200,6 +191,28 @@ struct TallyNow {
     recent: u32,
     // Events on the strobe phase.
     on_strobe: u32,
+}
+
+// What strobes have noted of it.
+struct Noted {
+    // 1 once a cycle is being read or has been, and its period if it attracts.
+    has_read: u32,
+    cycle: u32,
+    // Cycles that were read in vain.
+    tries: u32,
+    // Period at which counting began.
+    counted_from: u32,
+    // Blocks of the exponent, and periods in the present one.
+    blocks: u32,
+    block_periods: u32,
+    // Recurrence: when the anchor was taken, lags of this window, for how many windows the candidate
+    // has contracted, lags that the last window held.
+    anchor_period: u32,
+    window: u32,
+    streak: u32,
+    known_lags: u32,
+    // 1 if the candidate's limit is near.
+    settled: u32,
     // In quarter octaves below 1: distance of the cycle from its mirror image; how far the
     // cycle that was read last took the lane, and the one before a Newton step.
     mirror: u32,
@@ -226,6 +239,7 @@ struct TallyNow {
 
 struct Tally {
     now: TallyNow,
+    noted: Noted,
     // Distances per lag, of this window and the last: quarter octaves below 1, in bytes.
     distances: array<u32, 16>,
     last_distances: array<u32, 16>,

@@ -12,13 +12,13 @@ fn begin_period() {
         tally.to_read -= 1u;
         widen_scales(strobe_state());
         let read = tally.candidate - tally.to_read;
-        let apart = octaves(distance_between(strobe_state(), motion.anchor));
+        let apart = octaves(distance_between(strobe_state(), seen.anchor));
         if tally.to_read == 0u {
-            tally.apart = apart;
+            noted.apart = apart;
             tally.stage = STAGE_READ;
-        } else if tally.candidate % read == 0u && apart > tally.divisor_apart {
-            tally.divisor = read;
-            tally.divisor_apart = apart;
+        } else if tally.candidate % read == 0u && apart > noted.divisor_apart {
+            noted.divisor = read;
+            noted.divisor_apart = apart;
         }
         return;
     }
@@ -31,7 +31,7 @@ fn begin_period() {
     let read_by = tally.period + tally.candidate;
     let is_last = read_by == settings.periods || read_by == settings.longest;
     // What contracts by chance in the midst of growth has not settled.
-    let is_due = is_last && tally.streak >= STREAK && (tally.settled == 1u || !grows(DOUBT));
+    let is_due = is_last && noted.streak >= STREAK && (noted.settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
     if read_by <= settings.longest && (is_due || (decided && early)) {
         begin_reading();
@@ -55,8 +55,8 @@ fn is_quiet() -> bool {
 // Contact-free motion of period 1, with nothing left to read.
 fn end_quiet() {
     begin_counting();
-    tally.cycle = 1u;
-    motion.cycle_growth = flows[cell.flow_index].decay;
+    noted.cycle = 1u;
+    seen.cycle_growth = flows[cell.flow_index].decay;
     tally.stage = STAGE_DONE;
 }
 
@@ -77,7 +77,7 @@ fn begin_counting() {
     if WORD {
         tallies[lane].word = array<u32, 7>();
     }
-    tally.counted_from = tally.period;
+    noted.counted_from = tally.period;
 }
 
 // The period is decided: one cycle is read from here on.
@@ -85,13 +85,13 @@ fn begin_reading() {
     begin_counting();
     tally.stage = STAGE_READING;
     tally.to_read = tally.candidate;
-    tally.has_read = 1u;
+    noted.has_read = 1u;
     // A cycle of even period is never compared: it cannot be symmetric.
-    tally.mirror = 0u;
-    tally.divisor = 0u;
-    tally.divisor_apart = 0u;
-    motion.anchor = strobe_state();
-    narrow_scales(motion.anchor);
+    noted.mirror = 0u;
+    noted.divisor = 0u;
+    noted.divisor_apart = 0u;
+    seen.anchor = strobe_state();
+    narrow_scales(seen.anchor);
     if EXPONENT {
         set_vector_aside();
         tally.tangent_count = 4u;

@@ -7,6 +7,7 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     take_up(queued(i));
+    recall();
     var reading: Reading;
     var finding: Finding;
     finding.slot = lane;
@@ -19,18 +20,18 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
     if tally.status == STATUS_OK {
         finding.valid |= VALID_IMPACTS;
         finding.impacts = tally.impacts;
-        finding.counted = max(tally.period - tally.counted_from, 1u);
+        finding.counted = max(tally.period - noted.counted_from, 1u);
         if MESH {
             finding.valid |= VALID_MESH;
             reading.mesh_fraction = mesh_fraction(finding.counted);
         }
         if settings.max_period > 0u {
             finding.valid |= VALID_PERIOD;
-            finding.period = tally.cycle;
+            finding.period = noted.cycle;
         }
-        if tally.cycle > 0u {
+        if noted.cycle > 0u {
             read_cycle(&reading, &finding);
-        } else if EXPONENT && tally.blocks > 1u {
+        } else if EXPONENT && noted.blocks > 1u {
             finding.valid |= VALID_LYAPUNOV;
             let growth = mean_growth();
             reading.growth = growth.x;
@@ -45,8 +46,8 @@ fn last_status() -> u32 {
     if tally.status != STATUS_OK || tally.stage != STAGE_DONE {
         return tally.status;
     }
-    if tally.has_read == 0u || tally.cycle == 0u {
-        let is_open = settings.max_period > 0u && tally.cycle == 0u && EXPONENT && tally.blocks > 1u;
+    if noted.has_read == 0u || noted.cycle == 0u {
+        let is_open = settings.max_period > 0u && noted.cycle == 0u && EXPONENT && noted.blocks > 1u;
         return select(STATUS_OK, STATUS_SLOW, is_open && (departs(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
     }
     if tally.grazes > 0u {
@@ -72,7 +73,7 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     // cycle that is its own mirror image.
     if SYMMETRY && shapes[cell.flow_index].mirror == 1u {
         let has_twins = tally.impacts % 2u == 0u;
-        let is_symmetric = tally.has_read == 0u || (is_surely_symmetric() && has_twins);
+        let is_symmetric = noted.has_read == 0u || (is_surely_symmetric() && has_twins);
         if is_symmetric || !has_twins || is_surely_unsymmetric() {
             (*finding).valid |= VALID_SYMMETRIC;
             (*finding).symmetric = select(0u, 1u, is_symmetric);
@@ -80,7 +81,7 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     }
     if EXPONENT {
         (*finding).valid |= VALID_LYAPUNOV;
-        (*reading).growth = LN_2 * motion.cycle_growth / Real(tally.cycle);
+        (*reading).growth = LN_2 * seen.cycle_growth / Real(noted.cycle);
     }
     if !WORD {
         return;

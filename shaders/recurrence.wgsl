@@ -23,35 +23,35 @@ const LAGS_PER_CYCLE: u32 = 4u;
 fn recurs() -> bool {
     let q = strobe_state();
     widen_scales(q);
-    if tally.window == 0u {
+    if noted.window == 0u {
         begin_window(q, widest());
         return false;
     }
-    let lag = tally.period - tally.anchor_period;
-    let apart = octaves(distance_between(q, motion.anchor));
+    let lag = tally.period - noted.anchor_period;
+    let apart = octaves(distance_between(q, seen.anchor));
     tallies[lane].distances[(lag - 1u) / 4u] |= apart << (8u * ((lag - 1u) % 4u));
-    if lag < tally.window {
+    if lag < noted.window {
         return false;
     }
     let found = contracting_lag();
     let is_fast = found > 0u && shrinks(found);
     let settled = judge_lag(found);
-    tally.known_lags = tally.window;
+    noted.known_lags = noted.window;
     tallies[lane].last_distances = tallies[lane].distances;
     // The next anchor lies at the same place of the cycle: only there do distances compare. The
     // points of a cycle may be so close that a shorter lag seems to recur.
     let cycle = max(closest_lag(), 1u);
     // A short lag that contracts is seen as well in short windows.
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
-    let lags = select(widest(), min(enough, widest()), is_fast && tally.tries == 0u);
+    let lags = select(widest(), min(enough, widest()), is_fast && noted.tries == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
 
 // Units of distances: the largest strobe.
 fn widen_scales(q: array<Real, 4>) {
-    motion.position_scale = max(motion.position_scale, max(abs(q[0]), abs(q[2])));
-    motion.rate_scale = max(motion.rate_scale, max(abs(q[1]), abs(q[3])));
+    seen.position_scale = max(seen.position_scale, max(abs(q[0]), abs(q[2])));
+    seen.rate_scale = max(seen.rate_scale, max(abs(q[1]), abs(q[3])));
 }
 
 // What a motion was before it came to its cycle is no unit of the cycle. A strobe may catch it at its
@@ -60,8 +60,8 @@ fn narrow_scales(q: array<Real, 4>) {
     let angle = flows[cell.flow_index].domains[0].angle;
     let position = max(abs(q[0]), abs(q[2]));
     let rate = max(abs(q[1]), abs(q[3]));
-    motion.position_scale = min(motion.position_scale, max(position, rate / angle));
-    motion.rate_scale = min(motion.rate_scale, max(rate, angle * position));
+    seen.position_scale = min(seen.position_scale, max(position, rate / angle));
+    seen.rate_scale = min(seen.rate_scale, max(rate, angle * position));
 }
 
 fn widest() -> u32 {
@@ -70,7 +70,7 @@ fn widest() -> u32 {
 
 // The lag that recurs best; a longer one must be better by a factor of four.
 fn closest_lag() -> u32 {
-    return closest_of(tally.known_lags);
+    return closest_of(noted.known_lags);
 }
 
 fn closest_of(lags: u32) -> u32 {
@@ -89,16 +89,16 @@ fn closest_of(lags: u32) -> u32 {
 // The distance of two strobes, relative to the motion. Where strobes catch it at its turning point, their
 // rates are all rounding.
 fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
-    let least = flows[cell.flow_index].domains[0].angle * motion.position_scale;
-    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(motion.position_scale, Real(1e-30));
-    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / max(max(motion.rate_scale, least), Real(1e-30));
+    let least = flows[cell.flow_index].domains[0].angle * seen.position_scale;
+    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(seen.position_scale, Real(1e-30));
+    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / max(max(seen.rate_scale, least), Real(1e-30));
     return max(p, r);
 }
 
 fn begin_window(q: array<Real, 4>, lags: u32) {
-    motion.anchor = q;
-    tally.anchor_period = tally.period;
-    tally.window = min(lags, settings.max_period);
+    seen.anchor = q;
+    noted.anchor_period = tally.period;
+    noted.window = min(lags, settings.max_period);
     tallies[lane].distances = array<u32, 16>();
 }
 
@@ -123,8 +123,8 @@ fn last_distance_at(lag: u32) -> u32 {
 // Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
     // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
-    let best = closest_of(tally.window);
-    for (var lag = 1u; lag <= min(tally.window, tally.known_lags); lag++) {
+    let best = closest_of(noted.window);
+    for (var lag = 1u; lag <= min(noted.window, noted.known_lags); lag++) {
         trips += 1u;
         let now = distance_at(lag);
         let before = last_distance_at(lag);
@@ -133,7 +133,7 @@ fn contracting_lag() -> u32 {
             continue;
         }
         var kept = true;
-        for (var multiple = 2u * lag; multiple <= tally.window; multiple += lag) {
+        for (var multiple = 2u * lag; multiple <= noted.window; multiple += lag) {
             trips += 1u;
             kept = kept && distance_at(multiple) >= NEAR;
         }
@@ -159,7 +159,7 @@ fn has_settled(lag: u32) -> bool {
         return true;
     }
     // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
-    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), 1e-6, 1.0);
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), 1e-6, 1.0);
     return f32(now) >= SETTLED - OCTAVE * log2(away);
 }
 
@@ -167,8 +167,8 @@ fn has_settled(lag: u32) -> bool {
 fn is_refinable(lag: u32) -> bool {
     let now = f32(distance_at(lag));
     let shrunk = now - f32(last_distance_at(lag));
-    let away = clamp(shrunk * QUARTER_OCTAVE / f32(tally.known_lags), SLOWEST, 1.0);
-    return EXPONENT && tally.vain < VAIN && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), SLOWEST, 1.0);
+    return EXPONENT && noted.vain < VAIN && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
 }
 
 // Natural logarithm of a quarter octave.
@@ -176,26 +176,26 @@ const QUARTER_OCTAVE: f32 = 0.1733;
 
 // Keeps the books on the candidate; true once it is settled.
 fn judge_lag(found: u32) -> bool {
-    tally.settled = 0u;
+    noted.settled = 0u;
     if found == 0u {
         tally.candidate = 0u;
-        tally.streak = 0u;
+        noted.streak = 0u;
         return false;
     }
-    tally.streak = select(1u, tally.streak + 1u, found == tally.candidate);
+    noted.streak = select(1u, noted.streak + 1u, found == tally.candidate);
     tally.candidate = found;
     // Weak chaos contracts by chance, the oftener it is looked at: ask for more of it.
-    let windows = STREAK + tally.tries + select(0u, 2u, grows(CHAOS_ERRORS));
-    let has_contracted = tally.streak >= windows;
-    tally.settled = select(0u, 1u, has_contracted && has_settled(found));
-    return has_contracted && (tally.settled != 0u || is_refinable(found));
+    let windows = STREAK + noted.tries + select(0u, 2u, grows(CHAOS_ERRORS));
+    let has_contracted = noted.streak >= windows;
+    noted.settled = select(0u, 1u, has_contracted && has_settled(found));
+    return has_contracted && (noted.settled != 0u || is_refinable(found));
 }
 
 // Half a period after the middle of a cycle of odd period: how far is the state from the mirror
 // image of the cycle's start?
 fn compare_mirror() {
-    let a = motion.anchor;
-    tally.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
+    let a = seen.anchor;
+    noted.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
 }
 
 // A cycle this close to its mirror image, 2^-12 of the motion, is symmetric.

@@ -4,17 +4,17 @@
 // strobe. Moves the lane `to` where the linearised strobe map has its fixed point, to read on from
 // there; false where that brings it no closer or is no part of the motion.
 fn refine(to: array<Real, 4>) -> bool {
-    if tally.refinements == 0u {
-        motion.home = strobe_state();
-        tally.home_mode = tally.mode;
-        tally.home_origin = tally.origin;
+    if noted.refinements == 0u {
+        seen.home = strobe_state();
+        noted.home_mode = tally.mode;
+        noted.home_origin = tally.origin;
     }
-    let stalls = tally.refinements > 0u && tally.apart < tally.apart_before + SHRUNK;
-    let is_over = tally.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
+    let stalls = noted.refinements > 0u && noted.apart < noted.apart_before + SHRUNK;
+    let is_over = noted.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
     if stalls || is_over || tally.mode >= MODE_DIP || tally.order > 0u {
         return false;
     }
-    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, motion.home) < Real(REACH)) {
+    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, seen.home) < Real(REACH)) {
         return false;
     }
     motion.q = to;
@@ -22,8 +22,8 @@ fn refine(to: array<Real, 4>) -> bool {
         motion.q[0] -= walls[side_of(tally.mode)];
     }
     motion.bound = 0.0;
-    tally.refinements += 1u;
-    tally.apart_before = tally.apart;
+    noted.refinements += 1u;
+    noted.apart_before = noted.apart;
     begin_reading();
     return true;
 }
@@ -36,17 +36,17 @@ fn branch() -> u32 {
 
 // Notes the events of the first reading with the present period.
 fn note_branch() {
-    if tally.refinements == 0u || tally.branch_period != tally.candidate {
-        tally.branch = branch();
-        tally.branch_period = tally.candidate;
-        tally.apart_before = 0u;
+    if noted.refinements == 0u || noted.branch_period != tally.candidate {
+        noted.branch = branch();
+        noted.branch_period = tally.candidate;
+        noted.apart_before = 0u;
     }
 }
 
 // Whether the cycle lies on the branch on which the motion approaches it. Beyond a fold it may
 // be another motion's.
 fn is_own() -> bool {
-    return branch() == tally.branch && (tally.grazes == 0u || tally.refinements == 0u);
+    return branch() == noted.branch && (tally.grazes == 0u || noted.refinements == 0u);
 }
 
 // Whether the gap may be there in the present domain, at a phase that is no event's. Dips have no bounds.
@@ -65,19 +65,19 @@ fn beyond(to: array<Real, 4>) -> Real {
 
 // Back to where the lane came from.
 fn give_up() {
-    if tally.refinements == 0u {
+    if noted.refinements == 0u {
         return;
     }
-    motion.q = motion.home;
-    tally.mode = tally.home_mode;
-    tally.origin = tally.home_origin;
+    motion.q = seen.home;
+    tally.mode = noted.home_mode;
+    tally.origin = noted.home_origin;
     // Newton's method does not set out from a wall.
     tally.order = 0u;
     if tally.mode != MODE_FREE {
         motion.q[0] -= walls[side_of(tally.mode)];
     }
     motion.bound = 0.0;
-    tally.refinements = 0u;
+    noted.refinements = 0u;
 }
 
 // `a + (1 - M)^-1 (P(a) - a)` for the anchor `a`, by elimination with row pivots.
@@ -89,7 +89,7 @@ fn fixed_point() -> array<Real, 4> {
         for (var j = 0u; j < 4u; j++) {
             m[5u * i + j] = select(Real(0.0), Real(1.0), i == j) - motions[lane].tangents[4u * j + i];
         }
-        m[5u * i + 4u] = present[i] - motion.anchor[i];
+        m[5u * i + 4u] = present[i] - seen.anchor[i];
     }
     for (var k = 0u; k < 4u; k++) {
         var pivot = k;
@@ -111,7 +111,7 @@ fn fixed_point() -> array<Real, 4> {
             }
         }
     }
-    var to = motion.anchor;
+    var to = seen.anchor;
     for (var i = 0u; i < 4u; i++) {
         to[i] += m[5u * i + 4u] / m[6u * i];
     }

@@ -1,8 +1,12 @@
 // One invocation is one lane.
 
 var<private> cell: Cell;
+// What steps and events take.
 var<private> motion: MotionNow;
 var<private> tally: TallyNow;
+// What strobes take.
+var<private> seen: Seen;
+var<private> noted: Noted;
 // Index of this lane.
 var<private> lane: u32;
 // Loop trips of this dispatch.
@@ -42,11 +46,34 @@ fn take_up(i: u32) {
     motion = motions[i].now;
     tally = tallies[i].now;
     trips = 0u;
+    if KEEP {
+        seen = motions[i].seen;
+        noted = tallies[i].noted;
+    }
 }
 
 fn put_down() {
     motions[lane].now = motion;
     tallies[lane].now = tally;
+    if KEEP {
+        motions[lane].seen = seen;
+        tallies[lane].noted = noted;
+    }
+}
+
+// Before a strobe is looked at, and after: from one to the next, registers are for steps.
+fn recall() {
+    if !KEEP {
+        seen = motions[lane].seen;
+        noted = tallies[lane].noted;
+    }
+}
+
+fn remember() {
+    if !KEEP {
+        motions[lane].seen = seen;
+        tallies[lane].noted = noted;
+    }
 }
 
 // From event to event to the next mark; false if the lane or its share of this dispatch ends
@@ -101,15 +128,19 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     // together and look together.
     while running() && trips < settings.trips {
         if flight_to_mark() {
+            recall();
             if tally.step >= shape.steps {
                 begin_period();
             } else {
                 compare_mirror();
             }
+            remember();
         }
     }
     if tally.stage == STAGE_READ {
+        recall();
         judge_cycle();
+        remember();
     }
     keep_tangent();
     put_down();

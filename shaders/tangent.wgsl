@@ -55,7 +55,7 @@ fn set_vector_aside() {
 // It turns and grows as the matrix has it that was read along the motion. A fresh one instead would grow once more until
 // it has its direction: where cycles are read again and again, by 0.2 in a period of motion whose exponent is zero.
 fn carry_vector() {
-    if tally.refinements > 0u {
+    if noted.refinements > 0u {
         return;
     }
     let u = motions[lane].vector;
@@ -295,17 +295,17 @@ fn accumulate_growth() {
 // Growth over so many periods. A block that a cycle makes longer than the others counts like them.
 fn count_growth(growth: Real, periods: u32) {
     motion.block_growth += growth;
-    tally.block_periods += periods;
-    if tally.block_periods >= settings.exponent_block {
-        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(tally.block_periods));
+    noted.block_periods += periods;
+    if noted.block_periods >= settings.exponent_block {
+        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(noted.block_periods));
         // Squares of deviations, by Welford's update: sums of squares would cancel where blocks are nearly alike.
-        let blocks = Real(tally.blocks);
-        let deviation = whole - motion.growth_sum / max(blocks, 1.0);
-        motion.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
-        motion.growth_sum += whole;
+        let blocks = Real(noted.blocks);
+        let deviation = whole - seen.growth_sum / max(blocks, 1.0);
+        seen.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
+        seen.growth_sum += whole;
         motion.block_growth = 0.0;
-        tally.block_periods = 0u;
-        tally.blocks += 1u;
+        noted.block_periods = 0u;
+        noted.blocks += 1u;
     }
 }
 
@@ -314,7 +314,7 @@ const LN_2: Real = 0.6931471805599453;
 // Mean growth per period of the tangent vector, natural logarithms, and its standard error
 // from the means of blocks.
 fn mean_growth() -> vec2<Real> {
-    let blocks = Real(tally.blocks);
-    let variance = motion.growth_squares / (blocks * (blocks - 1.0));
-    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(motion.growth_sum / blocks, sqrt(variance));
+    let blocks = Real(noted.blocks);
+    let variance = seen.growth_squares / (blocks * (blocks - 1.0));
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(seen.growth_sum / blocks, sqrt(variance));
 }

@@ -204,36 +204,14 @@ pub struct Tally {
     pub grazes: u32,
     /// Running, reading the cycle, having read it, done.
     pub stage: u32,
+    /// Smallest lag that recurs and contracts.
+    pub candidate: u32,
     /// Periods of the cycle still to be read.
     pub to_read: u32,
-    /// 1 once a cycle is being read or has been.
-    pub has_read: u32,
-    /// Period of the cycle that was read, if it attracts.
-    pub cycle: u32,
-    /// Cycles that were read in vain.
-    pub tries: u32,
-    /// Period at which counting began.
-    pub counted_from: u32,
     /// Tangent vectors carried.
     pub tangent_count: u32,
     /// 1 once a lane is of the variant that carries one for the exponent.
     pub grows: u32,
-    /// Whole blocks of the exponent.
-    pub blocks: u32,
-    /// Periods in the present block.
-    pub block_periods: u32,
-    /// When the anchor was taken.
-    pub anchor_period: u32,
-    /// Lags of the present window.
-    pub window: u32,
-    /// Smallest lag that recurs and contracts.
-    pub candidate: u32,
-    /// Windows for which it has.
-    pub streak: u32,
-    /// Lags that the last window held.
-    pub known_lags: u32,
-    /// 1 if the candidate's limit is near.
-    pub settled: u32,
     /// Symbols of the cycle.
     pub word_length: u32,
     /// Hash of the stretches of symbols so far, low half.
@@ -244,6 +222,28 @@ pub struct Tally {
     pub recent: u32,
     /// Events on the strobe phase.
     pub on_strobe: u32,
+    /// 1 once a cycle is being read or has been.
+    pub has_read: u32,
+    /// Period of the cycle that was read, if it attracts.
+    pub cycle: u32,
+    /// Cycles that were read in vain.
+    pub tries: u32,
+    /// Period at which counting began.
+    pub counted_from: u32,
+    /// Whole blocks of the exponent.
+    pub blocks: u32,
+    /// Periods in the present block.
+    pub block_periods: u32,
+    /// When the anchor was taken.
+    pub anchor_period: u32,
+    /// Lags of the present window.
+    pub window: u32,
+    /// Windows for which it has.
+    pub streak: u32,
+    /// Lags that the last window held.
+    pub known_lags: u32,
+    /// 1 if the candidate's limit is near.
+    pub settled: u32,
     /// Distance of the cycle from its mirror image, in quarter octaves below 1.
     pub mirror: u32,
     /// How far the cycle that was read last took the lane, likewise.

@@ -53,7 +53,7 @@ pub struct Variant {
     pub symmetry: bool,
     /// Whether chatter may be followed by short flights.
     pub chatter: bool,
-    /// Whether lanes keep copies of all their constants: for software drivers.
+    /// Whether lanes keep copies of all their constants, and of what strobes alone take: for software drivers.
     pub keep: bool,
 }
 

@@ -28,15 +28,15 @@ fn with_event_times(source: &str) -> String {
     let noted = replace(
         &silent,
         "fn count_event(side: u32) {\n",
-        "fn count_event(side: u32) {\n    motion.growth_squares = motion.growth_sum;\n    \
-         motion.growth_sum = motion.theta;\n    \
+        "fn count_event(side: u32) {\n    motion.mesh_part = motion.block_growth;\n    \
+         motion.block_growth = motion.theta;\n    \
          tally.impacts = (tally.impacts << 16u) | (tally.step + 1u);\n",
     );
     replace(
         &noted,
         "        finding.valid |= VALID_IMPACTS;\n",
         "        finding.valid |= VALID_IMPACTS | VALID_LYAPUNOV;\n        \
-         reading.growth = motion.growth_sum;\n        reading.growth_error = motion.growth_squares;\n",
+         reading.growth = motion.block_growth;\n        reading.growth_error = motion.mesh_part;\n",
     )
 }
 
