@@ -46,6 +46,14 @@ fn enter(d: u32) {
     }
 }
 
+// The propagator of one step in the domain that governs. Careful passes do without it.
+fn propagator() -> array<Real, 28> {
+    if !KEEP {
+        return flows[cell.flow_index].domains[domain_of(tally.mode)].step;
+    }
+    return here.step;
+}
+
 // What accelerations take.
 struct Pull {
     gap_row: array<Real, 6>,

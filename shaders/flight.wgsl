@@ -27,7 +27,7 @@ fn scan() -> u32 {
         return SCAN_CAREFUL;
     }
     let d = domain_of(tally.mode);
-    let m = here.step;
+    let m = propagator();
     let row = here.gap_row;
     let growth = here.growth;
     let half = here.turn_half;

@@ -104,7 +104,7 @@ fn step_columns(count: u32) {
     if tally.tangent_count <= 1u {
         return;
     }
-    let m = here.step;
+    let m = propagator();
     for (var i = 0u; i < tally.tangent_count; i++) {
         var u = tangent(i);
         u[1] *= here.share;
