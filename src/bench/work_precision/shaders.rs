@@ -22,7 +22,7 @@ pub(super) fn runge_kutta_phased(source: String) -> String {
 
 /// Notes step and fraction of each event. Steps go to the count of impacts, one more than
 /// they are so that nothing is zero, the latest in the lower half; fractions to the exponent
-/// and its error.
+/// and its error. What is overwritten is growth within a block and time spent meshing, neither of which is asked for.
 fn with_event_times(source: &str) -> String {
     let silent = replace(source, "    tally.impacts += 1u;\n", "");
     let noted = replace(
