@@ -23,8 +23,6 @@ fn is_bounded(size: Real) -> bool {
 
 // Recurrence distances, in quarter octaves below 1, that are rounding itself: a motion this near to its last strobes is at rest.
 const AT_REST: u32 = 64u;
-// What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
-const NOISE: f32 = 4e-6;
 // A multiplier that is nearer to 1 than this, in octaves per period, is 1 as far as one can tell: a
 // double one, as a free body has, scatters by the square root of rounding.
 const NEUTRAL: Real = 1e-3;

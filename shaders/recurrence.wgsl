@@ -197,6 +197,3 @@ fn compare_mirror() {
     let a = seen.anchor;
     noted.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
 }
-
-// A cycle this close to its mirror image, 2^-12 of the motion, is symmetric.
-const MIRROR: f32 = 2.44e-4;

@@ -14,14 +14,3 @@ pub(crate) fn run(ask: &Bench) -> Result<(), Failure> {
         Bench::Stability(ask) => stability::run(ask),
     }
 }
-
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// Name of the processor as it gives it, which may be empty; none if there is no telling.
-fn processor() -> Option<String> {
-    let mut system = sysinfo::System::new();
-    system.refresh_cpu_list(sysinfo::CpuRefreshKind::nothing());
-    system.cpus().first().map(|cpu| cpu.brand().trim().to_owned())
-}

@@ -9,6 +9,7 @@ use rattlemap::size::Size;
 
 use crate::cli::EngineChoice;
 use crate::error::Failure;
+use crate::processor;
 
 /// What there is, in bytes; none where the system does not tell.
 struct Free {
@@ -26,7 +27,7 @@ pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(
 
 fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
     let size = Size::of(scene);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
+    let threads = processor::cores() as u64;
     let (cpu, gpu) = (size.on_cpu(threads), size.on_gpu());
     let memory = match engine {
         EngineChoice::Cpu => cpu,
@@ -91,7 +92,7 @@ mod tests {
 
     /// Half a million steps of tables for little more than a thousand cells.
     const SLOW: &str = "[[axis]]\nparameter = 'e'\nmin = 0.1\nmax = 0.9\ncount = 2\n\
-                        [[axis]]\nparameter = 'omega'\nmin = 0.002\nmax = 0.003\ncount = 16000\n";
+                        [[axis]]\nparameter = 'omega'\nmin = 0.002\nmax = 0.003\ncount = 8000\n";
 
     #[test]
     fn constants_of_lanes_count_where_lanes_may_run() {

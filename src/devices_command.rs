@@ -6,16 +6,15 @@ use rattlemap::plan::Plan;
 use rattlemap::scene::{Purpose, Scene};
 
 use crate::cli::{EngineChoice, EngineOptions};
-use crate::engine_choice;
 use crate::error::Failure;
+use crate::{engine_choice, processor};
 
 /// What engines are tried on.
 const MAIN_MAP: &str = include_str!("../scenes/e_omega.toml");
 
 /// Prints the processor, the adapters, and the choice of `--engine auto` on the main map.
 pub(crate) fn run() -> Result<(), Failure> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    print(&format!("cpu: event-driven reference, {threads} threads"))?;
+    print(&format!("cpu: event-driven reference on {}", processor::described()))?;
     print("  precision   f64")?;
     let adapters = pollster::block_on(gpu::adapters());
     for adapter in &adapters {

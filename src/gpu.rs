@@ -38,10 +38,11 @@ pub use device::{
 };
 pub use error::GpuError;
 pub use pool::Pool;
+pub use reading::Ended;
 pub use shader::{Precision, Variant, WORKGROUP};
 pub use stage::Stage;
 pub use tables::Tables;
-pub(crate) use tables::bytes as table_bytes;
+pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
 
 use crate::limits::MOST_STEPS;
 use crate::model::{Law, Oscillator, State};
@@ -287,8 +288,8 @@ impl Gpu {
                 return Ok(records);
             }
             let until = if begun < lanes.len() { pool.under_way() / 2 } else { 0 };
-            for (i, record) in self.advance(&mut pool, tables, until).await? {
-                records[i as usize] = record;
+            for ended in self.advance(&mut pool, tables, until).await? {
+                records[ended.number() as usize] = ended.record(tables);
             }
         }
     }
@@ -341,8 +342,7 @@ impl Gpu {
         pool.begin(self, tables, lanes).await
     }
 
-    /// Integrates until no more than `until` lanes are left; returns the records of those that have ended, with
-    /// their numbers.
+    /// Integrates until no more than `until` lanes are left; returns those that have ended.
     ///
     /// # Errors
     /// What the device refuses; the pool is of no use then.
@@ -351,7 +351,7 @@ impl Gpu {
         pool: &mut Pool,
         tables: &Tables,
         until: usize,
-    ) -> Result<Vec<(u32, Record)>, GpuError> {
+    ) -> Result<Vec<Ended>, GpuError> {
         pool.advance(self, tables, until).await
     }
 }

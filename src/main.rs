@@ -9,6 +9,7 @@ mod devices_command;
 mod engine_choice;
 mod error;
 mod map_command;
+mod processor;
 mod progress;
 mod say;
 mod scene_file;

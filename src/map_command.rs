@@ -24,7 +24,7 @@ use crate::cli::{EngineChoice, EngineOptions, Map};
 use crate::engine_choice::{self, Chosen};
 use crate::error::{Failure, fail_if};
 use crate::progress::Progress;
-use crate::{say, scene_file};
+use crate::{processor, say, scene_file};
 use interrupt::Interrupt;
 use resume_command::resume_command;
 use summary::summary;
@@ -67,6 +67,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         engine,
         precision,
         device: &device,
+        processor: &processor::described(),
         elapsed,
         elapsed_before,
         resumed_cells,

@@ -26,9 +26,9 @@ use start::Starts;
 /// The parameters that a contact law is made of; all others belong to the flow.
 pub(crate) const LAW_PARAMETERS: [&str; 2] = ["e", "mesh_speed"];
 
-/// Most flows that engines keep for all batches, or hand to a device at a time: below 1 GB but
-/// for motion that needs thousands of steps per forcing period.
-pub(crate) const KEPT_FLOWS: usize = 8_192;
+/// Most flows that engines keep for all batches: below 1 GB but for motion that needs thousands of steps per forcing
+/// period.
+const KEPT_FLOWS: usize = 8_192;
 
 /// What a run of a cell is made of: indices of its flow and its law in the plan, and its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -243,11 +243,6 @@ impl Plan {
     /// How many distinct flows there are.
     pub fn flow_count(&self) -> usize {
         self.count(false)
-    }
-
-    /// Most flows that engines have at hand at a time.
-    pub fn most_flows(&self) -> usize {
-        KEPT_FLOWS
     }
 
     /// Whether several runs share a flow, and all flows can be kept.

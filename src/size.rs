@@ -1,7 +1,7 @@
 //! How large a map is, before anything of it exists.
 
 use crate::gpu;
-use crate::plan::{KEPT_FLOWS, LAW_PARAMETERS, keeps_flows};
+use crate::plan::{LAW_PARAMETERS, keeps_flows};
 use crate::record::Record;
 use crate::scene::{Axis, Format, Scene, Steps};
 
@@ -123,7 +123,8 @@ fn lane_tables(scene: &Scene, runs: u64) -> u64 {
         let sum: u64 = (0..looked_at).map(bytes).sum();
         (sum as f64 / looked_at as f64 * flows as f64) as u64
     } else {
-        flows.min(KEPT_FLOWS as u64) * (0..looked_at).map(bytes).max().unwrap_or(0)
+        let largest = (0..looked_at).map(bytes).max().unwrap_or(0);
+        (flows.min(gpu::MOST_FLOWS as u64) * largest).min(gpu::MOST_BYTES.max(largest))
     }
 }
 
@@ -177,7 +178,9 @@ mod tests {
         assert_eq!(Size::of(&single).flows, FLOW);
         // Too many to be kept: the reference solves them one by one, lanes get some at a time.
         let many = scene("k", 1e3, 1e4, [2, 100_000]);
-        assert_eq!(Size::of(&many).lane_tables, KEPT_FLOWS as u64 * one(&many));
+        assert_eq!(Size::of(&many).lane_tables, gpu::MOST_FLOWS as u64 * one(&many));
+        let large = scene("omega", 0.002, 0.003, [2, 10_000]);
+        assert_eq!(Size::of(&large).lane_tables, gpu::MOST_BYTES);
         assert_eq!(Size::of(&many).flows, 0);
         // As slow a forcing as lanes can follow, times every cell, is not forgotten.
         let flows = 8_000;

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use common::{REST, gpu, paper};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::gpu::{Gpu, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{Ended, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::model::{GearPair, Law, Oscillator, State};
 use rattlemap::record::Record;
 
@@ -109,11 +109,11 @@ fn records_do_not_depend_on_when_lanes_are_begun() {
         }
         assert!(pollster::block_on(device.advance(&mut pool, &tables, 0)).unwrap().is_empty());
         assert_eq!(pool.under_way(), 0);
-        ended.sort_by_key(|(number, _)| *number);
-        let numbers: Vec<u32> = ended.iter().map(|(number, _)| *number).collect();
+        ended.sort_by_key(Ended::number);
+        let numbers: Vec<u32> = ended.iter().map(Ended::number).collect();
         assert_eq!(numbers, (1000..1060).collect::<Vec<_>>());
-        for ((number, record), expected) in ended.iter().zip(&expected) {
-            assert_eq!(record, expected, "{precision:?}, lane {number}");
+        for (ended, expected) in ended.iter().zip(&expected) {
+            assert_eq!(ended.record(&tables), *expected, "{precision:?}, lane {}", ended.number());
         }
     }
 }

@@ -14,11 +14,10 @@ use rattlemap::output::Folder;
 use rattlemap::scene::Scene;
 use rattlemap::validate::DEFAULT_SAMPLES;
 
-use super::{cores, processor};
 use crate::capacity;
 use crate::cli::{EngineChoice, Engines};
 use crate::error::Failure;
-use crate::say;
+use crate::{processor, say};
 
 /// Side of the map on which operations are counted.
 const COUNTED_SIDE: u32 = 24;
@@ -51,8 +50,8 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
     let asked = Asked {
         budget_seconds: budget,
         quick: ask.run.quick,
-        cores: cores(),
-        processor: described_processor(),
+        cores: processor::cores(),
+        processor: processor::described(),
         peaks: all.iter().map(|series| peak_of(ask, &series.engine)).collect(),
     };
     let files = write(&folder, &all, &asked)?;
@@ -60,16 +59,10 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
     verdict(&all)
 }
 
-fn described_processor() -> String {
-    let cores = cores();
-    let named = processor().filter(|name| !name.is_empty());
-    named.map_or_else(|| format!("{cores} cores"), |name| format!("{name}, {cores} cores"))
-}
-
 /// The CPU on all cores, which the others are compared with; adapters, the best first; the CPU
 /// on fewer cores.
 fn engines() -> Vec<Engine> {
-    let most = cores();
+    let most = processor::cores();
     let mut list = vec![Engine::Cpu { threads: most }];
     let mut cards: Vec<Card> = Vec::new();
     for adapter in pollster::block_on(gpu::adapters()) {
@@ -125,7 +118,7 @@ fn measure(
         say(ask, &format!("{lanes:>10} lanes and more are left out: {why}"));
     }
     // The reference on fewer threads is the same reference.
-    if engine.threads().is_none_or(|threads| threads == cores()) {
+    if engine.threads().is_none_or(|threads| threads == processor::cores()) {
         series.check = check(&mut bench, if ask.run.quick { 9 } else { DEFAULT_SAMPLES });
     }
     if peak_of(ask, engine).is_some() || ask.run.quick && is_first_lane {

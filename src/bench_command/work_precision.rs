@@ -8,9 +8,9 @@ use rattlemap::bench::work_precision::points::{self, Point};
 use rattlemap::bench::work_precision::ratio::sentences;
 use rattlemap::output::Folder;
 
-use super::{cores, processor};
 use crate::cli::WorkPrecision;
 use crate::error::{Failure, fail_if};
+use crate::processor;
 use crate::progress::Progress;
 
 /// Cells of every kind.
@@ -46,8 +46,8 @@ pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
     let left_out: Vec<&str> = methods.iter().filter(|m| !measured(m)).map(|m| m.name()).collect();
     let adapter = ours.iter().find(|point| point.device != ONE_CORE);
     let run = Run {
-        processor: &processor().unwrap_or_else(|| "processor".to_owned()),
-        cores: cores(),
+        processor: &processor::name().unwrap_or_else(|| "processor".to_owned()),
+        cores: processor::cores(),
         adapter: adapter.map_or("no device", |point| &point.device),
         rounds: how.rounds,
         quick,

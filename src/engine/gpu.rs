@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::EngineError;
-use crate::gpu::{self, Constants, FOLLOWED_MESH_SPEED, GpuError, Lane, LaneSettings, Pool, Tables};
+use crate::gpu::{self, Constants, Ended, FOLLOWED_MESH_SPEED, GpuError, Lane, LaneSettings, Pool, Tables};
 use crate::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use crate::scene::Steps;
@@ -13,6 +13,9 @@ use crate::scene::Steps;
 /// First batches: enough to keep a hardware device busy, or a software one for a second.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
 const LEAST_IN_SOFTWARE: usize = 256;
+
+/// Cells with a flow of their own that a software device is given at a time: some seconds of work.
+const FLOWS_IN_SOFTWARE: usize = 8_192;
 
 /// Lanes on one device, in one precision.
 pub struct Gpu<'p> {
@@ -45,8 +48,11 @@ impl<'p> Gpu<'p> {
             steps: 0,
             pool: None,
             waiting: Vec::new(),
-            most_waiting: plan.most_flows(),
+            most_waiting: gpu::MOST_FLOWS,
         };
+        if !engine.is_hardware() {
+            engine.most_waiting = FLOWS_IN_SOFTWARE;
+        }
         if plan.keeps_flows() {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
@@ -76,7 +82,11 @@ impl<'p> Gpu<'p> {
     }
 
     pub(super) fn least_batch(&self) -> usize {
-        if gpu::is_hardware(self.device.adapter()) { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+    }
+
+    fn is_hardware(&self) -> bool {
+        gpu::is_hardware(self.device.adapter())
     }
 
     /// Free steps of all lanes so far.
@@ -111,13 +121,15 @@ impl<'p> Gpu<'p> {
         let ended = match (&self.tables, &mut self.pool) {
             (Some(tables), Some(pool)) => match self.device.advance(pool, tables, until).await {
                 Ok(ended) => {
+                    let told = |ended: &Ended| (ended.number(), ended.record(tables));
+                    let records: Vec<_> = ended.par_iter().map(told).collect();
                     let steps = |id: u32| tables.steps_per_period(self.plan.cell(id).flow);
-                    self.steps += steps_of(ended.iter().map(|(id, record)| (record, steps(*id))));
-                    Ok(ended)
+                    self.steps += steps_of(records.iter().map(|(id, record)| (record, steps(*id))));
+                    Ok(records)
                 }
-                error => {
+                Err(error) => {
                     pool.clear();
-                    error
+                    Err(error)
                 }
             },
             _ => self.run_waiting().await,
@@ -127,11 +139,14 @@ impl<'p> Gpu<'p> {
         Ok(ended)
     }
 
-    /// Some of the cells whose flows are too many to be kept all together, fewer where the device has no memory
-    /// for as many.
+    /// Some of the cells whose flows are too many to be kept all together, fewer where there is no memory for as
+    /// many.
     async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
         while !self.waiting.is_empty() {
-            let left = self.waiting.len() - self.waiting.len().min(self.most_waiting);
+            let bytes = |cell: &Cell| {
+                gpu::table_bytes(&self.plan.oscillator(cell.flow), self.settings.steps_per_period)
+            };
+            let left = self.waiting.len() - fitting(self.waiting.iter().rev().map(bytes), self.most_waiting);
             let cells = self.waiting[left..].to_vec();
             match self.run_cells(&cells).await {
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if cells.len() > 1 => {
@@ -178,6 +193,16 @@ impl<'p> Gpu<'p> {
 /// Free steps of lanes, by their records and by those of a period.
 fn steps_of<'r>(lanes: impl Iterator<Item = (&'r Record, u32)>) -> u64 {
     lanes.map(|(record, steps)| u64::from(record.periods_run) * u64::from(steps)).sum()
+}
+
+/// How many things of these sizes are taken at a time: one at least, `most` at most, and between these as many as fit
+/// [`gpu::MOST_BYTES`].
+fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
+    let total = bytes.take(most).scan(0, |total, bytes| {
+        *total += bytes;
+        Some(*total)
+    });
+    total.take_while(|&total| total <= gpu::MOST_BYTES).count().max(1)
 }
 
 /// The flows and laws of these cells alone, and their lanes with indices among them.
@@ -250,6 +275,15 @@ fn keep(record: &mut Record, needs: &Needs) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_taken_at_a_time_fits_the_memory() {
+        let third = gpu::MOST_BYTES / 3;
+        assert_eq!(fitting([third; 10].into_iter(), 8), 3);
+        assert_eq!(fitting([1; 10].into_iter(), 8), 8);
+        assert_eq!(fitting([1; 10].into_iter(), 80), 10);
+        assert_eq!(fitting([4 * third; 2].into_iter(), 8), 1);
+    }
 
     #[test]
     fn what_nobody_asked_for_is_not_in_the_record() {

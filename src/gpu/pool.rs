@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::device::{BEGIN, Pipelines, most_slots};
 use super::guard::guarded;
 use super::layout::Cell;
-use super::reading::record;
+use super::reading::Ended;
 use super::rounds::{Rounds, bind, dispatch};
 use super::shader::Variant;
 use super::slots::Slots;
@@ -14,7 +14,6 @@ use super::tables::Tables;
 use super::transfer::reals;
 use super::{Gpu, GpuError, Lane, LaneSettings};
 use crate::orbit::Status;
-use crate::record::Record;
 
 /// Slots that are sent again lest there be one more transfer.
 const WIDEST_GAP: usize = 1024;
@@ -119,14 +118,13 @@ impl Pool {
         Ok(())
     }
 
-    /// Integrates until no more than `until` lanes are left; returns the records of those that have ended, with
-    /// their numbers.
+    /// Integrates until no more than `until` lanes are left; returns those that have ended.
     pub(super) async fn advance(
         &mut self,
         gpu: &Gpu,
         tables: &Tables,
         until: usize,
-    ) -> Result<Vec<(u32, Record)>, GpuError> {
+    ) -> Result<Vec<Ended>, GpuError> {
         let Some(buffers) = self.buffers.as_ref().filter(|_| !self.roster.is_empty()) else {
             return Ok(Vec::new());
         };
@@ -151,10 +149,9 @@ impl Pool {
             return Err(gpu.failure(GpuError::Lost { message }));
         }
         let mut ended = Vec::with_capacity(results.len());
-        for (reading, finding) in &results {
-            let (number, lane) = self.lanes[finding.slot as usize];
-            let constants = tables.constants[lane.flow as usize].as_ref();
-            ended.push((number, record(constants, reading, finding)));
+        for &(reading, finding) in &results {
+            let (number, Lane { flow, .. }) = self.lanes[finding.slot as usize];
+            ended.push(Ended { number, flow, reading, finding });
             self.free.push(finding.slot);
         }
         // Both are in the roster's order.

@@ -2,14 +2,37 @@
 
 use super::constants::Constants;
 use super::layout::{Finding, Reading};
+use super::tables::Tables;
 use crate::record::{Record, WORD_SYMBOLS, joined, valid};
 use crate::word::Word;
 
 /// Symbols that the shader keeps in one number.
 const SYMBOLS_PER_NUMBER: usize = 10;
 
+/// A lane that has ended, as the device tells it.
+#[derive(Clone, Copy, Debug)]
+pub struct Ended {
+    pub(super) number: u32,
+    pub(super) flow: u32,
+    pub(super) reading: Reading,
+    pub(super) finding: Finding,
+}
+
+impl Ended {
+    /// By which number the caller knows it.
+    pub fn number(&self) -> u32 {
+        self.number
+    }
+
+    /// Its record; `tables` are those on which it ran. A million take the better part of a second: to be made on all
+    /// cores.
+    pub fn record(&self, tables: &Tables) -> Record {
+        record(tables.constants[self.flow as usize].as_ref(), &self.reading, &self.finding)
+    }
+}
+
 /// The record of a lane; without constants it was refused before it started.
-pub(super) fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -> Record {
+fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -> Record {
     let status = finding.status;
     let Some(constants) = constants else { return Record { status, ..Record::default() } };
     let mut record = Record {

@@ -31,6 +31,17 @@ pub(crate) const REACH: f64 = 3e-2;
 /// Searches in vain after which a lane asks it no more.
 pub(crate) const VAIN: u32 = 2;
 
+/// A cycle this close to its mirror image, 2^-12 of the motion, is symmetric; states this close are the same.
+pub(crate) const MIRROR: f64 = 2.44e-4;
+
+/// What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
+pub(crate) const fn noise(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 4e-6,
+        Precision::F64 => 1e-14,
+    }
+}
+
 /// Recurrences within rounding, in parts of an octave: they need not shrink.
 pub(crate) const fn resolved(precision: Precision) -> u32 {
     match precision {
@@ -46,11 +57,12 @@ pub(crate) fn distance(parts: u32) -> f64 {
 
 /// The rules as the shaders' constants.
 pub(super) fn declarations(precision: Precision) -> String {
-    let resolved = resolved(precision);
+    let (resolved, noise) = (resolved(precision), noise(precision));
     format!(
         "const FEWEST_BLOCKS: u32 = {FEWEST_BLOCKS}u;\nconst NEUTRAL_ORDER: f32 = {NEUTRAL_ORDER:?};\n\
          const CHAOS_ERRORS: Real = {CHAOS_ERRORS:?};\nconst DEPARTURE: Real = {DEPARTURE:?};\n\
          const OCTAVE: f32 = f32({OCTAVE}u);\nconst NEAR: u32 = {NEAR}u;\nconst RESOLVED: u32 = {resolved}u;\n\
-         const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst VAIN: u32 = {VAIN}u;\n"
+         const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst VAIN: u32 = {VAIN}u;\n\
+         const MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n"
     )
 }

@@ -45,8 +45,9 @@ pub(super) async fn check(
         Precision::F32 => 1e-3,
         Precision::F64 => 1e-9,
     };
-    for (i, record) in pool.advance(gpu, &tables, 0).await? {
-        let (e, omega, answer) = ANSWERS[i as usize];
+    for ended in pool.advance(gpu, &tables, 0).await? {
+        let (e, omega, answer) = ANSWERS[ended.number() as usize];
+        let record = ended.record(&tables);
         let error = record.strobe.iter().zip(answer).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         if record.status != 0 || error.is_nan() || error > bar {
             let adapter = gpu.info.name.clone();

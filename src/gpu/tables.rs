@@ -23,6 +23,11 @@ pub struct Tables {
 /// has no memory of its own.
 const COPIES: u64 = 5;
 
+/// Most flows that are handed over at a time where they are too many to be kept, and most bytes of memory that their
+/// constants take then: lanes enough to keep hardware busy.
+pub(crate) const MOST_FLOWS: usize = 1 << 16;
+pub(crate) const MOST_BYTES: u64 = 1 << 30;
+
 /// Bytes of memory that the constants of one flow take at most.
 pub(crate) fn bytes(oscillator: &Oscillator, steps_per_period: Option<u32>) -> u64 {
     let steps = Constants::steps(oscillator, steps_per_period);

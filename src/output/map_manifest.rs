@@ -37,6 +37,8 @@ pub struct Run<'a> {
     pub precision: &'a str,
     /// What it ran on.
     pub device: &'a str,
+    /// The host's processor, in words.
+    pub processor: &'a str,
     /// Time spent integrating in this run.
     pub elapsed: Duration,
     /// And in those that it went on from.
@@ -57,6 +59,8 @@ pub(super) struct Manifest<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    /// Of the host.
+    processor: &'a str,
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
@@ -150,6 +154,7 @@ pub(super) fn map<'a>(cells: &Cells<'a>, run: &Run<'a>, files: &'a [String]) -> 
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        processor: run.processor,
         title: scene.title(),
         scene: scene.text(),
         set: run.sets,

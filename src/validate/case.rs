@@ -7,7 +7,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use crate::classify::classify;
 use crate::flow::Flow;
-use crate::gpu::Precision;
+use crate::gpu::{Precision, rules};
 use crate::model::{GearPair, Law, Parameter, Side, State};
 use crate::orbit::{Budget, Class, Measured, Scatter, analyse_flow, measure};
 use crate::random::Random;
@@ -33,8 +33,10 @@ const OF_PARAMETERS: u64 = 0x7061_7261_6d65_7465;
 /// A motion this far from where it was a cycle ago, relative to its size, is not on the cycle.
 pub(super) const ELSEWHERE: f64 = 1e-2;
 
-/// States this close, relative to the motion, are the same to lanes (`MIRROR` in the shaders).
+/// States this close, relative to the motion, are the same to lanes: what they take for its mirror image is no
+/// farther off.
 pub(super) const LANE_RESOLUTION: f64 = 2.5e-4;
+const _: () = assert!(LANE_RESOLUTION >= rules::MIRROR);
 
 /// A cell, its record, and the reference's answer within the same budget.
 pub(super) struct Case<'a> {

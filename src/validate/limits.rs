@@ -10,7 +10,7 @@ use super::rounded::Rounded;
 use super::rounding::moved_by_rounding;
 use super::same_cycle::{may_repel, within_reach};
 use crate::classify::classify;
-use crate::gpu::Precision;
+use crate::gpu::{Precision, rules};
 use crate::model::GearPair;
 use crate::orbit::{CHAOS_ERRORS, Class, Status, analyse};
 use crate::record::valid;
@@ -303,10 +303,11 @@ pub(super) fn within_scatter(case: &Case<'_>) -> Option<Explanation> {
 }
 
 /// A motion this close to where it was a cycle ago rests on it as nearly as lanes can that amplify no
-/// rounding (`NOISE` in the shaders for f32, `RESOLVED` for f64).
+/// rounding: in single precision what strobes scatter by; recurrences in double precision are told apart
+/// no further than this.
 pub(super) fn rest(precision: Precision) -> f64 {
     match precision {
-        Precision::F32 => 4e-6,
-        Precision::F64 => 1e-12,
+        Precision::F32 => rules::noise(precision),
+        Precision::F64 => rules::distance(rules::resolved(precision)),
     }
 }

@@ -207,6 +207,7 @@ impl<'a> Bench<'a> {
             engine: self.engine.name(),
             precision: self.engine.precision(),
             device: self.engine.device(),
+            processor: "",
             elapsed: Duration::from_secs_f64(run.times.running()),
             elapsed_before: Duration::ZERO,
             resumed_cells: 0,
