@@ -62,6 +62,9 @@ require_vulkan() {
     has_vulkan || fail "still no Vulkan driver after installing one; check VK_DRIVER_FILES and VK_ICD_FILENAMES"
 }
 
+# Nothing here is compiled twice, so that what makes the second time fast would only take room.
+export CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-0}"
+
 require_tools
 require_vulkan
 say "format: cargo fmt --check"
