@@ -30,7 +30,8 @@ use crate::reference::Trajectory;
 /// settles in hundreds of periods.
 const NEAR_BIFURCATION: f64 = 0.01;
 
-/// Share of a state error that rounding at the start must make on the reference itself.
+/// Share of a state error that rounding at the start must make on the reference itself, and that rounding at every step
+/// may leave of it.
 const SENSITIVE: f64 = 0.1;
 
 /// Lanes in single precision take recurrences this close for rounding: 2^-15 of the motion.
@@ -60,11 +61,16 @@ pub(super) fn explain(case: &Case<'_>, differences: &[Difference]) -> Option<Exp
     }
 }
 
-/// Rounding at the start moves the reference itself as far, beyond what tangents foresee.
+/// Rounding at the start moves the reference itself as far, beyond what tangents foresee; or a motion that is
+/// rounded at every step ends where the lane did, which had the last event before its strobe and not after it, or the
+/// other way round.
 fn explain_states(case: &Case<'_>) -> Option<Explanation> {
     let sensitivity = super::states::sensitivity(case)?;
     let error = super::states::lane_distance(case)?;
-    (sensitivity >= SENSITIVE * error).then_some(Explanation::NearGrazing)
+    if sensitivity >= SENSITIVE * error {
+        return Some(Explanation::NearGrazing);
+    }
+    rounding::ends_there(case, SENSITIVE * error)?.then_some(Explanation::BelowResolution)
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {

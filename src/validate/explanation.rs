@@ -34,7 +34,8 @@ pub enum Explanation {
     /// in a pattern whose period is a multiple; or the steps of a cycle round by more than lanes
     /// tell a symmetric one from an unsymmetric one by; or rounding of the tangents alone moves
     /// the exponent that far, from one that repels to one that attracts if need be; or rounding, which
-    /// the cycle amplifies, keeps a lane from ever seeing it settle, however long it runs.
+    /// the cycle amplifies, keeps a lane from ever seeing it settle, however long it runs; or an event lies on a
+    /// strobe to rounding, and the state is that on its other side.
     BelowResolution,
     /// Lanes call a cycle symmetric that is its own mirror image to 2.5e-4 of its size; this one
     /// is, but not quite.

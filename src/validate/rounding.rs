@@ -5,6 +5,7 @@ use super::case::{Case, ELSEWHERE, LANE_RESOLUTION, rounding};
 use super::explanation::Explanation;
 use super::lane_model::LaneModel;
 use super::rounded::{Rounded, read_cycle, read_exponent};
+use super::states::{HORIZON, largest};
 use crate::classify::{classify, status};
 use crate::gpu::LaneSettings;
 use crate::model::State;
@@ -124,6 +125,19 @@ pub(super) fn moved_by_rounding(
         Some(case.apart(image, &motion.trajectory().state()))
     };
     Some((0..FEW_RUNS).filter_map(moved).fold(0.0, f64::max))
+}
+
+/// Whether a motion that is rounded at every step, over the periods after which states are compared, ends within
+/// `reach` of the lane.
+pub(super) fn ends_there(case: &Case<'_>, reach: f64) -> Option<bool> {
+    let (lane, model) = (case.lane?, LaneModel::new(case)?);
+    let start: Trajectory<'_> = Trajectory::new(&model.flow, model.law, model.start(case.start));
+    let ends_there = |run| {
+        let mut motion = Rounded::new(&start, &model, run);
+        (0..HORIZON).all(|_| motion.advance_period(&mut ()).is_ok())
+            && largest(&lane.strobe, &motion.trajectory().state()) <= reach
+    };
+    Some((0..RUNS).any(ends_there))
 }
 
 /// Units of position and velocity by which lanes measure: of all strobes up to the record's last.

@@ -226,7 +226,8 @@ pub(super) fn lane_distance(case: &Case<'_>) -> Option<f64> {
     Some(largest(&lane.strobe, &case.after(case.start, HORIZON).ok()?.state()))
 }
 
-fn largest(a: &State, b: &State) -> f64 {
+/// The largest difference of two states.
+pub(super) fn largest(a: &State, b: &State) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
