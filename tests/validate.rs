@@ -18,9 +18,9 @@ use rattlemap::output::{Identity, RECORDS, RecordFile};
 use rattlemap::plan::Plan;
 use rattlemap::record::{Record, valid};
 use rattlemap::scene::{Purpose, Scene};
-use rattlemap::validate::states::{lane_states, run_lanes};
+use rattlemap::validate::states::{HORIZON, lane_states, run_lanes};
 use rattlemap::validate::{
-    Explanation, Sample, StateCheck, StateSource, Stratum, Subject, Validation, replay, sample,
+    Explanation, Pick, Sample, StateCheck, StateSource, Stratum, Subject, Validation, replay, sample,
 };
 use rattlemap::word::Word;
 
@@ -379,4 +379,38 @@ fn what_is_no_finished_map_is_refused() {
 fn explanations_have_distinct_names() {
     let names: std::collections::HashSet<_> = Explanation::ALL.iter().map(|e| e.name()).collect();
     assert_eq!(names.len(), Explanation::ALL.len());
+}
+
+/// An impact within rounding of the fourth strobe: in single precision a lane stands on the other side of it.
+#[test]
+fn an_event_on_the_strobe_may_be_on_its_other_side() {
+    let text = "[parameters]\nomega = 4.2\ne = 0.7\n\
+                [[axis]]\nparameter = 'm1'\nmin = 1.2204724409448817\nmax = 2.0\ncount = 2\n\
+                [[axis]]\nparameter = 'm2'\nmin = 1.447244094488189\nmax = 2.0\ncount = 2\n";
+    let plan = Plan::new(&Scene::parse(text, "cell", &[], Purpose::Map).unwrap());
+    let mut records = vec![Record::default(); plan.cell_count()];
+    records[0] = Record {
+        lyapunov: 1.0269397510210885,
+        lyapunov_error: 0.04305312626565277,
+        impacts_per_period: 739.0 / 104.0,
+        strobe: [3.9971641302108765, 30.14419069304812, 3.51179838180542, 31.10382907262965],
+        periods_run: 204,
+        valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH | valid::STROBE,
+        ..Record::default()
+    };
+    let subject = Subject { plan: &plan, records: &records, precision: Precision::F32, is_lane: true };
+    let picks = vec![Pick { id: 0, stratum: Stratum::Uniform }];
+    let drawn = Sample { seed: 0, picks, strata: Vec::new(), among: 1 };
+    let found = |strobe: [f64; 4]| {
+        let lane = Record { strobe, periods_run: HORIZON, ..records[0] };
+        replayed(&subject, &drawn, StateSource::Lanes(vec![lane])).mismatches
+    };
+    let there = [2.2326167821884155, 28.587222012810955, 1.7326555252075195, 25.76218473812631];
+    let mismatches = found(there);
+    assert_eq!(mismatches[0].explanation, Some(Explanation::BelowResolution), "{mismatches:?}");
+    // Nothing that rounds is elsewhere.
+    for off in [[0.0, 3.0, 0.0, 3.0], [1.0, 0.0, 1.0, 0.0], [0.0, -6.0, 0.0, 0.0]] {
+        let mismatches = found(std::array::from_fn(|i| there[i] + off[i]));
+        assert_eq!(mismatches[0].explanation, None, "{off:?}: {mismatches:?}");
+    }
 }

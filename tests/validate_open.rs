@@ -232,3 +232,25 @@ fn a_lane_is_left_open_on_the_cycle_where_chaos_ends() {
         ]);
     }
 }
+
+/// Chaos within a hundred-thousandth of the motion about a cycle of two periods that repels by 1.2 % a period: in single
+/// precision rounding holds a lane on the cycle, and what it averages is the cycle's own.
+#[test]
+fn rounding_may_hold_a_lane_on_a_cycle_amid_chaos() {
+    let text = format!(
+        "[parameters]\nomega = 3.1\n\
+         [[axis]]\nparameter = 'mesh_speed'\nmin = 0.08818897637795277\nmax = 0.2\ncount = 2\n\
+         [[axis]]\nparameter = 'e'\nmin = 0.2677165354330709\nmax = 1.0\ncount = 2\n{MORE_PERIODS}\
+         [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n"
+    );
+    let plan = Plan::new(&Scene::parse(&text, "cell", &[], Purpose::Map).unwrap());
+    let strobe = [2.5345593690872192, 1.491196159724417, 2.034390449523926, 1.3883452982364286];
+    let record = with_exponent(
+        open([8.0, 0.31821197271347046], strobe, 2112),
+        [0.006005663555867948, 1.0816699281962777e-5],
+    );
+    Said(&plan, Precision::F32, record).is_explained_by(Explanation::BelowResolution).but_not_with(&[
+        ("more growth", |record| record.lyapunov *= 3.0),
+        ("off the cycle", |record| record.strobe[1] += 1e-2),
+    ]);
+}

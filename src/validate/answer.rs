@@ -133,6 +133,13 @@ impl Bars {
         let least_counted = Averaging::new(budget.periods(), exponent_from).fewest_periods();
         Bars { multiplier, no_multiplier, mesh, impacts: 1e-9, forcing_period, exponent_from, least_counted }
     }
+
+    /// Whether two exponents of a cycle over so many forcing periods are those of the same multiplier.
+    pub(super) fn is_same_multiplier(&self, ours: f64, theirs: f64, period: f64) -> bool {
+        let [ours, theirs] = [ours, theirs].map(|exponent| exponent * period * self.forcing_period);
+        (ours - theirs).abs() <= self.multiplier * period.max(5.0)
+            || ours.max(theirs) <= self.no_multiplier.ln()
+    }
 }
 
 /// What some computation on the reference says of a cell. Absent fields are not compared.
@@ -227,10 +234,7 @@ impl Answer {
             list.push(compared(Field::Symmetric, ours == symmetric, shown));
         }
         if let (true, Some([theirs, _])) = (has(valid::LYAPUNOV), self.exponent) {
-            let log = |exponent: f64| exponent * period * bars.forcing_period;
-            let none = bars.no_multiplier.ln();
-            let same = (log(record.lyapunov) - log(theirs)).abs() <= bars.multiplier * period.max(5.0)
-                || log(record.lyapunov).max(log(theirs)) <= none;
+            let same = bars.is_same_multiplier(record.lyapunov, theirs, period);
             list.push(compared(Field::Exponent, same, || {
                 (Value::Number(record.lyapunov), Value::Number(theirs))
             }));

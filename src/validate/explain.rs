@@ -10,8 +10,8 @@ use super::case::{Case, ELSEWHERE, LANE_RESOLUTION};
 use super::explanation::Explanation;
 use super::lane_growth::{rare_chaos, weak_chaos};
 use super::limits::{
-    flip, held, is_shaken, is_spent, late, leaves_chaos_open, longer, rest, scattered, undecided_chaos,
-    within_scatter,
+    flip, held, held_in_chaos, is_shaken, is_spent, late, leaves_chaos_open, longer, rest, scattered,
+    undecided_chaos, within_scatter,
 };
 use super::on_the_way::{has_averages_ahead, has_averages_on_the_way};
 use super::own_figures::agrees_with_its_figures;
@@ -74,7 +74,7 @@ fn explain_states(case: &Case<'_>) -> Option<Explanation> {
 }
 
 fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
-    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 20] = [
+    const CHECKS: [fn(&Case<'_>) -> Option<Explanation>; 21] = [
         engine_cap,
         longer,
         other_attractor,
@@ -89,6 +89,7 @@ fn explain_answer(case: &Case<'_>) -> Option<Explanation> {
         flip,
         grazing,
         held,
+        held_in_chaos,
         within_scatter,
         rounded_cycle,
         at_rest,

@@ -32,6 +32,9 @@ const ROUNDED_RUNS: u64 = 8;
 /// Periods that lanes take to confirm a period: three windows of the longest they look for.
 const CONFIRMATION_WINDOWS: u32 = 3;
 
+/// A lane at rest moves by so many times what strobes scatter by: four quarter octaves.
+const AT_REST: f64 = 4.0;
+
 /// Multipliers below this belong to a cycle that is about to double its period.
 const NEAR_FLIP: f64 = -0.8;
 
@@ -248,6 +251,26 @@ pub(super) fn held(case: &Case<'_>) -> Option<Explanation> {
     let answer = case.read_as_is(&stands, period)?;
     let is_hidden = || within_reach(case, from, &answer) == Some(Explanation::BelowResolution);
     (case.is_least()? && is_hidden()).then_some(Explanation::BelowResolution)
+}
+
+/// The lane decides nothing because rounding holds it on a cycle that repels, amid the chaos that the reference sees:
+/// the cycle closes as nearly as lanes tell strobes apart at rest, and the record's growth and averages are its own.
+pub(super) fn held_in_chaos(case: &Case<'_>) -> Option<Explanation> {
+    let is_open = (Class::Undecided, Class::Chaotic) == (classify(case.record), case.truth.class);
+    if !case.is_lane || !is_open || !is_spent(case) {
+        return None;
+    }
+    let stands = case.standing(case.strobe()?).ok()?;
+    let rests = |period: &u32| case.unrest(&stands, *period) <= AT_REST * rest(case.precision);
+    let period = (1..=case.budget.settings.max_period).find(rests)?;
+    let read = case.read_as_is(&stands, period)?;
+    let [growth, _] = read.exponent?;
+    let (record, bars) = (case.record, &case.bars);
+    let is_its_own = growth > 0.0
+        && bars.is_same_multiplier(record.lyapunov, growth, f64::from(period))
+        && (record.impacts_per_period - read.impacts_per_period?).abs() <= bars.impacts
+        && (record.mesh_fraction - read.mesh_fraction?).abs() <= bars.mesh;
+    is_its_own.then_some(Explanation::BelowResolution)
 }
 
 /// Chaos on the way to a cycle: how long it lasts is decided by rounding, and among many starts
