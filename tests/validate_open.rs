@@ -52,7 +52,8 @@ fn plan_at(e: f64, omega: f64, integration: &str) -> Plan {
     Plan::new(&Scene::parse(&text, "cell", &[], Purpose::Map).unwrap())
 }
 
-/// Beside an unsymmetric cycle a symmetric one: rounding keeps a lane off either, and moves its averages.
+/// Beside an unsymmetric cycle a symmetric one: rounding keeps a lane off either, and moves its averages. Two hundred
+/// motions that are rounded at every step have 34 to 41 impacts in a period.
 #[test]
 fn what_is_left_open_has_the_averages_of_its_motion() {
     let plan = cell("beside").plan();
@@ -62,8 +63,8 @@ fn what_is_left_open_has_the_averages_of_its_motion() {
         ("more meshing", |record| record.mesh_fraction += 0.1),
         ("less meshing", |record| record.mesh_fraction -= 0.1),
         ("none", |record| record.mesh_fraction = 0.0),
-        ("more impacts", |record| record.impacts_per_period += 2.0),
-        ("fewer impacts", |record| record.impacts_per_period -= 2.0),
+        ("more impacts", |record| record.impacts_per_period += 6.0),
+        ("fewer impacts", |record| record.impacts_per_period -= 6.0),
         ("impacts that are not whole", |record| record.impacts_per_period += 0.01),
     ]);
 }
