@@ -266,11 +266,15 @@ pub(super) fn held_in_chaos(case: &Case<'_>) -> Option<Explanation> {
     let read = case.read_as_is(&stands, period)?;
     let [growth, _] = read.exponent?;
     let (record, bars) = (case.record, &case.bars);
-    let is_its_own = growth > 0.0
+    let is_its_own = |bit, ours: f64, theirs: Option<f64>, bar: f64| {
+        record.valid & bit == 0 || theirs.is_some_and(|theirs| (ours - theirs).abs() <= bar)
+    };
+    let is_held = record.valid & valid::LYAPUNOV != 0
+        && growth > 0.0
         && bars.is_same_multiplier(record.lyapunov, growth, f64::from(period))
-        && (record.impacts_per_period - read.impacts_per_period?).abs() <= bars.impacts
-        && (record.mesh_fraction - read.mesh_fraction?).abs() <= bars.mesh;
-    is_its_own.then_some(Explanation::BelowResolution)
+        && is_its_own(valid::IMPACTS, record.impacts_per_period, read.impacts_per_period, bars.impacts)
+        && is_its_own(valid::MESH, record.mesh_fraction, read.mesh_fraction, bars.mesh);
+    is_held.then_some(Explanation::BelowResolution)
 }
 
 /// Chaos on the way to a cycle: how long it lasts is decided by rounding, and among many starts
