@@ -30,11 +30,7 @@ const GROWTH: f64 = 1.2;
 /// What the last correction may leave of the flight.
 const LEFT: f64 = 1e-17;
 
-/// Where a first guess is off by less, what one step leaves is of third order and below ten cubes of this, since the
-/// second coefficient outweighs all later ones: no correction is needed.
-const SURE: f64 = 1e-6;
-
-/// Corrections allowed elsewhere; one is enough.
+/// Corrections allowed; one is enough.
 const CORRECTIONS: usize = 3;
 
 /// Weights of the term `m`, counted from zero: `m`, `m (m - 1) / 2`, `m (m + 1)` and `m + 1` without
@@ -137,11 +133,8 @@ impl Rise {
             return None;
         }
         let per_slope = per_slope * fma(-2.0 * bend, step, 1.0);
-        let mut root = fma(guess, step, guess);
-        if step.abs() < SURE {
-            return (root <= BRIEF).then_some(root);
-        }
         let share = fma(8.0 * step, step, 1e-10);
+        let mut root = fma(guess, step, guess);
         for _ in 0..CORRECTIONS {
             let correction = Powers::of(root).sum(&self.gap) * per_slope;
             root = fma(-guess, correction, root);
