@@ -32,7 +32,7 @@ const ROUNDED_RUNS: u64 = 8;
 /// Periods that lanes take to confirm a period: three windows of the longest they look for.
 const CONFIRMATION_WINDOWS: u32 = 3;
 
-/// A lane at rest moves by so many times what strobes scatter by: four quarter octaves.
+/// Strobes of a lane at rest, 2^-16 of the motion in single precision, lie within so many times what they scatter by.
 const AT_REST: f64 = 4.0;
 
 /// Multipliers below this belong to a cycle that is about to double its period.
