@@ -4,7 +4,8 @@ use std::path::Path;
 use std::process::Command;
 
 /// What the program is made of.
-const SOURCES: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
+const SOURCES: [&str; 7] =
+    ["src", "dynamics/src", "dynamics/Cargo.toml", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
 
 fn main() {
     let commit = commit().unwrap_or_else(|| "unknown".to_owned());

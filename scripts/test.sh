@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Everything that must hold before a change is taken: formatting, lints, docs, tests.
-# Installs a software Vulkan driver where there is none, so that shader tests run anywhere.
-# With --all the tests run, too, that take minutes each.
+# Everything that must hold before a change is taken: formatting, lints, docs, checks for WebAssembly, tests.
+# Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, and Rust's wasm32 target.
+# With --all the tests run, too, that take minutes each. Ends with the time of each phase and the ten slowest tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -11,11 +11,18 @@ fail() {
     exit 1
 }
 
+wasm=wasm32-unknown-unknown
+
 require_tools() {
-    say "tools: cargo, rustfmt, clippy"
+    say "tools: cargo, rustfmt, clippy, $wasm"
     command -v cargo >/dev/null || fail "cargo is missing; install Rust from https://rustup.rs"
     cargo fmt --version >/dev/null 2>&1 || fail "rustfmt is missing; run: rustup component add rustfmt"
     cargo clippy --version >/dev/null 2>&1 || fail "clippy is missing; run: rustup component add clippy"
+    # Rust without rustup may come with the target.
+    if [[ -d "$(rustc --print sysroot)/lib/rustlib/$wasm/lib" ]]; then return; fi
+    command -v rustup >/dev/null ||
+        fail "Rust's target $wasm is missing, and rustup, which would add it; install Rust from https://rustup.rs"
+    rustup target add "$wasm" || fail "rustup could not add the target $wasm; is the network there?"
 }
 
 # True if the Vulkan loader would find both itself and the description of a driver.
@@ -24,7 +31,7 @@ has_vulkan() {
     loader_cache="$( (ldconfig -p || /sbin/ldconfig -p) 2>/dev/null || true)"
     grep -q 'libvulkan\.so' <<<"$loader_cache" || return 1
     local drivers driver
-    # The loader looks at nothing else where one of these is set.
+    # The loader reads nothing else where one of these is set.
     drivers="${VK_DRIVER_FILES:-${VK_ICD_FILENAMES:-}}"
     if [[ -n "$drivers" ]]; then
         while IFS= read -r -d: driver; do
@@ -62,24 +69,71 @@ require_vulkan() {
     has_vulkan || fail "still no Vulkan driver after installing one; check VK_DRIVER_FILES and VK_ICD_FILENAMES"
 }
 
-# Nothing here is compiled twice, so that what makes the second time fast would only take room.
+# Runs a command under a title, and notes how long it took.
+phases=()
+phase() {
+    local title="$1" began=$SECONDS
+    shift
+    say "$title: $*"
+    "$@"
+    phases+=("$(printf '%5d s  %s' $((SECONDS - began)) "$title")")
+}
+
+docs() { RUSTDOCFLAGS="-D warnings" cargo doc --quiet --workspace --no-deps; }
+
+# Times of single tests are an unstable option of the test program. The compiler must not see what unlocks it, or
+# build scripts that look for it would have everything compiled anew: a runner sets it for the test program alone.
+timed_tests() {
+    cargo test --workspace --tests --no-fail-fast --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' \
+        -- -Zunstable-options --report-time "$@" 2>&1 | tee "$log"
+}
+
+# The ten slowest of `test NAME ... ok <1.234s>`, with the binary that they are in.
+slowest_tests() {
+    awk '
+        $1 == "Running" { binary = $NF; sub(/.*\//, "", binary); sub(/-[0-9a-f]+\)$/, "", binary) }
+        /^test .* <[0-9.]+s>$/ { seconds = $NF; gsub(/[<>s]/, "", seconds); print seconds, binary, $2 }
+    ' "$log" | sort -rn | awk 'NR <= 10 { printf "%7.1f s  %s: %s\n", $1, $2, $3 }'
+}
+
+# What tests could not do for want of a program: they say so past the harness, which keeps what passing tests print.
+skipped() { grep -o 'SKIPPED: .*' "$log" | sort | uniq -c || true; }
+
+# How many tests passed and how many wait for --all, over all binaries.
+totals() {
+    awk '/^test result:/ { passed += $4; ignored += $8 }
+        END { printf "%d passed, %d ignored", passed, ignored; exit passed == 0 }' "$log"
+}
+
+case "${1:-}" in
+    "") ignored=() ;;
+    --all) ignored=(--include-ignored) ;;
+    *) fail "unknown argument $1; usage: scripts/test.sh [--all]" ;;
+esac
+
+# Between runs either nothing is compiled, or what makes the second time fast would only take room.
 export CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-0}"
+# Mesa's software driver takes some five seconds to compile a lane's shader. Every process finds it here, and the next run.
+export MESA_SHADER_CACHE_DIR="${MESA_SHADER_CACHE_DIR:-${CARGO_TARGET_DIR:-$PWD/target}/shader-cache}"
+mkdir -p "$MESA_SHADER_CACHE_DIR"
+log="$(mktemp)"
+trap 'rm -f "$log"' EXIT
 
 require_tools
 require_vulkan
-say "format: cargo fmt --check"
-cargo fmt --check
-say "lints: cargo clippy --all-targets -- -D warnings"
-cargo clippy --all-targets -- -D warnings
-say "docs: cargo doc --no-deps, warnings denied"
-RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
-say "tests: cargo test"
-cargo test
-if [[ "${1:-}" == --all ]]; then
-    say "tests: those that take minutes each"
-    cargo test -- --ignored
-fi
-say "benchmarks: tiny sizes, so that they cannot rot"
-cargo test --quiet --bench reference
-cargo test --quiet --bench lane
+phase "format" cargo fmt --all --check
+phase "lints" cargo clippy --workspace --all-targets -- -D warnings
+phase "docs, warnings denied" docs
+phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
+phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu --lib
+phase "compilation of tests" cargo test --workspace --tests --benches --no-run
+phase "tests" timed_tests "${ignored[@]}"
+phase "examples in docs" cargo test --workspace --doc
+phase "benchmarks at tiny sizes" cargo test --quiet --workspace --bench reference --bench lane
+say "time by phase"
+printf '%s\n' "${phases[@]}"
+say "the ten slowest tests"
+slowest_tests
+skipped
+say "tests: $(totals)"
 say "all passed"

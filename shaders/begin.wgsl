@@ -3,10 +3,10 @@
 @compute @workgroup_size(WORKGROUP)
 fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = settings.fresh + id.y * settings.row + id.x;
-    if i >= settings.rostered {
+    if i >= settings.active_lanes {
         return;
     }
-    lane = rostered(i);
+    lane = active_lane(i);
     cell = cells[lane];
     tally.status = cell.refused;
     tally.mode = MODE_FREE;
@@ -26,6 +26,6 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
 // A start beyond a wall is meshing.
 fn begin_beyond(side: u32) {
     motion.q[0] -= flows[cell.flow_index].walls[side];
-    tally.mode = MODE_PRESSED + side;
+    tally.mode = MODE_SUSTAINED + side;
     tally.origin = side;
 }

@@ -1,4 +1,4 @@
-// Chaos: growth of the tangent vector that is sure, and no departure from a cycle.
+// Chaos: growth of the tangent vector that is sure, and no escape from a cycle.
 
 // Periods over which averages are taken, at least, before chaos is called early.
 const LEAST_COUNTED: u32 = 32u;
@@ -6,17 +6,17 @@ const LEAST_COUNTED: u32 = 32u;
 // Standard errors that cast doubt on a cycle that has not settled.
 const DOUBT: Real = 1.0;
 
-// Growth that is sure, and no recurrence that contracts. Looked at when a block is complete.
+// Growth that is sure, and no recurrence that contracts. Checked when a block is complete.
 fn is_chaos() -> bool {
     if noted.block_periods > 0u || noted.blocks < FEWEST_BLOCKS || noted.streak >= STREAK || tally.period < settings.chaos_from {
         return false;
     }
-    // Averages that a cycle read in vain has interrupted begin anew.
+    // Averages that a cycle read without success has interrupted begin anew.
     if tally.period < noted.counted_from + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
     let errors = select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods);
-    return grows(errors) && outgrows(errors) && !departs(errors);
+    return grows(errors) && outgrows(errors) && !escapes(errors);
 }
 
 // Whether the exponent exceeds zero by so many standard errors.
@@ -42,19 +42,19 @@ fn outgrows(errors: Real) -> bool {
     return (growth.x - errors * growth.y - rounding) * Real(periods) > Real(neutral);
 }
 
-// Whether the motion lingers at some cycle and its growth may be that of leaving it.
-fn departs(errors: Real) -> bool {
-    // A lane that has just been sent on lingered. A single lag comes near by chance, its
+// Whether the motion stays near some cycle and its growth may be that of leaving it.
+fn escapes(errors: Real) -> bool {
+    // A lane that has just been sent was near a saddle. A single lag comes near by chance, its
     // multiples with it do not.
-    var lingers = noted.known_lags == 0u;
+    var is_near_saddle = noted.known_lags == 0u;
     var rests = false;
     for (var lag = 1u; 2u * lag <= noted.known_lags && !rests; lag++) {
         var nearest = 255u;
         for (var multiple = lag; multiple <= noted.known_lags && nearest >= NEAR; multiple += lag) {
-            trips += 1u;
+            iterations += 1u;
             nearest = min(nearest, last_distance_at(multiple));
         }
-        lingers = lingers || nearest >= NEAR;
+        is_near_saddle = is_near_saddle || nearest >= NEAR;
         rests = nearest >= RESOLVED;
     }
     // What rests at a cycle is held there by rounding: its growth is no chaos.
@@ -63,5 +63,5 @@ fn departs(errors: Real) -> bool {
     }
     let growth = mean_growth();
     let periods = Real(noted.blocks * settings.exponent_block);
-    return lingers && (growth.x - errors * growth.y) * periods < DEPARTURE;
+    return is_near_saddle && (growth.x - errors * growth.y) * periods < ESCAPE_GROWTH;
 }

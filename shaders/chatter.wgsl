@@ -1,13 +1,12 @@
 // Chatter: ever slower impacts while the load presses. Short flights are followed by a
 // recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
 
-// A threshold below 1e-10 of half the walls' distance times the rate of free motion is none, as on the
-// reference. That rate is 1.6e-4 (`CLOSING_ANGLE` of the host) over `closing`.
-const NO_THRESHOLD: Real = 8e-15;
+// A threshold below this, relative to `speed`, is none.
+const NO_THRESHOLD: Real = 1e-10;
 
 // Whether impacts that the load presses back have no end.
 fn is_endless() -> bool {
-    return law.restitution < 1.0 && law.mesh_speed * h * closing <= NO_THRESHOLD * (walls[0] - walls[1]);
+    return law.restitution < 1.0 && law.mesh_speed * h <= NO_THRESHOLD * speed;
 }
 
 // Closes an infinite series of impacts by its limit, once it is so short that what the
@@ -39,7 +38,7 @@ fn close_chatter(side: u32, u: Real) {
     let damping = kick * row[3] - row[1];
     let lasts = whole * (1.0 - (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole);
     // A series cut by the strobe goes on bouncing until it lies within one stretch.
-    if lasts <= 0.0 || lasts >= to_mark(next_mark()) {
+    if lasts <= 0.0 || lasts >= to_stop_phase(next_stop_phase()) {
         return;
     }
     let across = here.x_row;
@@ -70,7 +69,7 @@ fn close_chatter(side: u32, u: Real) {
     advance_phase(lasts);
     turn_phasor(lasts);
     count_event(side);
-    tally.mode = MODE_PRESSED + side;
+    tally.mode = MODE_SUSTAINED + side;
     tally.order = 2u;
     enter(domain_of(tally.mode));
 }
@@ -84,7 +83,7 @@ fn begins_chatter(side: u32, u: Real) -> bool {
     let e = law.restitution;
     let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
     let is_short = u > 0.0 && 2.0 * u < SHORT * pressing;
-    return law.mesh_speed <= FOLLOWED_MESH_SPEED && is_short && e * e * u > least_leaving(pressing);
+    return law.mesh_speed * h <= FOLLOWED_MESH_SPEED * speed && is_short && e * e * u > least_leaving(pressing);
 }
 
 // The leaving speed at which a series ends in meshing, or by its limit where it has no end.
@@ -119,7 +118,7 @@ fn follow_chatter(side: u32) {
     for (var n = 0u; n < SHORT_FLIGHTS; n++) {
         expand_short();
         let t = short_flight();
-        if !(t > 0.0 && elapsed + t < 1.0 && t < to_mark(next_mark())) {
+        if !(t > 0.0 && elapsed + t < 1.0 && t < to_stop_phase(next_stop_phase())) {
             break;
         }
         let end = short_end(t);
@@ -129,7 +128,7 @@ fn follow_chatter(side: u32) {
         if !(pressing > 0.0 && leaving > least_leaving(pressing)) {
             break;
         }
-        trips += 1u;
+        iterations += 1u;
         elapsed += t;
         motion.q = array<Real, 4>(walls[side], -sign * leaving, end.x, end.x_rate + kick * removed);
         advance_phase(t);
@@ -176,7 +175,7 @@ fn short_flight() -> Real {
     let quartic = first * first * gap_terms[4] * inverse;
     var t = first * (1.0 - cubic + (2.0 * cubic * cubic - quartic));
     var step: Real = 0.0;
-    trips += 2u;
+    iterations += 2u;
     for (var n = 0u; n < 2u; n++) {
         var p: Real = 0.0;
         var p1: Real = 0.0;
@@ -253,7 +252,7 @@ fn carry_over_short(t: Real, end: End, removed: Real) {
     );
     crossing.jump.rate = end.rate;
     for (var i = 0u; i < tally.tangent_count; i++) {
-        trips += 1u;
+        iterations += 1u;
         set_tangent(i, saltate(glide_short(tangent(i), t)));
     }
     if tally.tangent_count == 1u {

@@ -1,15 +1,13 @@
 // The queue of lanes that a variant has work for, or whose records are to be read: the others cost nothing, and those
 // in it keep their order, for neighbours behave alike.
 //
-// Three passes: blocks of the roster are counted, the counts summed up, and what is left of every block
+// Three passes: blocks of the active list are counted, the counts summed up, and what is left of every block
 // put in its place in the queue.
-
-const BLOCK: u32 = 256u;
 
 var<workgroup> block_counts: array<u32, BLOCK>;
 
-// The lane at a place of the roster, and of the queue.
-fn rostered(i: u32) -> u32 {
+// The lane at a place of the active list, and of the queue.
+fn active_lane(i: u32) -> u32 {
     return queue.lanes[i];
 }
 
@@ -17,12 +15,12 @@ fn queued(i: u32) -> u32 {
     return queue.lanes[settings.slots + i];
 }
 
-// Whether place `i` of the roster holds a lane that this variant has work for, or one that has ended.
+// Whether place `i` of the active list holds a lane that this variant has work for, or one that has ended.
 fn is_left(i: u32) -> bool {
-    if i >= settings.rostered {
+    if i >= settings.active_lanes {
         return false;
     }
-    tally = tallies[rostered(i)].now;
+    tally = tallies[active_lane(i)].now;
     if settings.ended == 1u {
         return is_over();
     }
@@ -47,7 +45,7 @@ fn sum_block(k: u32, own: u32) {
 // Each workgroup takes every `groups.x`-th block: there may be more of them than workgroups.
 @compute @workgroup_size(BLOCK)
 fn count_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
-    let blocks = (settings.rostered + BLOCK - 1u) / BLOCK;
+    let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
     for (var b = group.x; b < blocks; b += groups.x) {
         sum_block(k, select(0u, 1u, is_left(b * BLOCK + k)));
         if k == BLOCK - 1u {
@@ -60,7 +58,7 @@ fn count_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
 // One workgroup: where each block's lanes go, and how many there are.
 @compute @workgroup_size(BLOCK)
 fn sum_left(@builtin(local_invocation_index) k: u32) {
-    let blocks = (settings.rostered + BLOCK - 1u) / BLOCK;
+    let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
     let share = (blocks + BLOCK - 1u) / BLOCK;
     let begin_at = min(k * share, blocks);
     let end_at = min(begin_at + share, blocks);
@@ -83,7 +81,7 @@ fn sum_left(@builtin(local_invocation_index) k: u32) {
 
 @compute @workgroup_size(BLOCK)
 fn move_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
-    let blocks = (settings.rostered + BLOCK - 1u) / BLOCK;
+    let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
     for (var b = group.x; b < blocks; b += groups.x) {
         let i = b * BLOCK + k;
         let stays = is_left(i);
@@ -91,7 +89,7 @@ fn move_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         sum_block(k, own);
         if stays {
             let place = starts_of_blocks[b] + block_counts[k] - own;
-            queue.lanes[settings.slots + place] = rostered(i);
+            queue.lanes[settings.slots + place] = active_lane(i);
         }
         workgroupBarrier();
     }

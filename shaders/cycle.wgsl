@@ -1,8 +1,8 @@
-// The cycle that was read: does it attract, and has the lane come near it?
+// The cycle that was read: is it stable, and has the lane come near it?
 
 // A lane has settled once it is this close to its cycle, relative to the motion.
 const ON_CYCLE: f32 = 1e-4;
-// A lane that rests on a cycle which repels is moved by so many times what counts as rest.
+// A lane that rests on an unstable cycle is moved by so many times what counts as rest.
 const KICK: f32 = 8.0;
 
 // The binary logarithm of a number near 1e-30 to 1e30, to the precision of its type: f64 has no
@@ -103,7 +103,7 @@ fn spectral_growth() -> Real {
 
 // Without exponents recurrence alone must do. A lane that has read a cycle which does not
 // attract, or which it has not come close to as its multiplier tells now, goes on while it has
-// periods left: chaos lingers at unstable cycles, and where a pair of cycles has just vanished.
+// periods left: chaos stays near unstable cycles, and where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
     let is_last = tally.period >= settings.longest;
@@ -120,17 +120,27 @@ fn judge_cycle() {
     note_branch();
     let to = fixed_point();
     noted.off = octaves(distance_between(strobe_state(), to));
-    let attracts = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    let is_stable = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
     // Beside a graze the map has no derivative that tells where the cycle is.
     let is_smooth = tally.grazes == 0u || noted.refinements > 0u;
     // And where rounding is amplified it throws the lane off: such cycles are waited for.
-    let helps = is_smooth && noted.vain < VAIN;
-    if attracts && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine(to) {
+    let helps = is_smooth && noted.failed_searches < MOST_FAILED_SEARCHES;
+    if is_stable && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine(to) {
         tally.stage = STAGE_READING;
         return;
     }
-    let is_cycle = attracts && is_own() && is_on_cycle(to, is_last);
-    if is_cycle && (!is_multiple() || is_refuted()) {
+    let is_found = is_stable && is_own() && is_on_cycle(to, is_last);
+    let is_cycle = is_found && is_approached(to);
+    if is_found && !is_cycle {
+        noted.doubted += 1u;
+        give_up();
+        if !is_last {
+            check_again();
+            noted.asked = 0u;
+        }
+        return;
+    }
+    if is_cycle && (!is_multiple() || is_rejected()) {
         noted.cycle = tally.candidate;
         return;
     }
@@ -140,15 +150,15 @@ fn judge_cycle() {
     // Where Newton's method has left the branch of the motion, a lane that goes back to where it set out
     // would set out once more, for ever.
     let is_lost = noted.refinements > 0u && !is_own();
-    if attracts && !is_lost && noted.refinements > 0u {
-        noted.vain += 1u;
+    if is_stable && !is_lost && noted.refinements > 0u {
+        noted.failed_searches += 1u;
     }
     give_up();
     if is_last {
         return;
     }
-    if attracts && !is_lost {
-        look_again();
+    if is_stable && !is_lost {
+        check_again();
     } else {
         search_on();
     }
@@ -167,11 +177,11 @@ fn reads_divisor() -> bool {
     return true;
 }
 
-// The cycle attracts, but is too far off: its recurrences count on.
-fn look_again() {
+// The cycle is stable, but too far off: its recurrences count on.
+fn check_again() {
     tally.stage = STAGE_RUNNING;
     noted.has_read = 0u;
-    noted.refuted = 0u;
+    noted.rejected_divisor = 0u;
     begin_counting();
     resume_growth();
     begin_window(strobe_state(), noted.window);
@@ -179,9 +189,9 @@ fn look_again() {
 
 // The exponent goes on; recurrence from scratch.
 fn search_on() {
-    // Rounding may hold a lane on a cycle that repels for ever.
-    let repels = seen.cycle_growth > NEUTRAL * Real(tally.candidate);
-    if repels && noted.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
+    // Rounding may hold a lane on an unstable cycle for ever.
+    let is_unstable = seen.cycle_growth > NEUTRAL * Real(tally.candidate);
+    if is_unstable && noted.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
         motion.q[1] += Real(KICK * exp2(-f32(AT_REST) / OCTAVE)) * seen.rate_scale;
         motion.bound = 0.0;
         // What grew there was no chaos.
@@ -194,9 +204,9 @@ fn search_on() {
     tally.stage = STAGE_RUNNING;
     noted.has_read = 0u;
     noted.tries += 1u;
-    // One that attracts, and was not come near to, may be the cycle all the same.
-    let attracts = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
-    noted.refuted = select(0u, tally.candidate, noted.asked == 1u && !attracts);
+    // A stable one, which was not come near to, may be the cycle all the same.
+    let is_stable = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    noted.rejected_divisor = select(0u, tally.candidate, noted.asked == 1u && !is_stable);
     begin_counting();
     resume_growth();
     noted.window = 0u;
@@ -216,12 +226,18 @@ fn is_multiple() -> bool {
 // Quarter octaves by which the points of a multiple are farther apart than the lane is from it.
 const ASUNDER: u32 = 12u;
 
-// Whether the divisor was read for this multiple, does not attract, and surely is another cycle: it may have
+// Whether the divisor was read for this multiple, is unstable, and surely is another cycle: it may have
 // been read elsewhere. A lane that comes to the divisor's own cycle from either side in turn is half as far
 // from it as its points seem to be apart.
-fn is_refuted() -> bool {
+fn is_rejected() -> bool {
     let is_asunder = noted.divisor_apart + ASUNDER <= noted.off;
-    return noted.refuted == noted.divisor && noted.divisor_apart < AT_REST && is_asunder;
+    return noted.rejected_divisor == noted.divisor && noted.divisor_apart < AT_REST && is_asunder;
+}
+
+// Whether the cycle closes earlier by no more than rounding may do in a cycle: its period may be that divisor, and
+// the rest a pattern of rounding.
+fn hides_period() -> bool {
+    return noted.divisor > 0u && exp2(-f32(noted.divisor_apart) / OCTAVE) < max(noise(), NOISE);
 }
 
 // What rounding moves the state by over a cycle at most, relative to the motion: every event rounds, and
@@ -238,7 +254,7 @@ fn gain() -> Real {
     let scales = array<Real, 4>(seen.position_scale, seen.rate_scale, seen.position_scale, seen.rate_scale);
     var most: Real = 1.0;
     for (var k = 0u; k < 16u; k++) {
-        trips += 1u;
+        iterations += 1u;
         let unit = scales[k / 4u] / max(scales[k % 4u], Real(1e-30));
         most = max(most, abs(motions[lane].tangents[k]) * unit);
     }
@@ -293,14 +309,14 @@ const MISPLACED: Real = 8.0;
 // Whether a motion without events has its limit beyond the wall: it creeps out, by more than roundings in a period.
 fn leaves(to: array<Real, 4>) -> bool {
     let unsure = MISPLACED * ULP * seen.position_scale * Real(limit_of(1.0));
-    let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_DIP;
+    let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_ONSET;
     return may_leave && beyond(to) > unsure;
 }
 
 // Near, or as near as rounding lets it. What lies in another domain than the lane, as its derivative has
 // it, is no cycle that it comes to; and beside a graze only rest will do.
 fn is_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
-    let is_blurred = (noted.vain >= VAIN || is_last) && noted.settled != 0u && exp2(-f32(noted.apart) / OCTAVE) < min(noise(), ON_CYCLE);
+    let is_blurred = (noted.failed_searches >= MOST_FAILED_SEARCHES || is_last) && noted.settled != 0u && exp2(-f32(noted.apart) / OCTAVE) < min(noise(), ON_CYCLE);
     // Whether it goes on with the same events is seen where Newton's method leads it, if there is time.
     let is_confirmed = !is_last || settings.early_stop == 0u || noted.refinements > 0u || away() <= REFINED;
     let is_near = is_near_cycle() && keeps_domain(to) && tally.grazes == 0u && is_confirmed;

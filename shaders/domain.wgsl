@@ -6,6 +6,7 @@ var<private> here: Domain;
 var<private> walls: array<Real, 2>;
 var<private> kick: Real;
 var<private> h: Real;
+var<private> speed: Real;
 var<private> closing: Real;
 var<private> law: Law;
 var<private> shape: FlowShape;
@@ -24,6 +25,7 @@ fn fetch_constants() {
     walls = flows[f].walls;
     kick = flows[f].kick;
     h = flows[f].h;
+    speed = flows[f].speed;
     closing = flows[f].closing;
     if KEEP {
         free = flows[f].domains[0];

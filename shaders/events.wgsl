@@ -54,7 +54,7 @@ fn watch(tau: Real) -> Watch {
         );
     }
     let sign = sign_of(side_of(tally.mode));
-    if tally.mode < MODE_DIP {
+    if tally.mode < MODE_ONSET {
         return Watch(vec3<Real>(offsets.x + sign * z.x, sign * z.y, sign * z.z), vec3<Real>(1.0, 0.0, 0.0));
     }
     return Watch(vec3<Real>(offsets.x - sign * z.x, -sign * z.y, -sign * z.z), sign * pressing_jet(tau));
@@ -66,7 +66,7 @@ fn set_offsets() {
         offsets = vec2<Real>(walls[0] - z, z - walls[1]);
     } else {
         let sign = sign_of(side_of(tally.mode));
-        offsets = vec2<Real>(select(sign, -sign, tally.mode >= MODE_DIP) * z, 0.0);
+        offsets = vec2<Real>(select(sign, -sign, tally.mode >= MODE_ONSET) * z, 0.0);
     }
 }
 
@@ -78,7 +78,7 @@ const STEEP: Real = 4.0;
 const NEWTON_CAP: u32 = 10u;
 const ROOT_CAP: u32 = 120u;
 // Stretches that one careful step may be cut into.
-const LOOK_CAP: u32 = 200u;
+const CHECK_CAP: u32 = 200u;
 
 // The root of one distance in (lo, hi], where it falls from + to -; on the exact flow, with
 // the root at the start divided out.
@@ -89,7 +89,7 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<R
     var hi = end;
     var t = guess;
     for (var i = 0u; i < ROOT_CAP; i++) {
-        trips += 1u;
+        iterations += 1u;
         let at = watch(t);
         let f = select(at.first, at.second, second);
         if f.x > 0.0 {
@@ -131,7 +131,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
     var a: Real = 0.0;
     var width = len;
     var left = watch(0.0);
-    var looks = 0u;
+    var checks = 0u;
     // A start that rounding has put on or beyond its boundary.
     if orders.x == 0u && left.first.x <= 0.0 {
         return Find(true, false, 0.0);
@@ -140,12 +140,12 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         return Find(true, true, 0.0);
     }
     loop {
-        looks += 1u;
-        if looks > LOOK_CAP {
+        checks += 1u;
+        if checks > CHECK_CAP {
             tally.status = STATUS_CAP_ROOT;
             break;
         }
-        trips += 1u;
+        iterations += 1u;
         var b = a + width;
         if b >= len - 0.5 * min(width, SHORTEST) {
             b = len;
@@ -154,7 +154,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         let right = watch(b);
         let cube = dt * dt * dt;
         let rest = cube * cube * (1.0 / 14400.0);
-        // In the dip the second distance is an acceleration: two derivatives further on.
+        // In the contact onset the second distance is an acceleration: two derivatives further on.
         let eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest)
             + 8.0 * ULP * abs(offsets);
         let first = judge(left.first, right.first, dt, orders.x, eps.x);
@@ -169,10 +169,10 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 2.0 * dt;
             continue;
         }
-        // Between the ends of a stretch either may dip by an eighth of its bend: as long as that shows, it may
+        // Between the ends of a stretch either may cross by an eighth of its bend: as long as that shows, it may
         // be an event, however short.
         var is_shortest = dt <= SHORTEST;
-        if is_shortest && dt > BRIEFEST {
+        if is_shortest && dt > SHORTEST_STEP {
             let bend = dt * dt * vec2<Real>(
                 max(abs(left.first.z), abs(right.first.z)),
                 max(abs(left.second.z), abs(right.second.z)),
@@ -229,22 +229,52 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
 // What the acceleration of a gap may have been that began this step at rest and was taken for none, else 0.
 var<private> balanced: Real;
 
-// Bound on the eighth derivative of the gap where the dip asks for it.
+// Bound on the eighth derivative of the gap where the contact onset asks for it.
 var<private> pressing_bound: Real;
 
-// Moves on to the first event of the next step, or to its end, and acts on it; true at a mark.
+// Bisections of the time at which the dip is deepest.
+const DEEPEST_CAP: u32 = 30u;
+
+// Whether the gap meets the other wall in the contact onset, at most `tau` after the expansion: the model has no rule for
+// a contact there. The depth is concave while the spring presses, so that its first tangent bounds it; where that does
+// not exclude the wall, the deepest place is looked for.
+fn crosses_backlash(tau: Real) -> bool {
+    let backlash = walls[0] - walls[1];
+    let rate = abs(gap_terms[1]);
+    if offsets.x + rate * tau < backlash {
+        return false;
+    }
+    var early: Real = 0.0;
+    var late = tau;
+    for (var i = 0u; i < DEEPEST_CAP; i++) {
+        iterations += 1u;
+        let middle = 0.5 * (early + late);
+        let depth = watch(middle).first;
+        if depth.x >= backlash {
+            return true;
+        }
+        if depth.y > 0.0 {
+            early = middle;
+        } else {
+            late = middle;
+        }
+    }
+    return watch(tau).first.x >= backlash;
+}
+
+// Moves on to the first event of the next step, or to its end, and acts on it; true at a stop phase.
 fn careful() -> bool {
     let d = domain_of(tally.mode);
     let substeps = here.substeps;
     let share = here.share;
     sync_phasor();
-    trips += 1u;
+    iterations += 1u;
     expand();
     set_offsets();
     motion.bound =
         derivative_bound(120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
-    if tally.mode >= MODE_DIP {
+    if tally.mode >= MODE_ONSET {
         pressing_bound =
             derivative_bound(5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
     }
@@ -257,13 +287,16 @@ fn careful() -> bool {
             balanced = most;
         }
     }
-    let mark = next_mark();
-    let part = to_mark(mark) * substeps;
-    let lands = part <= 1.0 && tally.step + 1u == mark;
+    let stop = next_stop_phase();
+    let part = to_stop_phase(stop) * substeps;
+    let lands = part <= 1.0 && tally.step + 1u == stop;
     let len = min(part, Real(1.0));
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
     let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
     let found = first_event(len, here.growth, order);
+    if tally.mode >= MODE_ONSET && crosses_backlash(found.tau) {
+        tally.status = STATUS_TOO_STIFF;
+    }
     tally.passes_in_period += 1u;
     motion.q = state_at(found.tau, substeps);
     motion.bound += here.growth;
@@ -273,7 +306,7 @@ fn careful() -> bool {
     }
     advance_phase(found.tau * share);
     if lands && !found.event {
-        tally.step = mark;
+        tally.step = stop;
         motion.theta = 0.0;
     }
     check_finite();
@@ -286,7 +319,7 @@ fn careful() -> bool {
     if EXPONENT {
         carry_tangents(flown, found.tau);
     }
-    return tally.step >= mark;
+    return tally.step >= stop;
 }
 
 // Acts on what ends the flight at the present state, `tau` after the expansion.
@@ -306,19 +339,19 @@ fn act(second: bool, tau: Real) {
     }
     if mode == MODE_FREE {
         jump = contact(side, settling);
-    } else if mode < MODE_DIP {
+    } else if mode < MODE_ONSET {
         jump = end_meshing(side, settling, tau);
     } else if second {
-        jump = end_dip(side, tau);
+        jump = end_onset(side, tau);
     } else {
-        jump = emerge(side);
+        jump = onset_ends(side);
     }
     if jump.event {
         count_event(side);
     }
     tally.origin = side;
-    // Where pressing has ceased inside the dip, the gap is off the wall.
-    if !(mode >= MODE_DIP && second) {
+    // Where pressing has ceased inside the contact onset, the gap is off the wall.
+    if !(mode >= MODE_ONSET && second) {
         tally.order = select(1u, 2u, motion.q[1] == 0.0);
     }
     if jump.mode != mode {

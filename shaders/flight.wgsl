@@ -18,12 +18,12 @@ fn room(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real
 }
 
 // Why a scan ended.
-const SCAN_CAREFUL: u32 = 0u; // the next step needs a careful look
+const SCAN_CAREFUL: u32 = 0u; // the next step needs a careful pass
 const SCAN_BUDGET: u32 = 1u; // this dispatch has done its share
 
 fn scan() -> u32 {
-    // From rest on a wall, and through the dip, every step is a careful one.
-    if tally.order > 1u || tally.mode >= MODE_DIP {
+    // From rest on a wall, and through the contact onset, every step is a careful one.
+    if tally.order > 1u || tally.mode >= MODE_ONSET {
         return SCAN_CAREFUL;
     }
     let d = domain_of(tally.mode);
@@ -34,7 +34,7 @@ fn scan() -> u32 {
     let sine = here.turn_sin;
     let share = here.share;
     let substeps = here.substeps;
-    let mark = next_mark();
+    let stop = next_stop_phase();
     // Meshing measures from its wall and has but one.
     var low = walls[1];
     var high = walls[0];
@@ -68,18 +68,18 @@ fn scan() -> u32 {
     let price = select(1u, 5u, tally.tangent_count > 1u);
     var verdict = SCAN_CAREFUL;
     loop {
-        if trips >= settings.trips {
+        if iterations >= settings.iterations {
             verdict = SCAN_BUDGET;
             break;
         }
-        // The mark must not be stepped over.
+        // The stop phase must not be stepped over.
         let next_theta = theta + share;
         let wraps = next_theta >= 1.0;
         let next_n = n + select(0u, 1u, wraps);
-        if next_n >= mark {
+        if next_n >= stop {
             break;
         }
-        trips += price;
+        iterations += price;
         let z1 = z + (((m[0] * z + m[1] * w) + (m[2] * x + m[3] * v)) + ((m[4] * c + m[5] * s) + m[6]));
         let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + m[13]));
         let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + m[20]));

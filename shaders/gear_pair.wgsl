@@ -85,8 +85,8 @@ struct Jump {
 // The gradient of the gap.
 const ALONG_GAP = array<Real, 4>(1.0, 0.0, 0.0, 0.0);
 
-// Approach speeds below this, with the load pulling away, count as near grazing.
-const GRAZING_SPEED: Real = 1e-4;
+// Approach speeds below this, relative to `speed` and with the load pulling away, count as near grazing.
+const GRAZING_SPEED: Real = 4e-5;
 
 // Free motion reaches a wall: the impact law, then meshing or not. The gap is on the wall.
 fn contact(side: u32, settling: bool) -> Jump {
@@ -105,14 +105,14 @@ fn contact(side: u32, settling: bool) -> Jump {
         return jump;
     }
     jump.event = true;
-    if !pressed && approach < GRAZING_SPEED * h {
+    if !pressed && approach < GRAZING_SPEED * speed {
         tally.grazes += 1u;
     }
     motion.q = after;
     if pressed && leaving <= law.mesh_speed * h {
         after[0] = 0.0;
         if presses(meshing_pull(side), side, after) {
-            jump.mode = select(MODE_PRESSED, MODE_DIP, leaving > 0.0) + side;
+            jump.mode = select(MODE_SUSTAINED, MODE_ONSET, leaving > 0.0) + side;
             motion.q = after;
             return jump;
         }
@@ -139,20 +139,20 @@ fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
     return jump;
 }
 
-// Pressing ceases inside the dip, `tau` after the expansion: the event function is the
+// Pressing ceases inside the contact onset, `tau` after the expansion: the event function is the
 // acceleration itself.
-fn end_dip(side: u32, tau: Real) -> Jump {
+fn end_onset(side: u32, tau: Real) -> Jump {
     let row = here.gap_row;
     let normal = array<Real, 4>(row[0], here.share * row[1], row[2], here.share * row[3]);
     motion.q[0] += walls[side];
     return Jump(true, MODE_FREE, normal, here.substeps * pressing_jet(tau).y, 1.0, 0.0, 0.0);
 }
 
-// The dip is over; no event.
-fn emerge(side: u32) -> Jump {
+// The contact onset is over; no event.
+fn onset_ends(side: u32) -> Jump {
     let sign = sign_of(side);
     motion.q[1] = sign * max(sign * motion.q[1], Real(0.0));
-    return Jump(false, MODE_PRESSED + side, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
+    return Jump(false, MODE_SUSTAINED + side, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
 }
 
 fn count_event(side: u32) {

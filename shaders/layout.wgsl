@@ -1,4 +1,4 @@
-// Everything that lies in buffers. The host's twins are in src/gpu/layout.rs; a test
+// Everything that lies in buffers. The host's side is in src/gpu/layout.rs; a test
 // compares the offsets. A struct holds either Reals or u32s alone, so that both precisions
 // have the same shape. Constants that no shader declares come from src/gpu/rules.rs and shader.rs.
 
@@ -35,6 +35,8 @@ struct Flow {
     kick: Real,
     // Length of a free step.
     h: Real,
+    // What speeds are measured by: half the walls' distance times the rate of free motion, per free step.
+    speed: Real,
     // Infinite series of impacts are closed once they last less than this, in free steps.
     closing: Real,
     // Contact-free motion: its steady state at phase 0 in lane units, the size of transients
@@ -70,7 +72,7 @@ struct Settings {
     // Lanes that the buffers have room for, lanes under way, and where those of them begin that are
     // at their starts.
     slots: u32,
-    rostered: u32,
+    active_lanes: u32,
     fresh: u32,
     // Forcing periods to integrate, and the most that undecided lanes get.
     periods: u32,
@@ -79,8 +81,8 @@ struct Settings {
     chaos_from: u32,
     // Standard errors by which the exponent must exceed zero then.
     chaos_errors: f32,
-    // Loop trips that one dispatch may spend on a lane.
-    trips: u32,
+    // Loop iterations that one dispatch may spend on a lane.
+    iterations: u32,
     // Passes (scan steps and careful steps) allowed in one period.
     passes_per_period: u32,
     // Events allowed in one period.
@@ -94,7 +96,7 @@ struct Settings {
     // Periods before the exponent is accumulated, and periods per block of it.
     exponent_from: u32,
     exponent_block: u32,
-    // Longest period looked for; 0 looks for none.
+    // Longest period searched for; 0 searches for none.
     max_period: u32,
     // 1: lanes end once they are decided.
     early_stop: u32,
@@ -134,6 +136,8 @@ struct Seen {
     anchor: array<Real, 4>,
     // Where Newton's method set out from.
     home: array<Real, 4>,
+    // The strobe one cycle before that.
+    before_home: array<Real, 4>,
     // Largest position and rate at strobes: the unit of distances.
     position_scale: Real,
     rate_scale: Real,
@@ -195,10 +199,10 @@ struct TallyNow {
 
 // What strobes have noted of it.
 struct Noted {
-    // 1 once a cycle is being read or has been, and its period if it attracts.
+    // 1 once a cycle is being read or has been, and its period if it is stable.
     has_read: u32,
     cycle: u32,
-    // Cycles that were read in vain.
+    // Cycles that were read without success.
     tries: u32,
     // Period at which counting began.
     counted_from: u32,
@@ -206,11 +210,13 @@ struct Noted {
     blocks: u32,
     block_periods: u32,
     // Recurrence: when the anchor was taken, lags of this window, for how many windows the candidate
-    // has contracted, lags that the last window held.
+    // has contracted, lags that the last window held, events in it, and events before the present one.
     anchor_period: u32,
     window: u32,
     streak: u32,
     known_lags: u32,
+    known_events: u32,
+    events_before: u32,
     // 1 if the candidate's limit is near.
     settled: u32,
     // In quarter octaves below 1: distance of the cycle from its mirror image; how far the
@@ -228,11 +234,13 @@ struct Noted {
     // The divisor of its period after which it came nearest to its start, and how near.
     divisor: u32,
     divisor_apart: u32,
-    // Times that Newton's method led nowhere; 1 while a divisor is read because its multiple might be
-    // it, and the divisor whose cycle then was found not to attract.
-    vain: u32,
+    // Times that Newton's method led nowhere, and that the motion was not seen to approach the cycle that it led to;
+    // 1 while a divisor is read because its multiple might be it, and the divisor whose cycle then was found not to
+    // attract.
+    failed_searches: u32,
+    doubted: u32,
     asked: u32,
-    refuted: u32,
+    rejected_divisor: u32,
     // How far its cycle is from the lane by the derivative, in quarter octaves below 1.
     off: u32,
 }
@@ -278,7 +286,7 @@ struct Finding {
     word: array<u32, 7>,
 }
 
-// Slots of lanes: first the roster, those under way in the order in which they were begun; from `slots` on those of
+// Slots of lanes: first the active list, those under way in the order in which they were begun; from `slots` on those of
 // them that a variant has work for, or that have ended.
 struct Queue {
     // How many the latter are, and how often they have been counted: a device that stands still does not.
@@ -307,18 +315,9 @@ const STAGE_DONE: u32 = 3u;
 @group(0) @binding(12) var<storage, read_write> starts_of_blocks: array<u32>;
 
 const MODE_FREE: u32 = 0u;
-const MODE_PRESSED: u32 = 1u; // + side
-const MODE_DIP: u32 = 3u; // + side
+const MODE_SUSTAINED: u32 = 1u; // + side
+const MODE_ONSET: u32 = 3u; // + side
 
 const SIDE_RIGHT: u32 = 0u;
 const SIDE_LEFT: u32 = 1u;
 const SIDE_NONE: u32 = 2u;
-
-const STATUS_OK: u32 = 0u;
-const STATUS_SLOW: u32 = 1u;
-const STATUS_NEAR_GRAZING: u32 = 2u;
-const STATUS_STROBE_ON_EVENT: u32 = 3u;
-const STATUS_CAP_EVENTS: u32 = 4u;
-const STATUS_CAP_ROOT: u32 = 5u;
-const STATUS_TOO_STIFF: u32 = 6u;
-const STATUS_NON_FINITE: u32 = 7u;

@@ -1,4 +1,4 @@
-// What a lane is: what is looked at, counted and read at phase 0.
+// What a lane does at phase 0: what it checks, counts and reads.
 
 // Phase 0: a forcing period is complete.
 fn begin_period() {
@@ -35,15 +35,15 @@ fn begin_period() {
     let early = settings.early_stop == 1u;
     if read_by <= settings.longest && (is_due || (decided && early)) {
         begin_reading();
-    } else if early && is_quiet() {
-        end_quiet();
+    } else if early && is_non_impacting() {
+        end_non_impacting();
     } else if tally.period >= settings.longest || (early && is_chaos()) {
         tally.stage = STAGE_DONE;
     }
 }
 
 // The energy of the transient keeps the gap off the walls for good.
-fn is_quiet() -> bool {
+fn is_non_impacting() -> bool {
     if tally.mode != MODE_FREE || settings.max_period == 0u {
         return false;
     }
@@ -53,7 +53,7 @@ fn is_quiet() -> bool {
 }
 
 // Contact-free motion of period 1, with nothing left to read.
-fn end_quiet() {
+fn end_non_impacting() {
     begin_counting();
     noted.cycle = 1u;
     seen.cycle_growth = flows[cell.flow_index].decay;
@@ -63,6 +63,8 @@ fn end_quiet() {
 // Averages start here.
 fn begin_counting() {
     tally.impacts = 0u;
+    // So that what a window has counted stays right.
+    noted.events_before -= tally.events;
     tally.events = 0u;
     tally.grazes = 0u;
     tally.on_strobe = 0u;

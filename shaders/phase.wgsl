@@ -34,9 +34,9 @@ fn advance_phase(part: Real) {
     }
 }
 
-// Free steps to the next mark, as far as one step can see: 1 stands for "one or more".
-fn to_mark(mark: u32) -> Real {
-    if tally.step + 1u < mark {
+// Free steps to the next stop phase, as far as one step can see: 1 stands for "one or more".
+fn to_stop_phase(stop: u32) -> Real {
+    if tally.step + 1u < stop {
         return 1.0;
     }
     return 1.0 - motion.theta;
@@ -44,7 +44,7 @@ fn to_mark(mark: u32) -> Real {
 
 // The step at which the lane must land: phase 0, or half a period where a cycle is read that
 // may be its own mirror image and stands halfway.
-fn next_mark() -> u32 {
+fn next_stop_phase() -> u32 {
     let steps = shape.steps;
     let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
     return select(steps, steps / 2u, halfway && tally.step < steps / 2u);

@@ -12,7 +12,7 @@ const ULP: Real = 6e-8;
 // Steps are not halved below this: what touches a wall there does so within rounding, unless it is seen
 // to go through; then not below this.
 const SHORTEST: Real = 0.001;
-const BRIEFEST: Real = 1e-6;
+const SHORTEST_STEP: Real = 1e-6;
 // States beyond this are taken for a loss of finiteness.
 const HUGE: Real = 1e15;
 

@@ -12,7 +12,7 @@ const ULP: Real = 1.2e-16;
 // Steps are not halved below this: what touches a wall there does so within rounding, unless it is seen
 // to go through; then not below this.
 const SHORTEST: Real = 1e-8;
-const BRIEFEST: Real = 1e-14;
+const SHORTEST_STEP: Real = 1e-14;
 // States beyond this are taken for a loss of finiteness.
 const HUGE: Real = 1e150;
 

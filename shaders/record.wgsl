@@ -48,7 +48,7 @@ fn last_status() -> u32 {
     }
     if noted.has_read == 0u || noted.cycle == 0u {
         let is_open = settings.max_period > 0u && noted.cycle == 0u && EXPONENT && noted.blocks > 1u;
-        return select(STATUS_OK, STATUS_SLOW, is_open && (departs(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
+        return select(STATUS_OK, STATUS_SLOW, is_open && (escapes(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
     }
     if tally.grazes > 0u {
         return STATUS_NEAR_GRAZING;
@@ -56,7 +56,10 @@ fn last_status() -> u32 {
     if tally.on_strobe > 0u {
         return STATUS_STROBE_ON_EVENT;
     }
-    return select(STATUS_SLOW, STATUS_OK, is_near_cycle());
+    if !is_near_cycle() {
+        return STATUS_SLOW;
+    }
+    return select(STATUS_OK, STATUS_BELOW_RESOLUTION, hides_period());
 }
 
 fn mesh_fraction(periods: u32) -> Real {
@@ -69,12 +72,12 @@ fn mesh_fraction(periods: u32) -> Real {
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
     // Contact-free motion has not been read. On a slow approach, or where rounding is amplified, a lost
-    // symmetry cannot be told from one not reached, unless it is lost by far. Every impact has a twin on a
+    // symmetry cannot be told from one not reached, unless it is lost by far. Every impact has an image on a
     // cycle that is its own mirror image.
     if SYMMETRY && shapes[cell.flow_index].mirror == 1u {
-        let has_twins = tally.impacts % 2u == 0u;
-        let is_symmetric = noted.has_read == 0u || (is_surely_symmetric() && has_twins);
-        if is_symmetric || !has_twins || is_surely_unsymmetric() {
+        let has_conjugate = tally.impacts % 2u == 0u;
+        let is_symmetric = noted.has_read == 0u || (is_surely_symmetric() && has_conjugate);
+        if is_symmetric || !has_conjugate || is_surely_unsymmetric() {
             (*finding).valid |= VALID_SYMMETRIC;
             (*finding).symmetric = select(0u, 1u, is_symmetric);
         }

@@ -14,12 +14,12 @@ const SLOW: u32 = 48u;
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Lags of any window, at least: they are a fifth of the time that has passed, or a few cycles.
+// Lags of any window, at least: they are a share of the time that has passed, or a few cycles.
 const LEAST_WINDOW: u32 = 2u;
 // Windows need not be longer than so many cycles that contract.
 const LAGS_PER_CYCLE: u32 = 4u;
 
-// Looks at a strobe; true once a period is confirmed.
+// Checks a strobe; true once a period is confirmed.
 fn recurs() -> bool {
     let q = strobe_state();
     widen_scales(q);
@@ -37,6 +37,7 @@ fn recurs() -> bool {
     let is_fast = found > 0u && shrinks(found);
     let settled = judge_lag(found);
     noted.known_lags = noted.window;
+    noted.known_events = tally.events - noted.events_before;
     tallies[lane].last_distances = tallies[lane].distances;
     // The next anchor lies at the same place of the cycle: only there do distances compare. The
     // points of a cycle may be so close that a shorter lag seems to recur.
@@ -65,7 +66,7 @@ fn narrow_scales(q: array<Real, 4>) {
 }
 
 fn widest() -> u32 {
-    return clamp(tally.period / 5u, LEAST_WINDOW, settings.max_period);
+    return clamp(tally.period / WINDOW_SHARE, LEAST_WINDOW, settings.max_period);
 }
 
 // The lag that recurs best; a longer one must be better by a factor of four.
@@ -77,7 +78,7 @@ fn closest_of(lags: u32) -> u32 {
     var best = 0u;
     var distance = NEAR;
     for (var lag = 1u; lag <= lags; lag++) {
-        trips += 1u;
+        iterations += 1u;
         if distance_at(lag) >= distance {
             best = lag;
             distance = distance_at(lag) + 8u;
@@ -99,6 +100,7 @@ fn begin_window(q: array<Real, 4>, lags: u32) {
     seen.anchor = q;
     noted.anchor_period = tally.period;
     noted.window = min(lags, settings.max_period);
+    noted.events_before = tally.events;
     tallies[lane].distances = array<u32, 16>();
 }
 
@@ -125,7 +127,7 @@ fn contracting_lag() -> u32 {
     // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
     let best = closest_of(noted.window);
     for (var lag = 1u; lag <= min(noted.window, noted.known_lags); lag++) {
-        trips += 1u;
+        iterations += 1u;
         let now = distance_at(lag);
         let before = last_distance_at(lag);
         let contracts = shrinks(lag) || (now >= SLOW && now >= before && lag == best);
@@ -134,7 +136,7 @@ fn contracting_lag() -> u32 {
         }
         var kept = true;
         for (var multiple = 2u * lag; multiple <= noted.window; multiple += lag) {
-            trips += 1u;
+            iterations += 1u;
             kept = kept && distance_at(multiple) >= NEAR;
         }
         if kept {
@@ -168,7 +170,7 @@ fn is_refinable(lag: u32) -> bool {
     let now = f32(distance_at(lag));
     let shrunk = now - f32(last_distance_at(lag));
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), SLOWEST, 1.0);
-    return EXPONENT && noted.vain < VAIN && settings.early_stop == 1u && now >= REFINABLE - OCTAVE * log2(away);
+    return EXPONENT && noted.failed_searches < MOST_FAILED_SEARCHES && settings.early_stop == 1u && now >= REFINABLE + 8.0 * f32(noted.doubted) - OCTAVE * log2(away);
 }
 
 // Natural logarithm of a quarter octave.
@@ -184,7 +186,7 @@ fn judge_lag(found: u32) -> bool {
     }
     noted.streak = select(1u, noted.streak + 1u, found == tally.candidate);
     tally.candidate = found;
-    // Weak chaos contracts by chance, the oftener it is looked at: ask for more of it.
+    // Weak chaos contracts by chance, the oftener it is checked: ask for more of it.
     let windows = STREAK + noted.tries + select(0u, 2u, grows(CHAOS_ERRORS));
     let has_contracted = noted.streak >= windows;
     noted.settled = select(0u, 1u, has_contracted && has_settled(found));

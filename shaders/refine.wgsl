@@ -6,12 +6,13 @@
 fn refine(to: array<Real, 4>) -> bool {
     if noted.refinements == 0u {
         seen.home = strobe_state();
+        seen.before_home = seen.anchor;
         noted.home_mode = tally.mode;
         noted.home_origin = tally.origin;
     }
     let stalls = noted.refinements > 0u && noted.apart < noted.apart_before + SHRUNK;
     let is_over = noted.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
-    if stalls || is_over || tally.mode >= MODE_DIP || tally.order > 0u {
+    if stalls || is_over || tally.mode >= MODE_ONSET || tally.order > 0u {
         return false;
     }
     if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, seen.home) < Real(REACH)) {
@@ -49,9 +50,65 @@ fn is_own() -> bool {
     return branch() == noted.branch && (tally.grazes == 0u || noted.refinements == 0u);
 }
 
-// Whether the gap may be there in the present domain, at a phase that is no event's. Dips have no bounds.
+// Departures from the linear map, as a share of the deviation, that are still small.
+const LINEAR: Real = 0.2;
+
+// Cycles ahead whose deviations must be no larger than the one seen: what is not normal in the matrix may grow before
+// it shrinks.
+const CYCLES_AHEAD: u32 = 64u;
+
+// Whether the motion approaches the cycle that Newton's method has led to: a cycle that is stable need not attract it.
+// The last window must have had the events of that cycle, the last cycle before must have moved the motion as its
+// monodromy matrix says, and those to come must not take it farther away.
+fn is_approached(to: array<Real, 4>) -> bool {
+    if noted.refinements == 0u {
+        return true;
+    }
+    if noted.known_events * tally.candidate != tally.events * noted.known_lags {
+        return false;
+    }
+    let before = difference(seen.before_home, to);
+    let present = difference(seen.home, to);
+    let size = size_of(before);
+    if noted.asked == 1u {
+        // One cycle of the multiple is several of this one.
+        return size_of(present) < size;
+    }
+    if size_of(difference(present, image_of(before))) > LINEAR * size + Real(noise()) {
+        return false;
+    }
+    var ahead = present;
+    for (var n = 0u; n < CYCLES_AHEAD; n++) {
+        iterations += 1u;
+        ahead = image_of(ahead);
+        if size_of(ahead) > size {
+            return false;
+        }
+    }
+    return true;
+}
+
+fn difference(a: array<Real, 4>, b: array<Real, 4>) -> array<Real, 4> {
+    return array<Real, 4>(a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]);
+}
+
+fn size_of(u: array<Real, 4>) -> Real {
+    return distance_between(u, array<Real, 4>(0.0, 0.0, 0.0, 0.0));
+}
+
+// What the monodromy matrix makes of a deviation.
+fn image_of(u: array<Real, 4>) -> array<Real, 4> {
+    var image: array<Real, 4>;
+    for (var i = 0u; i < 4u; i++) {
+        image[i] = (motions[lane].tangents[i] * u[0] + motions[lane].tangents[i + 4u] * u[1])
+            + (motions[lane].tangents[i + 8u] * u[2] + motions[lane].tangents[i + 12u] * u[3]);
+    }
+    return image;
+}
+
+// Whether the gap may be there in the present domain, at a phase that is no event's. A contact onset has no bounds.
 fn keeps_domain(to: array<Real, 4>) -> bool {
-    return tally.mode >= MODE_DIP || beyond(to) < 0.0;
+    return tally.mode >= MODE_ONSET || beyond(to) < 0.0;
 }
 
 // How far beyond the nearest end of the present domain the gap is there.

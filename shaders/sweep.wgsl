@@ -9,8 +9,8 @@ var<private> seen: Seen;
 var<private> noted: Noted;
 // Index of this lane.
 var<private> lane: u32;
-// Loop trips of this dispatch.
-var<private> trips: u32;
+// Loop iterations of this dispatch.
+var<private> iterations: u32;
 
 // The sum of sizes: a NaN among them makes it one.
 fn sum_of_sizes(q: array<Real, 4>) -> Real {
@@ -45,7 +45,7 @@ fn take_up(i: u32) {
     cell = cells[i];
     motion = motions[i].now;
     tally = tallies[i].now;
-    trips = 0u;
+    iterations = 0u;
     if KEEP {
         seen = motions[i].seen;
         noted = tallies[i].noted;
@@ -61,7 +61,7 @@ fn put_down() {
     }
 }
 
-// Before a strobe is looked at, and after: from one to the next, registers are for steps.
+// Before a strobe is checked, and after: from one to the next, registers are for steps.
 fn recall() {
     if !KEEP {
         seen = motions[lane].seen;
@@ -76,11 +76,11 @@ fn remember() {
     }
 }
 
-// From event to event to the next mark; false if the lane or its share of this dispatch ends
+// From event to event to the next stop phase; false if the lane or its share of this dispatch ends
 // before. Lanes wait for each other where chatter begins, too.
-fn flight_to_mark() -> bool {
+fn fly_to_stop_phase() -> bool {
     if CHATTER {
-        while running() && trips < settings.trips {
+        while running() && iterations < settings.iterations {
             if flight_to_chatter() {
                 return true;
             }
@@ -94,10 +94,10 @@ fn flight_to_mark() -> bool {
     return false;
 }
 
-// From event to event to the next mark, or to an impact from which chatter is to be followed.
+// From event to event to the next stop phase, or to an impact from which chatter is to be followed.
 fn flight_to_chatter() -> bool {
     chatters = false;
-    while running() && !chatters && trips < settings.trips {
+    while running() && !chatters && iterations < settings.iterations {
         if scan() == SCAN_BUDGET {
             break;
         }
@@ -124,10 +124,10 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
         // A start: no pass has bounded it yet.
         renew_bound();
     }
-    // Scanning, acting and looking at strobes are separate, so that lanes scan together, act
-    // together and look together.
-    while running() && trips < settings.trips {
-        if flight_to_mark() {
+    // Scanning, acting and checking strobes are separate, so that lanes scan together, act
+    // together and check together.
+    while running() && iterations < settings.iterations {
+        if fly_to_stop_phase() {
             recall();
             if tally.step >= shape.steps {
                 begin_period();

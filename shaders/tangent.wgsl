@@ -99,7 +99,7 @@ fn keep_tangent() {
     }
 }
 
-// Carries the monodromy's columns over full steps; each costs a trip per vector.
+// Carries the monodromy's columns over full steps; each costs an iteration per vector.
 fn step_columns(count: u32) {
     if tally.tangent_count <= 1u {
         return;
@@ -144,7 +144,7 @@ var<private> crossing: Crossing;
 fn carry_tangents(flown: Pull, tau: Real) {
     let back = 1.0 / flown.share;
     for (var i = 0u; i < tally.tangent_count; i++) {
-        trips += 1u;
+        iterations += 1u;
         var u = tangent(i);
         u[1] *= flown.share;
         u[3] *= flown.share;
@@ -240,7 +240,7 @@ fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     let jump = crossing.jump;
     let before = crossing.before;
     let after = crossing.after;
-    let inverse = select(1.0 / jump.rate, Real(0.0), abs(jump.rate) < NO_RATE);
+    let inverse = select(1.0 / jump.rate, Real(0.0), abs(jump.rate) < NO_SPEED * speed);
     let along = inverse * ((jump.normal[0] * u[0] + jump.normal[1] * u[1]) + (jump.normal[2] * u[2] + jump.normal[3] * u[3]));
     // The first row is the quotient of the gap's rates; as a sum it would lose what a small `e` keeps.
     return array<Real, 4>(
@@ -263,8 +263,8 @@ fn close(u: array<Real, 4>) -> array<Real, 4> {
     return array<Real, 4>(0.0, behind, x + crossing.lasts * v, v + (gained - kick * behind));
 }
 
-// Rates below this at an event leave the linearisation without meaning.
-const NO_RATE: Real = 1e-14;
+// Rates below this at an event, relative to `speed`, leave the linearisation without meaning.
+const NO_SPEED: Real = 1e-14;
 
 // Growth of the one vector since the last strobe, in octaves; it is given unit length.
 fn renormalise() -> Real {

@@ -13,8 +13,8 @@ fn note_symbol(side: u32) {
         return;
     }
     let n = tally.word_length;
-    if WORD && n < 70u {
-        tallies[lane].word[n / 10u] |= symbol << (3u * (n % 10u));
+    if WORD && n < 7u * SYMBOLS_PER_NUMBER {
+        tallies[lane].word[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
     }
     tally.word_length = n + 1u;
     take_symbol(symbol);

@@ -1,52 +1,60 @@
 //! Parameter maps of vibro-impact oscillators.
 //!
-//! Modules in the order in which data flows through them, a layer at a time: a scene says what
-//! is asked ([`scene`]) of which oscillator ([`model`]); its flow is solved in closed form
-//! ([`flow`]), the reference jumps from event to event on it ([`mod@reference`]), and what it
-//! meets is read as an orbit ([`orbit`], [`word`], [`stability`]). A map's cells are numbered
-//! ([`plan`]) and put in order ([`schedule`]), go through an engine ([`engine`], [`sweep`]),
-//! the reference or lanes on a graphics device with a grid of their own ([`gpu`]), and come back
-//! as records ([`record`], [`classify`], [`coexistence`]); a sample of them is replayed
-//! ([`mod@validate`]). Over one axis it is a bifurcation diagram ([`bifurcation`]). All of it is
-//! written down ([`output`]); [`mod@bench`] measures it.
+//! A layer a module, each on top of those below it:
+//!
+//! | layer | what it is |
+//! | --- | --- |
+//! | [`cli`] | arguments and commands |
+//! | [`output`] | files: one per format |
+//! | [`mod@validate`] | how right is a finished map |
+//! | [`map`] | many motions: scene, plan, schedule, engines |
+//! | [`gpu`] | the host's side of lanes |
+//! | [`record`] | what an engine hands back per cell, and its classes |
+//! | [`dynamics`] | one motion, exactly: a package of its own |
+//!
+//! A map of any [`model`] in a few lines:
+//!
+//! ```
+//! use rattlemap::map::scene::{Quantity, Scene};
+//! use rattlemap::map::{self, Processor};
+//! use rattlemap::model::Stops;
+//!
+//! let model = Stops { r: 0.1, k: 1.0, ..Stops::with_restitution(0.8) };
+//! let scene = Scene::builder(model)
+//!     .axis("F", 0.2..=2.0, 6)
+//!     .axis("omega", 0.5..=1.5, 6)
+//!     .quantities(&[Quantity::Class, Quantity::Impacts])
+//!     .build()?;
+//! let map = map::run(&scene, Processor::Cpu)?;
+//! for cell in map.cells() {
+//!     let [force, omega] = cell.values;
+//!     println!("{force} {omega}: {:?}, {} impacts", cell.class, cell.record.impacts_per_period);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![warn(clippy::print_stderr, clippy::print_stdout, reason = "output goes where the caller says")]
 
-mod fused;
-pub mod limits;
-mod random;
+pub use rattlemap_dynamics as dynamics;
+pub use rattlemap_dynamics::{certificate, flow, model, orbit, reference, stability, word};
 
-pub mod model;
-pub mod scene;
-
-pub mod certificate;
-pub mod flow;
-pub mod reference;
-
-pub mod orbit;
-pub mod stability;
-pub mod word;
-
-pub mod plan;
-pub mod schedule;
-pub mod size;
-
-pub mod engine;
-pub mod gpu;
-pub mod sweep;
-
-pub mod classify;
-pub mod coexistence;
 pub mod record;
 
-pub mod bifurcation;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+
+pub mod map;
+
+#[cfg(feature = "gpu")]
 pub mod validate;
 
+#[cfg(feature = "figures")]
 pub mod output;
 
-pub mod bench;
+#[cfg(feature = "cli")]
+pub mod cli;
 
-/// Compiles and runs the README's example as a doctest.
+/// Compiles and runs the README's examples as doctests.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

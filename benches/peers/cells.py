@@ -1,4 +1,4 @@
-"""Cells as `rattlemap bench work-precision` exports them, and how far off an answer is."""
+"""Cells as `rattlemap-bench work-precision` exports them, and how far off an answer is."""
 
 import json
 import math

@@ -1,9 +1,10 @@
-"""Peers on the cells of `rattlemap bench work-precision`, in turns with its one-core engine.
+"""Peers on the cells of `rattlemap-bench work-precision`, in turns with its one-core engine.
 
 usage: measure.py BINARY FOLDER [--rounds N] [--quick]
 
 Asks BINARY for the cells, times every method once per round, one after the other on one core,
-and writes FOLDER/peers.csv: rows for the command's `--peers`.
+and writes FOLDER/peers.csv: rows for the command's `--peers`. heyoka's compiled steps alone, as many with
+walls out of reach, go to FOLDER/steps.csv: they find no event, so they have a time and no error.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import heyoka
 import numba
+import numpy as np
 
 import cells as cell_files
 import heyoka_events
@@ -23,6 +25,8 @@ import rk4_numba
 
 NUMBA_STEPS = (128, 256, 512, 1024, 2048)
 HEYOKA_TOLERANCES = (1e-9, 1e-12)
+# Lanes side by side in heyoka's compiled steps.
+BATCHES = (1, 4, 8)
 # Least time of a measurement, in seconds: the cells are run again until it has passed.
 LEAST = 0.2
 
@@ -72,13 +76,43 @@ class Heyoka:
             results.append((q, [t % period for t in heyoka_events.events[:-3:-1]]))
         return results
 
+    def step_counts(self):
+        """Steps that each lane takes."""
+        counts = []
+        for parameters, start, until, _ in self.work:
+            self.integrator.integrate(parameters, start, until)
+            counts.append(self.integrator.steps)
+        return counts
+
+
+class Steps:
+    """heyoka without events, and so without Python callbacks: as many steps as each lane takes with them."""
+
+    def __init__(self, heyoka_with_events, batch):
+        self.tolerance, self.batch = heyoka_with_events.tolerance, batch
+        self.integrator = heyoka_events.Steps(self.tolerance, batch)
+        lanes = list(zip(heyoka_with_events.work, heyoka_with_events.step_counts()))
+        self.work = []
+        for at in range(0, len(lanes), batch):
+            # A batch that is not full repeats its last lane, which counts as nothing; all take the most steps.
+            group = lanes[at : at + batch]
+            group += group[-1:] * (batch - len(group))
+            parameters, starts = (np.array([work[i] for work, _ in group]).T for i in (0, 1))
+            if batch == 1:
+                parameters, starts = parameters[:, 0], starts[:, 0]
+            self.work.append((parameters, starts, max(steps for _, steps in group)))
+
+    def run(self):
+        if not all([self.integrator.integrate(*work) for work in self.work]):
+            raise RuntimeError("heyoka's steps met a wall that is out of reach")
+
 
 class Reference:
     """Our one-core engine, which times itself without its start."""
 
     def __init__(self, binary, folder):
         self.folder = Path(folder) / "reference"
-        self.command = [binary, "bench", "work-precision", "--methods", "reference", "--rounds", "1"]
+        self.command = [binary, "work-precision", "--methods", "reference", "--rounds", "1"]
         self.command += ["--out", str(self.folder), "--force", "--quiet"]
 
     def seconds(self):
@@ -137,16 +171,18 @@ def main():
     reference.seconds()
     cells = cell_files.read(reference.folder / "cells.json")
     steps, tolerances = (NUMBA_STEPS, HEYOKA_TOLERANCES) if not ask.quick else (NUMBA_STEPS[:1], HEYOKA_TOLERANCES[:1])
-    methods = [Numba(n, cells) for n in steps] + [Heyoka(tolerance, cells) for tolerance in tolerances]
+    with_events = [Heyoka(tolerance, cells) for tolerance in tolerances]
+    methods = [Numba(n, cells) for n in steps] + with_events
+    steps_alone = [Steps(method, batch) for method in with_events for batch in BATCHES]
     lane_periods = sum(cell.periods for cell in cells)
-    for method in methods:
+    for method in methods + steps_alone:
         method.run()  # compiles
 
-    times = {method: [] for method in methods}
+    times = {method: [] for method in methods + steps_alone}
     own = []
     for _ in range(1 if ask.quick else ask.rounds):
         own.append(reference.seconds())
-        for method in methods:
+        for method in methods + steps_alone:
             times[method].append(seconds_per_lane_period(method, lane_periods, 0.0 if ask.quick else LEAST))
 
     # Our engine as it was beside them: ratios are taken against this.
@@ -164,6 +200,19 @@ def main():
             f"{r['method']:<24} {setting!s:>8} {1e6 * float(r['seconds_per_lane_period']):10.3f} us per lane-period, "
             f"worst {float(r['state_error_worst']):.1e}, median {float(r['state_error_median']):.1e}, lost {r['lost']}"
         )
+    print(path)
+
+    path = Path(ask.folder) / "steps.csv"
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["tolerance", "batch", "seconds_per_lane_period", "fastest", "slowest"])
+        for method in steps_alone:
+            median = statistics.median(times[method])
+            writer.writerow([method.tolerance, method.batch, median, min(times[method]), max(times[method])])
+            print(
+                f"heyoka, no event within reach  {method.tolerance!s:>8}, {method.batch} at a time "
+                f"{1e6 * median:10.3f} us per lane-period"
+            )
     print(path)
 
 

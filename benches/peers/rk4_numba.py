@@ -2,10 +2,10 @@
 
 A step that ends beyond a wall is cut there: Newton's method on the step's length, each trial
 integrated anew from the start of the step, with bisection behind it; the rest of the step
-follows, so that strobes stay on the grid. A turning point inside a step is looked at on the
+follows, so that strobes stay on the grid. A turning point inside a step is checked on the
 step's cubic Hermite polynomial. After an event the root at the start is divided out.
-(Pressing that ceases inside the dip at the start of meshing ends it, too; the cells never do
-that, a unit test says.)
+(Pressing that ceases during contact onset ends meshing, too; the cells never do that, a unit
+test says.)
 """
 
 import math
@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-FREE, PRESSED, DIP = 0, 1, 2
+FREE, SUSTAINED, ONSET = 0, 1, 2
 EPS = 2.220446049250313e-16
 
 
@@ -55,13 +55,13 @@ def distance(mode, side, wall, b, z, w):
     """What is left until a flight ends at a wall, and its rate."""
     if mode == FREE:
         return b - wall * z, -wall * w
-    if mode == PRESSED:
+    if mode == SUSTAINED:
         return side * z - b, side * w
     return b - side * z, -side * w
 
 
 @njit(cache=True)
-def look(p, mode, side, wall, order, z, w, x, v, t, h, z1, w1):
+def find_ending(p, mode, side, wall, order, z, w, x, v, t, h, z1, w1):
     """How far into the step the distance is negative (nan: nowhere), and a first guess."""
     b = p[10]
     f0, s0 = distance(mode, side, wall, b, z, w)
@@ -135,7 +135,7 @@ def integrate(p, start, periods, steps):
     z, w, x, v = start
     mode, side = FREE, 1.0
     if abs(z) > b:
-        mode, side = PRESSED, math.copysign(1.0, z)
+        mode, side = SUSTAINED, math.copysign(1.0, z)
     # Wall and order of the root that the present step starts on.
     origin, order = 0.0, 0
     latest, before = math.nan, math.nan
@@ -153,11 +153,11 @@ def integrate(p, start, periods, steps):
                     q = part(p, mesh, side, z, w, x, v, t, rest)
                 wall = 1.0 if mode == FREE else side
                 own = order if origin == wall else 0
-                within, guess = look(p, mode, side, wall, own, z, w, x, v, t, rest, q[0], q[1])
+                within, guess = find_ending(p, mode, side, wall, own, z, w, x, v, t, rest, q[0], q[1])
                 if mode == FREE and math.isnan(within):
                     wall = -1.0
                     own = order if origin == wall else 0
-                    within, guess = look(p, mode, side, wall, own, z, w, x, v, t, rest, q[0], q[1])
+                    within, guess = find_ending(p, mode, side, wall, own, z, w, x, v, t, rest, q[0], q[1])
                 if math.isnan(within):
                     z, w, x, v = q
                     order = 0
@@ -174,10 +174,10 @@ def integrate(p, start, periods, steps):
                 if endings > 10_000:
                     return lost, (latest, before)
                 now = n * h + offset
-                if mode == DIP:
-                    mode = PRESSED
+                if mode == ONSET:
+                    mode = SUSTAINED
                     continue
-                if mode == PRESSED:
+                if mode == SUSTAINED:
                     if tau == 0.0 and side * w > 0.0:
                         continue
                     mode = FREE
@@ -199,5 +199,5 @@ def integrate(p, start, periods, steps):
                     meshing, _ = acceleration(p, 1.0, wall, z, w, x, v, cos)
                     if wall * free > 0.0 and wall * meshing > 0.0:
                         side = wall
-                        mode = DIP if leaving > 0.0 else PRESSED
+                        mode = ONSET if leaving > 0.0 else SUSTAINED
     return (z, w, x, v), (latest, before)

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
 # Peers beside the one-core engine on the same cells: a virtual environment with numba and
 # heyoka, then alternating rounds. Writes out/bench/peers/peers.csv, for
-# `rattlemap bench work-precision --peers`. Arguments go to measure.py: --rounds N, --quick.
+# `rattlemap-bench work-precision --peers`, and steps.csv. Arguments go to measure.py: --rounds N, --quick.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 environment="out/peers-venv"
-binary="target/release/rattlemap"
+binary="${CARGO_TARGET_DIR:-target}/release/rattlemap-bench"
 
 command -v python3 >/dev/null || { echo "error: python3 is missing" >&2; exit 1; }
-cargo build --release
+cargo build --release -p rattlemap-bench
 if ! cmp -s benches/peers/requirements.txt "$environment/installed.txt"; then
     python3 -m venv "$environment"
     "$environment/bin/pip" install --quiet --requirement benches/peers/requirements.txt

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use rattlemap::scene::{Purpose, Scene};
+use rattlemap::map::scene::{Purpose, Scene};
 
 fuzz_target!(|text: &str| {
     // Lines that look like `--set` arguments are some: values reach scenes in both ways.
@@ -14,7 +14,7 @@ fuzz_target!(|text: &str| {
             Ok(scene) => {
                 // Corner cells: ranges are convex.
                 let [first, last] = [0, 1].map(|end| {
-                    let index = |axis: &rattlemap::scene::Axis| end * (axis.count() - 1);
+                    let index = |axis: &rattlemap::map::scene::Axis| end * (axis.count() - 1);
                     scene.cell(&scene.axes().iter().map(index).collect::<Vec<_>>())
                 });
                 assert!(first.validate().is_ok() && last.validate().is_ok());

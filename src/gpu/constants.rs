@@ -4,15 +4,15 @@ use bytemuck::Zeroable;
 use nalgebra::{SMatrix, Vector2};
 
 use super::layout::{Domain, Flow};
-use crate::limits::MOST_STEPS;
-use crate::model;
+use crate::record::limits::MOST_STEPS;
+use rattlemap_dynamics::model;
 
 /// Largest angle, in radians, that the fastest mode may turn in one step: Taylor series and
 /// certificate of the shaders are laid out for it.
 pub const STEP_ANGLE: f64 = 1.0;
 
-/// Angle, in radians of the fastest free rate, below which a series of impacts is closed; the
-/// reference's, so that both count the same impacts before.
+/// Angle, in radians of the fastest free rate, below which a series of impacts is closed: what its limit leaves
+/// out is of third order in it. The reference's, so that both count the same impacts before.
 const CLOSING_ANGLE: f64 = 1.6e-4;
 
 /// Terms of the matrix exponential over one step; rates times steps are below 1.
@@ -80,17 +80,18 @@ impl Constants {
             walls: oscillator.walls,
             kick: kick(oscillator),
             h,
-            closing: closing(oscillator) / h,
+            speed: speed(oscillator) * h,
+            closing: CLOSING_ANGLE / free_rate(oscillator) / h,
             steady: [0.0; 4],
             reach: -1.0,
             decay: 0.0,
         };
-        if let Some(quiet) = model::Quiet::new(oscillator) {
+        if let Some(motion) = model::NonImpacting::new(oscillator) {
             let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses);
-            constants.flow.steady = constants.to_lane(quiet.steady());
+            constants.flow.steady = constants.to_lane(motion.steady());
             // In units of the free domain's energy form.
-            constants.flow.reach = h * ((g0 * g0 / m1 + g1 * g1 / m2) * quiet.reach()).sqrt();
-            constants.flow.decay = quiet.exponent() * period / std::f64::consts::LN_2;
+            constants.flow.reach = h * ((g0 * g0 / m1 + g1 * g1 / m2) * motion.reach()).sqrt();
+            constants.flow.decay = motion.exponent() * period / std::f64::consts::LN_2;
         }
         Some(constants)
     }
@@ -133,11 +134,15 @@ fn rate(oscillator: &model::Oscillator, domain: &model::Domain) -> f64 {
     (0.5 * damping + frequency.max(0.5 * damping)).max(oscillator.omega)
 }
 
-/// Longest infinite series of impacts that is closed in one jump: what its limit leaves out
-/// is of third order in it.
-fn closing(oscillator: &model::Oscillator) -> f64 {
+/// What speeds are measured by: half the walls' distance times the rate of free motion.
+pub(super) fn speed(oscillator: &model::Oscillator) -> f64 {
+    0.5 * (oscillator.walls[0] - oscillator.walls[1]) * free_rate(oscillator)
+}
+
+/// The rate of free motion that thresholds are measured by; the reference's, so that both mean the same.
+fn free_rate(oscillator: &model::Oscillator) -> f64 {
     let (damping, frequency) = norms(oscillator, &oscillator.free);
-    CLOSING_ANGLE / (damping + frequency).max(oscillator.omega)
+    (damping + frequency).max(oscillator.omega)
 }
 
 /// Spectral norms of a domain's mass-scaled damping, and the root of that of its stiffness.
@@ -270,7 +275,7 @@ mod tests {
     use nalgebra::Matrix4;
 
     use super::*;
-    use crate::model::GearPair;
+    use rattlemap_dynamics::model::GearPair;
 
     /// Underdamped, overdamped by the teeth and overdamped by a support.
     #[test]

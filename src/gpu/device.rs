@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::dispatch_policy::DispatchPolicy;
 use super::layout::{Motion, Tally};
-use super::rhythm::Rhythm;
 use super::{Gpu, GpuError, Precision};
 
 /// What narrows the adapters down in the environment: the first is wgpu's own.
@@ -207,8 +207,8 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
-    let rhythm = Rhythm::of(info.device_type);
-    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: None, rhythm, watcher: None })
+    let policy = DispatchPolicy::of(info.device_type);
+    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: None, policy, watcher: None })
 }
 
 /// What in the environment narrows the adapters down, as far as `choice` heeds it, and what to do about it; none

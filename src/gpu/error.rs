@@ -1,4 +1,4 @@
-//! Why a graphics device does not do what is asked, in words for users.
+//! Why a graphics device cannot do what is asked, in words for users.
 
 /// Why the engine could not do what was asked.
 #[derive(Debug, thiserror::Error)]

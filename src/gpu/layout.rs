@@ -1,4 +1,4 @@
-//! The host's twins of the structs in `shaders/layout.wgsl`.
+//! The host's side of the structs in `shaders/layout.wgsl`.
 //!
 //! Structs of reals are written once, in f64, and rounded number by number for the f32
 //! variant: they hold nothing else, so both precisions have the same shape.
@@ -43,6 +43,8 @@ pub struct Flow {
     pub kick: f64,
     /// Length of a free step.
     pub h: f64,
+    /// Half the walls' distance times the rate of free motion, per free step: what speeds are measured by.
+    pub speed: f64,
     /// Longest series of impacts that is closed in one jump, in free steps.
     pub closing: f64,
     /// Steady state of contact-free motion at phase 0, in lane units.
@@ -93,8 +95,8 @@ pub struct Cell {
 pub struct Settings {
     /// Lanes that the buffers have room for.
     pub slots: u32,
-    /// Lanes under way: the roster is as long.
-    pub rostered: u32,
+    /// Lanes under way: the active list is as long.
+    pub active_lanes: u32,
     /// Where those in it begin that are at their starts.
     pub fresh: u32,
     /// Forcing periods to integrate.
@@ -105,8 +107,8 @@ pub struct Settings {
     pub chaos_from: u32,
     /// Standard errors by which the exponent must exceed zero then.
     pub chaos_errors: f32,
-    /// Loop trips that one dispatch may spend on a lane.
-    pub trips: u32,
+    /// Loop iterations that one dispatch may spend on a lane.
+    pub iterations: u32,
     /// Passes allowed in one period.
     pub passes_per_period: u32,
     /// Events allowed in one period.
@@ -121,7 +123,7 @@ pub struct Settings {
     pub exponent_from: u32,
     /// Periods per block of the exponent.
     pub exponent_block: u32,
-    /// Longest period looked for; 0 looks for none.
+    /// Longest period searched for; 0 searches for none.
     pub max_period: u32,
     /// 1: lanes end once they are decided.
     pub early_stop: u32,
@@ -156,6 +158,8 @@ pub struct Motion {
     pub anchor: [f64; 4],
     /// Where Newton's method set out from.
     pub home: [f64; 4],
+    /// The strobe one cycle before that.
+    pub before_home: [f64; 4],
     /// Largest position at strobes.
     pub position_scale: f64,
     /// Largest rate at strobes.
@@ -224,9 +228,9 @@ pub struct Tally {
     pub on_strobe: u32,
     /// 1 once a cycle is being read or has been.
     pub has_read: u32,
-    /// Period of the cycle that was read, if it attracts.
+    /// Period of the cycle that was read, if it is stable.
     pub cycle: u32,
-    /// Cycles that were read in vain.
+    /// Cycles that were read without success.
     pub tries: u32,
     /// Period at which counting began.
     pub counted_from: u32,
@@ -242,6 +246,10 @@ pub struct Tally {
     pub streak: u32,
     /// Lags that the last window held.
     pub known_lags: u32,
+    /// Events in it.
+    pub known_events: u32,
+    /// Events before the present window.
+    pub events_before: u32,
     /// 1 if the candidate's limit is near.
     pub settled: u32,
     /// Distance of the cycle from its mirror image, in quarter octaves below 1.
@@ -265,11 +273,13 @@ pub struct Tally {
     /// How near, in quarter octaves below 1.
     pub divisor_apart: u32,
     /// Times that Newton's method led nowhere.
-    pub vain: u32,
+    pub failed_searches: u32,
+    /// Times that the motion was not seen to approach the cycle that Newton's method led to.
+    pub doubted: u32,
     /// 1 while a divisor is read because its multiple might be it.
     pub asked: u32,
-    /// The divisor whose cycle then was found not to attract.
-    pub refuted: u32,
+    /// The divisor whose cycle then was found unstable.
+    pub rejected_divisor: u32,
     /// How far its cycle is from the lane by the derivative, in quarter octaves below 1.
     pub off: u32,
     /// Distances per lag, in bytes.

@@ -13,7 +13,7 @@ use super::stage::Stage;
 use super::tables::Tables;
 use super::transfer::reals;
 use super::{Gpu, GpuError, Lane, LaneSettings};
-use crate::orbit::Status;
+use rattlemap_dynamics::orbit::Status;
 
 /// Slots that are sent again lest there be one more transfer.
 const WIDEST_GAP: usize = 1024;
@@ -27,7 +27,7 @@ pub struct Pool {
     most: usize,
     buffers: Option<Slots>,
     /// Slots of the lanes under way, in the order in which they were begun: neighbours behave alike.
-    roster: Vec<u32>,
+    active_list: Vec<u32>,
     /// Slots without a lane.
     free: Vec<u32>,
     /// By slot: the lane and its number.
@@ -35,8 +35,8 @@ pub struct Pool {
     /// What lies in the buffers, by slot.
     cells: Vec<Cell>,
     starts: Vec<[f64; 4]>,
-    /// Trips of the next round.
-    trips: u32,
+    /// Iterations of the next round.
+    iterations: u32,
 }
 
 impl Pool {
@@ -47,28 +47,28 @@ impl Pool {
             variants,
             most: settings.batch.unwrap_or(most).clamp(1, most),
             buffers: None,
-            roster: Vec::new(),
+            active_list: Vec::new(),
             free: Vec::new(),
             lanes: Vec::new(),
             cells: Vec::new(),
             starts: Vec::new(),
-            trips: 0,
+            iterations: 0,
         }
     }
 
     /// Lanes under way.
     pub fn under_way(&self) -> usize {
-        self.roster.len()
+        self.active_list.len()
     }
 
     /// Lanes that may be begun now.
     pub fn room(&self) -> usize {
-        self.most - self.roster.len()
+        self.most - self.active_list.len()
     }
 
     /// Forgets the lanes under way.
     pub fn clear(&mut self) {
-        self.free.append(&mut self.roster);
+        self.free.append(&mut self.active_list);
     }
 
     /// Puts lanes at their starts; each has a number of the caller's.
@@ -89,8 +89,8 @@ impl Pool {
         }
         self.make_room(gpu, lanes.len()).await?;
         // A few lanes had long dispatches; with many more these would take as many times longer.
-        self.trips = (u64::from(self.trips) * self.roster.len() as u64
-            / (self.roster.len() + lanes.len()) as u64) as u32;
+        self.iterations = (u64::from(self.iterations) * self.active_list.len() as u64
+            / (self.active_list.len() + lanes.len()) as u64) as u32;
         // The lowest slots: what is begun together lies together.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
@@ -98,7 +98,7 @@ impl Pool {
             let at = slot as usize;
             self.lanes[at] = (number, lane);
             (self.cells[at], self.starts[at]) = start(tables, &lane);
-            self.roster.push(slot);
+            self.active_list.push(slot);
         }
         let Some(buffers) = &self.buffers else { return Ok(()) };
         let real = gpu.precision.bytes();
@@ -108,7 +108,7 @@ impl Pool {
             gpu.queue.write_buffer(&buffers.cells, of_cells as u64, bytemuck::cast_slice(&self.cells[at]));
             gpu.queue.write_buffer(&buffers.starts, of_starts as u64, &starts);
         }
-        buffers.call(gpu, &self.roster, self.roster.len() - lanes.len(), &self.settings);
+        buffers.call(gpu, &self.active_list, self.active_list.len() - lanes.len(), &self.settings);
         let first = &gpu.pipelines[&self.variants[0]];
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let bindings = bind(gpu, &first.begin, BEGIN, &buffers.bindings(tables));
@@ -125,7 +125,7 @@ impl Pool {
         tables: &Tables,
         until: usize,
     ) -> Result<Vec<Ended>, GpuError> {
-        let Some(buffers) = self.buffers.as_ref().filter(|_| !self.roster.is_empty()) else {
+        let Some(buffers) = self.buffers.as_ref().filter(|_| !self.active_list.is_empty()) else {
             return Ok(Vec::new());
         };
         let bindings = buffers.bindings(tables);
@@ -134,16 +134,16 @@ impl Pool {
             settings: &buffers.settings,
             queue: &buffers.queue,
             buffers: &bindings,
-            rostered: self.roster.len() as u32,
+            active_lanes: self.active_list.len() as u32,
             grid: &|lanes| buffers.grid(lanes),
-            most_trips: self.settings.trips,
+            most_iterations: self.settings.iterations,
         };
         let variants: Vec<&Pipelines> = self.variants.iter().map(|variant| &gpu.pipelines[variant]).collect();
-        buffers.call(gpu, &self.roster, self.roster.len(), &self.settings);
-        let device_seconds = rounds.run(&variants, until as u32, &mut self.trips).await?;
+        buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings);
+        let device_seconds = rounds.run(&variants, until as u32, &mut self.iterations).await?;
         gpu.tell(Stage::Integrated { device_seconds });
         let last = variants[variants.len() - 1];
-        let results = buffers.conclude(gpu, last, &bindings, self.roster.len()).await?;
+        let results = buffers.conclude(gpu, last, &bindings, self.active_list.len()).await?;
         if results.is_empty() {
             let message = "it has records of no lane that it said had ended".into();
             return Err(gpu.failure(GpuError::Lost { message }));
@@ -154,16 +154,16 @@ impl Pool {
             ended.push(Ended { number, flow, reading, finding });
             self.free.push(finding.slot);
         }
-        // Both are in the roster's order.
+        // Both are in the active list's order.
         let mut slots = results.iter().map(|(_, finding)| finding.slot).peekable();
-        self.roster.retain(|&slot| slots.next_if_eq(&slot).is_none());
+        self.active_list.retain(|&slot| slots.next_if_eq(&slot).is_none());
         gpu.tell(Stage::Read);
         Ok(ended)
     }
 
     /// Makes slots for so many more lanes; those under way move with what they have.
     async fn make_room(&mut self, gpu: &Gpu, count: usize) -> Result<(), GpuError> {
-        let (had, needed) = (self.lanes.len(), self.roster.len() + count);
+        let (had, needed) = (self.lanes.len(), self.active_list.len() + count);
         if needed > self.most {
             return Err(GpuError::OutOfMemory { what: "lanes", count: needed });
         }
@@ -223,7 +223,7 @@ fn start(tables: &Tables, lane: &Lane) -> (Cell, [f64; 4]) {
 mod tests {
     use super::*;
     use crate::gpu::{AdapterChoice, Precision};
-    use crate::model::GearPair;
+    use rattlemap_dynamics::model::GearPair;
 
     #[test]
     fn what_lies_together_is_sent_together() {

@@ -2,12 +2,11 @@
 
 use super::constants::Constants;
 use super::layout::{Finding, Reading};
-use super::tables::Tables;
 use crate::record::{Record, WORD_SYMBOLS, joined, valid};
-use crate::word::Word;
+use rattlemap_dynamics::word::Word;
 
 /// Symbols that the shader keeps in one number.
-const SYMBOLS_PER_NUMBER: usize = 10;
+pub(super) const SYMBOLS_PER_NUMBER: usize = 10;
 
 /// A lane that has ended, as the device tells it.
 #[derive(Clone, Copy, Debug)]
@@ -24,10 +23,10 @@ impl Ended {
         self.number
     }
 
-    /// Its record; `tables` are those on which it ran. A million take the better part of a second: to be made on all
-    /// cores.
-    pub fn record(&self, tables: &Tables) -> Record {
-        record(tables.constants[self.flow as usize].as_ref(), &self.reading, &self.finding)
+    /// Its record; `constants` are those of the tables on which it ran. A million take the better part of a second:
+    /// to be made on all cores.
+    pub fn record(&self, constants: &[Option<Constants>]) -> Record {
+        record(constants[self.flow as usize].as_ref(), &self.reading, &self.finding)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Rounds of dispatches over the lanes under way, until few enough are running.
 //!
-//! Every round queues the lanes that a variant has work for, in the order of the roster, dispatches them a few times,
-//! and counts those that are left. The next round is under way while the host looks at the last one: rounds are kept
+//! Every round queues the lanes that a variant has work for, in the order of the active list, dispatches them a few times,
+//! and counts those that are left. The next round is under way while the host checks the last one: rounds are kept
 //! short enough for drivers that reset a device whose work takes seconds, and long enough to cost nothing.
 
 use web_time::{Duration, Instant};
@@ -9,25 +9,25 @@ use web_time::{Duration, Instant};
 use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
 use super::slots::{BEAT_AT, COUNT_AT};
 use super::stage::Clock;
-use super::transfer::{landing, read};
+use super::transfer::{read, readback};
 use super::{Gpu, GpuError};
 
-/// Trips of the first round of all, and at least of any: shorter dispatches cost more than they do.
-const FEWEST_TRIPS: u32 = 250;
+/// Iterations of the first round of all, and at least of any: shorter dispatches cost more than they do.
+const FEWEST_ITERATIONS: u32 = 250;
 
 /// With more lanes than this as many fewer of them, so that the first round, whose time nobody knows, is no longer.
-const FEWEST_TRIPS_FOR: u32 = 1 << 14;
+const FEWEST_ITERATIONS_FOR: u32 = 1 << 14;
 
-/// Lanes of a workgroup that compacts (`BLOCK` in the shader).
-const BLOCK: u32 = 256;
+/// Lanes of a workgroup that compacts.
+pub(super) const BLOCK: u32 = 256;
 
-/// Bytes of a look: lanes left for each of two variants, the device's count of its own work, two timestamps.
-const LOOK: u64 = 32;
+/// Bytes of a check: lanes left for each of two variants, the device's count of its own work, two timestamps.
+const CHECK: u64 = 32;
 const BEAT: u64 = 8;
 const TIMES: u64 = 16;
 
-/// Byte offset of the trips in the shader's settings.
-const TRIPS: u64 = std::mem::offset_of!(super::layout::Settings, trips) as u64;
+/// Byte offset of the iterations in the shader's settings.
+const ITERATIONS: u64 = std::mem::offset_of!(super::layout::Settings, iterations) as u64;
 
 /// What the host needs of a pool for its rounds.
 pub(super) struct Rounds<'a> {
@@ -36,12 +36,12 @@ pub(super) struct Rounds<'a> {
     pub(super) queue: &'a wgpu::Buffer,
     /// All buffers, by binding.
     pub(super) buffers: &'a [&'a wgpu::Buffer],
-    /// Lanes of the roster.
-    pub(super) rostered: u32,
+    /// Lanes of the active list.
+    pub(super) active_lanes: u32,
     /// Workgroups for so many lanes.
     pub(super) grid: &'a dyn Fn(u32) -> [u32; 2],
-    /// Most trips that one dispatch may spend on a lane.
-    pub(super) most_trips: u32,
+    /// Most iterations that one dispatch may spend on a lane.
+    pub(super) most_iterations: u32,
 }
 
 /// A variant, bound to the buffers.
@@ -52,46 +52,46 @@ struct Bound<'a> {
 
 /// A round under way.
 struct Sent<'a> {
-    look: &'a wgpu::Buffer,
+    check: &'a wgpu::Buffer,
     submission: wgpu::SubmissionIndex,
     /// Which variants it dispatched.
     ran: Vec<bool>,
-    trips: u32,
+    iterations: u32,
 }
 
 impl Rounds<'_> {
     /// Runs lanes until no more than `until` are left, or, if that is not none, some have ended and waited for long
-    /// enough; `trips` at first in a dispatch. Each variant takes over where the one before leaves off. Returns the
+    /// enough; `iterations` at first in a dispatch. Each variant takes over where the one before leaves off. Returns the
     /// device's own time where somebody measures.
     pub(super) async fn run(
         &self,
         variants: &[&Pipelines],
         until: u32,
-        trips: &mut u32,
+        iterations: &mut u32,
     ) -> Result<Option<f64>, GpuError> {
         let gpu = self.gpu;
         let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue));
         let bound: Vec<Bound<'_>> = variants.iter().map(|pipelines| self.bound(pipelines)).collect();
-        let looks = [landing(gpu, "look", LOOK), landing(gpu, "look", LOOK)];
+        let checks = [readback(gpu, "check", CHECK), readback(gpu, "check", CHECK)];
         // Lanes that a variant may have work for, those aside that come from the ones before.
         let mut left = vec![0; variants.len()];
-        left[0] = self.rostered;
-        let most = self.most_trips.max(1);
-        let fewest = fewest_trips(self.rostered).min(most);
-        *trips = (*trips).clamp(fewest, most);
+        left[0] = self.active_lanes;
+        let most = self.most_iterations.max(1);
+        let fewest = fewest_iterations(self.active_lanes).min(most);
+        *iterations = (*iterations).clamp(fewest, most);
         let mut seconds = 0.0;
         let mut last_beat = 0;
         let mut before: Option<Sent<'_>> = None;
         let mut last_end = Instant::now();
-        let mut looked = 0;
-        for (slot, look) in (0..2).zip(&looks).cycle() {
-            let sent = self.send(&bound, &left, *trips, (slot, look), clock.as_ref());
+        let mut checked = 0;
+        for (slot, check) in (0..2).zip(&checks).cycle() {
+            let sent = self.send(&bound, &left, *iterations, (slot, check), clock.as_ref());
             let Some(sent) = before.replace(sent) else { continue };
             let take = |bytes: &[u8]| {
                 let took = clock.as_ref().map_or(0.0, |clock| clock.seconds(&bytes[TIMES as usize..]));
                 (bytemuck::pod_read_unaligned::<[u32; 3]>(&bytes[..12]), took)
             };
-            let ([first, second, beat], took) = read(gpu, sent.look, LOOK, sent.submission, take).await?;
+            let ([first, second, beat], took) = read(gpu, sent.check, CHECK, sent.submission, take).await?;
             if beat <= last_beat {
                 return Err(gpu.failure(GpuError::Lost { message: "it drops what it is given to do".into() }));
             }
@@ -101,17 +101,20 @@ impl Rounds<'_> {
                 *left = if ran { now } else { 0 };
             }
             let all_left = left.iter().sum::<u32>();
-            looked += 1;
-            if all_left <= until || (until > 0 && looked >= gpu.rhythm.patience && all_left < self.rostered) {
+            checked += 1;
+            if all_left <= until
+                || (until > 0 && checked >= gpu.policy.patience && all_left < self.active_lanes)
+            {
                 break;
             }
-            *trips = next_trips(sent.trips, last_end.elapsed(), gpu.rhythm.round).clamp(fewest, most);
+            *iterations =
+                next_iterations(sent.iterations, last_end.elapsed(), gpu.policy.round).clamp(fewest, most);
             last_end = Instant::now();
         }
         // The last round is in time, too; what comes next waits for it anyway.
         if let (Some(clock), Some(sent)) = (&clock, before) {
             let take = |bytes: &[u8]| clock.seconds(&bytes[TIMES as usize..]);
-            seconds += read(gpu, sent.look, LOOK, sent.submission, take).await?;
+            seconds += read(gpu, sent.check, CHECK, sent.submission, take).await?;
         }
         Ok(clock.map(|_| seconds))
     }
@@ -132,12 +135,12 @@ impl Rounds<'_> {
         &self,
         variants: &[Bound<'_>],
         left: &[u32],
-        trips: u32,
-        (slot, look): (u32, &'a wgpu::Buffer),
+        iterations: u32,
+        (slot, check): (u32, &'a wgpu::Buffer),
         clock: Option<&Clock>,
     ) -> Sent<'a> {
         let gpu = self.gpu;
-        gpu.queue.write_buffer(self.settings, TRIPS, bytemuck::bytes_of(&trips));
+        gpu.queue.write_buffer(self.settings, ITERATIONS, bytemuck::bytes_of(&iterations));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         // Lanes may come from the variants before, so that a variant has work if one of them has.
         let first = left.iter().position(|&left| left > 0).unwrap_or(0);
@@ -146,10 +149,10 @@ impl Rounds<'_> {
             lanes += left[n];
             for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate() {
                 let writes = clock.and_then(|clock| clock.writes(slot, n == first && nth == 0, false));
-                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.rostered), writes);
+                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
             }
             let (pipeline, bindings) = &variant.sweep;
-            for _ in 0..gpu.rhythm.dispatches {
+            for _ in 0..gpu.policy.dispatches {
                 dispatch(&mut encoder, pipeline, bindings, (self.grid)(lanes), None);
             }
         }
@@ -157,16 +160,16 @@ impl Rounds<'_> {
             for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate().take(COUNTED) {
                 let is_last = n + 1 == variants.len() && nth + 1 == COUNTED;
                 let writes = clock.and_then(|clock| clock.writes(slot, false, is_last));
-                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.rostered), writes);
+                dispatch(&mut encoder, pipeline, bindings, compacting(nth, self.active_lanes), writes);
             }
-            encoder.copy_buffer_to_buffer(self.queue, COUNT_AT, look, 4 * n as u64, 4);
+            encoder.copy_buffer_to_buffer(self.queue, COUNT_AT, check, 4 * n as u64, 4);
         }
-        encoder.copy_buffer_to_buffer(self.queue, BEAT_AT, look, BEAT, 4);
+        encoder.copy_buffer_to_buffer(self.queue, BEAT_AT, check, BEAT, 4);
         if let Some(clock) = clock {
-            clock.copy(&mut encoder, slot, look, TIMES);
+            clock.copy(&mut encoder, slot, check, TIMES);
         }
         let submission = gpu.queue.submit([encoder.finish()]);
-        Sent { look, submission, ran: (0..variants.len()).map(|n| n >= first).collect(), trips }
+        Sent { check, submission, ran: (0..variants.len()).map(|n| n >= first).collect(), iterations }
     }
 }
 
@@ -174,20 +177,20 @@ impl Rounds<'_> {
 const COUNTED: usize = 2;
 
 /// Workgroups of a pass of the compaction.
-pub(super) fn compacting(pass: usize, rostered: u32) -> [u32; 2] {
-    [if pass == 1 { 1 } else { rostered.div_ceil(BLOCK).min(65_535) }, 1]
+pub(super) fn compacting(pass: usize, active_lanes: u32) -> [u32; 2] {
+    [if pass == 1 { 1 } else { active_lanes.div_ceil(BLOCK).min(65_535) }, 1]
 }
 
-/// Trips of a round at least, with so many lanes.
-fn fewest_trips(lanes: u32) -> u32 {
-    (FEWEST_TRIPS * FEWEST_TRIPS_FOR / lanes.max(1)).clamp(1, FEWEST_TRIPS)
+/// Iterations of a round at least, with so many lanes.
+fn fewest_iterations(lanes: u32) -> u32 {
+    (FEWEST_ITERATIONS * FEWEST_ITERATIONS_FOR / lanes.max(1)).clamp(1, FEWEST_ITERATIONS)
 }
 
-/// Trips for a round of the wanted length, from those of an earlier one and the time that it took.
+/// Iterations for a round of the wanted length, from those of an earlier one and the time that it took.
 /// What is done does not depend on it.
-fn next_trips(trips: u32, took: Duration, round: Duration) -> u32 {
+fn next_iterations(iterations: u32, took: Duration, round: Duration) -> u32 {
     let factor = round.as_secs_f64() / took.as_secs_f64().max(1e-6);
-    (f64::from(trips) * factor.clamp(0.25, 2.0)) as u32
+    (f64::from(iterations) * factor.clamp(0.25, 2.0)) as u32
 }
 
 /// Workgroups in a row of the grid for so many lanes.
@@ -234,16 +237,16 @@ mod tests {
 
     #[test]
     fn rounds_tend_to_their_length() {
-        // 0.3 ms per trip; what a round took is known when the next one is already under way.
-        let (mut under_way, mut trips) = (1000, 1000);
+        // 0.3 ms per iteration; what a round took is known when the next one is already under way.
+        let (mut under_way, mut iterations) = (1000, 1000);
         for _ in 0..20 {
-            let next = next_trips(under_way, Duration::from_micros(300) * under_way, ROUND);
-            (under_way, trips) = (trips, next);
+            let next = next_iterations(under_way, Duration::from_micros(300) * under_way, ROUND);
+            (under_way, iterations) = (iterations, next);
         }
-        assert!((300..=340).contains(&trips), "{trips}");
+        assert!((300..=340).contains(&iterations), "{iterations}");
         assert!((300..=340).contains(&under_way), "{under_way}");
-        assert_eq!(next_trips(1000, Duration::ZERO, ROUND), 2000);
-        assert_eq!(next_trips(1000, Duration::from_secs(100), ROUND), 250);
-        assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(fewest_trips), [250, 250, 125, 3]);
+        assert_eq!(next_iterations(1000, Duration::ZERO, ROUND), 2000);
+        assert_eq!(next_iterations(1000, Duration::from_secs(100), ROUND), 250);
+        assert_eq!([1, 1 << 14, 1 << 15, 1 << 20].map(fewest_iterations), [250, 250, 125, 3]);
     }
 }

@@ -1,8 +1,8 @@
-//! Rules by which lanes judge their motion and which others have to know, too: validation asks what a lane would
-//! have said. Written once, here; the shaders are compiled with them.
+//! Rules by which lanes judge their motion. Validation needs them, too, to tell what a lane would have said. They are
+//! written once, here; the shaders are compiled with them.
 
 use super::Precision;
-use crate::orbit::CHAOS_ERRORS;
+use rattlemap_dynamics::orbit::CHAOS_ERRORS;
 
 /// Chaos is called early by this many blocks of growth at least: a standard error of fewer is none.
 pub(crate) const FEWEST_BLOCKS: u32 = 6;
@@ -11,15 +11,18 @@ pub(crate) const FEWEST_BLOCKS: u32 = 6;
 /// torus or of an undamped swing in proportion to time, at a double root to its square.
 pub(crate) const NEUTRAL_ORDER: f64 = 2.0;
 
-/// Growth of a tangent vector, as a natural logarithm, that no departure from an unstable cycle lasts through:
+/// Growth of a tangent vector, as a natural logarithm, that no escape from an unstable cycle lasts through:
 /// beyond the ratio of the largest to the smallest distance.
-pub(crate) const DEPARTURE: f64 = 40.0;
+pub(crate) const ESCAPE_GROWTH: f64 = 40.0;
 
 /// Distances are kept in so many parts of an octave below the size of the motion: 4 means half.
 pub(crate) const OCTAVE: u32 = 4;
 
 /// Recurrences farther apart than this are none, in parts of an octave: 2^-6 of the motion.
 pub(crate) const NEAR: u32 = 24;
+
+/// A window of recurrence is so much of the time that has passed.
+pub(crate) const WINDOW_SHARE: u32 = 5;
 
 /// Steps of Newton's method that a lane takes to one cycle.
 pub(crate) const REFINEMENTS: u32 = 5;
@@ -28,8 +31,8 @@ pub(crate) const REFINEMENTS: u32 = 5;
 /// of the strobe map before it.
 pub(crate) const REACH: f64 = 3e-2;
 
-/// Searches in vain after which a lane asks it no more.
-pub(crate) const VAIN: u32 = 2;
+/// Failed Newton searches after which a lane asks it no more.
+pub(crate) const MOST_FAILED_SEARCHES: u32 = 2;
 
 /// A cycle this close to its mirror image, 2^-12 of the motion, is symmetric; states this close are the same.
 pub(crate) const MIRROR: f64 = 2.44e-4;
@@ -50,19 +53,14 @@ pub(crate) const fn resolved(precision: Precision) -> u32 {
     }
 }
 
-/// The distance of so many parts of an octave, relative to the motion.
-pub(crate) fn distance(parts: u32) -> f64 {
-    (-f64::from(parts) / f64::from(OCTAVE)).exp2()
-}
-
 /// The rules as the shaders' constants.
 pub(super) fn declarations(precision: Precision) -> String {
     let (resolved, noise) = (resolved(precision), noise(precision));
     format!(
         "const FEWEST_BLOCKS: u32 = {FEWEST_BLOCKS}u;\nconst NEUTRAL_ORDER: f32 = {NEUTRAL_ORDER:?};\n\
-         const CHAOS_ERRORS: Real = {CHAOS_ERRORS:?};\nconst DEPARTURE: Real = {DEPARTURE:?};\n\
+         const CHAOS_ERRORS: Real = {CHAOS_ERRORS:?};\nconst ESCAPE_GROWTH: Real = {ESCAPE_GROWTH:?};\n\
          const OCTAVE: f32 = f32({OCTAVE}u);\nconst NEAR: u32 = {NEAR}u;\nconst RESOLVED: u32 = {resolved}u;\n\
-         const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst VAIN: u32 = {VAIN}u;\n\
-         const MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n"
+         const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst MOST_FAILED_SEARCHES: u32 = {MOST_FAILED_SEARCHES}u;\n\
+         const WINDOW_SHARE: u32 = {WINDOW_SHARE}u;\nconst MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n"
     )
 }

@@ -1,7 +1,7 @@
-//! Known answers: a device is asked for them by every program that it has compiled, before that is trusted.
+//! Known answers: every program that a device has compiled must give them before it is trusted.
 
 use super::{Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
-use crate::model::{GearPair, State};
+use rattlemap_dynamics::model::{GearPair, State};
 
 /// Forcing periods from rest to the answers.
 const PERIODS: u32 = 20;
@@ -47,7 +47,7 @@ pub(super) async fn check(
     };
     for ended in pool.advance(gpu, &tables, 0).await? {
         let (e, omega, answer) = ANSWERS[ended.number() as usize];
-        let record = ended.record(&tables);
+        let record = ended.record(tables.constants());
         let error = record.strobe.iter().zip(answer).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         if record.status != 0 || error.is_nan() || error > bar {
             let adapter = gpu.info.name.clone();

@@ -1,8 +1,11 @@
 //! Shader variants: one source, put together from small files.
 
+use super::reading::SYMBOLS_PER_NUMBER;
+use super::rounds::BLOCK;
 use super::unroll::unroll;
 use super::{FOLLOWED_MESH_SPEED, rules};
 use crate::record::{WORD_SYMBOLS, valid};
+use rattlemap_dynamics::orbit::Status;
 
 /// Precision of a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -108,15 +111,19 @@ impl Variant {
         let Variant { workgroup, exponent, growth, word, mesh, symmetry, chatter, keep, .. } = self;
         let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
         let body = unroll(BODY, &names);
-        let bits: String =
-            VALID.iter().map(|(name, bits)| format!("const VALID_{name}: u32 = {bits}u;\n")).collect();
+        let valid = VALID.map(|(name, bits)| ("VALID", name.to_owned(), bits));
+        let status = Status::ALL.map(|status| ("STATUS", status.name().to_uppercase(), status.code()));
+        let numbered = valid.into_iter().chain(status);
+        let codes: String =
+            numbered.map(|(kind, name, code)| format!("const {kind}_{name}: u32 = {code}u;\n")).collect();
         let rules = rules::declarations(self.precision);
         format!(
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
              const GROWTH: bool = {growth};\n\
              const WORD: bool = {word};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
              const CHATTER: bool = {chatter};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
-             const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n{bits}{rules}{body}"
+             const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n\
+             const SYMBOLS_PER_NUMBER: u32 = {SYMBOLS_PER_NUMBER}u;\nconst BLOCK: u32 = {BLOCK}u;\n{codes}{rules}{body}"
         )
     }
 }

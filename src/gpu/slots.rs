@@ -1,20 +1,20 @@
-//! The buffers of a pool: what lies on the device for each slot, and what the host tells and asks of it.
+//! The buffers of a pool: what lies on the device for each slot, what the host writes there and reads back.
 
 use super::averaging::Averaging;
 use super::device::{COMPACT, CONCLUDE, Pipelines};
 use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
 use super::rounds::{bind, compacting, dispatch, row};
 use super::tables::Tables;
-use super::transfer::{buffer, from_reals, landing, read, upload};
+use super::transfer::{buffer, from_reals, read, readback, upload};
 use super::{Gpu, GpuError, LaneSettings};
-use crate::limits::LONGEST_CYCLE;
+use crate::record::limits::LONGEST_CYCLE;
 
 /// Numbers of the queue before its lanes, and where they lie.
 const QUEUE_HEAD: usize = 2;
 pub(super) const COUNT_AT: u64 = 0;
 pub(super) const BEAT_AT: u64 = 4;
 
-/// Byte offset of what compaction looks for in the shader's settings.
+/// Byte offset of what compaction selects, in the shader's settings.
 const ENDED: u64 = std::mem::offset_of!(Settings, ended) as u64;
 
 const COUNT_BYTES: u64 = size_of::<u32>() as u64;
@@ -33,8 +33,8 @@ pub(super) struct Slots {
     readings: wgpu::Buffer,
     findings: wgpu::Buffer,
     /// Where the host reads the last two, and how many there are.
-    landings: [wgpu::Buffer; 2],
-    count_landing: wgpu::Buffer,
+    readbacks: [wgpu::Buffer; 2],
+    count_readback: wgpu::Buffer,
     /// Workgroups in a row of the grid.
     row: u32,
 }
@@ -56,8 +56,8 @@ impl Slots {
             tallies: buffer(gpu, "tallies", slots * size_of::<Tally>()),
             queue: buffer(gpu, "queue", (QUEUE_HEAD + 2 * slots) * size_of::<u32>()),
             blocks: buffer(gpu, "blocks", slots * size_of::<u32>()),
-            landings: [&readings, &findings].map(|buffer| landing(gpu, "results", buffer.size())),
-            count_landing: landing(gpu, "count", COUNT_BYTES),
+            readbacks: [&readings, &findings].map(|buffer| readback(gpu, "results", buffer.size())),
+            count_readback: readback(gpu, "count", COUNT_BYTES),
             readings,
             findings,
             row: row(gpu, slots, workgroup),
@@ -91,40 +91,40 @@ impl Slots {
 
     /// Tells the device which slots have lanes, in the order in which these were begun; those from place `fresh` on
     /// are to begin.
-    pub(super) fn call(&self, gpu: &Gpu, roster: &[u32], fresh: usize, settings: &LaneSettings) {
-        let called = uniform(self, roster.len(), fresh, settings, gpu.rhythm.late_tangent);
+    pub(super) fn call(&self, gpu: &Gpu, active_list: &[u32], fresh: usize, settings: &LaneSettings) {
+        let called = uniform(self, active_list.len(), fresh, settings, gpu.policy.late_tangent);
         gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&called));
         let head = (QUEUE_HEAD * size_of::<u32>()) as u64;
-        gpu.queue.write_buffer(&self.queue, head, bytemuck::cast_slice(roster));
+        gpu.queue.write_buffer(&self.queue, head, bytemuck::cast_slice(active_list));
     }
 
-    /// What those of the roster's lanes have to say that have ended, in its order.
+    /// What those of the active list's lanes have to say that have ended, in its order.
     pub(super) async fn conclude(
         &self,
         gpu: &Gpu,
         pipelines: &Pipelines,
         bindings: &[&wgpu::Buffer],
-        rostered: usize,
+        active_lanes: usize,
     ) -> Result<Vec<(Reading, Finding)>, GpuError> {
         gpu.queue.write_buffer(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         for (pass, (entry_point, pipeline)) in COMPACT.into_iter().zip(&pipelines.compact).enumerate() {
             let compact = bind(gpu, pipeline, entry_point, bindings);
-            dispatch(&mut encoder, pipeline, &compact, compacting(pass, rostered as u32), None);
+            dispatch(&mut encoder, pipeline, &compact, compacting(pass, active_lanes as u32), None);
         }
         let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
-        dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(rostered as u32), None);
-        encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_landing, 0, COUNT_BYTES);
+        dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(active_lanes as u32), None);
+        encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_readback, 0, COUNT_BYTES);
         let submission = gpu.queue.submit([encoder.finish()]);
-        let count = read(gpu, &self.count_landing, COUNT_BYTES, submission, |bytes| {
+        let count = read(gpu, &self.count_readback, COUNT_BYTES, submission, |bytes| {
             bytemuck::pod_read_unaligned::<u32>(bytes) as usize
         })
         .await?
-        .min(rostered);
+        .min(active_lanes);
         if count == 0 {
             return Ok(Vec::new());
         }
-        let [readings, findings] = &self.landings;
+        let [readings, findings] = &self.readbacks;
         let numbers = (count * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
         let counts = (count * size_of::<Finding>()) as u64;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -141,7 +141,7 @@ impl Slots {
 
 fn uniform(
     slots: &Slots,
-    rostered: usize,
+    active_lanes: usize,
     fresh: usize,
     settings: &LaneSettings,
     late_tangent: bool,
@@ -157,13 +157,13 @@ fn uniform(
     let averaging = Averaging::new(periods, settings.exponent_from);
     Settings {
         slots: slots.count as u32,
-        rostered: rostered as u32,
+        active_lanes: active_lanes as u32,
         fresh: fresh as u32,
         periods,
         longest: periods.saturating_add(more),
         chaos_from: settings.chaos_from,
         chaos_errors: settings.chaos_errors,
-        trips: settings.trips,
+        iterations: settings.iterations,
         passes_per_period: settings.passes_per_period,
         events_per_period: settings.events_per_period,
         row: slots.row * settings.workgroup,

@@ -1,4 +1,4 @@
-//! How far lanes have come: told to whoever measures, who keeps the clock.
+//! How far lanes have come. Whoever measures is told, and keeps the clock.
 
 /// What has just been done for lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,17 +62,17 @@ impl Clock {
         })
     }
 
-    /// Copies the pair of submission `slot` to `landing`, from byte `at` on.
+    /// Copies the pair of submission `slot` to `readback`, from byte `at` on.
     pub(super) fn copy(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         slot: u32,
-        landing: &wgpu::Buffer,
+        readback: &wgpu::Buffer,
         at: u64,
     ) {
         let from = PAIR * u64::from(slot);
         encoder.resolve_query_set(&self.queries, 2 * slot..2 * slot + 2, &self.resolved, from);
-        encoder.copy_buffer_to_buffer(&self.resolved, from, landing, at, 16);
+        encoder.copy_buffer_to_buffer(&self.resolved, from, readback, at, 16);
     }
 
     /// Seconds between a pair, as it was copied.

@@ -5,7 +5,7 @@ use super::guard::guarded;
 use super::layout::{self, Flow, FlowShape};
 use super::transfer::{reals, upload};
 use super::{Gpu, GpuError};
-use crate::model::{Law, Oscillator};
+use rattlemap_dynamics::model::{Law, Oscillator};
 
 /// Flows and laws of a run, uploaded once for all its batches.
 pub struct Tables {
@@ -39,6 +39,11 @@ impl Tables {
     /// Free steps per forcing period of a flow; 0 if lanes cannot carry it.
     pub fn steps_per_period(&self, flow: u32) -> u32 {
         self.constants[flow as usize].as_ref().map_or(0, |constants| constants.steps)
+    }
+
+    /// What each flow was derived to; none for a flow that lanes cannot carry.
+    pub fn constants(&self) -> &[Option<Constants>] {
+        &self.constants
     }
 
     pub(super) async fn new(

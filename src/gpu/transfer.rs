@@ -48,7 +48,7 @@ pub(super) fn upload(gpu: &Gpu, label: &'static str, bytes: &[u8]) -> wgpu::Buff
 }
 
 /// A buffer of `size` bytes that the host can read.
-pub(super) fn landing(gpu: &Gpu, label: &'static str, size: u64) -> wgpu::Buffer {
+pub(super) fn readback(gpu: &Gpu, label: &'static str, size: u64) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size,
@@ -57,7 +57,7 @@ pub(super) fn landing(gpu: &Gpu, label: &'static str, size: u64) -> wgpu::Buffer
     })
 }
 
-/// The first `size` bytes of what a [`landing`] holds after the work up to `submission`, handed to `take`.
+/// The first `size` bytes of what a [`readback`] holds after the work up to `submission`, handed to `take`.
 pub(super) async fn read<T>(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::{Folder, bifurcation_csv, bifurcation_figure};
-use crate::bifurcation::Column;
-use crate::scene::{Format, Scene};
+use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure};
+use crate::map::bifurcation::Column;
+use crate::map::scene::{Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
 const PNG: &str = "bifurcation.png";
@@ -22,20 +22,22 @@ pub fn write(
     sets: &[String],
     columns: &[Column],
     elapsed: Duration,
-) -> anyhow::Result<Vec<&'static str>> {
+) -> Result<Vec<&'static str>, OutputError> {
     // Files of an earlier run must not stand beside a manifest that does not know them.
     folder.remove(&[MANIFEST, CSV, PNG])?;
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();
     if wanted.contains(&Format::Csv) {
-        folder.replace(CSV, |path| bifurcation_csv::write(path, parameter.name, columns))?;
+        folder.replace(CSV, |path| {
+            bifurcation_csv::write(path, &parameter.name, &scene.base().state_names(), columns)
+        })?;
         files.push(CSV);
     }
     if wanted.contains(&Format::Png) {
         let label = format!("{} {}", parameter.meaning, parameter.name);
         let title = format!("{}, {}", scene.title(), scene.start().in_words());
-        folder.replace(PNG, |path| bifurcation_figure::write(path, &title, &label, columns))?;
+        folder.replace(PNG, |path| Ok(bifurcation_figure::write(path, &title, &label, columns)?))?;
         files.push(PNG);
     }
     files.push(MANIFEST);

@@ -2,42 +2,33 @@
 
 use std::path::Path;
 
-use super::names;
-use crate::bifurcation::{Column, SectionPoint};
-use crate::model::State;
+use super::{WriteError, names};
+use crate::map::bifurcation::{Column, SectionPoint};
+use rattlemap_dynamics::model::State;
 
-/// Point fields, in their order after `class`, `period` and `status`.
-const POINT_FIELDS: [&str; 11] = [
-    "side",
-    "kind",
-    "t_mod_period",
-    "x1_before",
-    "v1_before",
-    "x2_before",
-    "v2_before",
-    "x1",
-    "v1",
-    "x2",
-    "v2",
-];
+/// Point fields after `class`, `period` and `status`; the state before and after follows.
+const POINT_FIELDS: [&str; 3] = ["side", "kind", "t_mod_period"];
 
-/// Writes the columns to `path`; the first field is named after the swept parameter.
+/// Writes the columns to `path`; the first field is named after the swept parameter, the last
+/// ones after the components of the state.
 ///
 /// A column without points (no contact at all) still has one row, with empty point fields,
 /// so that no value of the axis is missing from the table.
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(super) fn write(path: &Path, axis: &str, columns: &[Column]) -> anyhow::Result<()> {
+pub(super) fn write(path: &Path, axis: &str, names: &[&str], columns: &[Column]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_path(path)?;
-    table.write_record([axis, "class", "period", "status"].iter().chain(&POINT_FIELDS))?;
+    let before: Vec<String> = names.iter().map(|name| format!("{name}_before")).collect();
+    let states = before.iter().map(String::as_str).chain(names.iter().copied());
+    table.write_record([axis, "class", "period", "status"].into_iter().chain(POINT_FIELDS).chain(states))?;
     for column in columns {
         let head = head(column);
         for point in &column.points {
-            table.write_record(head.iter().cloned().chain(fields(point)))?;
+            table.write_record(head.iter().cloned().chain(fields(point, names.len())))?;
         }
         if column.points.is_empty() {
-            let empty = std::iter::repeat_n(String::new(), POINT_FIELDS.len());
+            let empty = std::iter::repeat_n(String::new(), POINT_FIELDS.len() + 2 * names.len());
             table.write_record(head.into_iter().chain(empty))?;
         }
     }
@@ -54,10 +45,10 @@ fn head(column: &Column) -> [String; 4] {
     ]
 }
 
-fn fields(point: &SectionPoint) -> impl Iterator<Item = String> {
+fn fields(point: &SectionPoint, components: usize) -> impl Iterator<Item = String> {
     let head =
         [names::side(point.side).to_string(), names::kind(point.kind).to_owned(), float(point.t_mod_period)];
-    let state = |state: State| state.into_iter().map(float);
+    let state = move |state: State| state.into_iter().take(components).map(float);
     head.into_iter().chain(state(point.before)).chain(state(point.after))
 }
 
@@ -69,8 +60,8 @@ fn float(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Side;
-    use crate::orbit::{Class, EventKind, Status};
+    use rattlemap_dynamics::model::Side;
+    use rattlemap_dynamics::orbit::{Class, EventKind, Status};
 
     #[test]
     fn one_row_per_point_and_one_for_none() {
@@ -88,7 +79,7 @@ mod tests {
         ];
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.csv");
-        write(&path, "e", &columns).unwrap();
+        write(&path, "e", &["x1", "v1", "x2", "v2"], &columns).unwrap();
         let row = "0.25,periodic,2,ok,-1,mesh_start,0.1,1.0,-2.0,1.5,1e-7,1.0,0.30000000000000004,1.5,";
         let expected = format!(
             "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2\n\

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use anyhow::Result;
 use plotters::style::RGBColor;
 
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{Canvas, FAINT, Marker, Rect, Shape, save_figure, wall_color};
-use crate::bifurcation::Column;
-use crate::model::Side;
-use crate::orbit::Class;
+use super::{DrawError, FigureError};
+use crate::map::bifurcation::Column;
+use rattlemap_dynamics::model::Side;
+use rattlemap_dynamics::orbit::Class;
 
 const SIZE: (u32, u32) = (1600, 1400);
 const LEFT: f64 = 130.0;
@@ -34,11 +34,11 @@ const CURVE_DOT: f64 = 1.3;
 ///
 /// # Errors
 /// A file that cannot be written, by name.
-pub fn write(path: &Path, title: &str, axis_label: &str, columns: &[Column]) -> Result<()> {
+pub fn write(path: &Path, title: &str, axis_label: &str, columns: &[Column]) -> Result<(), FigureError> {
     save_figure(path, SIZE, |canvas| draw(canvas, title, axis_label, columns))
 }
 
-fn draw(canvas: &Canvas<'_>, title: &str, axis_label: &str, columns: &[Column]) -> Result<()> {
+fn draw(canvas: &Canvas<'_>, title: &str, axis_label: &str, columns: &[Column]) -> Result<(), DrawError> {
     let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
     let top = draw_head(canvas, title, "", &legend(!left_out.is_empty()))? + 14.0;
     let whole = canvas.panel(LEFT, top);
@@ -94,7 +94,12 @@ fn value_axis(label: &str, columns: &[Column]) -> Axis {
 }
 
 /// Counts the dots on every canvas pixel, then blends each pixel once.
-fn draw_points(canvas: &Canvas<'_>, frame: &Frame, component: usize, columns: &[Column]) -> Result<()> {
+fn draw_points(
+    canvas: &Canvas<'_>,
+    frame: &Frame,
+    component: usize,
+    columns: &[Column],
+) -> Result<(), DrawError> {
     let (left, top, width, height) = Canvas::fine_rect(frame.rect);
     let mut counts = vec![[0u32; 2]; width * height];
     let [fine, joined] = [DOT.0, CURVE_DOT].map(|least| dot(frame, columns, least));

@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::manifest::{AxisObject, Head, StartObject, start};
 use super::names;
 use super::parameters::Parameters;
-use crate::bifurcation::Column;
-use crate::plan::count_classes;
-use crate::scene::Scene;
+use crate::map::bifurcation::Column;
+use crate::map::plan::count_classes;
+use crate::map::scene::Scene;
 
 /// It names neither the machine nor where on it the run took place.
 #[derive(Serialize)]

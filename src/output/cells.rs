@@ -1,12 +1,12 @@
 //! A finished map as rows: the one view that tables, figures and reports are made from.
 
-use crate::classify::{classify, status};
-use crate::model::State;
-use crate::orbit::{Class, Status};
-use crate::plan::Plan;
+use crate::map::plan::Plan;
+use crate::map::scene::{Continuous, Quantity, Scene};
+use crate::map::schedule::Refined;
+use crate::record::classify::{classify, status};
 use crate::record::{Record, Spelling, valid};
-use crate::scene::{Continuous, Quantity, Scene};
-use crate::schedule::Refined;
+use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::orbit::{Class, Status};
 
 /// Where a cell's values come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +80,7 @@ impl<'a> Cells<'a> {
 
     /// Cells along the two axes.
     pub fn counts(&self) -> [usize; 2] {
-        self.plan.axes().map(|axis| axis.count())
+        self.plan.axes().each_ref().map(|axis| axis.count())
     }
 
     /// The class of every cell, by id.

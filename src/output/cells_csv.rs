@@ -7,7 +7,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
-use super::names;
+use super::{WriteError, names};
 use crate::record::Spelling;
 
 /// Cells whose rows are formatted at a time, all cores together.
@@ -37,34 +37,38 @@ pub(super) const FIELDS: [&str; 11] = [
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
+pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
     let mut file = BufWriter::new(File::create(path)?);
-    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
+    let axes = cells.scene().axes().iter().map(|axis| &*axis.parameter().name);
     let mut header = csv::Writer::from_writer(Vec::new());
     let counted = cells.attractors().map(|_| ATTRACTORS);
     header.write_record(["i", "j"].into_iter().chain(axes).chain(FIELDS).chain(counted))?;
-    file.write_all(&header.into_inner()?)?;
+    file.write_all(&finished(header)?)?;
     let [columns, rows] = cells.counts();
     let count = columns * rows;
     for block in (0..count).step_by(BLOCK) {
         let end = count.min(block + BLOCK);
         let starts: Vec<usize> = (block..end).step_by(PART).collect();
         let parts = starts.par_iter().map(|&start| part(cells, start..end.min(start + PART)));
-        for part in parts.collect::<anyhow::Result<Vec<_>>>()? {
+        for part in parts.collect::<Result<Vec<_>, WriteError>>()? {
             file.write_all(&part)?;
         }
     }
     Ok(file.flush()?)
 }
 
-fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> anyhow::Result<Vec<u8>> {
+fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> Result<Vec<u8>, WriteError> {
     let mut table = csv::Writer::from_writer(Vec::with_capacity(160 * ids.len()));
     for id in ids {
         let row = cells.row(id);
         let counted = row.attractors.map(|count| count.to_string());
         table.write_record(fields(&row, cells.word(id)).into_iter().chain(counted))?;
     }
-    Ok(table.into_inner()?)
+    finished(table)
+}
+
+fn finished(table: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, WriteError> {
+    table.into_inner().map_err(|error| error.into_error().into())
 }
 
 fn fields(row: &Row, word: Option<Spelling>) -> [String; 15] {

@@ -8,7 +8,7 @@ use npyz::{DType, Field, TypeStr, TypeWrite, WriterBuilder};
 
 use super::cells::{Cells, Row};
 use super::cells_csv::{ATTRACTORS, FIELDS};
-use super::names;
+use super::{WriteError, names};
 use crate::record::Spelling;
 
 /// What stands for an absent class or an absent symmetry.
@@ -28,8 +28,8 @@ const WORD_BYTES: usize = 64;
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(super) fn write(path: &Path, cells: &Cells<'_>) -> anyhow::Result<()> {
-    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
+pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
+    let axes = cells.scene().axes().iter().map(|axis| &*axis.parameter().name);
     let names = ["i", "j"].into_iter().chain(axes).chain(FIELDS);
     let counted = cells.attractors().map(|_| (ATTRACTORS, ATTRACTORS_TYPE));
     let fields = names.zip(TYPES).chain(counted).map(|(name, kind)| {

@@ -5,9 +5,10 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use serde::Serialize;
 use thiserror::Error;
+
+use super::{OutputError, WriteError};
 
 /// Why a folder cannot be used.
 #[derive(Debug, Error)]
@@ -73,8 +74,12 @@ impl Folder {
     /// extension, which is renamed once it has succeeded.
     ///
     /// # Errors
-    /// Whatever `write` or the file system says, with the file's path.
-    pub fn replace(&self, name: &str, write: impl FnOnce(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    /// [`OutputError::Write`]: whatever `write` or the file system says, with the file's path.
+    pub fn replace(
+        &self,
+        name: &str,
+        write: impl FnOnce(&Path) -> Result<(), WriteError>,
+    ) -> Result<(), OutputError> {
         let target = self.path.join(name);
         let partial = self.path.join(format!("partial-{name}"));
         let written = write(&partial).and_then(|()| Ok(fs::rename(&partial, &target)?));
@@ -82,27 +87,27 @@ impl Folder {
             // Best effort: the error that matters is the one already at hand.
             let _ = fs::remove_file(&partial);
         }
-        written.with_context(|| format!("cannot write {}", target.display()))
+        written.map_err(|reason| OutputError::Write { path: target, reason })
     }
 
     /// Writes `object` as the file `name`, in lines to be read, whole or not at all.
     ///
     /// # Errors
     /// As [`Folder::replace`].
-    pub(crate) fn write_json(&self, name: &str, object: &impl Serialize) -> anyhow::Result<()> {
+    pub fn write_json(&self, name: &str, object: &impl Serialize) -> Result<(), OutputError> {
         self.replace(name, |path| Ok(fs::write(path, serde_json::to_string_pretty(object)? + "\n")?))
     }
 
     /// Removes the files `names` of an earlier run, as far as they exist.
     ///
     /// # Errors
-    /// If one exists and cannot be removed.
-    pub fn remove(&self, names: &[&str]) -> anyhow::Result<()> {
+    /// [`OutputError::Replace`] if one exists and cannot be removed.
+    pub fn remove(&self, names: &[&str]) -> Result<(), OutputError> {
         for name in names {
             let path = self.path.join(name);
             match fs::remove_file(&path) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(error).with_context(|| format!("cannot replace {}", path.display()));
+                Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
+                    return Err(OutputError::Replace { path, reason });
                 }
                 _ => {}
             }
@@ -162,9 +167,9 @@ mod tests {
         folder.replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap();
         let failed = folder.replace("x.txt", |at| {
             fs::write(at, "half")?;
-            anyhow::bail!("disk full")
+            Err(io::Error::other("disk full").into())
         });
-        assert!(format!("{:#}", failed.unwrap_err()).contains("x.txt: disk full"));
+        assert!(failed.unwrap_err().to_string().contains("x.txt: disk full"));
         assert_eq!(fs::read_to_string(root.path().join("x.txt")).unwrap(), "one");
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
     }

@@ -15,7 +15,7 @@ pub(super) use words::{Words, read as read_words};
 use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
-use crate::scene::Quantity;
+use crate::map::scene::Quantity;
 use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
 

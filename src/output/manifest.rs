@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-use crate::model::State;
-use crate::scene::{Axis, Scene, Start};
+use crate::map::scene::{Axis, Scene, Start};
 
 /// The manifest's name. It is the last file that a run writes: a folder that has one is complete.
 pub const MANIFEST: &str = "manifest.json";
@@ -13,7 +12,7 @@ const FORMAT: u32 = 1;
 
 /// What a run's JSON begins with: what it is, and which program wrote it.
 #[derive(Serialize)]
-pub(crate) struct Head {
+pub struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
@@ -23,7 +22,7 @@ pub(crate) struct Head {
 
 impl Head {
     /// The head of what `command` writes.
-    pub(crate) fn of(command: &'static str) -> Head {
+    pub fn of(command: &'static str) -> Head {
         Head {
             format: FORMAT,
             command,
@@ -35,7 +34,7 @@ impl Head {
 
 #[derive(Serialize)]
 pub(super) struct AxisObject {
-    parameter: &'static str,
+    parameter: String,
     min: f64,
     max: f64,
     count: usize,
@@ -43,14 +42,19 @@ pub(super) struct AxisObject {
 
 impl From<&Axis> for AxisObject {
     fn from(axis: &Axis) -> Self {
-        AxisObject { parameter: axis.parameter().name, min: axis.min(), max: axis.max(), count: axis.count() }
+        AxisObject {
+            parameter: axis.parameter().name.to_string(),
+            min: axis.min(),
+            max: axis.max(),
+            count: axis.count(),
+        }
     }
 }
 
 #[derive(Serialize)]
 pub(super) struct StartObject {
     policy: &'static str,
-    state: Option<State>,
+    state: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     count: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,7 +64,7 @@ pub(super) struct StartObject {
 pub(super) fn start(scene: &Scene) -> StartObject {
     let (policy, state) = match scene.start() {
         Start::Rest => ("rest", None),
-        Start::State(state) => ("state", Some(state)),
+        Start::State(state) => ("state", Some(state[..scene.base().state_names().len()].to_vec())),
         Start::Up => ("up", None),
         Start::Down => ("down", None),
     };

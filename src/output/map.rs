@@ -5,8 +5,11 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::validation_json::ValidationObject;
-use super::{Cells, Folder, cells_csv, cells_npy, layers, map_figure, map_manifest, report, unfinished};
-use crate::scene::Format;
+use super::{
+    Cells, Folder, OutputError, WriteError, cells_csv, cells_npy, layers, map_figure, map_manifest, report,
+    unfinished,
+};
+use crate::map::scene::Format;
 use crate::validate::Validation;
 
 pub use super::manifest::MANIFEST;
@@ -37,7 +40,7 @@ const ALL: [&str; 11] = [
 ///
 /// # Errors
 /// If a file cannot be removed.
-pub fn clear(folder: &Folder) -> anyhow::Result<()> {
+pub fn clear(folder: &Folder) -> Result<(), OutputError> {
     folder.remove(&ALL)
 }
 
@@ -46,7 +49,7 @@ pub fn clear(folder: &Folder) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> anyhow::Result<Vec<String>> {
+pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<String>, OutputError> {
     clear(folder)?;
     // Side by side, for each of them has parts that one core must do alone.
     let (tables, pictures) = rayon::join(|| write_tables(folder, cells), || write_pictures(folder, cells));
@@ -70,7 +73,7 @@ pub fn write_validation(
     made: &Made<'_>,
     again: Option<&str>,
     validation: &Validation,
-) -> anyhow::Result<Vec<&'static str>> {
+) -> Result<Vec<&'static str>, OutputError> {
     let object = ValidationObject::new(cells, made, again, validation);
     folder.write_json(VALIDATION, &object)?;
     if !folder.path().join(HTML).is_file() {
@@ -82,9 +85,9 @@ pub fn write_validation(
     Ok(vec![VALIDATION, HTML])
 }
 
-fn write_tables(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String>> {
+fn write_tables(folder: &Folder, cells: &Cells<'_>) -> Result<Vec<String>, OutputError> {
     let wants = |format| cells.scene().outputs().files.contains(&format);
-    let write_if = |wanted: bool, name: &str, write: fn(&Path, &Cells<'_>) -> anyhow::Result<()>| {
+    let write_if = |wanted: bool, name: &str, write: fn(&Path, &Cells<'_>) -> Result<(), WriteError>| {
         if wanted {
             folder.replace(name, |path| write(path, cells)).map(|()| Some(name.to_owned()))
         } else {
@@ -98,7 +101,7 @@ fn write_tables(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String
     Ok([csv?, npy?].into_iter().flatten().collect())
 }
 
-fn write_pictures(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<String>> {
+fn write_pictures(folder: &Folder, cells: &Cells<'_>) -> Result<Vec<String>, OutputError> {
     let wants = |format| cells.scene().outputs().files.contains(&format);
     let mut files = Vec::new();
     if !wants(Format::Png) && !wants(Format::Html) {
@@ -109,7 +112,7 @@ fn write_pictures(folder: &Folder, cells: &Cells<'_>) -> anyhow::Result<Vec<Stri
     if wants(Format::Png) {
         let names: Vec<String> = layers.iter().map(|layer| format!("{}.png", layer.name)).collect();
         layers.par_iter().zip(&names).try_for_each(|(layer, name)| {
-            folder.replace(name, |path| map_figure::write(path, cells, layer))
+            folder.replace(name, |path| Ok(map_figure::write(path, cells, layer)?))
         })?;
         files.extend(names);
     }

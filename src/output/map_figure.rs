@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use anyhow::Result;
 use plotters::style::RGBColor;
 
 use super::cells::Cells;
@@ -10,7 +9,8 @@ use super::layers::{Bar, Entry, Layer};
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::draw_head;
 use super::plot_style::{Align, BELOW, Canvas, DARK, Rect, SMALL, save_figure};
-use crate::scene::{self, Scene, Start};
+use super::{DrawError, FigureError};
+use crate::map::scene::{self, Scene, Start};
 
 const LEFT: f64 = 140.0;
 const TOP: f64 = 130.0;
@@ -37,7 +37,7 @@ const LOWEST: f64 = 700.0;
 ///
 /// # Errors
 /// A file that cannot be written, by name.
-pub(super) fn write(path: &Path, cells: &Cells<'_>, layer: &Layer) -> Result<()> {
+pub(super) fn write(path: &Path, cells: &Cells<'_>, layer: &Layer) -> Result<(), FigureError> {
     let [width, height] = cells.counts().map(side);
     let inside = height.max(legend_height(layer)).max(LOWEST);
     let size = (LEFT + width + GAP + BESIDE, TOP + inside + BELOW);
@@ -62,7 +62,12 @@ fn side(count: usize) -> f64 {
     pixels as f64
 }
 
-fn draw(canvas: &Canvas<'_>, cells: &Cells<'_>, layer: &Layer, [width, height]: [f64; 2]) -> Result<()> {
+fn draw(
+    canvas: &Canvas<'_>,
+    cells: &Cells<'_>,
+    layer: &Layer,
+    [width, height]: [f64; 2],
+) -> Result<(), DrawError> {
     let scene = cells.scene();
     draw_head(canvas, scene.title(), &format!("{}; {}", layer.title, subtitle(scene)), &[])?;
     let rect = Rect { left: LEFT, top: TOP, right: LEFT + width, bottom: TOP + height };
@@ -81,7 +86,7 @@ fn draw(canvas: &Canvas<'_>, cells: &Cells<'_>, layer: &Layer, [width, height]: 
 
 /// Where cells start and how long they run: what a map means depends on it.
 pub(super) fn subtitle(scene: &Scene) -> String {
-    let last = scene.axes().last().map_or("", |axis| axis.parameter().name);
+    let last = scene.axes().last().map_or("", |axis| &*axis.parameter().name);
     let start = match scene.start() {
         Start::Rest => "from rest".to_owned(),
         Start::State([x1, v1, x2, v2]) => format!("from ({x1}, {v1}, {x2}, {v2})"),
@@ -124,7 +129,7 @@ fn draw_entries(
     layer: &Layer,
     (left, top): (f64, f64),
     cells: &Cells<'_>,
-) -> Result<()> {
+) -> Result<(), DrawError> {
     let total: usize = cells.counts().iter().product();
     let right = left + BESIDE - GAP - 20.0;
     for (row, entry) in layer.entries.iter().enumerate() {
@@ -150,7 +155,7 @@ fn share(entry: &Entry, total: usize) -> String {
     }
 }
 
-fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64)) -> Result<()> {
+fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64)) -> Result<(), DrawError> {
     canvas.text(bar.label, (left, top + 12.0), SMALL, Align::Left, DARK)?;
     let top = top + BAR_HEAD;
     let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
@@ -163,9 +168,9 @@ fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64)) -> Result<(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Plan;
+    use crate::map::plan::Plan;
+    use crate::map::scene::Purpose;
     use crate::record::Record;
-    use crate::scene::Purpose;
 
     const LOW: [u8; 3] = [1, 2, 3];
     const HIGH: [u8; 3] = [4, 5, 6];

@@ -10,10 +10,10 @@ use super::cells_npy::ABSENT;
 use super::manifest::{AxisObject, Head, StartObject, start};
 use super::names;
 use super::parameters::Parameters;
-use crate::orbit::Status;
-use crate::plan::count_classes;
-use crate::scene::{Scene, Steps};
-use crate::schedule::{Audit, Refined};
+use crate::map::plan::count_classes;
+use crate::map::scene::{Scene, Steps};
+use crate::map::schedule::{Audit, Deviation, Refined};
+use rattlemap_dynamics::orbit::Status;
 
 /// Who computed a map.
 #[derive(Clone, Copy, Debug)]
@@ -119,6 +119,52 @@ struct AuditObject {
     interval: [f64; 2],
     words: usize,
     wrong_words: usize,
+    errors: ErrorsObject,
+}
+
+/// Absolute differences between what the sampled cells had been filled with and what integration shows; null
+/// where filled cells show no such quantity.
+#[derive(Serialize)]
+struct ErrorsObject {
+    lyapunov: Option<DeviationObject>,
+    impacts_per_period: Option<DeviationObject>,
+    mesh_fraction: Option<DeviationObject>,
+}
+
+/// `empty` cells have a value but were filled with none, and are not `compared`.
+#[derive(Serialize)]
+struct DeviationObject {
+    compared: usize,
+    empty: usize,
+    median: f64,
+    p95: f64,
+    worst: f64,
+    #[serde(flatten)]
+    off_by_one: Option<OffByOneObject>,
+}
+
+/// Cells whose counts differ by 1 or more.
+#[derive(Serialize)]
+struct OffByOneObject {
+    off_by_one: usize,
+    off_by_one_rate: f64,
+    off_by_one_interval: [f64; 2],
+}
+
+impl DeviationObject {
+    fn of(deviation: Deviation) -> DeviationObject {
+        let Deviation { compared, empty, median, p95, worst, .. } = deviation;
+        DeviationObject { compared, empty, median, p95, worst, off_by_one: None }
+    }
+
+    fn of_counts(deviation: Deviation) -> DeviationObject {
+        let off_by_one = OffByOneObject {
+            off_by_one: deviation.off_by_one,
+            off_by_one_rate: deviation.off_by_one_rate(),
+            off_by_one_interval: deviation.off_by_one_interval(),
+        };
+        DeviationObject { off_by_one: Some(off_by_one), ..DeviationObject::of(deviation) }
+    }
 }
 
 impl From<&Refined> for RefinementObject {
@@ -131,6 +177,11 @@ impl From<&Refined> for RefinementObject {
             interval: audit.interval(),
             words: audit.words,
             wrong_words: audit.wrong_words,
+            errors: ErrorsObject {
+                lyapunov: audit.errors.lyapunov.map(DeviationObject::of),
+                impacts_per_period: audit.errors.impacts.map(DeviationObject::of_counts),
+                mesh_fraction: audit.errors.mesh.map(DeviationObject::of),
+            },
         };
         let Refined { integrated, filled, rounds, ref audits, .. } = *refined;
         RefinementObject { integrated, filled, rounds, audits: audits.iter().map(audit).collect() }

@@ -1,8 +1,8 @@
 //! The names that outputs use: part of the contract with scripts.
 
 use super::cells::Source;
-use crate::model::Side;
-use crate::orbit::{Class, EventKind, Status};
+use rattlemap_dynamics::model::Side;
+use rattlemap_dynamics::orbit::{Class, EventKind, Status};
 
 /// Every class name, in the order in which they are counted.
 pub(super) const CLASSES: [&str; 4] = Class::NAMES;

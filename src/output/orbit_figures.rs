@@ -5,7 +5,6 @@ mod motion;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use plotters::style::RGBColor;
 
 use self::motion::{Motion, Piece};
@@ -14,8 +13,9 @@ use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{
     Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MESHING, Marker, Rect, SMALL, Shape, save_figure, wall_color,
 };
-use crate::model::{GearPair, Side, State};
-use crate::orbit::{EventKind, Orbit, Sample};
+use super::{DrawError, OutputError};
+use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
+use rattlemap_dynamics::orbit::{EventKind, Orbit, Sample};
 
 /// The files that [`write`] makes.
 pub(super) const NAMES: [&str; 3] = ["phase_plane.png", "time_history.png", "gap.png"];
@@ -39,12 +39,19 @@ const TIME_LABEL: &str = "time in forcing periods, t / T";
 /// Returns the files written.
 ///
 /// # Errors
-/// A file that cannot be written, by name.
-pub fn write(dir: &Path, pair: &GearPair, orbit: &Orbit, trace: &[Sample]) -> Result<Vec<PathBuf>> {
+/// [`OutputError`] for a file that cannot be written, by name, or a model without motion.
+pub fn write(
+    dir: &Path,
+    model: &dyn Model,
+    orbit: &Orbit,
+    trace: &[Sample],
+) -> Result<Vec<PathBuf>, OutputError> {
     let scene = Scene {
-        pair,
+        names: model.state_names().into_iter().map(subscripted).collect(),
+        bodies: model.bodies(),
+        oscillator: model.oscillator()?,
         motion: Motion::new(orbit, trace),
-        title: heading::parameters(pair),
+        title: heading::parameters(model),
         subtitle: heading::character(orbit),
     };
     let [phase_plane, time_history, gap] = NAMES.map(|name| dir.join(name));
@@ -56,27 +63,32 @@ pub fn write(dir: &Path, pair: &GearPair, orbit: &Orbit, trace: &[Sample]) -> Re
 
 /// One orbit on its way onto paper.
 struct Scene<'a> {
-    pair: &'a GearPair,
+    /// Of the state's components.
+    names: Vec<String>,
+    bodies: Vec<&'a str>,
+    oscillator: Oscillator,
     motion: Motion,
     title: String,
     subtitle: String,
 }
 
 impl Scene<'_> {
-    fn draw_phase_planes(&self, canvas: &Canvas<'_>) -> Result<()> {
+    fn draw_phase_planes(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
         let mut legend = vec![Entry::new(Key::Line { color: DARK, width: LINE }, "free motion")];
         legend.extend(self.meshing_entry());
         legend.extend(self.event_entries(true));
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
         let whole = canvas.panel(LEFT, top);
-        let width = (whole.right - whole.left - BETWEEN) / 2.0;
-        for (gear, left) in [(1, LEFT), (2, LEFT + width + BETWEEN)] {
-            let (x, v) = (2 * gear - 2, 2 * gear - 1);
+        let count = self.bodies.len() as f64;
+        let width = (whole.right - whole.left - (count - 1.0) * BETWEEN) / count;
+        for (i, body) in self.bodies.iter().enumerate() {
+            let left = LEFT + i as f64 * (width + BETWEEN);
+            let (x, v) = (2 * i, 2 * i + 1);
             let rect = Rect { left, right: left + width, ..whole };
             let frame = Frame {
                 rect,
-                x: self.state_axis(&format!("displacement of gear {gear}, x{}", subscript(gear)), &[x], 1.0),
-                y: self.state_axis(&format!("velocity, v{}", subscript(gear)), &[v], self.pair.omega),
+                x: self.state_axis(&format!("displacement of {body}, {}", self.names[x]), &[x], 1.0),
+                y: self.state_axis(&format!("velocity, {}", self.names[v]), &[v], self.oscillator.omega),
             };
             frame.draw_grid(canvas)?;
             let at = |_: f64, state: &State| (state[x], state[v]);
@@ -88,11 +100,12 @@ impl Scene<'_> {
         Ok(())
     }
 
-    fn draw_time_history(&self, canvas: &Canvas<'_>) -> Result<()> {
-        let mut legend = vec![
-            Entry::new(Key::Line { color: GEAR_1, width: LINE }, "gear 1"),
-            Entry::new(Key::Line { color: GEAR_2, width: LINE }, "gear 2"),
-        ];
+    fn draw_time_history(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
+        let colored = || self.bodies.iter().zip([GEAR_1, GEAR_2]).enumerate();
+        let line = |(_, (body, color)): (usize, (&&str, RGBColor))| {
+            Entry::new(Key::Line { color, width: LINE }, body)
+        };
+        let mut legend: Vec<Entry> = colored().map(line).collect();
         for side in
             Side::BOTH.into_iter().filter(|s| self.motion.pieces.iter().any(|p| p.meshing == Some(*s)))
         {
@@ -105,17 +118,19 @@ impl Scene<'_> {
         let middle = (top + whole.bottom) / 2.0;
         let panels = [
             (0, "displacement, x", 1.0, top, middle - 15.0),
-            (1, "velocity, v", self.pair.omega, middle + 15.0, whole.bottom),
+            (1, "velocity, v", self.oscillator.omega, middle + 15.0, whole.bottom),
         ];
         for (quantity, label, scale, top, bottom) in panels {
+            let components: Vec<usize> = (quantity..self.names.len()).step_by(2).collect();
             let frame = Frame {
                 rect: Rect { top, bottom, ..whole },
                 x: self.time_axis(),
-                y: self.state_axis(label, &[quantity, quantity + 2], scale),
+                y: self.state_axis(label, &components, scale),
             };
             self.draw_bands(canvas, &frame)?;
             frame.draw_grid(canvas)?;
-            for (index, color) in [(quantity, GEAR_1), (quantity + 2, GEAR_2)] {
+            for (i, (_, color)) in colored() {
+                let index = quantity + 2 * i;
                 let at = |t: f64, state: &State| (t, state[index]);
                 self.draw_jumps(canvas, &frame, at)?;
                 self.draw_lines(canvas, &frame, (color, color), at)?;
@@ -126,7 +141,7 @@ impl Scene<'_> {
         Ok(())
     }
 
-    fn draw_gap(&self, canvas: &Canvas<'_>) -> Result<()> {
+    fn draw_gap(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
         let mut legend = vec![Entry::new(Key::Line { color: DARK, width: LINE }, "gap in free motion")];
         legend.extend(self.meshing_entry());
         legend.extend(self.event_entries(false));
@@ -135,16 +150,17 @@ impl Scene<'_> {
         let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
         let bottom = panel.bottom;
         let split = if self.motion.meshes() { top + 0.64 * (bottom - top) } else { bottom };
-        let b = self.pair.b;
-        let walls = [1.25 * b, -1.25 * b];
-        let gaps = self.motion.points().map(|(_, state)| state[0] - state[2]);
+        let half = self.half();
+        let [right, left] = self.oscillator.walls;
+        let walls = [right + 0.25 * half, left - 0.25 * half];
+        let gaps = self.motion.points().map(|(_, state)| self.gap(state));
         let frame = Frame {
             rect: Rect { bottom: split, ..panel },
             x: self.time_axis(),
-            y: Axis::around("gap, z = x\u{2081} \u{2212} x\u{2082}", gaps.chain(walls), b),
+            y: Axis::around(&format!("gap, z = {}", self.gap_in_words()), gaps.chain(walls), half),
         };
         self.draw_walls(canvas, &frame)?;
-        let at = |t: f64, state: &State| (t, state[0] - state[2]);
+        let at = |t: f64, state: &State| (t, self.gap(state));
         self.draw_lines(canvas, &frame, (DARK, MESHING), at)?;
         self.draw_markers(canvas, &frame, false, at)?;
         frame.draw_axes(canvas, split == bottom)?;
@@ -155,9 +171,9 @@ impl Scene<'_> {
     }
 
     /// The walls of the gap, and what lies behind them.
-    fn draw_walls(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
+    fn draw_walls(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), DrawError> {
         let rect = frame.rect;
-        let [upper, lower] = Side::BOTH.map(|side| frame.at(0.0, side.sign() * self.pair.b).1);
+        let [upper, lower] = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
         canvas.fill(Rect { bottom: upper, ..rect }, DARK, 0.08)?;
         canvas.fill(Rect { top: lower, ..rect }, DARK, 0.08)?;
         frame.draw_grid(canvas)?;
@@ -172,15 +188,17 @@ impl Scene<'_> {
     }
 
     /// How deep the teeth press into the wall: too little to be seen in the gap itself.
-    fn draw_penetration(&self, canvas: &Canvas<'_>, rect: Rect) -> Result<()> {
+    fn draw_penetration(&self, canvas: &Canvas<'_>, rect: Rect) -> Result<(), DrawError> {
         let depth = |piece: &Piece, state: &State| {
-            piece.meshing.map_or(0.0, |side| side.sign() * (state[0] - state[2]) - self.pair.b)
+            piece
+                .meshing
+                .map_or(0.0, |side| side.sign() * (self.gap(state) - self.oscillator.walls[side as usize]))
         };
         let depths = self.motion.pieces.iter().flat_map(|p| p.points.iter().map(move |(_, s)| depth(p, s)));
         let frame = Frame {
             rect,
             x: self.time_axis(),
-            y: Axis::around("depth, |z| \u{2212} b", depths, 1e-6 * self.pair.b),
+            y: Axis::around("depth, |z| \u{2212} b", depths, 1e-6 * self.half()),
         };
         frame.draw_grid(canvas)?;
         let y = frame.at(0.0, 0.0).1;
@@ -196,7 +214,7 @@ impl Scene<'_> {
         frame.draw_axes(canvas, true)
     }
 
-    fn draw_bands(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<()> {
+    fn draw_bands(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), DrawError> {
         for piece in &self.motion.pieces {
             if let Some(side) = piece.meshing {
                 let (from, to) = piece.span();
@@ -213,7 +231,7 @@ impl Scene<'_> {
         frame: &Frame,
         (free, meshing): (RGBColor, RGBColor),
         at: impl Fn(f64, &State) -> (f64, f64),
-    ) -> Result<()> {
+    ) -> Result<(), DrawError> {
         // Many turns in one panel need a thinner line.
         let thin = if self.motion.pieces.len() > 100 { 0.6 } else { 1.0 };
         for piece in &self.motion.pieces {
@@ -239,7 +257,7 @@ impl Scene<'_> {
         canvas: &Canvas<'_>,
         frame: &Frame,
         at: impl Fn(f64, &State) -> (f64, f64),
-    ) -> Result<()> {
+    ) -> Result<(), DrawError> {
         for (t, event) in &self.motion.events {
             let [from, to] = [at(*t, &event.before), at(*t, &event.after)].map(|(x, y)| frame.at(x, y));
             canvas.dashes(from, to, 1.3, FAINT)?;
@@ -254,7 +272,7 @@ impl Scene<'_> {
         frame: &Frame,
         both: bool,
         at: impl Fn(f64, &State) -> (f64, f64),
-    ) -> Result<()> {
+    ) -> Result<(), DrawError> {
         for kind in self.motion.kinds() {
             for (t, event) in self.motion.events.iter().filter(|(_, event)| event.kind == kind) {
                 let marker = self.marker(kind, wall_color(event.side));
@@ -306,6 +324,36 @@ impl Scene<'_> {
         entries
     }
 
+    /// Half the walls' distance.
+    fn half(&self) -> f64 {
+        let [right, left] = self.oscillator.walls;
+        0.5 * (right - left)
+    }
+
+    fn gap(&self, state: &State) -> f64 {
+        let [g1, g2] = self.oscillator.gap;
+        g1 * state[0] + g2 * state[2]
+    }
+
+    /// The gap in terms of the displacements.
+    fn gap_in_words(&self) -> String {
+        let mut words = String::new();
+        let terms = self.oscillator.gap.into_iter().zip(self.names.iter().step_by(2));
+        for (factor, name) in terms.filter(|(factor, _)| *factor != 0.0) {
+            words += match (words.is_empty(), factor < 0.0) {
+                (true, true) => "\u{2212}",
+                (true, false) => "",
+                (false, true) => " \u{2212} ",
+                (false, false) => " + ",
+            };
+            match factor.abs() {
+                1.0 => words += name,
+                size => words += &format!("{size} {name}"),
+            }
+        }
+        words
+    }
+
     fn time_axis(&self) -> Axis {
         let (first, last) = self.motion.points().fold((0f64, 0f64), |(a, b), (t, _)| (a.min(t), b.max(t)));
         Axis::exact(TIME_LABEL, first, if last > first { last } else { first + 1.0 })
@@ -315,7 +363,7 @@ impl Scene<'_> {
     fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
         let values = self.motion.points().flat_map(|(_, state)| components.iter().map(|i| state[*i]));
         // A tenth of the half backlash is motion that has died down.
-        Axis::around(label, values, 0.1 * self.pair.b * scale)
+        Axis::around(label, values, 0.1 * self.half() * scale)
     }
 }
 
@@ -326,6 +374,8 @@ fn name(side: Side) -> &'static str {
     }
 }
 
-fn subscript(gear: usize) -> char {
-    if gear == 1 { '\u{2081}' } else { '\u{2082}' }
+/// A component's name with its digits below the line.
+fn subscripted(name: &str) -> String {
+    let below = |c: char| c.to_digit(10).and_then(|digit| char::from_u32(0x2080 + digit));
+    name.chars().map(|c| below(c).unwrap_or(c)).collect()
 }

@@ -4,14 +4,16 @@ use serde::Serialize;
 
 use super::names;
 use super::parameters::Parameters;
-use crate::model::{GearPair, State};
-use crate::orbit::{Event, Orbit};
+use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::orbit::{Event, Orbit};
 
 /// The object; not-a-number becomes null, as JSON has no word for it.
 #[derive(Serialize)]
 struct OrbitObject<'a> {
-    e: f64,
-    omega: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    e: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    omega: Option<f64>,
     parameters: Parameters,
     class: &'static str,
     period: Option<u32>,
@@ -25,7 +27,7 @@ struct OrbitObject<'a> {
     status: &'static str,
     /// Forcing periods that the motion was followed for.
     periods_run: u64,
-    strobe: State,
+    strobe: Vec<f64>,
     events: Vec<EventObject>,
 }
 
@@ -35,33 +37,35 @@ struct EventObject {
     side: i8,
     t: f64,
     t_mod_period: f64,
-    before: State,
-    after: State,
+    before: Vec<f64>,
+    after: Vec<f64>,
 }
 
-impl From<&Event> for EventObject {
-    fn from(event: &Event) -> Self {
+impl EventObject {
+    fn new(event: &Event, shown: impl Fn(State) -> Vec<f64>) -> Self {
         EventObject {
             kind: names::kind(event.kind),
             side: names::side(event.side),
             t: event.t,
             t_mod_period: event.t_mod_period,
-            before: event.before,
-            after: event.after,
+            before: shown(event.before),
+            after: shown(event.after),
         }
     }
 }
 
-/// The orbit of `pair` as a JSON object of several lines; floats are shortest round-trip
+/// The orbit of a model as a JSON object of several lines; floats are shortest round-trip
 /// decimals, what is absent or not finite is null.
 ///
 /// # Errors
 /// None that an [`Orbit`] can cause; serialisation is fallible by signature.
-pub(super) fn to_json(pair: &GearPair, orbit: &Orbit) -> serde_json::Result<String> {
+pub(super) fn to_json(model: &dyn Model, orbit: &Orbit) -> serde_json::Result<String> {
+    let components = model.state_names().len();
+    let shown = |state: State| state[..components].to_vec();
     serde_json::to_string_pretty(&OrbitObject {
-        e: pair.e,
-        omega: pair.omega,
-        parameters: Parameters::of(pair),
+        e: model.get("e").ok(),
+        omega: model.get("omega").ok(),
+        parameters: Parameters::of(model),
         class: names::class(orbit.class),
         period: names::period(orbit.class),
         lyapunov: orbit.lyapunov,
@@ -73,7 +77,7 @@ pub(super) fn to_json(pair: &GearPair, orbit: &Orbit) -> serde_json::Result<Stri
         mesh_fraction: orbit.mesh_fraction,
         status: names::status(orbit.status),
         periods_run: orbit.periods_run,
-        strobe: orbit.strobe,
-        events: orbit.events.iter().map(EventObject::from).collect(),
+        strobe: shown(orbit.strobe),
+        events: orbit.events.iter().map(|event| EventObject::new(event, shown)).collect(),
     })
 }

@@ -3,16 +3,16 @@
 use std::fmt::Write;
 
 use super::names;
-use crate::model::{GearPair, Side, State};
-use crate::orbit::{Class, Event, Orbit, Status};
+use rattlemap_dynamics::model::{Model, Side};
+use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
 
 /// Numbers as the paper prints them, one digit more.
 const DECIMALS: usize = 5;
 
-/// A summary of the orbit of `pair` in lines of aligned text.
-pub(super) fn summary(pair: &GearPair, orbit: &Orbit) -> String {
+/// A summary of the orbit of a model in lines of aligned text.
+pub(super) fn summary(model: &dyn Model, orbit: &Orbit) -> String {
     let mut text = String::new();
-    for (label, value) in facts(pair, orbit) {
+    for (label, value) in facts(model, orbit) {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{label:<22}{value}");
     }
@@ -24,19 +24,20 @@ pub(super) fn summary(pair: &GearPair, orbit: &Orbit) -> String {
         periods => format!("{periods} forcing periods"),
     };
     let _ = writeln!(text, "\nevents over {span} (T = {:.DECIMALS$})", orbit.forcing_period);
-    text.push_str(&events(&orbit.events));
+    text.push_str(&events(model, &orbit.events));
     text
 }
 
-fn facts(pair: &GearPair, orbit: &Orbit) -> Vec<(&'static str, String)> {
+fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let mut facts = vec![
-        ("parameters", parameters(pair)),
+        ("parameters", parameters(model)),
         ("class", class(orbit)),
         ("status", status(orbit.status).to_owned()),
     ];
     if orbit.class == Class::Failed {
-        return facts;
+        return labelled(facts);
     }
+    let names = model.state_names();
     facts.extend([
         ("word, in time", or_dash(orbit.word.time_order())),
         ("word, as printed", or_dash(orbit.word.paper_notation())),
@@ -47,20 +48,28 @@ fn facts(pair: &GearPair, orbit: &Orbit) -> Vec<(&'static str, String)> {
         facts.push(("Floquet multipliers", listed.join(", ")));
     }
     if let Some(symmetric) = orbit.symmetric {
-        facts.push(("symmetric", if symmetric { "yes" } else { "no, a mirror twin coexists" }.to_owned()));
+        facts.push((
+            "symmetric",
+            if symmetric { "yes" } else { "no, a symmetry-conjugate orbit coexists" }.to_owned(),
+        ));
     }
     facts.extend([
         ("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period)),
         ("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction)),
-        ("strobe x1 v1 x2 v2", numbers(orbit.strobe).trim_start().to_owned()),
     ]);
+    let mut facts = labelled(facts);
+    let strobe = numbers(&orbit.strobe[..names.len()]).trim_start().to_owned();
+    facts.push((format!("strobe {}", names.join(" ")), strobe));
     facts
 }
 
-fn parameters(pair: &GearPair) -> String {
-    let named = GearPair::PARAMETERS.iter();
-    let listed = named.filter_map(|p| Some(format!("{}={:?}", p.name, pair.get(p.name).ok()?)));
-    listed.collect::<Vec<_>>().join(" ")
+fn labelled(facts: Vec<(&str, String)>) -> Vec<(String, String)> {
+    facts.into_iter().map(|(label, value)| (label.to_owned(), value)).collect()
+}
+
+fn parameters(model: &dyn Model) -> String {
+    let all = model.parameters().iter().enumerate();
+    all.map(|(i, p)| format!("{}={:?}", p.name, model.value(i))).collect::<Vec<_>>().join(" ")
 }
 
 fn class(orbit: &Orbit) -> String {
@@ -82,6 +91,9 @@ fn status(status: Status) -> &'static str {
         Status::CapRoot => "cap_root: more root iterations than the cap allows",
         Status::TooStiff => "too_stiff: too stiff for this engine",
         Status::NonFinite => "non_finite: the state left the range of finite numbers",
+        Status::BelowResolution => {
+            "below_resolution: points of the cycle closer together than can be told apart"
+        }
     }
 }
 
@@ -101,17 +113,24 @@ fn or_dash(text: String) -> String {
     if text.is_empty() { "-".to_owned() } else { text }
 }
 
-fn numbers(state: State) -> String {
-    state.map(|x| format!(" {x:>9.DECIMALS$}")).concat()
+fn numbers(state: &[f64]) -> String {
+    state.iter().map(|x| format!(" {x:>9.DECIMALS$}")).collect()
 }
 
-fn events(events: &[Event]) -> String {
+fn events(model: &dyn Model, events: &[Event]) -> String {
     if events.is_empty() {
         return "none: the walls are not reached\n".to_owned();
     }
+    let names = model.state_names();
+    let (count, listed) = (names.len(), names.join(", "));
     let mut text = format!(
-        "{:<11}{:<6} {:>10} {:>10}  {:<40}  {}\n",
-        "kind", "side", "t", "t mod T", " before (x1, v1, x2, v2)", " after (x1, v1, x2, v2)"
+        "{:<11}{:<6} {:>10} {:>10}  {:<width$}   after ({listed})\n",
+        "kind",
+        "side",
+        "t",
+        "t mod T",
+        format!(" before ({listed})"),
+        width = 10 * count
     );
     for event in events {
         let side = if event.side == Side::Right { "right" } else { "left" };
@@ -121,8 +140,8 @@ fn events(events: &[Event]) -> String {
             names::kind(event.kind),
             event.t,
             event.t_mod_period,
-            numbers(event.before),
-            numbers(event.after)
+            numbers(&event.before[..count]),
+            numbers(&event.after[..count])
         );
     }
     text

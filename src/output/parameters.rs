@@ -1,33 +1,28 @@
-//! A gear pair's parameters in JSON: one object, a field per parameter.
+//! A model's parameters in JSON: one object, a field per parameter.
 
 use serde::{Serialize, Serializer};
 
-use crate::model::GearPair;
-use crate::scene::Scene;
+use crate::map::scene::Scene;
+use rattlemap_dynamics::model::Model;
 
-/// Every parameter by name, in the order of Table 1.
-pub(crate) struct Parameters {
-    pair: GearPair,
-    /// Parameters to leave out because they are swept.
-    except: Vec<&'static str>,
-}
+/// Names and values, in the order of the model's table.
+pub struct Parameters(Vec<(String, f64)>);
 
 impl Parameters {
-    /// All parameters of a gear pair.
-    pub(crate) fn of(pair: &GearPair) -> Parameters {
-        Parameters { pair: *pair, except: Vec::new() }
+    /// All parameters of a model.
+    pub fn of(model: &dyn Model) -> Parameters {
+        let all = model.parameters().iter().enumerate();
+        Parameters(all.map(|(index, p)| (p.name.to_string(), model.value(index))).collect())
     }
 
     /// Those of a scene that no axis sweeps.
     pub(super) fn of_scene(scene: &Scene) -> Parameters {
-        let swept = scene.axes().iter().map(|axis| axis.parameter().name);
-        Parameters { pair: scene.base(), except: swept.collect() }
+        Parameters(scene.fixed().map(|(name, value)| (name.to_owned(), value)).collect())
     }
 }
 
 impl Serialize for Parameters {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let named = GearPair::PARAMETERS.iter().filter(|p| !self.except.contains(&p.name));
-        serializer.collect_map(named.map(|p| (p.name, self.pair.get(p.name).ok())))
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
     }
 }

@@ -5,48 +5,49 @@
 //! outlines to whole pixels. Lines are rasterised here: plotters fills a thick polyline
 //! as one polygon, which leaves holes wherever a trajectory crosses itself.
 
-pub(crate) mod axes;
-pub(crate) mod labels;
-pub(crate) mod legend;
+pub mod axes;
+pub mod labels;
+pub mod legend;
 mod raster;
 mod ticks;
 
 use std::path::Path;
 use std::sync::Once;
 
-use anyhow::{Context, Result};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::register_font;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::model::Side;
-use crate::orbit::EventKind;
+use super::{DrawError, FigureError};
+use rattlemap_dynamics::model::Side;
+use rattlemap_dynamics::orbit::EventKind;
 
 /// Text, axes and outlines.
-pub(crate) const DARK: RGBColor = RGBColor(0x26, 0x26, 0x26);
+pub const DARK: RGBColor = RGBColor(0x26, 0x26, 0x26);
 /// Lines that should not draw the eye: velocity jumps, marks without data.
-pub(crate) const FAINT: RGBColor = RGBColor(0x96, 0x96, 0x96);
+pub const FAINT: RGBColor = RGBColor(0x96, 0x96, 0x96);
 /// Grid lines.
-pub(crate) const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
+pub const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
 /// Trajectory while the teeth mesh.
-pub(crate) const MESHING: RGBColor = RGBColor(0x00, 0x9e, 0x73);
+pub const MESHING: RGBColor = RGBColor(0x00, 0x9e, 0x73);
 /// Gear 1 where both gears share a panel.
-pub(crate) const GEAR_1: RGBColor = DARK;
+pub const GEAR_1: RGBColor = DARK;
 /// Gear 2 where both gears share a panel.
-pub(crate) const GEAR_2: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
+pub const GEAR_2: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
 
 /// Size of tick labels and legends.
-pub(crate) const SMALL: f64 = 23.0;
+pub const SMALL: f64 = 23.0;
 /// Size of axis labels and subtitles.
-pub(crate) const MEDIUM: f64 = 26.0;
+pub const MEDIUM: f64 = 26.0;
 /// Size of titles.
-pub(crate) const LARGE: f64 = 32.0;
+pub const LARGE: f64 = 32.0;
 
 /// From a figure's edges to its panels: room for the last tick label on the right, for ticks and
 /// the axis' name below.
 const RIGHT: f64 = 58.0;
-pub(crate) const BELOW: f64 = 105.0;
+/// The same, below.
+pub const BELOW: f64 = 105.0;
 
 /// Canvas pixels per pixel of the finished picture, along each direction.
 const FINE: u32 = 2;
@@ -55,7 +56,7 @@ const FONT: &str = "figure";
 const CAP_HEIGHT: f64 = 0.62;
 
 /// The colour of a wall (Okabe and Ito's colour-blind safe set).
-pub(crate) fn wall_color(side: Side) -> RGBColor {
+pub fn wall_color(side: Side) -> RGBColor {
     match side {
         Side::Right => RGBColor(0xd5, 0x5e, 0x00),
         Side::Left => RGBColor(0x00, 0x72, 0xb2),
@@ -63,22 +64,29 @@ pub(crate) fn wall_color(side: Side) -> RGBColor {
 }
 
 /// A position in pixels of the finished picture, y downwards.
-pub(crate) type Point = (f64, f64);
+pub type Point = (f64, f64);
 
 /// A rectangle in pixels of the finished picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rect {
-    pub(crate) left: f64,
-    pub(crate) top: f64,
-    pub(crate) right: f64,
-    pub(crate) bottom: f64,
+pub struct Rect {
+    /// Its left edge.
+    pub left: f64,
+    /// Its upper edge.
+    pub top: f64,
+    /// Its right edge.
+    pub right: f64,
+    /// Its lower edge.
+    pub bottom: f64,
 }
 
 /// Where the anchor of a text lies; vertically it is always the middle of the capitals.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Align {
+pub enum Align {
+    /// The text begins there.
     Left,
+    /// The text's middle lies there.
     Center,
+    /// The text ends there.
     Right,
     /// Centred and turned by a quarter, to be read upwards.
     Upwards,
@@ -86,14 +94,18 @@ pub(crate) enum Align {
 
 /// The outline of a marker: one per kind of event.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Shape {
+pub enum Shape {
+    /// An impact.
     Circle,
+    /// A start of meshing.
     Triangle,
+    /// An end of meshing.
     Square,
 }
 
 impl Shape {
-    pub(crate) fn of(kind: EventKind) -> Shape {
+    /// That of a kind of event.
+    pub fn of(kind: EventKind) -> Shape {
         match kind {
             EventKind::Impact => Shape::Circle,
             EventKind::MeshStart => Shape::Triangle,
@@ -102,19 +114,21 @@ impl Shape {
     }
 }
 
-/// How a marker looks.
+/// The form of a marker.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Marker {
-    pub(crate) shape: Shape,
-    pub(crate) color: RGBColor,
+pub struct Marker {
+    /// Its outline.
+    pub shape: Shape,
+    /// Its colour.
+    pub color: RGBColor,
     /// Half its extent.
-    pub(crate) radius: f64,
+    pub radius: f64,
     /// White inside: the state after the event where both are marked.
-    pub(crate) hollow: bool,
+    pub hollow: bool,
 }
 
 /// A picture being drawn.
-pub(crate) struct Canvas<'a> {
+pub struct Canvas<'a> {
     area: DrawingArea<BitMapBackend<'a>, Shift>,
     size: (f64, f64),
 }
@@ -123,24 +137,24 @@ pub(crate) struct Canvas<'a> {
 ///
 /// # Errors
 /// What `draw` returns, or that the file could not be written; both name the file.
-pub(crate) fn save_figure(
+pub fn save_figure(
     path: &Path,
     (width, height): (u32, u32),
-    draw: impl FnOnce(&Canvas<'_>) -> Result<()>,
-) -> Result<()> {
+    draw: impl FnOnce(&Canvas<'_>) -> Result<(), DrawError>,
+) -> Result<(), FigureError> {
     register_fonts();
     let fine = (width * FINE, height * FINE);
     let mut pixels = vec![0xff; 3 * (fine.0 * fine.1) as usize];
     {
         let area = BitMapBackend::with_buffer(&mut pixels, fine).into_drawing_area();
         let canvas = Canvas { area, size: (width.into(), height.into()) };
-        draw(&canvas).with_context(|| format!("cannot draw the figure {}", path.display()))?;
+        draw(&canvas).map_err(|reason| FigureError::draw(path, reason))?;
     }
     let pixels = averaged(&pixels, (width, height));
     let mut file = BitMapBackend::new(path, (width, height));
     file.blit_bitmap((0, 0), (width, height), &pixels)
         .and_then(|()| file.present())
-        .with_context(|| format!("cannot write the figure {}", path.display()))
+        .map_err(|reason| FigureError::save(path, reason))
 }
 
 fn register_fonts() {
@@ -175,23 +189,30 @@ fn fine(at: Point) -> (i32, i32) {
 
 impl Canvas<'_> {
     /// Width and height.
-    pub(crate) fn size(&self) -> (f64, f64) {
+    pub fn size(&self) -> (f64, f64) {
         self.size
     }
 
     /// What is left for panels of the picture below `top`, `left` pixels from its left edge.
-    pub(crate) fn panel(&self, left: f64, top: f64) -> Rect {
+    pub fn panel(&self, left: f64, top: f64) -> Rect {
         Rect { left, top, right: self.size.0 - RIGHT, bottom: self.size.1 - BELOW }
     }
 
     /// Fills a rectangle.
-    pub(crate) fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<()> {
+    pub fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<(), DrawError> {
         let corners = [fine((rect.left, rect.top)), fine((rect.right, rect.bottom))];
-        Ok(self.area.draw(&Rectangle::new(corners, color.mix(opacity).filled()))?)
+        self.area.draw(&Rectangle::new(corners, color.mix(opacity).filled()))
     }
 
     /// Writes one line of text.
-    pub(crate) fn text(&self, text: &str, at: Point, size: f64, align: Align, color: RGBColor) -> Result<()> {
+    pub fn text(
+        &self,
+        text: &str,
+        at: Point,
+        size: f64,
+        align: Align,
+        color: RGBColor,
+    ) -> Result<(), DrawError> {
         let size = size * f64::from(FINE);
         // Plotters puts the baseline half a size below the top of its box; going back from
         // there by half the height of a capital centres digits and capitals on the anchor.
@@ -205,11 +226,11 @@ impl Canvas<'_> {
             Align::Upwards => (font.transform(FontTransform::Rotate270), HPos::Center, (x + shift, y)),
         };
         let style = font.color(&color).pos(Pos::new(h_pos, VPos::Top));
-        Ok(self.area.draw_text(text, &style, at)?)
+        self.area.draw_text(text, &style, at)
     }
 
     /// Width of a text.
-    pub(crate) fn text_width(&self, text: &str, size: f64) -> Result<f64> {
+    pub fn text_width(&self, text: &str, size: f64) -> Result<f64, DrawError> {
         let scale = f64::from(FINE);
         let font = FontDesc::new(FontFamily::Name(FONT), size * scale, FontStyle::Normal);
         let (width, _) = self.area.estimate_text_size(text, &font.into())?;
@@ -217,7 +238,7 @@ impl Canvas<'_> {
     }
 
     /// The beginning of a text that is not wider than `room`, with an ellipsis if that is not all.
-    pub(crate) fn fitted(&self, text: &str, size: f64, room: f64) -> Result<String> {
+    pub fn fitted(&self, text: &str, size: f64, room: f64) -> Result<String, DrawError> {
         let mut text = text.to_owned();
         while text.chars().count() > 2 && self.text_width(&text, size)? > room {
             text.truncate(text.char_indices().nth_back(1).map_or(0, |(i, _)| i));
@@ -227,7 +248,7 @@ impl Canvas<'_> {
     }
 
     /// Draws an event marker, with a thin white rim that sets it off from the line.
-    pub(crate) fn marker(&self, at: Point, marker: Marker) -> Result<()> {
+    pub fn marker(&self, at: Point, marker: Marker) -> Result<(), DrawError> {
         let Marker { shape, color, radius, hollow } = marker;
         // Small markers are many, and the rim of one would wipe out its neighbour.
         if radius > 4.0 {
@@ -237,7 +258,7 @@ impl Canvas<'_> {
         if hollow { self.shape(at, shape, 0.6 * radius, WHITE) } else { Ok(()) }
     }
 
-    fn shape(&self, at: Point, shape: Shape, radius: f64, color: RGBColor) -> Result<()> {
+    fn shape(&self, at: Point, shape: Shape, radius: f64, color: RGBColor) -> Result<(), DrawError> {
         let corner = |dx: f64, dy: f64| fine((at.0 + dx * radius, at.1 + dy * radius));
         match shape {
             Shape::Circle => {
@@ -257,7 +278,7 @@ impl Canvas<'_> {
     }
 
     /// Draws a polyline with round joints and ends.
-    pub(crate) fn stroke(&self, path: &[Point], width: f64, color: RGBColor) -> Result<()> {
+    pub fn stroke(&self, path: &[Point], width: f64, color: RGBColor) -> Result<(), DrawError> {
         let scale = f64::from(FINE);
         let path: Vec<Point> = path.iter().map(|p| (p.0 * scale, p.1 * scale)).collect();
         let Some(mut coverage) = Coverage::of(&path, width * scale, self.area.dim_in_pixel()) else {
@@ -276,14 +297,14 @@ impl Canvas<'_> {
     }
 
     /// Draws the border of a rectangle.
-    pub(crate) fn outline(&self, rect: Rect, width: f64) -> Result<()> {
+    pub fn outline(&self, rect: Rect, width: f64) -> Result<(), DrawError> {
         let Rect { left, top, right, bottom } = rect;
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
         self.stroke(&corners, width, DARK)
     }
 
     /// Draws a dashed straight line.
-    pub(crate) fn dashes(&self, from: Point, to: Point, width: f64, color: RGBColor) -> Result<()> {
+    pub fn dashes(&self, from: Point, to: Point, width: f64, color: RGBColor) -> Result<(), DrawError> {
         const DASH: f64 = 5.0;
         let length = (to.0 - from.0).hypot(to.1 - from.1);
         if length == 0.0 || !length.is_finite() {
@@ -301,25 +322,25 @@ impl Canvas<'_> {
     }
 
     /// The canvas pixels inside a rectangle: `(left, top, width, height)`.
-    pub(crate) fn fine_rect(rect: Rect) -> (i32, i32, usize, usize) {
+    pub fn fine_rect(rect: Rect) -> (i32, i32, usize, usize) {
         let (left, top) = fine((rect.left, rect.top));
         let (right, bottom) = fine((rect.right, rect.bottom));
         (left, top, (right - left).max(0) as usize, (bottom - top).max(0) as usize)
     }
 
     /// The canvas pixel at a position.
-    pub(crate) fn fine_pixel(at: Point) -> (i32, i32) {
+    pub fn fine_pixel(at: Point) -> (i32, i32) {
         fine(at)
     }
 
     /// A length in canvas pixels.
-    pub(crate) fn fine_length(length: f64) -> f64 {
+    pub fn fine_length(length: f64) -> f64 {
         length * f64::from(FINE)
     }
 
     /// Blends one canvas pixel.
-    pub(crate) fn blend(&self, at: (i32, i32), color: RGBColor, opacity: f64) -> Result<()> {
-        Ok(self.area.draw_pixel(at, &color.mix(opacity))?)
+    pub fn blend(&self, at: (i32, i32), color: RGBColor, opacity: f64) -> Result<(), DrawError> {
+        self.area.draw_pixel(at, &color.mix(opacity))
     }
 }
 

@@ -1,7 +1,6 @@
 //! `records.bin`: what a killed run leaves and the next one goes on from.
 //!
-//! A header that says whose records these are, then batches, appended one by one as cells end,
-//! each with its checksum. All numbers are little-endian:
+//! A header identifies the run. Batches follow, appended as cells end, each with its checksum. All numbers are little-endian:
 //!
 //! ```text
 //! magic "RTLMAP\0\x02"   length u32   crc32 u32   identity (JSON)

@@ -21,9 +21,9 @@ use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
 use super::validation_json::ValidationObject;
-use super::{names, replay};
-use crate::orbit::Status;
-use crate::scene::Quantity;
+use super::{WriteError, names, replay};
+use crate::map::scene::Quantity;
+use rattlemap_dynamics::orbit::Status;
 
 const PAGE: &str = include_str!("report/page.html");
 const STYLE: &str = include_str!("report/page.css");
@@ -52,8 +52,8 @@ struct Data<'a> {
 
 #[derive(Serialize)]
 struct AxisData {
-    parameter: &'static str,
-    meaning: &'static str,
+    parameter: String,
+    meaning: String,
     min: f64,
     max: f64,
     count: usize,
@@ -104,7 +104,7 @@ pub(super) fn write(
     layers: &[Layer],
     words: Option<&Words>,
     validation: Option<&ValidationObject>,
-) -> anyhow::Result<()> {
+) -> Result<(), WriteError> {
     let scene = cells.scene();
     let data = Data {
         title: scene.title().to_owned(),
@@ -198,12 +198,12 @@ fn packed<T: NoUninit>(kind: &'static str, values: &[T]) -> Packed {
     Packed { kind, data: STANDARD.encode(bytes.unwrap_or_default()) }
 }
 
-impl From<&crate::scene::Axis> for AxisData {
-    fn from(axis: &crate::scene::Axis) -> Self {
+impl From<&crate::map::scene::Axis> for AxisData {
+    fn from(axis: &crate::map::scene::Axis) -> Self {
         let parameter = axis.parameter();
         AxisData {
-            parameter: parameter.name,
-            meaning: parameter.meaning,
+            parameter: parameter.name.to_string(),
+            meaning: parameter.meaning.to_string(),
             min: axis.min(),
             max: axis.max(),
             count: axis.count(),

@@ -2,16 +2,16 @@
 
 use std::io::{ErrorKind, Write, stdout};
 
-use anyhow::Context;
+use super::OutputError;
 
 /// Prints a line, or several, to stdout.
 ///
 /// # Errors
 /// If stdout cannot be written, unless its reader has closed it.
-pub fn print(text: &str) -> anyhow::Result<()> {
+pub fn print(text: &str) -> Result<(), OutputError> {
     match writeln!(stdout(), "{}", text.trim_end()) {
         // A reader that has seen enough, `head` say, is no reason to leave the rest undone.
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        written => written.context("cannot write to stdout"),
+        written => written.map_err(OutputError::Stdout),
     }
 }

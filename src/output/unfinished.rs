@@ -1,12 +1,12 @@
-//! `unfinished.json`: how long a map has been worked on that has no manifest yet.
+//! `unfinished.json`: the time spent so far on a map that has no manifest yet.
 
 use std::fs;
 use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::Folder;
 use super::manifest::MANIFEST;
+use super::{Folder, OutputError};
 
 const UNFINISHED: &str = "unfinished.json";
 const ELAPSED: &str = "elapsed_seconds";
@@ -26,7 +26,7 @@ pub fn elapsed(folder: &Folder) -> Duration {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn keep_elapsed(folder: &Folder, elapsed: Duration) -> anyhow::Result<()> {
+pub fn keep_elapsed(folder: &Folder, elapsed: Duration) -> Result<(), OutputError> {
     folder.write_json(UNFINISHED, &json!({ ELAPSED: elapsed.as_secs_f64() }))
 }
 
@@ -34,7 +34,7 @@ pub fn keep_elapsed(folder: &Folder, elapsed: Duration) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// If it cannot be removed.
-pub fn clear(folder: &Folder) -> anyhow::Result<()> {
+pub fn clear(folder: &Folder) -> Result<(), OutputError> {
     folder.remove(&[UNFINISHED])
 }
 

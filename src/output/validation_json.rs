@@ -1,4 +1,4 @@
-//! `validation.json`: what the replay of a map's cells on the reference showed.
+//! `validation.json`: what the replay of a sample of a map's cells showed.
 //!
 //! The report shows the same object.
 
@@ -9,9 +9,10 @@ use serde::Serialize;
 use super::cells::Cells;
 use super::manifest::Head;
 use super::map_manifest::Made;
-use super::{names, replay};
-use crate::validate::states::HORIZON;
-use crate::validate::{Explanation, Mismatch, Quantiles, StateCheck, Stratum, Validation, Value};
+use super::replay;
+use crate::validate::{
+    ChaosTest, HORIZON, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation, Value,
+};
 
 #[derive(Serialize)]
 pub(super) struct ValidationObject {
@@ -20,6 +21,10 @@ pub(super) struct ValidationObject {
     engine: String,
     precision: String,
     device: String,
+    /// What ran lanes again, if anything did, and whether that is what made the map.
+    again_on: Option<String>,
+    same_device: bool,
+    judge: &'static str,
     seed: u64,
     cells: usize,
     /// What all numbers but `cells` count: runs if cells have several starts.
@@ -29,20 +34,34 @@ pub(super) struct ValidationObject {
     integrated: usize,
     filled: usize,
     samples: usize,
+    /// Why the map is not to be trusted; none if it is.
+    faults: Vec<String>,
     strata: Vec<StratumObject>,
+    kinds: BTreeMap<&'static str, &'static str>,
     agreement: BTreeMap<&'static str, AgreementObject>,
-    states: StatesObject,
-    mismatched: usize,
-    explanations: Vec<ExplanationObject>,
-    unexplained: usize,
+    /// Records that their engine gave again to the bit.
+    identical: usize,
+    computed_again: usize,
+    chaos: Vec<ChaosObject>,
+    states: Option<StatesObject>,
     mismatches: Vec<MismatchObject>,
 }
 
 #[derive(Serialize)]
+struct RateObject {
+    count: usize,
+    /// Ends of the 95 % interval.
+    interval: [f64; 2],
+    text: String,
+}
+
+#[derive(Serialize)]
 struct StratumObject {
-    name: String,
+    name: &'static str,
     runs: usize,
     sampled: usize,
+    differing: RateObject,
+    kinds: BTreeMap<&'static str, RateObject>,
 }
 
 #[derive(Serialize)]
@@ -52,40 +71,31 @@ struct AgreementObject {
 }
 
 #[derive(Serialize)]
-#[serde(tag = "check", rename_all = "snake_case")]
-enum StatesObject {
-    Lanes {
-        /// What ran the lanes again, and whether that is what made the map.
-        device: String,
-        same_device: bool,
-        horizon_periods: u32,
-        compared: usize,
-        above_budget: usize,
-        budgets: Option<QuantilesObject>,
-        absolute: Option<QuantilesObject>,
-    },
-    Replay {
-        compared: usize,
-        identical: usize,
-        absolute: Option<QuantilesObject>,
-    },
-    Skipped {
-        reason: String,
-    },
-}
-
-#[derive(Serialize)]
-struct QuantilesObject {
-    median: f64,
-    percentile_99: f64,
-    worst: f64,
-}
-
-#[derive(Serialize)]
-struct ExplanationObject {
+struct ChaosObject {
     name: &'static str,
-    meaning: &'static str,
-    mismatches: usize,
+    cells: usize,
+    distance: f64,
+    bar: Option<f64>,
+    means: [f64; 2],
+    fails: bool,
+}
+
+#[derive(Serialize)]
+struct StatesObject {
+    horizon_periods: u32,
+    compared: usize,
+    off: RateObject,
+    median: f64,
+    worst: f64,
+    lanes: Vec<OffObject>,
+}
+
+#[derive(Serialize)]
+struct OffObject {
+    id: u32,
+    /// Not a number in JSON where it is infinite: null.
+    distance: f64,
+    bar: f64,
 }
 
 #[derive(Serialize)]
@@ -93,9 +103,9 @@ struct MismatchObject {
     id: u32,
     i: usize,
     j: usize,
-    values: BTreeMap<&'static str, f64>,
+    values: BTreeMap<String, f64>,
     differences: Vec<DifferenceObject>,
-    explanation: Option<&'static str>,
+    kind: &'static str,
     replay: String,
 }
 
@@ -103,49 +113,48 @@ struct MismatchObject {
 struct DifferenceObject {
     field: &'static str,
     map: Value,
-    reference: Value,
+    judge: Value,
 }
 
 impl ValidationObject {
-    /// `again` is the device that ran the sample's lanes again, if one did.
+    /// `again_on` is the device that ran lanes again, if one did.
     pub(super) fn new(
         cells: &Cells<'_>,
         made: &Made<'_>,
-        again: Option<&str>,
+        again_on: Option<&str>,
         validation: &Validation,
     ) -> ValidationObject {
-        let strata = validation.strata.iter().map(|stratum| StratumObject {
-            name: stratum_name(stratum.stratum),
-            runs: stratum.runs,
-            sampled: stratum.sampled,
-        });
         let agreement = validation.agreement.iter().map(|field| {
             let counts = AgreementObject { compared: field.compared, agreeing: field.agreeing };
             (field.field.name(), counts)
-        });
-        let explanations = Explanation::ALL.into_iter().map(|explanation| ExplanationObject {
-            name: explanation.name(),
-            meaning: meaning(explanation),
-            mismatches: validation.explained_by(explanation),
         });
         ValidationObject {
             head: Head::of("validate"),
             engine: made.engine.to_owned(),
             precision: made.precision.to_owned(),
             device: made.device.to_owned(),
+            again_on: again_on.map(str::to_owned),
+            same_device: again_on.is_none_or(|again| again == made.device),
+            judge: match validation.judge {
+                Judge::Reference => "reference",
+                Judge::Lanes => "lanes_f64",
+                Judge::Independent => "dop853",
+            },
             seed: validation.seed,
             cells: cells.counts().iter().product(),
             counted: validation.counted(),
             runs: validation.runs,
             integrated: validation.runs - validation.filled,
             filled: validation.filled,
-            samples: validation.sampled(),
-            strata: strata.collect(),
+            samples: validation.replayed,
+            faults: validation.faults(),
+            strata: validation.strata.iter().map(StratumObject::from).collect(),
+            kinds: Kind::ALL.into_iter().map(|kind| (kind.name(), meaning(kind))).collect(),
             agreement: agreement.collect(),
-            states: StatesObject::new(&validation.states, made.device, again),
-            mismatched: validation.mismatches.len(),
-            explanations: explanations.collect(),
-            unexplained: validation.unexplained(),
+            identical: validation.again[0],
+            computed_again: validation.again[1],
+            chaos: validation.chaos.iter().map(ChaosObject::from).collect(),
+            states: validation.states.as_ref().map(StatesObject::from),
             mismatches: validation.mismatches.iter().map(|mismatch| mismatched(cells, mismatch)).collect(),
         }
     }
@@ -153,11 +162,11 @@ impl ValidationObject {
 
 fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
     let row = cells.row(mismatch.id as usize);
-    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name);
+    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name.to_string());
     let differences = mismatch.differences.iter().map(|difference| DifferenceObject {
         field: difference.field.name(),
         map: difference.record.clone(),
-        reference: difference.reference.clone(),
+        judge: difference.judge.clone(),
     });
     MismatchObject {
         id: mismatch.id,
@@ -165,80 +174,67 @@ fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
         j: row.indices[1],
         values: axes.zip(row.values).collect(),
         differences: differences.collect(),
-        explanation: mismatch.explanation.map(Explanation::name),
+        kind: mismatch.kind.name(),
         replay: replay::command(cells, mismatch.id as usize),
     }
 }
 
-impl StatesObject {
-    fn new(check: &StateCheck, made_on: &str, again: Option<&str>) -> StatesObject {
-        let object = |quantiles: &Option<Quantiles>| quantiles.as_ref().map(QuantilesObject::from);
-        match check {
-            StateCheck::Lanes { cells, above_budget, units, absolute } => StatesObject::Lanes {
-                device: again.unwrap_or(made_on).to_owned(),
-                same_device: again.is_none_or(|again| again == made_on),
-                horizon_periods: HORIZON,
-                compared: *cells,
-                above_budget: *above_budget,
-                budgets: object(units),
-                absolute: object(absolute),
-            },
-            StateCheck::Replay { cells, identical, absolute } => {
-                StatesObject::Replay { compared: *cells, identical: *identical, absolute: object(absolute) }
-            }
-            StateCheck::Skipped { reason } => StatesObject::Skipped { reason: reason.clone() },
+impl From<Rate> for RateObject {
+    fn from(rate: Rate) -> RateObject {
+        RateObject { count: rate.count, interval: rate.interval, text: rate.text() }
+    }
+}
+
+impl From<&StratumResult> for StratumObject {
+    fn from(stratum: &StratumResult) -> StratumObject {
+        let kinds = Kind::ALL.into_iter().map(|kind| (kind.name(), stratum.rate(kind).into()));
+        StratumObject {
+            name: stratum.stratum.name(),
+            runs: stratum.runs,
+            sampled: stratum.sampled,
+            differing: stratum.differing().into(),
+            kinds: kinds.collect(),
         }
     }
 }
 
-impl From<&Quantiles> for QuantilesObject {
-    fn from(quantiles: &Quantiles) -> QuantilesObject {
-        let &Quantiles { median, percentile_99, worst } = quantiles;
-        QuantilesObject { median, percentile_99, worst }
+impl From<&ChaosTest> for ChaosObject {
+    fn from(test: &ChaosTest) -> ChaosObject {
+        let &ChaosTest { name, cells, distance, bar, means } = test;
+        ChaosObject { name, cells, distance, bar, means, fails: test.fails() }
     }
 }
 
-fn stratum_name(stratum: Stratum) -> String {
-    match stratum {
-        Stratum::Uniform => "uniform".to_owned(),
-        Stratum::Border => "border".to_owned(),
-        Stratum::Status(status) => format!("status {}", names::status(status)),
+impl From<&StateCheck> for StatesObject {
+    fn from(states: &StateCheck) -> StatesObject {
+        let lane = |&Off { id, distance, bar }: &Off| OffObject { id, distance, bar };
+        StatesObject {
+            horizon_periods: HORIZON,
+            compared: states.compared,
+            off: states.rate().into(),
+            median: states.distances[0],
+            worst: states.distances[1],
+            lanes: states.off.iter().map(lane).collect(),
+        }
     }
 }
 
-/// The explanation for a reader who has not read the code.
-fn meaning(explanation: Explanation) -> &'static str {
-    match explanation {
-        Explanation::EngineCap => {
-            "the engine's caps ended the cell, as its status says, and it does need more"
+/// A kind for a reader who has not read the code.
+fn meaning(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Attractor => {
+            "another attractor of the same cell: the start reaches it when it moves within the engine's resolution, and \
+             the reference stays on it from the map's last state"
         }
-        Explanation::UndecidedInBudget => {
-            "one side does not decide within the periods allowed; on the reference the motion settles too late for that, or \
-             grows too little"
+        Kind::Border => {
+            "a border within rounding: the reference gives the map's answer when parameters and start move within the \
+             engine's resolution, or lanes in double precision give the reference's"
         }
-        Explanation::CoexistingAttractor => {
-            "another attractor of the same cell: the reference stays on it when started on the map's last state, and \
-             comes to it from the cell's start moved within rounding"
+        Kind::Budget => {
+            "a budget too short: one side gives the other's answer with fewer or with more periods, or the motion \
+             settles or separates too slowly to be told"
         }
-        Explanation::Chaos => {
-            "a chaotic transient outlives the periods allowed, or averages over chaos scatter as much on the \
-             reference itself"
-        }
-        Explanation::Border => {
-            "the reference changes its answer to the map's within the rounding of parameters and start, or at a \
-             bifurcation"
-        }
-        Explanation::Unsettled => {
-            "the cycle was read before the motion had settled on it, or rounding keeps it from settling; the \
-             reference reads the same there"
-        }
-        Explanation::NearlySymmetric => {
-            "the cycle differs from its mirror image by less than 2.5e-4 of its size, all that lanes look for"
-        }
-        Explanation::BelowResolution => {
-            "lanes cannot resolve it: one period is a multiple of the other and the cycles are as near to each other, \
-             or rounding moves the exponent that far or keeps the motion from settling"
-        }
-        Explanation::NearGrazing => "an event grazes more nearly than the precision resolves",
+        Kind::Cap => "a cap ended the lane, as its status says, and does so again",
+        Kind::Unexplained => "no computation gives a reason",
     }
 }

@@ -1,12 +1,12 @@
 //! Words inside records: 64 symbols spelled out, longer ones as hash and length.
 
 use super::{Record, WORD_SYMBOLS, valid};
-use crate::word::Word;
+use rattlemap_dynamics::word::Word;
 
 /// Symbols that one `u64` holds.
 const PER_WORD: usize = 21;
 
-/// Consecutive symbols that the hash looks at together.
+/// Consecutive symbols that the hash takes together.
 const HASH_WINDOW: usize = 8;
 
 /// A word as a record keeps it.

@@ -1,40 +1,48 @@
-//! Which cells are replayed: a sample in strata, so that rare kinds are seen, too.
+//! Which cells are replayed: a uniform sample, and two of rare kinds that are counted apart.
 
-use crate::classify::{classify, status};
-use crate::orbit::{Class, Status};
-use crate::plan::Plan;
-use crate::random::Random;
+use crate::map::plan::Plan;
+use crate::map::random::Random;
+use crate::record::classify::{classify, status};
 use crate::record::{Record, valid};
+use rattlemap_dynamics::orbit::{Class, Status};
 
-/// Why a cell is in the sample.
+/// Lanes whose states are looked at beside, per cell of the sample: a few periods each.
+const STATES_PER_CELL: usize = 10;
+
+/// What a cell was drawn from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stratum {
-    /// Drawn from all runs that were integrated.
+    /// All runs that were integrated: rates of the map come from these alone.
     Uniform,
-    /// One of its four neighbours has another class or period.
+    /// Runs with a neighbour of another class or period.
     Border,
-    /// Its status is this one, and not `ok`.
-    Status(Status),
+    /// Runs whose status is not `ok`.
+    Status,
 }
 
-/// A cell of the sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pick {
-    /// The run, as in [`Plan::cell`].
-    pub id: u32,
-    /// What it was drawn for; it may belong to other strata, too.
-    pub stratum: Stratum,
+impl Stratum {
+    /// Every stratum, the uniform one first.
+    pub const ALL: [Stratum; 3] = [Stratum::Uniform, Stratum::Border, Stratum::Status];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stratum::Uniform => "uniform",
+            Stratum::Border => "border",
+            Stratum::Status => "status",
+        }
+    }
 }
 
-/// How large a stratum is, and how many cells were drawn for it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StratumCount {
+/// Cells of one stratum, drawn without regard to the other strata.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Draw {
     /// Which.
     pub stratum: Stratum,
     /// Integrated runs of the map that belong to it.
     pub runs: usize,
-    /// Runs drawn for it.
-    pub sampled: usize,
+    /// Those that were drawn, by id, ascending.
+    pub ids: Vec<u32>,
 }
 
 /// Cells to replay.
@@ -42,71 +50,60 @@ pub struct StratumCount {
 pub struct Sample {
     /// What decided the draw.
     pub seed: u64,
-    /// The cells, each once.
-    pub picks: Vec<Pick>,
-    /// The same by stratum.
-    pub strata: Vec<StratumCount>,
-    /// Cells among which these are compared: of many, averages may be as rare as one in so many.
-    pub among: usize,
+    /// The cells by stratum; one may be in several.
+    pub draws: Vec<Draw>,
+    /// Cells whose states are compared after a few periods, drawn from all.
+    pub states: Vec<u32>,
 }
 
-/// Draws `size` runs, or all if there are fewer: half of them from all that were integrated, a
-/// quarter at class borders, the rest shared equally among the statuses other than `ok`. What a
-/// stratum is short of is drawn from all. The same map, size and seed give the same sample.
+impl Sample {
+    /// The cells, each once, ascending.
+    pub fn ids(&self) -> Vec<u32> {
+        let mut ids: Vec<u32> = self.draws.iter().flat_map(|draw| &draw.ids).copied().collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    }
+}
+
+/// Draws `size` runs: half of them from all that were integrated, a quarter at borders of classes, a quarter by
+/// status. What a stratum is short of is drawn from all; a map that has no more runs is replayed whole. The same map,
+/// size and seed give the same sample.
 pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample {
-    let mut draw = Draw { random: Random::new(seed), taken: vec![false; records.len()], picks: Vec::new() };
     // Filled cells were never integrated: the audit of an adaptive map looks after them.
     let is_own = |id: &u32| records[*id as usize].valid & valid::FILLED == 0;
     let all: Vec<u32> = (0..records.len() as u32).filter(is_own).collect();
-    let size = size.min(all.len());
-    let mut counts = Vec::new();
-    draw.from(&all, size - size / 2, Stratum::Uniform);
-
-    let border: Vec<u32> = border(plan, records).into_iter().filter(is_own).collect();
-    counts.push((Stratum::Border, border.len()));
-    draw.from(&border, size / 4, Stratum::Border);
-
-    let of = |wanted: Status| all.iter().copied().filter(move |&id| status(&records[id as usize]) == wanted);
-    let kinds = || Status::ALL.into_iter().filter(|&kind| kind != Status::Ok && of(kind).next().is_some());
-    let share = (size / 2 - size / 4) / kinds().count().max(1);
-    for kind in kinds() {
-        let cells: Vec<u32> = of(kind).collect();
-        counts.push((Stratum::Status(kind), cells.len()));
-        draw.from(&cells, share, Stratum::Status(kind));
-    }
-    let missing = size - draw.picks.len();
-    draw.from(&all, missing, Stratum::Uniform);
-    counts.insert(0, (Stratum::Uniform, all.len()));
-
-    let sampled = |stratum| draw.picks.iter().filter(|pick| pick.stratum == stratum).count();
-    let strata =
-        counts.into_iter().map(|(stratum, runs)| StratumCount { stratum, runs, sampled: sampled(stratum) });
-    Sample { seed, strata: strata.collect(), among: draw.picks.len(), picks: draw.picks }
-}
-
-struct Draw {
-    random: Random,
-    taken: Vec<bool>,
-    picks: Vec<Pick>,
-}
-
-impl Draw {
-    /// Draws up to `count` cells of the list that were not drawn before.
-    fn from(&mut self, list: &[u32], count: usize, stratum: Stratum) {
-        let mut left: Vec<u32> = list.iter().copied().filter(|&id| !self.taken[id as usize]).collect();
-        let count = count.min(left.len());
-        self.random.draw(&mut left, count);
-        for &id in &left[..count] {
-            self.taken[id as usize] = true;
-            self.picks.push(Pick { id, stratum });
-        }
-    }
+    let rare: [Vec<u32>; 2] = if size >= all.len() {
+        [Vec::new(), Vec::new()]
+    } else {
+        let remarked = |id: &u32| status(&records[*id as usize]) != Status::Ok;
+        [
+            border(plan, records).into_iter().filter(is_own).collect(),
+            all.iter().copied().filter(remarked).collect(),
+        ]
+    };
+    let shares = [0, 1].map(|i| rare[i].len().min(size / 4));
+    let mut random = Random::new(seed);
+    let mut drawn = |mut list: Vec<u32>, count: usize| {
+        let count = count.min(list.len());
+        random.draw(&mut list, count);
+        list.truncate(count);
+        list.sort_unstable();
+        list
+    };
+    let states = drawn(all.clone(), size.saturating_mul(STATES_PER_CELL));
+    let runs = [all.len(), rare[0].len(), rare[1].len()];
+    let counts = [size.saturating_sub(shares[0] + shares[1]), shares[0], shares[1]];
+    let lists = std::iter::once(all).chain(rare);
+    let draws = Stratum::ALL.into_iter().zip(lists).zip(runs.into_iter().zip(counts));
+    let draws = draws.map(|((stratum, list), (runs, count))| Draw { stratum, runs, ids: drawn(list, count) });
+    Sample { seed, draws: draws.collect(), states }
 }
 
 /// Runs with a neighbour to the side, above or below of another class or period.
 fn border(plan: &Plan, records: &[Record]) -> Vec<u32> {
     let classes: Vec<Class> = records.iter().map(classify).collect();
-    let [columns, rows] = plan.axes().map(|axis| axis.count());
+    let [columns, rows] = plan.axes().each_ref().map(|axis| axis.count());
     let differs = |id: usize| {
         let [i, j] = plan.indices(id as u32);
         let neighbours = [

@@ -27,7 +27,7 @@ pub(super) fn layer(counts: &[u8]) -> Layer {
     Layer {
         name: "attractors",
         short: "attractors",
-        title: "coexisting attractors, mirror twins as one",
+        title: "coexisting attractors, symmetry-conjugate orbits as one",
         indices: counts.to_vec(),
         palette,
         entries,

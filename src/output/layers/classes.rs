@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use super::colors::{self, FAILED, NO_CONTACT, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC, chaos};
 use super::scale::nice_bound;
 use super::{Bar, Color, Entry, Layer, ids};
-use crate::classify::classify;
-use crate::orbit::Class;
+use crate::map::scene::Quantity;
 use crate::output::cells::Cells;
+use crate::record::classify::classify;
 use crate::record::{Record, valid};
-use crate::scene::Quantity;
+use rattlemap_dynamics::orbit::Class;
 
 /// Places in the palette: four kinds of period 1, periods 2 to 64, the two exceptions, then
 /// shades of chaos.

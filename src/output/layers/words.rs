@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use super::colors::{NO_VALUE, distinct};
 use super::{Color, Entry, Layer};
-use crate::classify::classify;
-use crate::orbit::Class;
 use crate::output::cells::Cells;
+use crate::record::classify::classify;
 use crate::record::{Record, Spelling};
+use rattlemap_dynamics::orbit::Class;
 
 /// Words that get a name in the legend.
 const NAMED: usize = 20;
@@ -48,7 +48,7 @@ fn packed(record: &Record) -> Packed {
 
 /// Collects the words of a map; none if they were not asked for.
 pub(in crate::output) fn read(cells: &Cells<'_>) -> Option<Words> {
-    if !cells.asks(crate::scene::Quantity::Word) {
+    if !cells.asks(crate::map::scene::Quantity::Word) {
         return None;
     }
     let [columns, rows] = cells.counts();

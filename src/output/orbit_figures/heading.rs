@@ -1,21 +1,21 @@
 //! The words above an orbit's figures.
 
-use crate::model::GearPair;
-use crate::orbit::{Class, Orbit};
+use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::orbit::{Class, Orbit};
 
 /// Symbols of a word that a heading has room for.
 const WORD_SYMBOLS: usize = 32;
 
-/// The parameters that tell this cell from the paper's Table 1.
-pub(super) fn parameters(pair: &GearPair) -> String {
-    let mut text = format!("Gear pair: e = {}, \u{3c9} = {}", pair.e, pair.omega);
-    for parameter in GearPair::PARAMETERS.iter().filter(|p| p.name != "omega") {
-        let value = pair.get(parameter.name).expect("the name is from the model's own table");
-        if parameter.default.is_some_and(|default| default != value) {
-            text += &format!(", {} = {value}", parameter.name);
-        }
-    }
-    text.replace('-', "\u{2212}")
+/// The parameters that tell this cell from the model's defaults, and the frequency.
+pub(super) fn parameters(model: &dyn Model) -> String {
+    let all = || model.parameters().iter().enumerate().map(|(i, p)| (p, model.value(i)));
+    let mut listed: Vec<String> = Vec::new();
+    let chosen = all().filter(|(p, _)| p.default.is_none());
+    listed.extend(chosen.map(|(p, value)| format!("{} = {value}", p.name)));
+    listed.extend(model.get("omega").map(|omega| format!("\u{3c9} = {omega}")));
+    let others = all().filter(|(p, value)| p.name != "omega" && p.default.is_some_and(|d| d != *value));
+    listed.extend(others.map(|(p, value)| format!("{} = {value}", p.name)));
+    format!("{}: {}", model.title(), listed.join(", ")).replace('-', "\u{2212}")
 }
 
 /// Class, word and Lyapunov exponent of the orbit.
@@ -75,6 +75,7 @@ fn superscript(digit: char) -> char {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rattlemap_dynamics::model::GearPair;
 
     #[test]
     fn long_words_are_written_with_powers() {

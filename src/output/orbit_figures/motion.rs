@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::model::{Side, State};
-use crate::orbit::{Event, EventKind, Orbit, Sample};
+use rattlemap_dynamics::model::{Side, State};
+use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
 
 /// A stretch of motion between two events.
 pub(super) struct Piece {
@@ -119,8 +119,8 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::orbit::{Class, Status};
-    use crate::word::Word;
+    use rattlemap_dynamics::orbit::{Class, Status};
+    use rattlemap_dynamics::word::Word;
 
     fn orbit(events: Vec<Event>) -> Orbit {
         Orbit {

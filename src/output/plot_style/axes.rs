@@ -1,9 +1,8 @@
 //! Axes: ranges, scales, and the frame that maps data to pixels.
 
-use anyhow::Result;
-
 use super::ticks::{Tick, ticks};
 use super::{Align, Canvas, DARK, GRID, MEDIUM, Point, Rect, SMALL};
+use crate::output::DrawError;
 
 /// Share of its span by which an axis reaches beyond its data.
 const PADDING: f64 = 0.06;
@@ -15,7 +14,8 @@ const APART_ON_BAR: f64 = 45.0;
 
 /// How values lie on an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Scale {
+pub enum Scale {
+    /// In proportion.
     Linear,
     /// By decimal logarithms.
     Logarithmic,
@@ -23,17 +23,20 @@ pub(crate) enum Scale {
 
 /// One axis: what it shows and from where to where.
 #[derive(Clone, Debug)]
-pub(crate) struct Axis {
-    pub(crate) label: String,
+pub struct Axis {
+    /// What stands beside it.
+    pub label: String,
     /// Ends in the scale: decimal logarithms on a logarithmic axis.
-    pub(crate) low: f64,
-    pub(crate) high: f64,
-    pub(crate) scale: Scale,
+    pub low: f64,
+    /// See `low`.
+    pub high: f64,
+    /// How values lie on it.
+    pub scale: Scale,
 }
 
 impl Axis {
     /// An axis from `low` to `high`; widened if that is empty or not finite.
-    pub(crate) fn exact(label: &str, low: f64, high: f64) -> Axis {
+    pub fn exact(label: &str, low: f64, high: f64) -> Axis {
         let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 0.0) };
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-6);
         let (low, high) = if high - low > least { (low, high) } else { (low - 0.5, low + 0.5) };
@@ -44,7 +47,7 @@ impl Axis {
     ///
     /// It spans at least `least_span`, lest motion that has died down fills a panel with
     /// its rounding errors.
-    pub(crate) fn around(label: &str, values: impl Iterator<Item = f64>, least_span: f64) -> Axis {
+    pub fn around(label: &str, values: impl Iterator<Item = f64>, least_span: f64) -> Axis {
         let Some((low, high)) = ends(values) else {
             return Axis::exact(label, -least_span / 2.0, least_span / 2.0);
         };
@@ -54,17 +57,13 @@ impl Axis {
 
     /// A logarithmic axis that holds all positive `values` with some room and spans at least
     /// `least_decades`.
-    pub(crate) fn around_logarithms(
-        label: &str,
-        values: impl Iterator<Item = f64>,
-        least_decades: f64,
-    ) -> Axis {
+    pub fn around_logarithms(label: &str, values: impl Iterator<Item = f64>, least_decades: f64) -> Axis {
         let axis = Axis::around(label, values.filter(|v| *v > 0.0).map(f64::log10), least_decades);
         Axis { scale: Scale::Logarithmic, ..axis }
     }
 
     /// A logarithmic axis that holds all positive `values`, of whole decades, one at least.
-    pub(crate) fn decades(label: &str, values: impl Iterator<Item = f64>) -> Axis {
+    pub fn decades(label: &str, values: impl Iterator<Item = f64>) -> Axis {
         let logarithms = values.filter(|v| *v > 0.0).map(f64::log10);
         let (low, high) = ends(logarithms).unwrap_or((-1.0, 1.0));
         let axis = Axis::exact(label, low.floor(), high.ceil().max(low.floor() + 1.0));
@@ -89,15 +88,18 @@ fn ends(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 
 /// A panel: its place on the canvas and what its edges mean.
 #[derive(Clone, Debug)]
-pub(crate) struct Frame {
-    pub(crate) rect: Rect,
-    pub(crate) x: Axis,
-    pub(crate) y: Axis,
+pub struct Frame {
+    /// Its place.
+    pub rect: Rect,
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
 }
 
 impl Frame {
     /// The pixel at which a data point lies.
-    pub(crate) fn at(&self, x: f64, y: f64) -> Point {
+    pub fn at(&self, x: f64, y: f64) -> Point {
         (self.x_pixel(self.x.place(x)), self.y_pixel(self.y.place(y)))
     }
 
@@ -112,13 +114,13 @@ impl Frame {
     }
 
     /// The pixels between two values of x over the panel's whole height.
-    pub(crate) fn column(&self, from: f64, to: f64) -> Rect {
+    pub fn column(&self, from: f64, to: f64) -> Rect {
         let [from, to] = [from, to].map(|x| self.at(x, 0.0).0.clamp(self.rect.left, self.rect.right));
         Rect { left: from, right: to, ..self.rect }
     }
 
     /// Draws the grid; comes before the data.
-    pub(crate) fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<()> {
+    pub fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
         let Rect { left, top, right, bottom } = self.rect;
         for tick in self.x_ticks() {
             let x = self.x_pixel(tick.at);
@@ -133,7 +135,7 @@ impl Frame {
 
     /// Draws border, ticks and labels; comes after the data. `x_labels` is false for a
     /// panel that shares the x axis of the one below.
-    pub(crate) fn draw_axes(&self, canvas: &Canvas<'_>, x_labels: bool) -> Result<()> {
+    pub fn draw_axes(&self, canvas: &Canvas<'_>, x_labels: bool) -> Result<(), DrawError> {
         let Rect { left, top, bottom, .. } = self.rect;
         canvas.outline(self.rect, 1.5)?;
         self.draw_x_axis(canvas, x_labels)?;
@@ -149,7 +151,7 @@ impl Frame {
     }
 
     /// Draws the lower edge with its ticks, and labels if they are wanted.
-    pub(crate) fn draw_x_axis(&self, canvas: &Canvas<'_>, labels: bool) -> Result<()> {
+    pub fn draw_x_axis(&self, canvas: &Canvas<'_>, labels: bool) -> Result<(), DrawError> {
         let Rect { left, right, bottom, .. } = self.rect;
         canvas.stroke(&[(left, bottom), (right, bottom)], 1.5, DARK)?;
         for Tick { at, label } in self.x_ticks() {
@@ -167,7 +169,7 @@ impl Frame {
     }
 
     /// Draws ticks and labels of the y axis on the right: the scale of a colour bar.
-    pub(crate) fn draw_scale(&self, canvas: &Canvas<'_>) -> Result<()> {
+    pub fn draw_scale(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
         let right = self.rect.right;
         for Tick { at, label } in self.y_ticks(APART_ON_BAR) {
             let y = self.y_pixel(at);

@@ -1,9 +1,9 @@
 //! Labels of points: beside them, where they cover no marker, no other label and no edge.
 
-use anyhow::Result;
 use plotters::style::RGBColor;
 
 use super::{Align, CAP_HEIGHT, Canvas, Point, Rect};
+use crate::output::DrawError;
 
 /// Room around a label.
 const GAP: f64 = 3.0;
@@ -14,7 +14,7 @@ const PLACES: [Point; 6] = [(1.0, 0.0), (-1.0, 0.0), (1.0, -1.0), (1.0, 1.0), (-
 
 /// Places labels one after another; drawn after all markers, so that none covers them.
 #[derive(Debug)]
-pub(crate) struct Labels {
+pub struct Labels {
     within: Rect,
     taken: Vec<Rect>,
     placed: Vec<(String, Rect, RGBColor)>,
@@ -23,21 +23,21 @@ pub(crate) struct Labels {
 
 impl Labels {
     /// No labels yet, of type of `size`, to lie `within` a rectangle and beside `markers` of a radius.
-    pub(crate) fn beside(markers: &[Point], radius: f64, within: Rect, size: f64) -> Labels {
+    pub fn beside(markers: &[Point], radius: f64, within: Rect, size: f64) -> Labels {
         let taken = markers.iter().map(|at| around(*at, radius, radius)).collect();
         Labels { within, taken, placed: Vec::new(), size }
     }
 
     /// Adds the label of a point of a curve that comes from `before`: on the side away from it if
     /// there is room, to the right if there is room nowhere.
-    pub(crate) fn add(
+    pub fn add(
         &mut self,
         canvas: &Canvas<'_>,
         text: String,
         at: Point,
         before: Option<Point>,
         color: RGBColor,
-    ) -> Result<()> {
+    ) -> Result<(), DrawError> {
         let half = (canvas.text_width(&text, self.size)? / 2.0, CAP_HEIGHT * self.size / 2.0);
         let place = |(x, y): Point| {
             let x_off = if y == 0.0 { OFF + half.0 } else { half.0 };
@@ -52,7 +52,7 @@ impl Labels {
     }
 
     /// Writes what was added.
-    pub(crate) fn draw(&self, canvas: &Canvas<'_>) -> Result<()> {
+    pub fn draw(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
         for (text, rect, color) in &self.placed {
             let at = (rect.left, (rect.top + rect.bottom) / 2.0);
             canvas.text(text, at, self.size, Align::Left, *color)?;

@@ -1,9 +1,9 @@
 //! The head of a figure: title, subtitle and a legend in rows.
 
-use anyhow::Result;
 use plotters::style::RGBColor;
 
 use super::{Align, Canvas, DARK, LARGE, MEDIUM, Marker, Point, Rect, SMALL};
+use crate::output::DrawError;
 
 /// Width of a legend's key, and the room on either side of its text.
 const KEY: f64 = 38.0;
@@ -16,42 +16,58 @@ const MARGIN: f64 = 40.0;
 
 /// What stands before a legend's text.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Key {
+pub enum Key {
+    /// A stretch of a line.
     Line {
+        /// Its colour.
         color: RGBColor,
+        /// Its width in pixels.
         width: f64,
     },
+    /// A dashed line.
     Dashes {
+        /// Its colour.
         color: RGBColor,
     },
+    /// A marker.
     Marker(Marker),
-    /// A filled marker and its hollow twin: the states before and after.
+    /// A filled and a hollow marker: the states before and after.
     MarkerPair(Marker),
+    /// An area.
     Patch {
+        /// Its colour.
         color: RGBColor,
+        /// From 0 to 1.
         opacity: f64,
     },
     /// A short upright stroke.
     Mark {
+        /// Its colour.
         color: RGBColor,
     },
 }
 
 /// One legend entry.
 #[derive(Clone, Debug)]
-pub(crate) struct Entry {
+pub struct Entry {
     key: Key,
     text: String,
 }
 
 impl Entry {
-    pub(crate) fn new(key: Key, text: &str) -> Entry {
+    /// `text` behind `key`.
+    pub fn new(key: Key, text: &str) -> Entry {
         Entry { key, text: text.to_owned() }
     }
 }
 
 /// Draws title, subtitle (may be empty) and legend; returns where the panels may start.
-pub(crate) fn draw_head(canvas: &Canvas<'_>, title: &str, subtitle: &str, entries: &[Entry]) -> Result<f64> {
+pub fn draw_head(
+    canvas: &Canvas<'_>,
+    title: &str,
+    subtitle: &str,
+    entries: &[Entry],
+) -> Result<f64, DrawError> {
     let mut y = 40.0;
     draw_fitted(canvas, title, y, LARGE)?;
     if !subtitle.is_empty() {
@@ -60,7 +76,7 @@ pub(crate) fn draw_head(canvas: &Canvas<'_>, title: &str, subtitle: &str, entrie
     }
     y += 44.0;
     for row in rows(canvas, entries)?.into_iter().filter(|row| !row.is_empty()) {
-        let widths = row.iter().map(|e| width(canvas, e)).collect::<Result<Vec<_>>>()?;
+        let widths = row.iter().map(|e| width(canvas, e)).collect::<Result<Vec<_>, DrawError>>()?;
         let total = widths.iter().sum::<f64>() + BETWEEN * (row.len() - 1) as f64;
         let mut x = (canvas.size().0 - total) / 2.0;
         for (entry, width) in row.iter().zip(widths) {
@@ -74,21 +90,22 @@ pub(crate) fn draw_head(canvas: &Canvas<'_>, title: &str, subtitle: &str, entrie
 }
 
 /// A centred line, in smaller type if it is too long, and cut if that is not enough.
-fn draw_fitted(canvas: &Canvas<'_>, text: &str, y: f64, size: f64) -> Result<()> {
+fn draw_fitted(canvas: &Canvas<'_>, text: &str, y: f64, size: f64) -> Result<(), DrawError> {
     let room = canvas.size().0 - 2.0 * MARGIN;
     let size = (size * room / canvas.text_width(text, size)?.max(1.0)).clamp(SMALLEST, size);
     let text = canvas.fitted(text, size, room + 1.0)?;
     canvas.text(&text, (canvas.size().0 / 2.0, y), size, Align::Center, DARK)
 }
 
-fn width(canvas: &Canvas<'_>, entry: &Entry) -> Result<f64> {
+fn width(canvas: &Canvas<'_>, entry: &Entry) -> Result<f64, DrawError> {
     Ok(KEY + GAP + canvas.text_width(&entry.text, SMALL)?)
 }
 
 /// Breaks the legend into as few rows as fit, of about the same length.
-fn rows<'e>(canvas: &Canvas<'_>, entries: &'e [Entry]) -> Result<Vec<&'e [Entry]>> {
+fn rows<'e>(canvas: &Canvas<'_>, entries: &'e [Entry]) -> Result<Vec<&'e [Entry]>, DrawError> {
     let room = canvas.size().0 - 2.0 * MARGIN;
-    let widths = entries.iter().map(|e| Ok(width(canvas, e)? + BETWEEN)).collect::<Result<Vec<_>>>()?;
+    let widths =
+        entries.iter().map(|e| Ok(width(canvas, e)? + BETWEEN)).collect::<Result<Vec<_>, DrawError>>()?;
     let total: f64 = widths.iter().sum();
     let count = (total / room).ceil().max(1.0);
     let mut rows = Vec::new();
@@ -107,7 +124,7 @@ fn rows<'e>(canvas: &Canvas<'_>, entries: &'e [Entry]) -> Result<Vec<&'e [Entry]
     Ok(rows)
 }
 
-fn draw_key(canvas: &Canvas<'_>, key: Key, (x, y): Point) -> Result<()> {
+fn draw_key(canvas: &Canvas<'_>, key: Key, (x, y): Point) -> Result<(), DrawError> {
     let middle = x + KEY / 2.0;
     match key {
         Key::Line { color, width } => canvas.stroke(&[(x, y), (x + KEY, y)], width, color),

@@ -1,19 +1,19 @@
 //! Grids of colours: maps and colour bars.
 
-use anyhow::Result;
 use plotters::prelude::*;
 
 use super::{Canvas, Rect};
+use crate::output::DrawError;
 
 impl Canvas<'_> {
     /// Fills a rectangle with a grid of colours, `[column, row]` counted from its lower left
     /// corner; each canvas pixel shows the cell that its centre lies in.
-    pub(crate) fn raster(
+    pub fn raster(
         &self,
         rect: Rect,
         [columns, rows]: [usize; 2],
         color: impl Fn([usize; 2]) -> [u8; 3],
-    ) -> Result<()> {
+    ) -> Result<(), DrawError> {
         let (left, top, width, height) = Canvas::fine_rect(rect);
         if width * height == 0 {
             return Ok(());
@@ -33,7 +33,7 @@ impl Canvas<'_> {
         }
         let size = (width as u32, height as u32);
         match BitMapElement::with_owned_buffer((left, top), size, pixels) {
-            Some(element) => Ok(self.area.draw(&element)?),
+            Some(element) => self.area.draw(&element),
             None => unreachable!("the buffer has three bytes per pixel"),
         }
     }

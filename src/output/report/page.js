@@ -378,6 +378,8 @@ function tellRefinement({ integrated, filled, rounds, audits }) {
       + `${percent(last.rate)} (95 %: ${percent(last.interval[0])} to ${percent(last.interval[1])}).`
       + (last.words ? ` Of ${count(last.words, "filled word")} among them, ${last.wrong_words} turned out wrong.` : "")
     : "No audit was asked for.");
+  if (last) byId("audit-errors").append(...Object.keys(FILLED).filter((name) => last.errors[name])
+    .map((name) => element("li", tellError(FILLED[name], last.errors[name]))));
   if (audits.length > 1) {
     byId("audits").append(...audits.map((audit, k) => {
       const row = element("tr");
@@ -385,6 +387,18 @@ function tellRefinement({ integrated, filled, rounds, audits }) {
       return row;
     }));
   }
+}
+
+const FILLED = { lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing" };
+
+// How far one quantity of the sampled cells was from what had been filled.
+function tellError(name, error) {
+  const [low, high] = error.off_by_one_interval ?? [];
+  return `${name}: ${count(error.compared, "filled cell")} compared`
+    + (error.empty ? `, ${error.empty} left empty` : "")
+    + `; off by ${short(error.median)} in the median, ${short(error.p95)} at 95 %, ${short(error.worst)} at worst`
+    + (low === undefined ? "." : `; by 1 or more in ${error.off_by_one}: ${percent(error.off_by_one_rate)} `
+      + `(95 %: ${percent(low)} to ${percent(high)}).`);
 }
 
 // ---- validation
@@ -412,91 +426,77 @@ function table(caption, heads, lines, numbers = []) {
   return box;
 }
 
-const STRATA = { uniform: "from all that were integrated", border: "at a border of classes" };
+const STRATA = { uniform: "drawn from all that were integrated", border: "drawn at borders of classes", status: "drawn by status" };
 const FIELDS = { class: "class", period: "period", word: "word, up to mirror image", symmetric: "symmetry",
-  lyapunov: "exponent", lyapunov_error: "the exponent's error", impacts_per_period: "impacts per period",
-  mesh_fraction: "time in meshing", status: "status", periods_run: "periods integrated", valid: "fields kept",
-  state: "state, within the error budget" };
+  lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing", status: "status",
+  periods_run: "periods integrated", again: "the same record again" };
+const JUDGES = { reference: "the event-driven reference, without early stops",
+  lanes_f64: "lanes in f64 and by the reference without early stops",
+  dop853: "DOP853, an adaptive ODE library, with event location, and by the reference without early stops" };
 
-function stateText({ check, ...states }, samples, one) {
-  if (check === "skipped") return `States were not compared: ${states.reason}.`;
-  if (check === "replay") {
-    return "The map was made by the reference itself, so this replay shows that the records are what they were, "
-      + `not that the reference is right: the last states of ${states.identical} of `
-      + `${count(states.compared, one)} are the same to the last bit`
-      + (states.absolute ? `, the largest difference is ${short(states.absolute.worst)}.` : ".");
-  }
-  const where = states.same_device ? "" : ` on ${states.device}, not on the map's own device,`;
-  return `The lanes were run again${where} over ${states.horizon_periods} forcing periods and their states compared with the `
-    + "reference's. The budget is what rounding may amount to by an estimate made beforehand, from the precision, the "
-    + `number of steps and the growth of small errors along the motion: ${states.above_budget} of `
-    + `${count(states.compared, one)} are above it`
-    + (states.compared < samples ? `; in the other ${samples - states.compared} the budget is as large as the motion, or the lane failed.` : ".");
-}
+const rateText = ({ count, text }, among) => `${count} of ${among} (${text})`;
 
-function explained(found) {
-  const meaning = Object.fromEntries(found.explanations.map(({ name, meaning }) => [name, meaning]));
-  const differs = ({ field, map, reference }) => field === "state"
-    ? `state off by ${short(map)} budgets` : `${field}: ${short(map)}, reference ${short(reference)}`;
+function differing(found) {
+  const differs = ({ field, map, judge }) => `${FIELDS[field] ?? field}: ${short(map)}, judge ${short(judge)}`;
   const parameters = map.axes.map((axis) => axis.parameter);
-  const line = ({ i, j, values, differences, explanation, replay }) => {
+  const line = ({ i, j, values, differences, kind, replay }) => {
     const go = element("button", `${i}, ${j}`);
     go.type = "button";
     go.title = "show this cell on the map";
     go.addEventListener("click", () => { choose({ i, j }); scrollTo({ top: 0, behavior: "smooth" }); });
-    const why = element("span", explanation?.replaceAll("_", " ") ?? "unexplained");
-    why.title = meaning[explanation] ?? "no check gives the map's answer";
-    return { bad: !explanation,
+    const why = element("span", kind.replaceAll("_", " "));
+    why.title = found.kinds[kind];
+    return { bad: kind === "unexplained",
       cells: [go, ...parameters.map((name) => short(values[name])), differences.map(differs).join("; "), why, element("code", replay)] };
   };
-  const worstFirst = [...found.mismatches].sort((a, b) => Boolean(a.explanation) - Boolean(b.explanation));
-  return table("Cells that differ", ["cell", ...parameters, "what differs", "why", "replay"], worstFirst.map(line));
+  const worstFirst = [...found.mismatches].sort((a, b) => (b.kind === "unexplained") - (a.kind === "unexplained"));
+  return table("Cells that differ", ["cell", ...parameters, "what differs", "kind", "replay"], worstFirst.map(line));
 }
 
 function tellValidation(found) {
-  const one = found.counted.replace(/s$/, "");
   const section = byId("validation");
   document.body.classList.add("validated");
   section.hidden = false;
-  const agreed = found.samples - found.mismatched;
-  const verdict = found.unexplained === 0
-    ? `${agreed} of ${count(found.samples, `replayed ${one}`)} agree with the reference; `
-      + (found.mismatched === 0 ? "none differs." : `${count(found.mismatched, "differs", "differ")}, each for a reason that a check has shown.`)
-    : `${found.unexplained} of ${count(found.samples, `replayed ${one}`)} differ from the reference and no check shows why: `
-      + "do not trust the map there.";
+  const [uniform] = found.strata;
+  const verdict = `${rateText(uniform.differing, uniform.sampled)} ${found.counted} differ; `
+    + `unexplained ${rateText(uniform.kinds.unexplained, uniform.sampled)}.`;
   byId("validated").hidden = false;
-  byId("verdict").textContent = found.unexplained === 0
-    ? `${count(found.samples, one)} replayed on the reference: ${found.mismatched === 0 ? "all agree" : `${found.mismatched} differ, all explained`}.`
-    : `${found.unexplained} of ${count(found.samples, `replayed ${one}`)} differ without an explanation.`;
+  byId("verdict").textContent = found.faults.length ? `Not to be trusted: ${found.faults.join("; ")}.` : verdict;
   byId("details").addEventListener("click", () => section.scrollIntoView({ behavior: "smooth" }));
   const tables = element("div");
   tables.id = "tables";
+  const kinds = Object.keys(found.kinds);
+  const strata = found.strata.filter(({ sampled }) => sampled > 0);
   tables.append(
-    table(`Replayed ${found.counted}`, ["", "replayed", "in the map"], found.strata.map(({ name, sampled, runs }) =>
-      ({ cells: [STRATA[name] ?? name.replace(/^status (.*)/, "with status $1"), sampled, runs] })), [1, 2]),
+    table("Rates, with their 95 % intervals", ["", "replayed", "in the map", "differ", ...kinds.map((kind) => kind.replaceAll("_", " "))],
+      strata.map(({ name, sampled, runs, differing: all, kinds: of }) =>
+        ({ cells: [STRATA[name], sampled, runs, ...[all, ...kinds.map((kind) => of[kind])].map(({ count, text }) => `${count} (${text})`)] })), [1, 2]),
     table("Agreement", ["", "compared", "agree"], Object.keys(FIELDS).filter((name) => found.agreement[name]?.compared)
       .map((name) => ({ cells: [FIELDS[name], found.agreement[name].compared, found.agreement[name].agreeing] })), [1, 2]),
+    table("Kinds", ["", ""], kinds.map((kind) => ({ cells: [kind.replaceAll("_", " "), found.kinds[kind]] }))),
   );
-  const errors = [["in units of the budget", found.states.budgets], ["as they are", found.states.absolute]]
-    .filter(([, quantiles]) => quantiles);
-  if (errors.length) {
-    tables.append(table("Errors of states", ["", "median", "99 %", "worst"], errors.map(([name, q]) =>
-      ({ cells: [name, short(q.median), short(q.percentile_99), short(q.worst)] })), [1, 2, 3]));
-  }
-  const reasons = found.explanations.filter(({ mismatches }) => mismatches > 0);
-  if (reasons.length) {
-    tables.append(table("Why cells differ", ["", found.counted, ""], reasons.map(({ name, mismatches, meaning }) =>
-      ({ cells: [name.replaceAll("_", " "), mismatches, meaning] })), [1]));
+  if (found.chaos.some(({ cells }) => cells)) {
+    tables.append(table("Averages over chaos, as distributions", ["", found.counted, "distance", "at most"],
+      found.chaos.map(({ name, cells, distance, bar, fails }) =>
+        ({ bad: fails, cells: [FIELDS[name] ?? "the exponent's error", cells, short(distance), bar ? short(bar) : "too few"] })), [1, 2, 3]));
   }
   section.append(
     element("h2", "Validation"),
-    element("p", verdict, found.unexplained ? "verdict bad" : "verdict"),
+    element("p", verdict, "verdict"),
+    ...found.faults.map((fault) => element("p", `Not to be trusted: ${fault}.`, "verdict bad")),
     element("p", `A sample of ${found.samples} of ${found.integrated} integrated ${found.counted} (seed ${found.seed}), made by the engine `
-      + `${found.engine} in ${found.precision} on ${found.device}, was computed again by the event-driven reference `
-      + "within the same number of periods."
-      + (found.filled ? ` The other ${found.filled} were filled from their neighbours: the audit looks after them.` : "")),
-    element("p", stateText(found.states, found.samples, one)), tables);
-  if (found.mismatches.length) section.append(explained(found));
+      + `${found.engine} in ${found.precision} on ${found.device}, was judged by ${JUDGES[found.judge]}, over the whole budget.`
+      + (found.filled ? ` The other ${found.filled} were filled from their neighbours: the audit looks after them.` : "")));
+  if (found.computed_again) {
+    section.append(element("p", `Computed again by the same engine${found.same_device ? "" : ` on ${found.again_on}, not on the map's own device`}: `
+      + `${found.identical} of ${found.computed_again} are the same to the bit.`));
+  }
+  if (found.states) {
+    section.append(element("p", `States of ${found.states.compared} lanes ${found.states.horizon_periods} periods after their start: `
+      + `${rateText(found.states.off, found.states.compared)} are off by more than rounding may lead.`));
+  }
+  section.append(tables);
+  if (found.mismatches.length) section.append(differing(found));
 }
 
 // ---- start

@@ -1,0 +1,141 @@
+//! What a lane costs: time per forcing period, work per period, instructions per pass. See
+//! `README.md`.
+
+use std::time::Instant;
+
+use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision, Variant};
+use rattlemap::record::Record;
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator};
+
+#[path = "lane/rewrite.rs"]
+mod rewrite;
+
+use rattlemap::cli::bench::measure::{LOOPS, counting, instructions};
+use rattlemap::cli::bench::statistics::Spread;
+use rewrite::{CHECKS, Rewrite};
+
+/// Sizes of one run.
+struct Size {
+    /// Cells along each axis.
+    side: u32,
+    /// Periods per cell.
+    periods: u32,
+    /// Runs of each form; the median is given.
+    runs: usize,
+}
+
+/// The full size to measure; a tiny one where the program is only shown to run.
+fn size() -> Size {
+    let measured = std::env::args().any(|a| a == "--bench") && !std::env::args().any(|a| a == "--test");
+    if measured { Size { side: 48, periods: 100, runs: 5 } } else { Size { side: 3, periods: 3, runs: 1 } }
+}
+
+/// The plane of restitution in `[0, 1]` and frequency in `[1, 12]`, from rest.
+struct Plane {
+    flows: Vec<Oscillator>,
+    laws: Vec<Law>,
+    lanes: Vec<Lane>,
+}
+
+impl Plane {
+    fn new(side: u32) -> Plane {
+        let at = |i: u32, low: f64, high: f64| low + (high - low) * f64::from(i) / f64::from(side - 1);
+        let pair = |e: f64, omega: f64| GearPair { omega, ..GearPair::paper(e) };
+        let flows = (0..side).map(|i| pair(0.0, at(i, 1.0, 12.0)).oscillator().expect("valid parameters"));
+        let laws = (0..side).map(|i| pair(at(i, 0.0, 1.0), 1.0).law());
+        // Rows of 8 x 8 cells: neighbours on the device are neighbours in the plane.
+        let mut places: Vec<_> = (0..side * side).map(|i| (i / side, i % side)).collect();
+        places.sort_by_key(|&(flow, law)| (flow / 8, law / 8, flow, law));
+        let lanes = places.into_iter().map(|(flow, law)| Lane { flow, law, start: [0.0; 4] }).collect();
+        Plane { flows: flows.collect(), laws: laws.collect(), lanes }
+    }
+
+    /// Integrates every cell; the seconds that it took, and what came of it.
+    fn run(&self, gpu: &mut Gpu, size: &Size, exponent: bool) -> (f64, Vec<Record>) {
+        let settings = LaneSettings { exponent, ..LaneSettings::only(size.periods) };
+        let start = Instant::now();
+        let run = gpu.run(&self.flows, &self.laws, &self.lanes, &settings);
+        let records = pollster::block_on(run).expect("the device runs the lanes");
+        (start.elapsed().as_secs_f64(), records)
+    }
+}
+
+fn open(precision: Precision, rewrite: Rewrite) -> Gpu {
+    let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).expect("an adapter");
+    gpu.rewrite_shaders(rewrite);
+    gpu
+}
+
+/// Seconds of every form, run in alternation: the machine's moods fall on all alike.
+fn seconds(plane: &Plane, size: &Size, gpus: &mut [Gpu], exponent: bool) -> Vec<f64> {
+    for gpu in gpus.iter_mut() {
+        // Compiles.
+        plane.run(gpu, &Size { periods: 1, ..*size }, exponent);
+    }
+    let mut times = vec![Vec::new(); gpus.len()];
+    for _ in 0..size.runs {
+        for (times, gpu) in times.iter_mut().zip(gpus.iter_mut()) {
+            times.push(plane.run(gpu, size, exponent).0);
+        }
+    }
+    times.into_iter().map(|times| Spread::of(times).median).collect()
+}
+
+/// Mean over the cells of what a counting variant reports in place of impacts.
+fn count(plane: &Plane, size: &Size, precision: Precision, function: &str) -> f64 {
+    let mut gpu = open(precision, counting(function));
+    let (_, records) = plane.run(&mut gpu, size, false);
+    records.iter().map(|record| record.impacts_per_period).sum::<f64>() / records.len() as f64
+}
+
+/// What scenes ask for, and what is compiled for it.
+fn variants(precision: Precision) -> [(&'static str, Variant); 7] {
+    let everything = Variant::of(precision);
+    let class = Variant { word: false, mesh: false, symmetry: false, ..everything };
+    [
+        ("everything", everything),
+        ("everything, before the exponent", Variant { growth: false, ..everything }),
+        ("class, exponent, word", Variant { word: true, ..class }),
+        ("class, exponent", class),
+        ("class, before the exponent", Variant { growth: false, ..class }),
+        ("averages and words, no class", Variant { exponent: false, growth: false, ..everything }),
+        ("impacts alone", Variant { exponent: false, growth: false, ..class }),
+    ]
+}
+
+fn main() {
+    let size = size();
+    let plane = Plane::new(size.side);
+    let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);
+    println!("{0} x {0} cells, {1} periods from rest, median of {2}", size.side, size.periods, size.runs);
+    for precision in Precision::ALL {
+        println!("\n{precision:?}, work per lane-period:");
+        let work = LOOPS.map(|(function, what)| (what, count(&plane, &size, precision, function)));
+        for (what, count) in work {
+            println!("  {count:8.2} {what}");
+        }
+        let [(_, steps), ..] = work;
+        for exponent in [false, true] {
+            println!("{precision:?}, exponent {exponent}: forms in one run");
+            let mut gpus: Vec<_> = CHECKS.iter().map(|&(_, rewrite)| open(precision, rewrite)).collect();
+            let times = seconds(&plane, &size, &mut gpus, exponent);
+            for (time, (name, _)) in times.iter().zip(CHECKS) {
+                println!(
+                    "  {name:<9} {:8.0} lane-periods/s, {:6.1} ns per scan step, {:.2} of the first",
+                    lane_periods / time,
+                    1e9 * time / lane_periods / steps,
+                    time / times[0],
+                );
+            }
+            let results: Vec<_> = gpus.iter_mut().map(|gpu| plane.run(gpu, &size, exponent).1).collect();
+            assert!(results.iter().all(|other| *other == results[0]), "the forms differ in their results");
+        }
+        println!("{precision:?}: arithmetic instructions of the text, by variant");
+        println!("  {:<44} {:>6} {:>8} {:>6} {:>7}", "", "scan", "careful", "root", "all");
+        for (name, variant) in variants(precision) {
+            let counts = instructions(&variant.source());
+            let [scan, careful, root, all] = [counts.scan, counts.careful, counts.root, counts.all];
+            println!("  {name:<44} {scan:6} {careful:8} {root:6} {all:7}");
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! The instruments: ask, measure, write, judge.
+
+pub(crate) mod stress;
+pub(crate) mod work_precision;

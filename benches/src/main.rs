@@ -1,0 +1,19 @@
+//! The instruments' program: `cargo run --release -p rattlemap-bench -- --help`.
+
+mod arguments;
+mod commands;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::{Cli, Instrument};
+use commands::{stress, work_precision};
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().instrument {
+        Instrument::WorkPrecision(ask) => work_precision::run(&ask),
+        Instrument::Stress(ask) => stress::run(&ask),
+    };
+    done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
+}

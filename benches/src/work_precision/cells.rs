@@ -1,0 +1,273 @@
+//! Which cells are integrated, from where, and what the reference makes of them.
+
+use super::outcome::Outcome;
+use super::{EVENTS, PERIODS};
+use rattlemap::validate::independent::flight::Flight;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
+use rattlemap_dynamics::reference::{Happening, Observer, Trajectory};
+
+/// Variants of a cell, side by side as on a map: their restitution grows by [`RESTITUTION_STEP`], the
+/// distance from grazing by an eighth.
+pub const VARIANTS: u32 = 8;
+
+/// A quarter of a column of a map of 1024.
+pub const RESTITUTION_STEP: f64 = 1.0 / 4096.0;
+
+/// Periods from rest to the motion that is measured.
+const SETTLING_PERIODS: u32 = 200;
+
+/// What a cell's motion is like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Periodic, with impacts alone.
+    Impacts,
+    /// Periodic, meshing on both sides.
+    Meshing,
+    /// Periodic, with series of impacts that end in meshing.
+    Chatter,
+    /// Symmetric steady motion that passes the walls, or reaches beyond them, by a stated distance.
+    Grazing,
+    /// Chaotic.
+    Chaos,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 5] = [Kind::Impacts, Kind::Meshing, Kind::Chatter, Kind::Grazing, Kind::Chaos];
+
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Impacts => "impacts",
+            Kind::Meshing => "meshing",
+            Kind::Chatter => "chatter",
+            Kind::Grazing => "grazing",
+            Kind::Chaos => "chaos",
+        }
+    }
+}
+
+/// Settled cells of Table 1: kind, restitution, frequency.
+const SETTLED: [(Kind, f64, f64); 20] = [
+    (Kind::Impacts, 0.45, 5.6),
+    (Kind::Impacts, 0.56, 5.6),
+    (Kind::Impacts, 0.3, 9.0),
+    (Kind::Impacts, 0.8, 7.0),
+    (Kind::Impacts, 0.56, 3.4),
+    (Kind::Meshing, 0.0, 5.6),
+    (Kind::Meshing, 0.06, 5.6),
+    (Kind::Meshing, 0.0, 2.0),
+    (Kind::Meshing, 0.0, 1.0),
+    (Kind::Meshing, 0.1, 2.5),
+    (Kind::Chatter, 0.2, 1.5),
+    (Kind::Chatter, 0.56, 1.5),
+    (Kind::Chatter, 0.7, 1.5),
+    (Kind::Chatter, 0.5, 1.0),
+    (Kind::Chatter, 0.3, 2.0),
+    (Kind::Chaos, 0.72, 5.6),
+    (Kind::Chaos, 0.7, 5.4),
+    (Kind::Chaos, 0.65, 5.6),
+    (Kind::Chaos, 0.8, 5.6),
+    (Kind::Chaos, 0.62, 5.6),
+];
+
+/// How far the contact-free steady motion at e = 0.5, omega = 5.6 would reach beyond the walls:
+/// the force amplitude is set so. Negative distances miss.
+const BEYOND: [f64; 5] = [-1e-3, -1e-5, 1e-2, 1e-3, 1e-4];
+
+/// One lane that every method integrates, and the answer.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// Number of its cell, the same for all variants.
+    pub cell: u32,
+    /// What the motion is like.
+    pub kind: Kind,
+    /// Distance beyond the walls, of grazing cells.
+    pub beyond: Option<f64>,
+    /// The parameters.
+    pub pair: GearPair,
+    /// The oscillator.
+    pub oscillator: Oscillator,
+    /// The contact law.
+    pub law: Law,
+    /// State at phase 0, exact in f32.
+    pub start: State,
+    /// What the reference ends with.
+    pub truth: Outcome,
+    /// Frobenius norm of the derivative of the last state by the start.
+    pub amplification: f64,
+}
+
+/// The subjects, variants of a cell side by side: `cells` of every kind, [`VARIANTS`] of each.
+///
+/// # Panics
+/// If the reference cannot carry a cell, which none of the table does.
+pub fn subjects(cells_per_kind: usize) -> Vec<Subject> {
+    let mut all = Vec::new();
+    for (n, (kind, e, omega)) in table().into_iter().enumerate() {
+        let place = n % (SETTLED.len() / 4);
+        if place >= cells_per_kind {
+            continue;
+        }
+        for variant in 0..VARIANTS {
+            let share = f64::from(variant);
+            let (pair, beyond) = match kind {
+                Kind::Grazing => {
+                    let beyond = BEYOND[place] * (1.0 + share / 8.0);
+                    (grazing(GearPair { omega, ..GearPair::paper(e) }, beyond), Some(beyond))
+                }
+                _ => (GearPair { omega, ..GearPair::paper(e + share * RESTITUTION_STEP) }, None),
+            };
+            all.push(subject(n as u32, kind, beyond, pair));
+        }
+    }
+    all
+}
+
+fn table() -> Vec<(Kind, f64, f64)> {
+    let grazing = BEYOND.map(|_| (Kind::Grazing, 0.5, 5.6));
+    let all = SETTLED.into_iter().chain(grazing);
+    let mut all: Vec<_> = all.collect();
+    all.sort_by_key(|(kind, ..)| Kind::ALL.iter().position(|k| k == kind));
+    all
+}
+
+/// The pair with the force at which gear 1 alone swings by `b + beyond`.
+fn grazing(pair: GearPair, beyond: f64) -> GearPair {
+    GearPair { force: (pair.b + beyond) / compliance(&pair), ..pair }
+}
+
+/// Amplitude of gear 1 per unit of force, contact-free.
+fn compliance(pair: &GearPair) -> f64 {
+    (pair.k1 - pair.m1 * pair.omega * pair.omega).hypot(pair.r1 * pair.omega).recip()
+}
+
+fn subject(cell: u32, kind: Kind, beyond: Option<f64>, pair: GearPair) -> Subject {
+    let oscillator = pair.oscillator().expect("the table is valid");
+    let flow = Flow::new(&oscillator);
+    let law = pair.law();
+    let start = match kind {
+        Kind::Grazing => steady(&pair),
+        _ => {
+            let mut trajectory = Trajectory::new(&flow, law, [0.0; 4]);
+            for _ in 0..SETTLING_PERIODS {
+                trajectory.advance_period(&mut ()).expect("an ordinary cell");
+            }
+            trajectory.state()
+        }
+    };
+    let start = start.map(|x| f64::from(x as f32));
+    let (truth, amplification) = reference(&flow, law, start);
+    Subject { cell, kind, beyond, pair, oscillator, law, start, truth, amplification }
+}
+
+/// Contact-free steady motion at phase 0: `x1 = Re(F exp(i omega t) / (k1 - m1 omega^2 + i r1 omega))`.
+fn steady(pair: &GearPair) -> State {
+    let amplitude = pair.force * compliance(pair);
+    let lag = (pair.r1 * pair.omega).atan2(pair.k1 - pair.m1 * pair.omega * pair.omega);
+    [amplitude * lag.cos(), amplitude * pair.omega * lag.sin(), 0.0, 0.0]
+}
+
+/// The latest events.
+#[derive(Clone, Copy, Debug)]
+pub struct Latest(pub [f64; EVENTS]);
+
+impl Default for Latest {
+    fn default() -> Latest {
+        Latest([f64::NAN; EVENTS])
+    }
+}
+
+impl Latest {
+    /// Those of a flight.
+    pub fn of(flight: &Flight) -> Latest {
+        let mut latest = Latest::default();
+        flight.events.iter().for_each(|ended| latest.note(ended.t));
+        latest
+    }
+
+    /// Notes an event at a time since phase 0.
+    #[inline]
+    pub fn note(&mut self, t: f64) {
+        self.0.rotate_right(1);
+        self.0[0] = t;
+    }
+}
+
+impl Observer for Latest {
+    #[inline]
+    fn event(&mut self, happening: &Happening) {
+        self.note(happening.t);
+    }
+}
+
+/// The reference's answer.
+pub fn by_reference(flow: &Flow, law: Law, start: State) -> Outcome {
+    let mut latest = Latest::default();
+    let mut trajectory = Trajectory::new(flow, law, start);
+    for _ in 0..PERIODS {
+        if trajectory.advance_period(&mut latest).is_err() {
+            return Outcome::lost();
+        }
+    }
+    Outcome { state: trajectory.state(), events: latest.0 }
+}
+
+fn reference(flow: &Flow, law: Law, start: State) -> (Outcome, f64) {
+    let columns = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+    let mut trajectory: Trajectory<'_, 4> = Trajectory::with_tangents(flow, law, start, columns);
+    for _ in 0..PERIODS {
+        trajectory.advance_period(&mut ()).expect("an ordinary cell");
+    }
+    let squares: f64 = trajectory.tangents().iter().flatten().map(|x| x * x).sum();
+    (by_reference(flow, law, start), squares.sqrt() * trajectory.log_scale().exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::flow::DomainKind;
+    use rattlemap_dynamics::reference::EventKind::{Impact, MeshEnd, MeshStart};
+
+    #[test]
+    fn cells_are_what_their_kind_says() {
+        for subject in subjects(5) {
+            let flow = Flow::new(&subject.oscillator);
+            let mut events: Vec<Happening> = Vec::new();
+            let mut trajectory = Trajectory::new(&flow, subject.law, subject.start);
+            for _ in 0..PERIODS {
+                trajectory.advance_period(&mut events).unwrap();
+            }
+            // Peers need not know the rarest of the rules: pressing that ceases during contact onset.
+            let ends_off_the_wall = |e: &Happening| e.kind == MeshEnd && e.before[0] != flow.wall(e.side);
+            assert!(!events.iter().any(ends_off_the_wall), "{:?}", subject.pair);
+            let count = |kind| events.iter().filter(|event| event.kind == kind).count();
+            let at = format!("{:?}", subject.pair);
+            match subject.kind {
+                Kind::Impacts | Kind::Chaos => assert!(count(Impact) > 8 && count(MeshStart) == 0, "{at}"),
+                Kind::Meshing => assert!(count(MeshStart) >= 16, "{at}"),
+                Kind::Chatter => assert!(count(Impact) >= 32 && count(MeshStart) >= 16, "{at}"),
+                Kind::Grazing => assert_eq!(subject.beyond > Some(0.0), count(Impact) > 0, "{at}"),
+            }
+            assert!(subject.amplification < 1e3, "{at}: {:e}", subject.amplification);
+        }
+    }
+
+    #[test]
+    fn grazing_cells_pass_the_wall_at_the_stated_distance() {
+        for subject in subjects(5).iter().filter(|subject| subject.kind == Kind::Grazing) {
+            let flow = Flow::new(&subject.oscillator);
+            let samples = 10_000;
+            let gap = |i: i32| {
+                let tau = flow.period * f64::from(i) / f64::from(samples);
+                let y = flow.propagate(DomainKind::Free, subject.start, 0.0, tau);
+                y[0] - y[2]
+            };
+            let widest = (0..samples).map(gap).fold(0.0f64, |m, z| m.max(z.abs()));
+            let beyond = subject.beyond.unwrap();
+            // Half a sample off the turning point, and the start's rounding.
+            assert!((widest - subject.pair.b - beyond).abs() < 2e-7, "{widest} {beyond}");
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Run time against error, one curve per method.
+
+use std::path::Path;
+
+use plotters::style::RGBColor;
+
+use super::points::Point;
+use rattlemap::output::plot_style::axes::{Axis, Frame};
+use rattlemap::output::plot_style::labels::Labels;
+use rattlemap::output::plot_style::legend::{Entry, Key, draw_head};
+use rattlemap::output::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
+use rattlemap::output::{DrawError, FigureError};
+
+const SIZE: (u32, u32) = (1500, 1280);
+const LEFT: f64 = 160.0;
+/// The setting at the end of a curve.
+const SMALLEST: f64 = 18.0;
+const RADIUS: f64 = 7.0;
+/// Errors outside of this are drawn on its ends.
+const ERRORS: (f64, f64) = (1e-16, 10.0);
+
+/// How a method is drawn.
+struct Style {
+    method: &'static str,
+    label: &'static str,
+    color: RGBColor,
+    shape: Shape,
+}
+
+const fn style(method: &'static str, label: &'static str, [r, g, b]: [u8; 3], shape: Shape) -> Style {
+    Style { method, label, color: RGBColor(r, g, b), shape }
+}
+
+/// Methods in the order of the legend: circles for this project's.
+const STYLES: [Style; 12] = [
+    style("lane-f32", "lane, f32", [0xd5, 0x5e, 0x00], Shape::Circle),
+    style("lane-f64", "lane, f64", [0x00, 0x72, 0xb2], Shape::Circle),
+    style("reference", "reference (the measure)", [0x26, 0x26, 0x26], Shape::Circle),
+    style("rk4-wgsl-f32", "RK4 in WGSL, one loop, f32", [0xe6, 0x9f, 0x00], Shape::Triangle),
+    style("rk4-wgsl-f64", "RK4 in WGSL, one loop, f64", [0x56, 0xb4, 0xe9], Shape::Triangle),
+    style("rk4-phased-f32", "the same in two phases, f32", [0x9a, 0x6a, 0x00], Shape::Triangle),
+    style("rk4-phased-f64", "the same in two phases, f64", [0x1b, 0x6f, 0x8f], Shape::Triangle),
+    style("rk4-core", "RK4 in Rust", [0x60, 0x60, 0x60], Shape::Triangle),
+    style("rk4-numba", "RK4 in numba", [0xcc, 0x79, 0xa7], Shape::Triangle),
+    style("euler-core", "semi-implicit Euler in Rust", [0xaa, 0xaa, 0xaa], Shape::Square),
+    style("dop853-core", "DOP853 (ode_solvers)", [0x00, 0x9e, 0x73], Shape::Square),
+    style("heyoka", "heyoka", [0x6a, 0x3d, 0x9a], Shape::Square),
+];
+
+/// Which error is shown.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shown {
+    pub(super) title: &'static str,
+    pub(super) axis: &'static str,
+    pub(super) error: fn(&Point) -> f64,
+}
+
+/// Draws the points as a PNG; `subtitle` names the hardware.
+///
+/// # Errors
+/// A file that cannot be written, by name.
+pub(super) fn write(path: &Path, subtitle: &str, shown: Shown, points: &[Point]) -> Result<(), FigureError> {
+    save_figure(path, SIZE, |canvas| draw(canvas, subtitle, shown, points))
+}
+
+fn draw(canvas: &Canvas<'_>, subtitle: &str, shown: Shown, points: &[Point]) -> Result<(), DrawError> {
+    let present: Vec<(&Style, Vec<&Point>)> = STYLES
+        .iter()
+        .map(|style| (style, points.iter().filter(|point| point.method == style.method).collect()))
+        .filter(|(_, points): &(_, Vec<&Point>)| !points.is_empty())
+        .collect();
+    let mut entries: Vec<Entry> = present.iter().map(|(style, _)| entry(style)).collect();
+    if let Some((style, _)) =
+        present.iter().find(|(_, points)| points.iter().any(|point| is_lost(shown, point)))
+    {
+        let marker = Marker { hollow: true, ..marker(style) };
+        entries.push(Entry::new(Key::Marker(marker), "hollow: a lane was lost"));
+    }
+    entries.push(Entry::new(
+        Key::Mark { color: FAINT },
+        "number: finest setting (steps per period, or tolerance)",
+    ));
+    let top = draw_head(canvas, shown.title, subtitle, &entries)? + 10.0;
+    let error = |point: &Point| (shown.error)(point).clamp(ERRORS.0, ERRORS.1);
+    let drawn = || present.iter().flat_map(|(style, points)| points.iter().map(move |point| (style, *point)));
+    let frame = Frame {
+        rect: canvas.panel(LEFT, top),
+        x: Axis::decades(
+            "microseconds per lane and forcing period (processor: times cores; graphics card: as a whole)",
+            drawn().map(|(_, point)| microseconds(point)),
+        ),
+        y: Axis::decades(
+            shown.axis,
+            drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| error(point)),
+        ),
+    };
+    frame.draw_grid(canvas)?;
+    let place = |point: &Point| frame.at(microseconds(point), error(point));
+    let markers: Vec<_> =
+        drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| place(point)).collect();
+    let mut labels = Labels::beside(&markers, RADIUS, frame.rect, SMALLEST);
+    for (style, points) in &present {
+        if style.method == MEASURE {
+            let x = frame.at(microseconds(points[0]), 1.0).0;
+            canvas.dashes((x, frame.rect.top), (x, frame.rect.bottom), 2.0, style.color)?;
+            continue;
+        }
+        let path: Vec<_> = points.iter().map(|point| place(point)).collect();
+        canvas.stroke(&path, 2.0, style.color)?;
+        for (point, at) in points.iter().zip(&path) {
+            canvas.marker(*at, Marker { hollow: is_lost(shown, point), ..marker(style) })?;
+        }
+        if let (Some(point), Some(at)) = (points.last(), path.last()) {
+            let before = path.iter().rev().nth(1).copied();
+            labels.add(canvas, setting(point), *at, before, style.color)?;
+        }
+    }
+    labels.draw(canvas)?;
+    frame.draw_axes(canvas, true)
+}
+
+/// The steps per period or the tolerance of a point.
+fn setting(point: &Point) -> String {
+    match (point.steps, point.tolerance) {
+        (Some(steps), _) => steps.to_string(),
+        (None, Some(tolerance)) => format!("{tolerance:e}").replace('-', "\u{2212}"),
+        (None, None) => String::new(),
+    }
+}
+
+/// A lane that was lost, or might as well have been.
+fn is_lost(shown: Shown, point: &Point) -> bool {
+    (shown.error)(point) > ERRORS.1
+}
+
+/// Its error is zero by definition: it is a line, not a curve.
+const MEASURE: &str = "reference";
+
+fn entry(style: &Style) -> Entry {
+    let key = if style.method == MEASURE { Key::Dashes { color: DARK } } else { Key::Marker(marker(style)) };
+    Entry::new(key, style.label)
+}
+
+fn marker(style: &Style) -> Marker {
+    Marker { shape: style.shape, color: style.color, radius: RADIUS, hollow: false }
+}
+
+fn microseconds(point: &Point) -> f64 {
+    1e6 * point.cost()
+}

@@ -1,0 +1,125 @@
+//! Integrators of fixed step, as studies of such systems use them: classical Runge-Kutta and
+//! semi-implicit Euler, in f64 on one core.
+
+use super::PERIODS;
+use super::cells::{Latest, Subject};
+use super::outcome::Outcome;
+use rattlemap::validate::independent::flight::{Field, Flight};
+use rattlemap_dynamics::flow::Gap;
+
+/// Endings in one period beyond which a lane is given up.
+const ENDINGS_PER_PERIOD: u32 = 10_000;
+
+/// How a step is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheme {
+    /// The classical Runge-Kutta method of order 4.
+    RungeKutta,
+    /// Semi-implicit (symplectic) Euler of order 1: velocities first, positions with the new ones.
+    SemiImplicitEuler,
+}
+
+/// One step from `y`, with cos of the phase at its start, middle and end.
+trait Step {
+    fn step(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap;
+}
+
+struct RungeKutta;
+struct SemiImplicitEuler;
+
+impl Step for RungeKutta {
+    #[inline(always)]
+    fn step(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
+        let slope = |y: &Gap, cos: f64| {
+            let [a, b] = field.accelerations(y, cos);
+            [y[1], a, y[3], b]
+        };
+        let moved = |by: f64, k: &Gap| -> Gap { std::array::from_fn(|i| y[i] + by * k[i]) };
+        let k1 = slope(y, cos[0]);
+        let k2 = slope(&moved(0.5 * h, &k1), cos[1]);
+        let k3 = slope(&moved(0.5 * h, &k2), cos[1]);
+        let k4 = slope(&moved(h, &k3), cos[2]);
+        std::array::from_fn(|i| y[i] + h / 6.0 * ((k1[i] + k4[i]) + 2.0 * (k2[i] + k3[i])))
+    }
+}
+
+impl Step for SemiImplicitEuler {
+    #[inline(always)]
+    fn step(field: &Field, y: &Gap, h: f64, cos: [f64; 3]) -> Gap {
+        let [a, b] = field.accelerations(y, cos[0]);
+        let (v1, v2) = (y[1] + h * a, y[3] + h * b);
+        [y[0] + h * v1, v1, y[2] + h * v2, v2]
+    }
+}
+
+/// Integrates a subject with `steps` steps per forcing period, at least 1.
+pub fn integrate(scheme: Scheme, subject: &Subject, steps: u32) -> Outcome {
+    match scheme {
+        Scheme::RungeKutta => run::<RungeKutta>(subject, steps),
+        Scheme::SemiImplicitEuler => run::<SemiImplicitEuler>(subject, steps),
+    }
+}
+
+fn run<S: Step>(subject: &Subject, steps: u32) -> Outcome {
+    let grid = Grid::new(subject.oscillator.omega, steps);
+    let mut flight = Flight::new(&subject.oscillator, subject.law, subject.start);
+    for _ in 0..PERIODS {
+        if grid.period::<S>(&mut flight).is_none() {
+            return Outcome::lost();
+        }
+    }
+    Outcome { state: flight.state(), events: Latest::of(&flight).0 }
+}
+
+/// The steps of a period.
+struct Grid {
+    omega: f64,
+    h: f64,
+    /// cos of the phase at every half step.
+    cosines: Vec<f64>,
+}
+
+impl Grid {
+    fn new(omega: f64, steps: u32) -> Grid {
+        let turn = |i: u32| (std::f64::consts::TAU * f64::from(i) / f64::from(2 * steps)).cos();
+        let h = std::f64::consts::TAU / omega / f64::from(steps);
+        Grid { omega, h, cosines: (0..=2 * steps).map(turn).collect() }
+    }
+
+    /// One forcing period; none for a lane that is lost.
+    fn period<S: Step>(&self, flight: &mut Flight) -> Option<()> {
+        let mut endings = 0;
+        for (n, cosines) in self.cosines.windows(3).step_by(2).enumerate() {
+            let start = self.h * n as f64;
+            let mut offset = 0.0;
+            // Whole, or cut by events into parts.
+            while offset < self.h {
+                let (t, rest) = (start + offset, self.h - offset);
+                let (field, y) = (*flight.field(), flight.q);
+                let after = |tau: f64| {
+                    let cos = [t, t + 0.5 * tau, t + tau].map(|t| (self.omega * t).cos());
+                    S::step(&field, &y, tau, cos)
+                };
+                let end = if offset == 0.0 {
+                    S::step(&field, &y, rest, [cosines[0], cosines[1], cosines[2]])
+                } else {
+                    after(rest)
+                };
+                let Some(sighting) = flight.find_ending(true, &y, t, rest, &end, after) else {
+                    flight.q = end;
+                    flight.leave_wall();
+                    break;
+                };
+                let tau = flight.locate(true, t, sighting, after)?;
+                flight.q = after(tau);
+                offset += tau;
+                flight.act(sighting.ending, start + offset, tau == 0.0);
+                endings += 1;
+                if endings > ENDINGS_PER_PERIOD {
+                    return None;
+                }
+            }
+        }
+        flight.q.iter().all(|x| x.is_finite()).then_some(())
+    }
+}

@@ -1,0 +1,135 @@
+//! The subjects on a graphics device: this project's lane, and Runge-Kutta in its place.
+
+use std::time::{Duration, Instant};
+
+use super::cells::{Subject, VARIANTS};
+use super::outcome::Outcome;
+use super::{EVENTS, PERIODS, shaders};
+use rattlemap::gpu::{
+    AdapterChoice, Gpu, GpuError, Lane, LaneSettings, Precision, Tables, describe, is_hardware,
+};
+use rattlemap::record::{Record, valid};
+use rattlemap_dynamics::model::{Law, Oscillator};
+
+/// How lanes move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// By the exact propagator: the lane of the maps.
+    Exact,
+    /// By classical Runge-Kutta steps, events within the loop over steps.
+    RungeKutta,
+    /// By classical Runge-Kutta steps in the lane's two phases.
+    RungeKuttaPhased,
+}
+
+/// A device that integrates subjects.
+pub struct Device {
+    gpu: Gpu,
+    flows: Vec<Oscillator>,
+    laws: Vec<Law>,
+    lanes: Vec<Lane>,
+    /// Copies of each subject.
+    copies: usize,
+}
+
+impl Device {
+    /// Opens the adapter that the environment asks for, else the best, for `copies` copies of
+    /// each of the subjects, at least one.
+    ///
+    /// # Errors
+    /// As [`Gpu::open`].
+    pub fn open(
+        precision: Precision,
+        form: Form,
+        subjects: &[Subject],
+        copies: usize,
+    ) -> Result<Device, GpuError> {
+        let mut gpu = pollster::block_on(Gpu::open(precision, &AdapterChoice::from_environment()))?;
+        gpu.rewrite_shaders(match form {
+            Form::Exact => shaders::lane,
+            Form::RungeKutta => shaders::runge_kutta,
+            Form::RungeKuttaPhased => shaders::runge_kutta_phased,
+        });
+        let (mut flows, mut laws): (Vec<Oscillator>, Vec<Law>) = (Vec::new(), Vec::new());
+        let lanes: Vec<Lane> = subjects
+            .iter()
+            .map(|subject| Lane {
+                flow: index_of(&mut flows, subject.oscillator),
+                law: index_of(&mut laws, subject.law),
+                start: subject.start,
+            })
+            .collect();
+        // Variants of a cell stay together: neighbours on the device are neighbours of a map.
+        let copied = lanes.chunks(VARIANTS as usize).flat_map(|cell| cell.repeat(copies)).collect();
+        Ok(Device { gpu, flows, laws, lanes: copied, copies })
+    }
+
+    /// The adapter in words.
+    pub fn adapter(&self) -> String {
+        describe(self.gpu.adapter())
+    }
+
+    /// Whether it is more than a program on the processor.
+    pub fn is_hardware(&self) -> bool {
+        is_hardware(self.gpu.adapter())
+    }
+
+    /// Lanes of one run.
+    pub fn lane_count(&self) -> usize {
+        self.lanes.len()
+    }
+
+    /// Derives and uploads the constants for so many steps per forcing period, or more where
+    /// the motion needs them.
+    ///
+    /// # Errors
+    /// As [`Gpu::load`].
+    pub fn load(&self, steps: u32) -> Result<Tables, GpuError> {
+        pollster::block_on(self.gpu.load(&self.flows, &self.laws, Some(steps)))
+    }
+
+    /// Integrates every copy; the time from lanes to records, and what one copy of each
+    /// subject came to.
+    ///
+    /// # Errors
+    /// As [`Gpu::run_on`].
+    pub fn run(&mut self, tables: &Tables) -> Result<(Duration, Vec<Outcome>), GpuError> {
+        // The time that meshing takes is not asked for; its place is taken by events.
+        let settings = LaneSettings { mesh: false, ..LaneSettings::only(PERIODS) };
+        let clock = Instant::now();
+        let records = pollster::block_on(self.gpu.run_on(tables, &self.lanes, &settings))?;
+        let elapsed = clock.elapsed();
+        let cell = self.copies * VARIANTS as usize;
+        let outcome = |(record, lane): (&Record, &Lane)| self.outcome(record, lane, tables);
+        let first_copies = records.chunks(cell).zip(self.lanes.chunks(cell));
+        let outcomes = first_copies
+            .flat_map(|(records, lanes)| records.iter().zip(lanes).take(VARIANTS as usize))
+            .map(outcome)
+            .collect();
+        Ok((elapsed, outcomes))
+    }
+
+    fn outcome(&self, record: &Record, lane: &Lane, tables: &Tables) -> Outcome {
+        if record.valid & valid::LYAPUNOV == 0 {
+            return Outcome::lost();
+        }
+        let period = self.flows[lane.flow as usize].period();
+        let steps = f64::from(tables.steps_per_period(lane.flow));
+        let packed = (record.impacts_per_period * f64::from(record.periods_run)).round() as u32;
+        // The record divides what it takes for exponents by the period.
+        let fractions = [record.lyapunov, record.lyapunov_error].map(|x| x * period);
+        let time = |i: usize| {
+            let step = (packed >> (16 * i)) & 0xffff;
+            if step == 0 { f64::NAN } else { (f64::from(step - 1) + fractions[i]) / steps * period }
+        };
+        Outcome { state: record.strobe, events: std::array::from_fn::<f64, EVENTS, _>(time) }
+    }
+}
+
+fn index_of<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
+    let at = list.iter().position(|other| *other == item).unwrap_or_else(|| {
+        list.push(item);
+        list.len() - 1
+    });
+    at as u32
+}

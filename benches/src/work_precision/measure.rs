@@ -1,0 +1,293 @@
+//! Every method at every setting, in turns.
+
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use super::cells::{Subject, by_reference};
+use super::fixed_step::Scheme;
+use super::lanes::{Device, Form};
+use super::outcome::{Error, Outcome, median_and_worst};
+use super::points::Point;
+use super::{PERIODS, adaptive, fixed_step};
+use rattlemap::cli::bench::statistics::Spread;
+use rattlemap::gpu::{GpuError, Precision, Tables};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::Law;
+
+/// Who integrates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Lanes of a graphics device.
+    Lanes(Form, Precision),
+    /// A fixed step on one core.
+    FixedStep(Scheme),
+    /// DOP853 on one core.
+    Dop853,
+    /// The event-driven reference on one core.
+    Reference,
+}
+
+/// What a method is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Setting {
+    /// Steps per forcing period.
+    Steps(u32),
+    /// Relative and absolute tolerance.
+    Tolerance(f64),
+    /// Nothing.
+    None,
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: [Method; 10] = [
+        Method::Lanes(Form::Exact, Precision::F32),
+        Method::Lanes(Form::Exact, Precision::F64),
+        Method::Lanes(Form::RungeKutta, Precision::F32),
+        Method::Lanes(Form::RungeKutta, Precision::F64),
+        Method::Lanes(Form::RungeKuttaPhased, Precision::F32),
+        Method::Lanes(Form::RungeKuttaPhased, Precision::F64),
+        Method::FixedStep(Scheme::RungeKutta),
+        Method::FixedStep(Scheme::SemiImplicitEuler),
+        Method::Dop853,
+        Method::Reference,
+    ];
+
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Lanes(Form::Exact, Precision::F32) => "lane-f32",
+            Method::Lanes(Form::Exact, Precision::F64) => "lane-f64",
+            Method::Lanes(Form::RungeKutta, Precision::F32) => "rk4-wgsl-f32",
+            Method::Lanes(Form::RungeKutta, Precision::F64) => "rk4-wgsl-f64",
+            Method::Lanes(Form::RungeKuttaPhased, Precision::F32) => "rk4-phased-f32",
+            Method::Lanes(Form::RungeKuttaPhased, Precision::F64) => "rk4-phased-f64",
+            Method::FixedStep(Scheme::RungeKutta) => "rk4-core",
+            Method::FixedStep(Scheme::SemiImplicitEuler) => "euler-core",
+            Method::Dop853 => "dop853-core",
+            Method::Reference => "reference",
+        }
+    }
+
+    /// The settings that are measured; `quick` takes the first and the third.
+    pub fn settings(self, quick: bool) -> Vec<Setting> {
+        let doubled = |from: u32, to: u32| {
+            std::iter::successors(Some(from), |n| Some(2 * n))
+                .take_while(move |&n| n <= to)
+                .map(Setting::Steps)
+        };
+        let all: Vec<Setting> = match self {
+            Method::Lanes(Form::Exact, _) => doubled(16, 1024).collect(),
+            Method::Lanes(..) | Method::FixedStep(_) => doubled(64, 8192).collect(),
+            Method::Dop853 => [1e-4, 1e-6, 1e-8, 1e-10, 1e-12].map(Setting::Tolerance).to_vec(),
+            Method::Reference => vec![Setting::None],
+        };
+        if quick { all.into_iter().step_by(2).take(2).collect() } else { all }
+    }
+
+    fn precision(self) -> Precision {
+        match self {
+            Method::Lanes(_, precision) => precision,
+            _ => Precision::F64,
+        }
+    }
+}
+
+/// How thorough a measurement is.
+#[derive(Clone, Copy, Debug)]
+pub struct Thoroughness {
+    /// Timed runs of everything.
+    pub rounds: usize,
+    /// Copies of each subject on a device; none for as many as fill it.
+    pub copies: Option<usize>,
+    /// Few settings.
+    pub quick: bool,
+    /// The least time, in seconds, that a method on a core is timed for in one round.
+    pub least_seconds: f64,
+}
+
+/// Errors of one method and setting, subject by subject.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// The row of the table.
+    pub point: Point,
+    /// One per subject.
+    pub errors: Vec<Error>,
+}
+
+/// Measures the methods; `report` is told after each run how many of how many are done.
+///
+/// # Errors
+/// What a device refuses. A method in f64 is left out where the device has none.
+pub fn measure(
+    subjects: &[Subject],
+    methods: &[Method],
+    how: Thoroughness,
+    report: &dyn Fn(usize, usize),
+) -> Result<Vec<Curve>, GpuError> {
+    let mut runners = Vec::new();
+    for &method in methods {
+        match Runner::open(method, subjects, how) {
+            Ok(runner) => runners.push(runner),
+            Err(GpuError::NoAdapter { .. }) if method.precision() == Precision::F64 => {}
+            Err(error) => return Err(error),
+        }
+    }
+    let all: usize = runners.iter().map(|runner| runner.settings.len()).sum::<usize>() * (how.rounds + 1);
+    let mut done = 0;
+    // The first round warms up, and its outcomes are judged.
+    for round in 0..=how.rounds {
+        for runner in &mut runners {
+            for i in 0..runner.settings.len() {
+                let least = if round == 0 { 0.0 } else { how.least_seconds };
+                let (seconds, outcomes) = runner.run(i, subjects, least)?;
+                if round == 0 {
+                    runner.outcomes.push(outcomes);
+                } else {
+                    runner.times[i].push(seconds);
+                }
+                done += 1;
+                report(done, all);
+            }
+        }
+    }
+    Ok(runners.iter().flat_map(|runner| runner.curves(subjects)).collect())
+}
+
+/// The flow and law of each subject; neighbours of one oscillator share its flow.
+fn flows(subjects: &[Subject]) -> Vec<(Rc<Flow>, Law)> {
+    let mut flows: Vec<(Rc<Flow>, Law)> = Vec::new();
+    for (n, subject) in subjects.iter().enumerate() {
+        let flow = match flows.last() {
+            Some((flow, _)) if subjects[n - 1].oscillator == subject.oscillator => Rc::clone(flow),
+            _ => Rc::new(Flow::new(&subject.oscillator)),
+        };
+        flows.push((flow, subject.law));
+    }
+    flows
+}
+
+/// A method ready to run, and what it has done.
+struct Runner {
+    method: Method,
+    settings: Vec<Setting>,
+    device: Option<(Device, Vec<Tables>)>,
+    /// Solved outside the clock, and shared by the cells of an oscillator, as a map does.
+    flows: Vec<(Rc<Flow>, Law)>,
+    outcomes: Vec<Vec<Outcome>>,
+    times: Vec<Vec<f64>>,
+}
+
+/// What methods without a device run on, as tables have it.
+pub const ONE_CORE: &str = "one core";
+
+/// Copies of each subject that fill a device.
+const HARDWARE_COPIES: usize = 1024;
+const SOFTWARE_COPIES: usize = 16;
+
+impl Runner {
+    fn open(method: Method, subjects: &[Subject], how: Thoroughness) -> Result<Runner, GpuError> {
+        let settings = method.settings(how.quick);
+        let mut device = None;
+        if let Method::Lanes(form, precision) = method {
+            let open = |copies| Device::open(precision, form, subjects, copies);
+            let mut opened = open(how.copies.unwrap_or(SOFTWARE_COPIES))?;
+            if how.copies.is_none() && opened.is_hardware() {
+                opened = open(HARDWARE_COPIES)?;
+            }
+            let load = |setting: &Setting| match setting {
+                Setting::Steps(steps) => opened.load(*steps),
+                _ => unreachable!("lanes have a grid"),
+            };
+            let tables = settings.iter().map(load).collect::<Result<_, _>>()?;
+            device = Some((opened, tables));
+        }
+        let flows = match method {
+            Method::Reference => flows(subjects),
+            _ => Vec::new(),
+        };
+        let times = vec![Vec::new(); settings.len()];
+        Ok(Runner { method, settings, device, flows, outcomes: Vec::new(), times })
+    }
+
+    /// Seconds per lane-period, and what came of each subject.
+    fn run(&mut self, i: usize, subjects: &[Subject], least: f64) -> Result<(f64, Vec<Outcome>), GpuError> {
+        if let Some((device, tables)) = &mut self.device {
+            let (elapsed, outcomes) = device.run(&tables[i])?;
+            let lane_periods = device.lane_count() as f64 * f64::from(PERIODS);
+            return Ok((elapsed.as_secs_f64() / lane_periods, outcomes));
+        }
+        let clock = Instant::now();
+        let mut runs = 0;
+        loop {
+            let outcomes: Vec<Outcome> = (0..subjects.len()).map(|n| self.one(i, subjects, n)).collect();
+            runs += 1;
+            let elapsed: Duration = clock.elapsed();
+            if elapsed.as_secs_f64() >= least {
+                let lane_periods = (runs * subjects.len()) as f64 * f64::from(PERIODS);
+                return Ok((elapsed.as_secs_f64() / lane_periods, outcomes));
+            }
+        }
+    }
+
+    fn one(&self, i: usize, subjects: &[Subject], n: usize) -> Outcome {
+        let subject = &subjects[n];
+        match (self.method, self.settings[i]) {
+            (Method::FixedStep(scheme), Setting::Steps(steps)) => {
+                fixed_step::integrate(scheme, subject, steps)
+            }
+            (Method::Dop853, Setting::Tolerance(tolerance)) => adaptive::integrate(subject, tolerance),
+            (Method::Reference, _) => {
+                let (flow, law) = &self.flows[n];
+                by_reference(flow, *law, subject.start)
+            }
+            other => unreachable!("no method takes this setting: {other:?}"),
+        }
+    }
+
+    fn curves(&self, subjects: &[Subject]) -> Vec<Curve> {
+        (0..self.settings.len()).map(|i| self.curve(i, subjects)).collect()
+    }
+
+    fn curve(&self, i: usize, subjects: &[Subject]) -> Curve {
+        let errors: Vec<Error> = subjects
+            .iter()
+            .zip(&self.outcomes[i])
+            .map(|(subject, outcome)| outcome.error(&subject.truth, subject.oscillator.period()))
+            .collect();
+        let [state_median, state_worst] = median_and_worst(errors.iter().map(|e| e.state).collect());
+        let [event_median, event_worst] = median_and_worst(errors.iter().filter_map(|e| e.event).collect());
+        let Spread { median, low, high } = Spread::of(self.times[i].clone());
+        let (device, cores, lanes) = match &self.device {
+            Some((device, _)) => {
+                let cores = (!device.is_hardware()).then(cores);
+                (device.adapter(), cores, device.lane_count())
+            }
+            None => (ONE_CORE.to_owned(), Some(1), subjects.len()),
+        };
+        let point = Point {
+            method: self.method.name().to_owned(),
+            device,
+            precision: self.method.precision().name().to_owned(),
+            steps: if let Setting::Steps(steps) = self.settings[i] { Some(steps) } else { None },
+            tolerance: if let Setting::Tolerance(t) = self.settings[i] { Some(t) } else { None },
+            cores,
+            lanes,
+            periods: PERIODS,
+            rounds: self.times[i].len(),
+            seconds_per_lane_period: median,
+            fastest: low,
+            slowest: high,
+            state_error_median: state_median,
+            state_error_worst: state_worst,
+            event_error_median: event_median,
+            event_error_worst: event_worst,
+            lost: errors.iter().filter(|e| e.state.is_infinite()).count(),
+        };
+        Curve { point, errors }
+    }
+}
+
+fn cores() -> u32 {
+    std::thread::available_parallelism().map_or(1, |n| n.get() as u32)
+}

@@ -1,0 +1,205 @@
+//! Files of `work-precision`: tables, figures, the cells for other programs, a manifest.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::PERIODS;
+use super::cells::Subject;
+use super::figure::{self, Shown};
+use super::measure::Curve;
+use super::points::{self, Point};
+use rattlemap::output::manifest::{Head, MANIFEST};
+use rattlemap::output::parameters::Parameters;
+use rattlemap::output::{Folder, OutputError, WriteError};
+use rattlemap_dynamics::model::State;
+
+const TABLE: &str = "work_precision.csv";
+const CELLS_TABLE: &str = "work_precision_cells.csv";
+const CELLS: &str = "cells.json";
+
+/// Every file that a run may write.
+pub const FILES: [&str; 7] = [
+    TABLE,
+    CELLS_TABLE,
+    CELLS,
+    "work_precision.png",
+    "work_precision_median.png",
+    "work_precision_events.png",
+    MANIFEST,
+];
+
+/// The figures.
+const FIGURES: [(&str, Shown); 3] = [
+    (
+        "work_precision.png",
+        Shown {
+            title: "Run time against error, the worst cell of all: lower left is better",
+            axis: "error of the state after 8 forcing periods, worst cell",
+            error: |point| point.state_error_worst,
+        },
+    ),
+    (
+        "work_precision_median.png",
+        Shown {
+            title: "Run time against error, the median cell: lower left is better",
+            axis: "error of the state after 8 forcing periods, median cell",
+            error: |point| point.state_error_median,
+        },
+    ),
+    (
+        "work_precision_events.png",
+        Shown {
+            title: "Run time against error of event times, the worst cell of all: lower left is better",
+            axis: "error of the times of the last two events, worst cell",
+            error: |point| point.event_error_worst,
+        },
+    ),
+];
+
+/// What a run was.
+#[derive(Clone, Debug, Serialize)]
+pub struct Run<'a> {
+    /// The processor.
+    pub processor: &'a str,
+    /// Its cores.
+    pub cores: usize,
+    /// The graphics adapter, in words.
+    pub adapter: &'a str,
+    /// Timed rounds.
+    pub rounds: usize,
+    /// Whether sizes were tiny: then the figures mean nothing.
+    pub quick: bool,
+    /// Time against time at equal error, in sentences.
+    pub ratios: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Manifest<'a> {
+    #[serde(flatten)]
+    head: Head,
+    #[serde(flatten)]
+    run: &'a Run<'a>,
+    periods: u32,
+    cells: Vec<CellObject>,
+    files: [&'static str; 7],
+}
+
+/// A cell, by its first variant; amplification is the largest over the variants.
+#[derive(Serialize)]
+struct CellObject {
+    kind: &'static str,
+    e: f64,
+    omega: f64,
+    #[serde(rename = "F")]
+    force: f64,
+    beyond: Option<f64>,
+    amplification: f64,
+    variants: usize,
+}
+
+/// A subject, as other programs integrate it.
+#[derive(Serialize)]
+struct SubjectObject {
+    kind: &'static str,
+    parameters: Parameters,
+    periods: u32,
+    start: State,
+    state: State,
+    events: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct CellRow<'a> {
+    method: &'a str,
+    steps: Option<u32>,
+    tolerance: Option<f64>,
+    kind: &'static str,
+    e: f64,
+    omega: f64,
+    #[serde(rename = "F")]
+    force: f64,
+    state_error: f64,
+    event_error: Option<f64>,
+}
+
+/// Writes everything; `peers` are points of other programs, which join table and figures.
+///
+/// # Errors
+/// A file that cannot be written, by name.
+pub fn write(
+    folder: &Folder,
+    run: &Run<'_>,
+    subjects: &[Subject],
+    curves: &[Curve],
+    peers: &[Point],
+) -> Result<(), OutputError> {
+    let all: Vec<Point> =
+        curves.iter().map(|curve| curve.point.clone()).chain(peers.iter().cloned()).collect();
+    folder.replace(TABLE, |at| points::write(at, &all))?;
+    folder.replace(CELLS_TABLE, |at| write_cells(at, subjects, curves))?;
+    let objects: Vec<_> = subjects.iter().map(subject).collect();
+    folder.write_json(CELLS, &objects)?;
+    let subtitle = format!("{} cores: {}; lanes on {}", run.cores, run.processor, run.adapter);
+    for (name, shown) in FIGURES {
+        folder.replace(name, |at| Ok(figure::write(at, &subtitle, shown, &all)?))?;
+    }
+    let manifest = Manifest {
+        head: Head::of("work-precision"),
+        run,
+        periods: PERIODS,
+        cells: subjects.chunk_by(|a, b| a.cell == b.cell).map(cell).collect(),
+        files: FILES,
+    };
+    folder.write_json(MANIFEST, &manifest)
+}
+
+fn cell(variants: &[Subject]) -> CellObject {
+    let first = &variants[0];
+    CellObject {
+        kind: first.kind.name(),
+        e: first.pair.e,
+        omega: first.pair.omega,
+        force: first.pair.force,
+        beyond: first.beyond,
+        amplification: variants.iter().map(|subject| subject.amplification).fold(0.0, f64::max),
+        variants: variants.len(),
+    }
+}
+
+fn subject(subject: &Subject) -> SubjectObject {
+    SubjectObject {
+        kind: subject.kind.name(),
+        parameters: Parameters::of(&subject.pair),
+        periods: PERIODS,
+        start: subject.start,
+        state: subject.truth.state,
+        events: subject.truth.events.iter().copied().filter(|t| !t.is_nan()).collect(),
+    }
+}
+
+/// One row per method, setting and cell: the largest errors over the cell's variants.
+fn write_cells(path: &Path, subjects: &[Subject], curves: &[Curve]) -> Result<(), WriteError> {
+    let mut writer = csv::Writer::from_path(path)?;
+    for Curve { point, errors } in curves {
+        let mut errors = errors.iter();
+        for variants in subjects.chunk_by(|a, b| a.cell == b.cell) {
+            let (first, own) = (&variants[0], errors.by_ref().take(variants.len()));
+            let largest = own.fold((0.0f64, None::<f64>), |(state, event), error| {
+                (state.max(error.state), event.into_iter().chain(error.event).reduce(f64::max))
+            });
+            writer.serialize(CellRow {
+                method: &point.method,
+                steps: point.steps,
+                tolerance: point.tolerance,
+                kind: first.kind.name(),
+                e: first.pair.e,
+                omega: first.pair.omega,
+                force: first.pair.force,
+                state_error: largest.0,
+                event_error: largest.1,
+            })?;
+        }
+    }
+    Ok(writer.flush()?)
+}

@@ -1,0 +1,110 @@
+//! The instruments at tiny sizes: they must not rot.
+
+use std::collections::HashMap;
+use std::fs;
+
+use assert_cmd::Command;
+
+type Row = HashMap<String, String>;
+
+fn rows(path: &std::path::Path) -> Vec<Row> {
+    csv::Reader::from_path(path).unwrap().deserialize().map(|row| row.unwrap()).collect()
+}
+
+#[test]
+fn stress_judges_every_part_and_writes_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("rattlemap-bench").unwrap();
+        command.current_dir(folder.path()).args(["stress", "--quick"]).args(arguments).assert()
+    };
+    let said = run(&[]).success().stdout("").get_output().stderr.clone();
+    let said = String::from_utf8(said).unwrap();
+    for part in ["long_runs", "impacts", "grazing", "chatter", "stiffness", "grid", "fuzz"] {
+        let line = said.lines().find(|line| line.starts_with(part));
+        assert!(line.is_some_and(|line| line.contains("holds: ")), "{part}: {said}");
+    }
+    let out = folder.path().join("out/bench/stress");
+    let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    assert_eq!(manifest["command"], "stress");
+    for file in manifest["files"].as_array().unwrap() {
+        let size = out.join(file.as_str().unwrap()).metadata().unwrap().len();
+        assert!(size > 0, "{file} is empty");
+    }
+
+    // Parts on their own leave nothing of the other ones behind.
+    let said =
+        run(&["--part", "grazing", "--part", "chatter", "--force"]).success().get_output().stderr.clone();
+    let said = String::from_utf8(said).unwrap();
+    let judged: Vec<&str> = said.lines().filter(|line| line.contains("holds: ")).collect();
+    assert!(judged.len() == 2 && judged[0].starts_with("grazing"), "{said}");
+    let mut names: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["chatter.csv", "grazing.csv", "grazing.png", "manifest.json"]);
+    let refused = run(&["--part", "grinding", "--force"]).code(2).get_output().clone();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("long_runs, impacts"), "{refused:?}");
+}
+
+#[test]
+fn work_precision_measures_every_method() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        Command::cargo_bin("rattlemap-bench")
+            .unwrap()
+            .current_dir(folder.path())
+            .args(["work-precision", "--quick"])
+            .args(arguments)
+            .assert()
+    };
+    let output = run(&[]).success().get_output().clone();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    for part in ["lane-f32", "rk4-wgsl-f64", "dop853-core", "times less time than", "smallest error"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let out = folder.path().join("out/bench/work-precision");
+    let points = rows(&out.join("work_precision.csv"));
+    let methods = "lane-f32 lane-f64 rk4-wgsl-f32 rk4-wgsl-f64 rk4-phased-f32 rk4-phased-f64 rk4-core euler-core dop853-core";
+    for method in methods.split(' ') {
+        let own: Vec<_> = points.iter().filter(|row| row["method"] == method).collect();
+        assert_eq!(own.len(), 2, "{method}");
+        for row in own {
+            let number = |name: &str| row[name].parse::<f64>().unwrap();
+            assert!(number("seconds_per_lane_period") > 0.0, "{row:?}");
+            assert!(number("state_error_median") > 0.0, "{row:?}");
+            assert!(number("state_error_worst") >= number("state_error_median"), "{row:?}");
+            assert!(number("fastest") <= number("slowest"), "{row:?}");
+        }
+    }
+    let lane = points.iter().find(|row| row["method"] == "lane-f64").unwrap();
+    assert!(lane["state_error_worst"].parse::<f64>().unwrap() < 1e-11, "{lane:?}");
+    assert_eq!(points.iter().filter(|row| row["method"] == "reference").count(), 1);
+
+    let json = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&fs::read_to_string(out.join(name)).unwrap()).unwrap()
+    };
+    let manifest = json("manifest.json");
+    assert_eq!(manifest["quick"], true);
+    for file in manifest["files"].as_array().unwrap() {
+        assert!(fs::metadata(out.join(file.as_str().unwrap())).unwrap().len() > 100, "{file}");
+    }
+    let cells = json("cells.json");
+    assert_eq!(cells.as_array().unwrap().len(), 5 * 8);
+    assert_eq!(cells[0]["parameters"]["omega"], 5.6);
+
+    // A table of points, such as this one, joins as peers.
+    let peers = folder.path().join("peers.csv");
+    let foreign =
+        fs::read_to_string(out.join("work_precision.csv")).unwrap().replace("rk4-core", "rk4-numba");
+    fs::write(&peers, foreign).unwrap();
+    run(&["--methods", "reference", "--peers", "peers.csv", "--out", "joined", "--quiet"]).success();
+    let joined = rows(&folder.path().join("joined/work_precision.csv"));
+    assert_eq!(joined.iter().filter(|row| row["method"] == "rk4-numba").count(), 2);
+
+    let refused = run(&["--methods", "rk5"]).code(2).get_output().clone();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("rk4-core"), "{refused:?}");
+    fs::write(&peers, "not,a,table\n1,2,3\n").unwrap();
+    let refused = run(&["--peers", "peers.csv", "--out", "elsewhere"]).code(2).get_output().clone();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("peers.csv"), "{refused:?}");
+    assert!(!folder.path().join("elsewhere").exists(), "nothing was written");
+}

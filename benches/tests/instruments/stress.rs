@@ -1,0 +1,69 @@
+//! The parts of the stress instrument in small: each must hold.
+
+use rattlemap::gpu::AdapterChoice;
+use rattlemap_bench::stress::{self, Lanes, Size, Verdict};
+
+const SEED: u64 = 1;
+
+fn lanes() -> Lanes {
+    pollster::block_on(Lanes::open(&AdapterChoice::default())).unwrap()
+}
+
+#[track_caller]
+fn holds(verdict: &Verdict) {
+    println!("{}: {}", verdict.part, verdict.sentence);
+    assert!(verdict.holds, "{}: {}", verdict.part, verdict.sentence);
+}
+
+#[test]
+fn errors_do_not_grow_with_time() {
+    let rows = stress::long_runs::measure(Size::Small, &mut lanes(), &()).unwrap();
+    rows.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::long_runs::judge(&rows));
+}
+
+#[test]
+fn impacts_keep_momentum_and_the_law_of_energy() {
+    let rows = stress::impacts::measure(Size::Small, SEED, &mut lanes()).unwrap();
+    rows.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::impacts::judge(&rows));
+}
+
+#[test]
+fn grazing_obeys_the_square_root_law() {
+    let rows = stress::grazing::measure(Size::Small, SEED, &mut lanes()).unwrap();
+    rows.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::grazing::judge(&rows));
+}
+
+#[test]
+fn chatter_ends_as_restitution_goes_to_one() {
+    let rows = stress::chatter::measure(Size::Small, &mut lanes()).unwrap();
+    rows.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::chatter::judge(&rows));
+}
+
+#[test]
+fn stiff_meshing_costs_steps_and_nothing_else() {
+    let rows = stress::stiffness::measure(Size::Small, &mut lanes()).unwrap();
+    rows.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::stiffness::judge(&rows));
+}
+
+#[test]
+fn no_grid_is_too_coarse_to_see_an_event() {
+    let rows = stress::grid::measure(Size::Small, SEED, &mut lanes(), &()).unwrap();
+    rows.swings.iter().for_each(|row| println!("{row:?}"));
+    rows.motions.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::grid::judge(&rows));
+}
+
+/// A thousand cells; the first 200 of them are part of `stress_judges_every_part_and_writes_its_folder`.
+#[test]
+#[ignore = "a minute; scripts/test.sh --all"]
+fn random_parameters_end_as_on_the_reference() {
+    let rows = stress::fuzz::measure(Size::Small, SEED, &mut lanes(), &()).unwrap();
+    rows.counts.iter().for_each(|row| println!("{row:?}"));
+    rows.mismatches.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::fuzz::judge(&rows));
+}

@@ -1,0 +1,192 @@
+//! Motion near any instant of a step, as a Taylor polynomial short enough to be cheap.
+//!
+//! Propagators of every sixteenth of the Taylor step, and of whole ones, are stored. One of
+//! each leads to within a thirty-second of any instant; from there eight terms of the
+//! trajectory's own Taylor series reach rounding: `(1.6 * 0.035)^9 / 9! < 2e-17`, a little slack for
+//! rounding included. One polynomial serves the search for a root and the state there, so an event
+//! costs one.
+
+use wide::f64x4;
+
+use super::columns::Columns;
+use super::linear::terms;
+use super::{Gap, Phasor};
+use crate::fused::fma;
+
+/// Parts of the Taylor step whose propagators are stored.
+const PARTS: usize = 16;
+
+/// The finest of them.
+pub(super) const FINEST_PART: f64 = 1.0 / PARTS as f64;
+
+/// Of these every fourth is summed, and the first three; the others are products.
+const COARSER: usize = 4;
+
+/// Terms of the local series.
+pub(crate) const TERMS: usize = 8;
+
+/// Distance from the grid up to which the series may be used, in Taylor steps: half a part and
+/// a little, for a root beyond the middle.
+pub(crate) const REACH: f64 = 0.035;
+
+/// Added to a small number it leaves the nearest whole one in the last bits.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+const MASK: u64 = 0xffff;
+
+/// Series of `1 - sin(x) / x` and of `1 - cos(x)`, signs left out.
+const SIN: [f64; 3] = [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0];
+const COS: [f64; 4] = [0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40320.0];
+
+/// Their next terms, for angles up to 0.2.
+const SIN_TAIL: [f64; 2] = [1.0 / 362_880.0, 1.0 / 39_916_800.0];
+const COS_TAIL: [f64; 2] = [1.0 / 3_628_800.0, 1.0 / 479_001_600.0];
+
+/// The phasor after a turn by an angle of up to 0.2.
+#[inline(always)]
+pub(crate) fn turned([cos, sin]: &Phasor, angle: f64) -> Phasor {
+    let square = angle * angle;
+    let fourth = square * square;
+    let series = |a: f64, b: f64, c: f64, d: f64, e: f64| {
+        fma(fourth, fma(fourth, e, fma(-square, d, c)), fma(-square, b, a))
+    };
+    let s = angle * fma(-square, series(SIN[0], SIN[1], SIN[2], SIN_TAIL[0], SIN_TAIL[1]), 1.0);
+    let tail = fma(-square, COS_TAIL[1], COS_TAIL[0]);
+    let less =
+        -square * fma(fourth, fma(fourth, tail, fma(-square, COS[3], COS[2])), fma(-square, COS[1], COS[0]));
+    [cos + fma(less, *cos, -s * sin), sin + fma(s, *cos, less * sin)]
+}
+
+/// Propagators of a grid of instants, less the identity, and the terms of the Taylor series.
+#[derive(Clone, Debug)]
+pub(crate) struct Grid {
+    parts: Vec<Columns>,
+    wholes: Vec<Columns>,
+    terms: [Columns; TERMS],
+}
+
+/// The motion near an instant of the grid.
+pub(crate) struct Expansion {
+    /// The instant, in Taylor steps since the start.
+    pub(crate) start: f64,
+    /// What has been added to the state by then.
+    moved: f64x4,
+    q: f64x4,
+    terms: [f64x4; TERMS],
+    phasor: Phasor,
+}
+
+impl Grid {
+    /// Propagators that are stored.
+    pub(super) fn stored(&self) -> usize {
+        self.parts.capacity() + self.wholes.capacity()
+    }
+
+    /// A grid over `wholes` Taylor steps, from the table of terms.
+    pub(super) fn new(table: &[Columns], wholes: usize) -> Grid {
+        // Products of two sums, never of more: errors do not pile up.
+        let sum = |i: usize| {
+            let u = i as f64 / PARTS as f64;
+            Columns::horner(&table[..terms(u)], u)
+        };
+        let mut parts = vec![Columns::ZERO; PARTS];
+        for i in 1..PARTS {
+            let fine = i % COARSER;
+            parts[i] = if i < COARSER || fine == 0 { sum(i) } else { parts[fine].after(&parts[i - fine]) };
+        }
+        let mut whole = Vec::with_capacity(wholes + 1);
+        whole.extend([Columns::ZERO, sum(PARTS)]);
+        for i in 2..=wholes {
+            whole.push(whole[i / 2].after(&whole[i - i / 2]));
+        }
+        Grid { parts, wholes: whole, terms: std::array::from_fn(|n| table[n]) }
+    }
+
+    /// The propagator, less the identity, of a multiple of the sixteenth: exact grid only.
+    pub(super) fn propagator(&self, u: f64) -> Columns {
+        let (_, whole, part) = self.nearest(u);
+        self.parts[part].after(&self.wholes[whole])
+    }
+
+    /// The grid point nearest to `u`, and its whole steps and parts.
+    #[inline(always)]
+    fn nearest(&self, u: f64) -> (f64, usize, usize) {
+        let rounded = fma(u, PARTS as f64, ROUNDER);
+        let i = (rounded.to_bits() & MASK) as usize;
+        ((rounded - ROUNDER) * FINEST_PART, (i / PARTS).min(self.wholes.len() - 1), i % PARTS)
+    }
+
+    /// The motion from a state near the instant `u >= 0`, in Taylor steps.
+    #[inline(always)]
+    pub(crate) fn expansion(&self, q: &Gap, phasor: &Phasor, u: f64) -> Expansion {
+        let (instant, whole, part) = self.nearest(u);
+        let start = f64x4::from(*q);
+        let (mut moved, mut p) = (f64x4::ZERO, *phasor);
+        let mut here = *q;
+        if whole > 0 {
+            let step = &self.wholes[whole];
+            moved = step.apply(&here, &p);
+            p = step.carry_phasor(&p);
+            here = (start + moved).to_array();
+        }
+        let step = &self.parts[part];
+        moved += step.apply(&here, &p);
+        p = step.carry_phasor(&p);
+        let there = start + moved;
+        let here = there.to_array();
+        Expansion {
+            start: instant,
+            moved,
+            q: there,
+            terms: std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p)),
+            phasor: p,
+        }
+    }
+
+    /// Tangent vectors after `u` Taylor steps.
+    #[inline(always)]
+    pub(crate) fn carry<const N: usize>(&self, u: f64, tangents: [Gap; N]) -> [Gap; N] {
+        let (instant, whole, part) = self.nearest(u);
+        let v = u - instant;
+        let mut here = tangents;
+        if whole > 0 {
+            here = here.map(|t| self.wholes[whole].carry_tangent(&t));
+        }
+        here = here.map(|t| self.parts[part].carry_tangent(&t));
+        Columns::carry(&self.terms, v, here)
+    }
+}
+
+impl Expansion {
+    /// Coefficients of what is added to the gap, in powers of the Taylor step from `start`.
+    #[inline(always)]
+    pub(crate) fn gap(&self) -> [f64; TERMS + 1] {
+        let mut series = [self.moved.to_array()[0]; TERMS + 1];
+        for (coefficient, term) in series[1..].iter_mut().zip(&self.terms) {
+            *coefficient = term.to_array()[0];
+        }
+        series
+    }
+
+    /// The state `v` Taylor steps after `start`.
+    #[inline(always)]
+    pub(crate) fn state(&self, v: f64) -> Gap {
+        let t = &self.terms;
+        let v = f64x4::splat(v);
+        let square = v * v;
+        // In a tree: whoever needs the state has nothing else to do meanwhile.
+        let pair = |i: usize| t[i + 1].mul_add(v, t[i]);
+        let low = pair(2).mul_add(square, pair(0));
+        let high = pair(6).mul_add(square, pair(4));
+        high.mul_add(square * square, low).mul_add(v, self.q).to_array()
+    }
+
+    /// The phasor after a turn by a small angle.
+    #[inline(always)]
+    pub(crate) fn phasor(&self, angle: f64) -> Phasor {
+        let [cos, sin] = self.phasor;
+        let square = angle * angle;
+        let s = angle * fma(-square, fma(-square, fma(-square, SIN[2], SIN[1]), SIN[0]), 1.0);
+        let less = square * fma(square, fma(-square, fma(-square, COS[3], COS[2]), COS[1]), -COS[0]);
+        [cos + fma(less, cos, -s * sin), sin + fma(s, cos, less * sin)]
+    }
+}

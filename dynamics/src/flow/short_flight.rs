@@ -1,0 +1,260 @@
+//! Flights from a wall that are short enough for their own Taylor series to show when they end.
+//!
+//! A flight pressed back to its wall leaves it by `z(v) = v P(v)`, `v` in Taylor steps. Twelve
+//! terms reach rounding, in the speeds, too, up to an eighth of a Taylor step:
+//! `0.2^12 / 12! < 1e-17`. Where the second coefficient outweighs all later ones, the gap bends
+//! towards the wall all the way to the root of `P`: that is its first return, and pressing does
+//! not cease before.
+
+use wide::f64x4;
+
+use super::columns::Columns;
+use super::{Gap, Phasor};
+use crate::fused::fma;
+
+/// Registers that hold the coefficients of one series.
+const WIDTH: usize = 3;
+
+/// Coefficients of one series.
+type Series = [f64x4; WIDTH];
+
+/// The longest flight, in Taylor steps.
+pub(crate) const SHORT: f64 = 0.125;
+
+/// A first guess has to be this near to the root.
+const NEAR: f64 = 0.01;
+
+/// What powers may grow by over that distance, and a little.
+const GROWTH: f64 = 1.2;
+
+/// What the last correction may leave of the flight.
+const LEFT: f64 = 1e-17;
+
+/// Corrections allowed; one is enough.
+const CORRECTIONS: usize = 3;
+
+/// Weights of the term `m`, counted from zero: `m`, `m (m - 1) / 2`, `m (m + 1)` and `m + 1` without
+/// the terms that are taken by themselves.
+const SLOPE: Series = weights([[0.0, 1.0, 2.0, 3.0], [4.0, 5.0, 6.0, 7.0], [8.0, 9.0, 10.0, 11.0]]);
+const BEND: Series = weights([[0.0, 0.0, 1.0, 3.0], [6.0, 10.0, 15.0, 21.0], [28.0, 36.0, 45.0, 55.0]]);
+const TURNING: Series =
+    weights([[0.0, 0.0, 6.0, 12.0], [20.0, 30.0, 42.0, 56.0], [72.0, 90.0, 110.0, 132.0]]);
+const GAIN: Series = weights([[0.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [9.0, 10.0, 11.0, 12.0]]);
+
+const fn weights(w: [[f64; 4]; WIDTH]) -> Series {
+    [f64x4::new(w[0]), f64x4::new(w[1]), f64x4::new(w[2])]
+}
+
+/// Takes `a = (z, w, x, v, cos, sin, 1)` to the Taylor coefficients of gap and second displacement.
+#[derive(Clone, Debug)]
+pub(crate) struct ShortFlight {
+    columns: [[f64x4; 2 * WIDTH]; 7],
+}
+
+/// What is added to gap and second displacement, in powers of the Taylor step.
+pub(crate) struct Rise {
+    gap: Series,
+    other: Series,
+}
+
+/// Powers of a time, four at a time.
+struct Powers {
+    low: f64x4,
+    fourth: f64x4,
+}
+
+impl Powers {
+    #[inline(always)]
+    fn of(v: f64) -> Powers {
+        let square = v * v;
+        Powers { low: f64x4::from([1.0, v, square, square * v]), fourth: f64x4::splat(square * square) }
+    }
+
+    /// The sum of a series over these powers.
+    #[inline(always)]
+    fn sum(&self, c: &Series) -> f64 {
+        let [a, b, c, d] = (c[2].mul_add(self.fourth, c[1]).mul_add(self.fourth, c[0]) * self.low).to_array();
+        (a + c) + (b + d)
+    }
+
+    #[inline(always)]
+    fn weighted(&self, c: &Series, weights: &Series) -> f64 {
+        self.sum(&std::array::from_fn(|i| c[i] * weights[i]))
+    }
+}
+
+impl ShortFlight {
+    /// From the Taylor table.
+    pub(super) fn new(table: &[Columns]) -> ShortFlight {
+        let coefficient = |row: usize, n: usize, j: usize| table[n].row(row)[j];
+        let quad = |row: usize, i: usize, j: usize| {
+            f64x4::from(std::array::from_fn::<f64, 4, _>(|n| coefficient(row, 4 * i + n, j)))
+        };
+        let column = |j: usize| std::array::from_fn(|i| quad(2 * (i / WIDTH), i % WIDTH, j));
+        ShortFlight { columns: std::array::from_fn(column) }
+    }
+
+    /// The series from a state.
+    #[inline(always)]
+    pub(crate) fn from(&self, q: &Gap, phasor: &Phasor) -> Rise {
+        let c = &self.columns;
+        let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]].map(f64x4::splat);
+        let quad = |i: usize| {
+            let state = c[0][i].mul_add(a[0], c[1][i] * a[1]) + c[2][i].mul_add(a[2], c[3][i] * a[3]);
+            state + c[4][i].mul_add(a[4], c[5][i].mul_add(a[5], c[6][i]))
+        };
+        Rise { gap: [quad(0), quad(1), quad(2)], other: [quad(3), quad(4), quad(5)] }
+    }
+}
+
+impl Rise {
+    /// When the gap is back where it started, in Taylor steps, if that is certain to be its first
+    /// return; none also where it goes farther than `width` from there.
+    #[inline(always)]
+    pub(crate) fn back(&self, width: f64) -> Option<f64> {
+        let [c1, c2, c3, c4] = self.gap[0].to_array();
+        // Reversion of the first four terms.
+        let inverse = 1.0 / c2;
+        let first = -c1 * inverse;
+        let per = first * inverse;
+        let (a, b) = (c3 * per, c4 * first * per);
+        let guess = first * (1.0 - fma(a, fma(a, fma(5.0, a, -2.0), fma(-5.0, b, 1.0)), b));
+        let powers = Powers::of(guess);
+        let slope = powers.weighted(&self.gap, &SLOPE);
+        let per_slope = 1.0 / slope;
+        let bend = powers.weighted(&self.gap, &BEND) * per_slope;
+        let step = -powers.sum(&self.gap) * per_slope;
+        let step = fma(-bend * step, step, step);
+        let sizes = self.gap.map(|c| (-c).fast_max(c));
+        let turning = GROWTH * powers.weighted(&sizes, &TURNING);
+        let is_certain =
+            guess > 0.0 && step.abs() < NEAR && turning < 2.0 * c2.abs() * guess && c1.abs() * SHORT < width;
+        if !is_certain {
+            return None;
+        }
+        let per_slope = per_slope * fma(-2.0 * bend, step, 1.0);
+        let share = fma(8.0 * step, step, 1e-10);
+        let mut root = fma(guess, step, guess);
+        for _ in 0..CORRECTIONS {
+            let correction = Powers::of(root).sum(&self.gap) * per_slope;
+            root = fma(-guess, correction, root);
+            if correction.abs() * share <= LEFT {
+                return (root <= SHORT).then_some(root);
+            }
+        }
+        None
+    }
+
+    /// What is added to `(w, x, v)` by the time `v`, in Taylor steps of which a unit of time has
+    /// `per_unit`.
+    #[inline(always)]
+    pub(crate) fn gained(&self, v: f64, per_unit: f64) -> [f64; 3] {
+        let powers = Powers::of(v);
+        [
+            per_unit * powers.weighted(&self.gap, &GAIN),
+            v * powers.sum(&self.other),
+            per_unit * powers.weighted(&self.other, &GAIN),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::{DomainKind, Flow, turned};
+    use crate::model::{GearPair, Side};
+
+    /// Starts on the right wall: free, or at the start of a contact onset.
+    fn starts() -> impl Iterator<Item = (DomainKind, Gap, Phasor)> {
+        (0..4000u32).map(|i| {
+            let t = f64::from(i);
+            let kind = if i % 2 == 0 { DomainKind::Free } else { DomainKind::Meshing(Side::Right) };
+            let leaving = 10f64.powf(-8.0 + 8.0 * (0.618 * t).fract());
+            let q = [0.5, -leaving, 2.0 * (1.7 * t).sin(), 6.0 * (2.3 * t).cos()];
+            (kind, q, [(0.9 * t).cos(), (0.9 * t).sin()])
+        })
+    }
+
+    /// What is called a first return is one, on the exact flow, and pressing holds until then.
+    #[test]
+    fn returns_are_first_returns() {
+        let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
+        let (mut found, mut refused) = (0, 0);
+        for (kind, q, phasor) in starts() {
+            let linear = flow.domain(kind);
+            let rise = linear.short_flight.from(&q, &phasor);
+            let Some(u) = rise.back(1.0) else {
+                refused += 1;
+                continue;
+            };
+            found += 1;
+            let case = format!("{kind:?} from {q:?}, {phasor:?}");
+            let [w, x, v] = rise.gained(u, linear.per_unit);
+            let s = u * linear.unit;
+            let end = linear.propagate(q, phasor, s);
+            assert!((end[0] - q[0]).abs() <= 4.0 * f64::EPSILON, "{case}: {} off the wall", end[0] - q[0]);
+            for (ours, exact, size) in
+                [(q[1] + w, end[1], 6.0), (q[2] + x, end[2], 2.0), (q[3] + v, end[3], 6.0)]
+            {
+                assert!((ours - exact).abs() <= 8.0 * f64::EPSILON * size, "{case}: {ours} for {exact}");
+            }
+            for part in 1..64 {
+                let part = f64::from(part) / 64.0;
+                let between = linear.propagate(q, phasor, part * s);
+                let at = turned(&phasor, part * u * linear.turn);
+                // Short flights rise by less than an ulp of the wall.
+                let short = 4.0 * f64::EPSILON;
+                assert!(between[0] < q[0] + short, "{case}: beyond the wall on the way");
+                assert!(linear.acceleration(&between, &at) > 0.0, "{case}: not pressed on the way");
+            }
+        }
+        assert!(found > 500 && refused > 500, "{found} found, {refused} refused");
+    }
+
+    /// Very short flights keep their relative accuracy: uniformly accelerated motion and a little more.
+    #[test]
+    fn short_flights_keep_their_shape() {
+        let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
+        let linear = flow.domain(DomainKind::Free);
+        let phasor = [1.0, 0.0];
+        for leaving in [1e-3, 1e-6, 1e-9, 1e-12] {
+            let q = [0.5, -leaving, 0.3, 0.1];
+            let pressing = linear.acceleration(&[0.5, 0.0, 0.3, 0.1], &phasor);
+            let rise = linear.short_flight.from(&q, &phasor);
+            let s = rise.back(1.0).unwrap() * linear.unit;
+            let uniform = 2.0 * leaving / pressing;
+            assert!((s / uniform - 1.0).abs() < 2.0 * leaving + 1e-14, "{s} for {uniform}");
+            let [w, ..] = rise.gained(s * linear.per_unit, linear.per_unit);
+            assert!(((w - leaving) / leaving - 1.0).abs() < 2.0 * leaving + 1e-14);
+        }
+    }
+
+    #[test]
+    fn no_return_is_made_up() {
+        let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
+        let linear = flow.domain(DomainKind::Free);
+        // Pulled away from the wall; fast; wider than allowed.
+        let pulled = linear.short_flight.from(&[0.5, -0.01, -2.0, 0.0], &[-1.0, 0.0]);
+        assert!(linear.acceleration(&[0.5, -0.01, -2.0, 0.0], &[-1.0, 0.0]) < 0.0);
+        assert_eq!(pulled.back(1.0), None);
+        let fast = linear.short_flight.from(&[0.5, -3.0, 0.3, 0.1], &[1.0, 0.0]);
+        assert_eq!(fast.back(1.0), None);
+        let near = linear.short_flight.from(&[0.5, -0.1, 0.3, 0.1], &[1.0, 0.0]);
+        assert!(near.back(1.0).is_some());
+        assert_eq!(near.back(1e-4), None);
+        let nothing = linear.short_flight.from(&[f64::NAN; 4], &[1.0, 0.0]);
+        assert_eq!(nothing.back(1.0), None);
+    }
+
+    #[test]
+    fn phasors_turn_to_rounding() {
+        for i in 0..=200 {
+            let (from, angle) = (0.37 * f64::from(i), 0.001 * f64::from(i));
+            let [cos, sin] = turned(&[from.cos(), from.sin()], angle);
+            let exact = (from + angle).sin_cos();
+            assert!(
+                (cos - exact.1).abs() < 3e-16 + from * 1e-16 && (sin - exact.0).abs() < 3e-16 + from * 1e-16
+            );
+        }
+    }
+}

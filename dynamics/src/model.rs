@@ -1,0 +1,59 @@
+//! What is integrated: piecewise-linear oscillators between two walls.
+//!
+//! A [`Model`] (today [`GearPair`], and [`Stops`], which can be solved by hand) has parameters by
+//! name and hands on an [`Oscillator`]: masses, three linear domains with harmonic forcing, a gap
+//! that is linear in the displacements, its two walls, and the contact law. Flow, reference,
+//! stability and words know nothing but that description; scenes, maps and files nothing but the
+//! trait.
+
+mod gear_pair;
+mod non_impacting;
+mod oscillator;
+mod parameter;
+mod seam;
+mod stops;
+
+pub use gear_pair::GearPair;
+pub use non_impacting::NonImpacting;
+pub use oscillator::{Domain, Law, Oscillator, OscillatorError};
+pub use parameter::{Parameter, ParameterError, Range, Shapes};
+pub use seam::{Boxed, Model, ModelError};
+pub use stops::Stops;
+
+/// State of an oscillator of two degrees of freedom: `(x1, v1, x2, v2)`, dimensionless.
+pub type State = [f64; 4];
+
+/// The state at rest.
+pub const REST: State = [0.0; 4];
+
+/// One of the two walls that bound the free gap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Side {
+    /// The upper wall, `z = +b`; the tooth surface of the gear pair.
+    Right,
+    /// The lower wall, `z = -b`; the tooth back of the gear pair.
+    Left,
+}
+
+impl Side {
+    /// Both walls.
+    pub const BOTH: [Side; 2] = [Side::Right, Side::Left];
+
+    /// The direction of the wall seen from the gap: `+1` right, `-1` left.
+    #[inline]
+    pub fn sign(self) -> f64 {
+        match self {
+            Side::Right => 1.0,
+            Side::Left => -1.0,
+        }
+    }
+
+    /// The opposite wall.
+    #[inline]
+    pub fn mirrored(self) -> Side {
+        match self {
+            Side::Right => Side::Left,
+            Side::Left => Side::Right,
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! The gear pair with backlash: Table 1 and equations (11) to (13), (22) of the paper.
+
+use super::parameter::parameters;
+use super::{Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
+
+/// A pair of gears on damped elastic supports, meshing through a backlash `2b`.
+///
+/// Free motion, `|z| < b` with `z = x1 - x2` (11):
+///
+/// ```text
+/// m1 x1'' + r1 x1' + k1 x1 = F cos(omega t)
+/// m2 x2'' + r2 x2' + k2 x2 = 0
+/// ```
+///
+/// Meshing on side `s` (12), (13) adds the contact force `r w + k (z - s b)`,
+/// `w = v1 - v2`, with opposite signs to both. All quantities are dimensionless.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GearPair {
+    /// Equivalent mass of gear 1, > 0.
+    pub m1: f64,
+    /// Equivalent mass of gear 2, > 0.
+    pub m2: f64,
+    /// Support damping of gear 1, >= 0.
+    pub r1: f64,
+    /// Support damping of gear 2, >= 0.
+    pub r2: f64,
+    /// Support stiffness of gear 1, >= 0.
+    pub k1: f64,
+    /// Support stiffness of gear 2, >= 0.
+    pub k2: f64,
+    /// Meshing damping, >= 0.
+    pub r: f64,
+    /// Meshing stiffness, >= 0.
+    pub k: f64,
+    /// Force amplitude on gear 1.
+    pub force: f64,
+    /// Excitation frequency, > 0; the forcing period is `2 pi / omega`.
+    pub omega: f64,
+    /// Half backlash, > 0.
+    pub b: f64,
+    /// Coefficient of restitution, 0 to 1.
+    pub e: f64,
+    /// Leaving speed at or below which a pressed contact becomes meshing, >= 0.
+    pub mesh_speed: f64,
+}
+
+parameters! { GearPair:
+    "m1" m1 Some(2.0), Positive, Oscillator, "equivalent mass of gear 1";
+    "m2" m2 Some(1.0), Positive, Oscillator, "equivalent mass of gear 2";
+    "r1" r1 Some(0.6), NonNegative, Oscillator, "support damping of gear 1";
+    "r2" r2 Some(0.6), NonNegative, Oscillator, "support damping of gear 2";
+    "k1" k1 Some(30.0), NonNegative, Oscillator, "support stiffness of gear 1";
+    "k2" k2 Some(20.0), NonNegative, Oscillator, "support stiffness of gear 2";
+    "r" r Some(1.0), NonNegative, Oscillator, "meshing damping";
+    "k" k Some(1000.0), NonNegative, Oscillator, "meshing stiffness";
+    "F" force Some(50.0), Finite, Oscillator, "force amplitude on gear 1";
+    "omega" omega Some(5.6), Positive, Oscillator, "excitation frequency";
+    "b" b Some(0.5), Positive, Oscillator, "half backlash";
+    "e" e None, Unit, Law, "coefficient of restitution";
+    "mesh_speed" mesh_speed Some(0.01), NonNegative, Law, "leaving speed at which a pressed contact becomes meshing";
+}
+
+impl GearPair {
+    /// Every parameter, in the order of Table 1.
+    pub const PARAMETERS: &'static [Parameter] = TABLE;
+
+    /// Table 1 with restitution `e`. Valid if `0 <= e <= 1`.
+    pub fn paper(e: f64) -> GearPair {
+        GearPair {
+            m1: 2.0,
+            m2: 1.0,
+            r1: 0.6,
+            r2: 0.6,
+            k1: 30.0,
+            k2: 20.0,
+            r: 1.0,
+            k: 1000.0,
+            force: 50.0,
+            omega: 5.6,
+            b: 0.5,
+            e,
+            mesh_speed: 0.01,
+        }
+    }
+
+    /// As [`Model::oscillator`].
+    ///
+    /// # Errors
+    /// [`ModelError`] if a parameter is not valid, or an entry too large for a number.
+    pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
+        self.check()?;
+        let free = Domain {
+            damping: [[self.r1, 0.0], [0.0, self.r2]],
+            stiffness: [[self.k1, 0.0], [0.0, self.k2]],
+            load: [0.0, 0.0],
+        };
+        let meshing = |sign: f64| Domain {
+            damping: [[self.r1 + self.r, -self.r], [-self.r, self.r2 + self.r]],
+            stiffness: [[self.k1 + self.k, -self.k], [-self.k, self.k2 + self.k]],
+            load: [sign * self.k * self.b, -sign * self.k * self.b],
+        };
+        let oscillator = Oscillator {
+            masses: [self.m1, self.m2],
+            gap: [1.0, -1.0],
+            walls: [self.b, -self.b],
+            omega: self.omega,
+            force: [self.force, 0.0],
+            free,
+            meshing: [meshing(1.0), meshing(-1.0)],
+        };
+        oscillator.validate()?;
+        Ok(oscillator)
+    }
+
+    /// As [`Model::law`].
+    pub fn law(&self) -> Law {
+        Law { restitution: self.e, mesh_speed: self.mesh_speed }
+    }
+}
+
+impl Model for GearPair {
+    fn name(&self) -> &str {
+        "gear-pair"
+    }
+
+    fn title(&self) -> &str {
+        "Gear pair"
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        TABLE
+    }
+
+    fn value(&self, index: usize) -> f64 {
+        *ACCESSORS[index](&mut { *self })
+    }
+
+    fn assign(&mut self, index: usize, value: f64) {
+        *ACCESSORS[index](self) = value;
+    }
+
+    fn oscillator(&self) -> Result<Oscillator, ModelError> {
+        self.oscillator()
+    }
+
+    fn law(&self) -> Law {
+        self.law()
+    }
+
+    fn state_names(&self) -> Vec<&str> {
+        vec!["x1", "v1", "x2", "v2"]
+    }
+
+    fn bodies(&self) -> Vec<&str> {
+        vec!["gear 1", "gear 2"]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::ParameterError;
+
+    #[test]
+    fn table_and_paper_agree() {
+        let mut pair = GearPair::paper(0.5);
+        for (parameter, at) in TABLE.iter().zip(ACCESSORS) {
+            assert_eq!(*at(&mut pair), parameter.default.unwrap_or(0.5), "{}", parameter.name);
+        }
+    }
+
+    #[test]
+    fn setting_out_of_range_changes_nothing() {
+        let mut pair = GearPair::paper(0.5);
+        let before = pair;
+        for (name, value) in
+            [("e", 1.01), ("m1", 0.0), ("b", 0.0), ("omega", -1.0), ("F", f64::NAN), ("k", f64::INFINITY)]
+        {
+            assert!(matches!(pair.set(name, value), Err(ParameterError::OutOfRange { .. })), "{name}");
+        }
+        assert_eq!(pair, before);
+        assert!(matches!(pair.set("mass", 1.0), Err(ParameterError::Unknown { .. })));
+    }
+}

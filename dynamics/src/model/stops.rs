@@ -1,0 +1,143 @@
+//! A 1-DOF oscillator between stops: the second model, small enough to solve by hand.
+
+use super::parameter::parameters;
+use super::{Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
+
+/// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
+///
+/// With `r = k = F = 0` flights are straight lines and every event is known in closed
+/// form, which is what the tests use it for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stops {
+    /// Mass, > 0.
+    pub m: f64,
+    /// Damping, >= 0.
+    pub r: f64,
+    /// Stiffness, >= 0.
+    pub k: f64,
+    /// Damping of a stop in lasting contact, >= 0.
+    pub stop_damping: f64,
+    /// Stiffness of a stop in lasting contact, >= 0.
+    pub stop_stiffness: f64,
+    /// Force amplitude.
+    pub force: f64,
+    /// Excitation frequency, > 0.
+    pub omega: f64,
+    /// Half distance of the stops, > 0.
+    pub b: f64,
+    /// Coefficient of restitution, 0 to 1.
+    pub e: f64,
+    /// Leaving speed at or below which a pressed contact lasts, >= 0.
+    pub mesh_speed: f64,
+}
+
+parameters! { Stops:
+    "m" m Some(1.0), Positive, Oscillator, "mass";
+    "r" r Some(0.0), NonNegative, Oscillator, "damping";
+    "k" k Some(0.0), NonNegative, Oscillator, "stiffness";
+    "stop_damping" stop_damping Some(1.0), NonNegative, Oscillator, "damping of a stop";
+    "stop_stiffness" stop_stiffness Some(1000.0), NonNegative, Oscillator, "stiffness of a stop";
+    "F" force Some(1.0), Finite, Oscillator, "force amplitude";
+    "omega" omega Some(1.0), Positive, Oscillator, "excitation frequency";
+    "b" b Some(0.5), Positive, Oscillator, "half distance of the stops";
+    "e" e None, Unit, Law, "coefficient of restitution";
+    "mesh_speed" mesh_speed Some(0.01), NonNegative, Law, "leaving speed at which a pressed contact lasts";
+}
+
+impl Stops {
+    /// Every parameter.
+    pub const PARAMETERS: &'static [Parameter] = TABLE;
+
+    /// Every parameter at its default, with restitution `e`. Valid if `0 <= e <= 1`.
+    pub fn with_restitution(e: f64) -> Stops {
+        Stops {
+            m: 1.0,
+            r: 0.0,
+            k: 0.0,
+            stop_damping: 1.0,
+            stop_stiffness: 1000.0,
+            force: 1.0,
+            omega: 1.0,
+            b: 0.5,
+            e,
+            mesh_speed: 0.01,
+        }
+    }
+
+    /// As [`Model::oscillator`]; the second degree of freedom is a unit mass that nothing acts on.
+    ///
+    /// # Errors
+    /// [`ModelError`] if a parameter is not valid, or an entry too large for a number.
+    pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
+        self.check()?;
+        let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
+        let stop = |sign: f64| Domain {
+            damping: first(self.r + self.stop_damping),
+            stiffness: first(self.k + self.stop_stiffness),
+            load: [sign * self.stop_stiffness * self.b, 0.0],
+        };
+        let oscillator = Oscillator {
+            masses: [self.m, 1.0],
+            gap: [1.0, 0.0],
+            walls: [self.b, -self.b],
+            omega: self.omega,
+            force: [self.force, 0.0],
+            free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0] },
+            meshing: [stop(1.0), stop(-1.0)],
+        };
+        oscillator.validate()?;
+        Ok(oscillator)
+    }
+
+    /// As [`Model::law`].
+    pub fn law(&self) -> Law {
+        Law { restitution: self.e, mesh_speed: self.mesh_speed }
+    }
+}
+
+impl Model for Stops {
+    fn name(&self) -> &str {
+        "stops"
+    }
+
+    fn title(&self) -> &str {
+        "Oscillator between stops"
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        TABLE
+    }
+
+    fn value(&self, index: usize) -> f64 {
+        *ACCESSORS[index](&mut { *self })
+    }
+
+    fn assign(&mut self, index: usize, value: f64) {
+        *ACCESSORS[index](self) = value;
+    }
+
+    fn oscillator(&self) -> Result<Oscillator, ModelError> {
+        self.oscillator()
+    }
+
+    fn law(&self) -> Law {
+        self.law()
+    }
+
+    fn state_names(&self) -> Vec<&str> {
+        vec!["x", "v"]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn table_and_defaults_agree() {
+        let stops = Stops::with_restitution(0.5);
+        for (i, parameter) in TABLE.iter().enumerate() {
+            assert_eq!(stops.value(i), parameter.default.unwrap_or(0.5), "{}", parameter.name);
+        }
+    }
+}

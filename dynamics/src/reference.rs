@@ -1,0 +1,348 @@
+//! The reference: an event-driven f64 integrator on the exact flow.
+//!
+//! A [`Trajectory`] jumps along one oscillator. Between events it takes the longest steps
+//! that [`crate::certificate`] can show to be free of events, whatever the forcing does;
+//! a step that crosses is cut at the event, converged to rounding on the exact flow. There
+//! is no time-stepping error and no event is missed.
+//!
+//! # What it costs
+//!
+//! A clear step is four 4 x 7 products: its end, its bound and its certificate; an event adds
+//! ten, a search on one short polynomial, and the contact law. A flight pressed back to its wall
+//! before it has gone far is six in all, and its own series is its certificate.
+//!
+//! # How it can end
+//!
+//! Every loop has a cap and every ending a name: see [`Stop`].
+
+mod chatter;
+mod clock;
+mod contact;
+mod event;
+mod localisation;
+mod short_flight;
+mod start;
+mod step_verdict;
+mod tangent;
+
+use clock::Clock;
+pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, Happening, Observer, STEPS_PER_PERIOD_CAP, Stop, Work};
+use step_verdict::{Crossing, StepVerdict};
+
+use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Step};
+use crate::model::{Law, Side, State};
+
+/// Steps between checks of the tangents' size: a step changes it by less than `e^13`.
+const RESCALE_STEPS: u64 = 16;
+
+/// States beyond this are taken for a loss of finiteness.
+const HUGE: f64 = 1e150;
+
+/// What governs the motion at present.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Free,
+    /// Meshing has begun with a leaving speed: the gap is still short of the wall.
+    Onset(Side),
+    /// Meshing, pressed beyond the wall.
+    Sustained(Side),
+}
+
+impl Mode {
+    #[inline]
+    fn domain(self) -> DomainKind {
+        match self {
+            Mode::Free => DomainKind::Free,
+            Mode::Onset(side) | Mode::Sustained(side) => DomainKind::Meshing(side),
+        }
+    }
+
+    fn mirrored(self) -> Mode {
+        match self {
+            Mode::Free => Mode::Free,
+            Mode::Onset(side) => Mode::Onset(side.mirrored()),
+            Mode::Sustained(side) => Mode::Sustained(side.mirrored()),
+        }
+    }
+}
+
+/// One oscillator on its way, with `N` tangent vectors (0, 1 for an exponent, 4 for a
+/// monodromy matrix).
+#[derive(Clone, Debug)]
+pub struct Trajectory<'f, const N: usize = 0> {
+    flow: &'f Flow,
+    law: Law,
+    mode: Mode,
+    /// The wall of the last event: the first half of the next flight's symbol.
+    origin: Option<Side>,
+    /// The wall the gap starts from, and the order of that root of the distance.
+    from_wall: Option<(Side, usize)>,
+    /// Whether the flight that begins here promises to be short.
+    short_flight: bool,
+    /// A contact to act on before anything else: a start on a wall.
+    pending: Option<Side>,
+    q: Gap,
+    phasor: Phasor,
+    clock: Clock,
+    /// Where the present call ends; no jump may lead beyond.
+    goal: f64,
+    period: u64,
+    level: [usize; 2],
+    tangents: [Gap; N],
+    /// Logarithm of the factor that was taken out of the tangents to keep them in range.
+    log_scale: f64,
+    events_in_period: u64,
+    steps_in_period: u64,
+    meshing_time: f64,
+    near_grazing: bool,
+    work: Work,
+}
+
+impl<'f, const N: usize> Trajectory<'f, N> {
+    /// Multiplies the state by `1 + shares`, as rounding would in the coordinates of a lane: the
+    /// gap, from its wall while the teeth mesh, its rate, and `x2`, `v2`. A gap that is just leaving
+    /// a wall stays on it.
+    pub fn shake(&mut self, shares: [f64; 4]) {
+        let wall = self.meshing().map_or(0.0, |side| self.flow.wall(side));
+        if self.from_wall.is_none() {
+            self.q[0] += shares[0] * (self.q[0] - wall);
+        }
+        (1..4).for_each(|i| self.q[i] += shares[i] * self.q[i]);
+    }
+
+    /// The flow it follows.
+    pub fn flow(&self) -> &'f Flow {
+        self.flow
+    }
+
+    /// The present state.
+    pub fn state(&self) -> State {
+        self.flow.to_state(self.q)
+    }
+
+    /// The tangent vectors, in the coordinates of [`State`], to be multiplied by the
+    /// exponential of [`log_scale`](Self::log_scale).
+    pub fn tangents(&self) -> [State; N] {
+        self.tangents.map(|u| self.flow.to_state(u))
+    }
+
+    /// Logarithm of a common factor of all tangent vectors: over a long period they leave the
+    /// range of f64, so it is taken out on the way.
+    pub fn log_scale(&self) -> f64 {
+        self.log_scale
+    }
+
+    /// Replaces the tangent vectors.
+    pub fn set_tangents(&mut self, tangents: [State; N]) {
+        self.log_scale = 0.0;
+        self.tangents = tangents.map(|u| self.flow.to_gap(u));
+    }
+
+    /// The wall the teeth mesh on, if they do.
+    pub fn meshing(&self) -> Option<Side> {
+        match self.mode {
+            Mode::Free => None,
+            Mode::Onset(side) | Mode::Sustained(side) => Some(side),
+        }
+    }
+
+    /// Forcing periods completed.
+    pub fn period(&self) -> u64 {
+        self.period
+    }
+
+    /// Time since the last phase 0.
+    pub fn time_in_period(&self) -> f64 {
+        self.clock.time()
+    }
+
+    /// Time spent meshing so far.
+    pub fn meshing_time(&self) -> f64 {
+        self.meshing_time
+    }
+
+    /// Whether any event so far was too near to grazing for the linearisation to mean much.
+    pub fn near_grazing(&self) -> bool {
+        self.near_grazing
+    }
+
+    /// Forgets earlier near-grazing events.
+    pub fn clear_near_grazing(&mut self) {
+        self.near_grazing = false;
+    }
+
+    /// Work done so far.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Integrates to the next phase 0.
+    ///
+    /// # Errors
+    /// A [`Stop`] if the trajectory cannot be continued.
+    pub fn advance_period(&mut self, observer: &mut impl Observer) -> Result<(), Stop> {
+        let period = self.flow.period;
+        self.advance_to(period, observer)?;
+        self.clock.set(0.0);
+        self.phasor = [1.0, 0.0];
+        self.period += 1;
+        self.events_in_period = 0;
+        self.steps_in_period = 0;
+        Ok(())
+    }
+
+    /// Integrates to the time `until` since the last phase 0, at most the forcing period.
+    ///
+    /// # Errors
+    /// A [`Stop`] if the trajectory cannot be continued.
+    pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        self.goal = until;
+        if let Some(side) = self.pending.take() {
+            self.contact(side, observer);
+        }
+        while self.clock.time() < until {
+            self.step(until, observer)?;
+        }
+        self.check_finite()
+    }
+
+    fn check_finite(&self) -> Result<(), Stop> {
+        let finite = self.q.iter().all(|x| x.abs() < HUGE);
+        if finite { Ok(()) } else { Err(Stop::NonFinite) }
+    }
+
+    fn check_events(&self) -> Result<(), Stop> {
+        if self.events_in_period > EVENTS_PER_PERIOD_CAP { Err(Stop::CapEvents) } else { Ok(()) }
+    }
+
+    /// Rates whose powers leave the range of f64 leave nothing that bounds a step.
+    fn check_bounds(&self, linear: &LinearFlow) -> Result<(), Stop> {
+        let bound = match self.mode {
+            Mode::Free | Mode::Sustained(_) => &linear.gap_bound,
+            Mode::Onset(_) => &linear.pressing_bound,
+        };
+        let finite = bound.remainder(&self.q, &self.phasor, 1.0).is_finite();
+        if finite { Ok(()) } else { Err(Stop::NonFinite) }
+    }
+
+    /// One step: as far as it is clear, or to its event, or to `until`.
+    #[inline(always)]
+    fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        let flow = self.flow;
+        let linear = flow.domain(self.mode.domain());
+        if std::mem::take(&mut self.short_flight) && self.fly_back(linear, until, observer)? {
+            return Ok(());
+        }
+        let slot = usize::from(self.mode != Mode::Free);
+        let mut level = self.level[slot];
+        loop {
+            self.work.steps += 1;
+            self.steps_in_period += 1;
+            if self.steps_in_period > STEPS_PER_PERIOD_CAP {
+                return Err(Stop::CapRoot);
+            }
+            let made;
+            let step = match linear.step(level) {
+                Some(step) => step,
+                None => {
+                    made = linear.new_step(level);
+                    &made
+                }
+            };
+            match self.step_verdict(linear, step) {
+                StepVerdict::Clear { roomy } => {
+                    self.level[slot] = level;
+                    if roomy && level > 0 {
+                        self.lengthen(slot);
+                    }
+                    self.clear_step(linear, step, until);
+                    return Ok(());
+                }
+                StepVerdict::Rests => {
+                    self.near_grazing = true;
+                    self.clear_step(linear, step, until);
+                    return Ok(());
+                }
+                StepVerdict::Crossing(crossing, bracket) => {
+                    self.level[slot] = level;
+                    return self.cross(linear, step.u, crossing, bracket, until, observer);
+                }
+                StepVerdict::Unclear if self.settle_start(observer) => return self.check_events(),
+                StepVerdict::Unclear if level + 1 == linear.levels => {
+                    // What is not a number is never clear.
+                    self.check_finite()?;
+                    self.check_bounds(linear)?;
+                    self.settle_graze(linear, step.h, until, observer);
+                    return self.check_events();
+                }
+                StepVerdict::Unclear => {
+                    self.work.halvings += 1;
+                    level += 1;
+                }
+            }
+        }
+    }
+
+    /// Takes a longer step next time. Out of line, so that the next step need not wait for the
+    /// arithmetic of this one's certificate.
+    #[cold]
+    #[inline(never)]
+    fn lengthen(&mut self, slot: usize) {
+        self.level[slot] -= 1;
+    }
+
+    /// Takes a step that is clear, cut at `until`.
+    #[inline(always)]
+    fn clear_step(&mut self, linear: &LinearFlow, step: &Step, until: f64) {
+        let remaining = self.clock.remaining(until);
+        self.from_wall = None;
+        if step.h < remaining {
+            (self.q, self.phasor) = step.end(&self.q, &self.phasor);
+            self.clock.advance(step.h);
+            if N > 0 {
+                self.tangents = self.tangents.map(|u| step.propagator.carry_tangent(&u));
+                if self.steps_in_period.is_multiple_of(RESCALE_STEPS) {
+                    self.rescale_tangents();
+                }
+            }
+            self.count_meshing(step.h);
+        } else {
+            self.move_to(linear, remaining, until);
+        }
+    }
+
+    /// Moves everything to `until`, the rest `s` of a step away that is clear so far.
+    #[inline(always)]
+    fn move_to(&mut self, linear: &LinearFlow, s: f64, until: f64) {
+        self.move_within(linear, s);
+        self.from_wall = None;
+        self.clock.set(until);
+    }
+
+    /// Moves everything by a time of at most the longest step.
+    #[inline(always)]
+    fn move_within(&mut self, linear: &LinearFlow, s: f64) {
+        let u = s * linear.per_unit;
+        let expansion = linear.grid.expansion(&self.q, &self.phasor, u);
+        self.arrive(linear, &expansion, u);
+        self.count_meshing(s);
+    }
+
+    /// Moves everything along an expansion, to `u` Taylor steps from here.
+    #[inline(always)]
+    fn arrive(&mut self, linear: &LinearFlow, expansion: &Expansion, u: f64) {
+        let v = u - expansion.start;
+        self.q = expansion.state(v);
+        self.phasor = expansion.phasor(linear.turn * v);
+        if N > 0 {
+            self.tangents = linear.grid.carry(u, self.tangents);
+        }
+    }
+
+    #[inline(always)]
+    fn count_meshing(&mut self, s: f64) {
+        if self.mode != Mode::Free {
+            self.meshing_time += s;
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Infinite chatter: the whole series of ever smaller impacts in one jump.
+
+use super::{EventKind, Observer, Trajectory};
+use crate::flow::{DomainKind, Gap, LinearFlow, Phasor};
+use crate::model::Side;
+
+/// A series is closed once its whole duration, in units of the fastest rate of free
+/// motion, is this short: what the closed form leaves out is of third order in it.
+const CLOSING_DURATION: f64 = 1e-4;
+
+/// A threshold below this, relative to the scale of length and the rate of free motion, is
+/// none: the series is infinite for all that f64 can tell.
+const NO_THRESHOLD: f64 = 1e-10;
+
+/// Motion with the gap held closed: the wall takes up the relative acceleration.
+struct Sliding {
+    /// Relative acceleration that the wall takes up, and its rate of change.
+    acceleration: f64,
+    acceleration_rate: f64,
+    /// What it changes by with the second displacement and its rate.
+    gradient: [f64; 2],
+    /// Acceleration of the second displacement, its rate of change, and what it changes by likewise.
+    v_rate: f64,
+    v_jerk: f64,
+    v_gradient: [f64; 2],
+    /// Damping of the relative motion at fixed momentum, and what the momentum has of it.
+    damping: f64,
+    drag: f64,
+}
+
+impl Sliding {
+    fn new(free: &LinearFlow, closed: &Gap, phasor: &Phasor, omega: f64, kick: f64) -> Sliding {
+        let row = free.acceleration_row();
+        let second = free.second_acceleration_row();
+        let shared: [f64; 7] = std::array::from_fn(|j| second[j] + kick * row[j]);
+        let [_, acceleration, _, v_free] = free.field(closed, phasor);
+        let v_rate = v_free + kick * acceleration;
+        let forcing = |row: &[f64; 7]| omega * (row[5] * phasor[0] - row[4] * phasor[1]);
+        let change = |row: &[f64; 7]| row[2] * closed[3] + row[3] * v_rate + forcing(row);
+        Sliding {
+            acceleration,
+            acceleration_rate: change(row),
+            gradient: [row[2], row[3]],
+            v_rate,
+            v_jerk: change(&shared),
+            v_gradient: [shared[2], shared[3]],
+            damping: kick * row[3] - row[1],
+            drag: shared[1] - kick * shared[3],
+        }
+    }
+}
+
+impl<const N: usize> Trajectory<'_, N> {
+    /// Closes an infinite series of impacts (`mesh_speed = 0`, or so small that it makes no
+    /// difference; `0 < e < 1`): one jump to the moment at which the gap rests on the wall and meshing starts.
+    ///
+    /// With the leaving speed `u`, the pressing acceleration `G`, its rate of change `J`
+    /// while the gap stays closed, and the relative damping `gamma`, the series lasts
+    /// `T0 (1 - J T0 / (3 G) - gamma T0 / 6)`, `T0 = 2 u / (G (1 - e))`, up to third order.
+    /// Meanwhile the centre of mass moves as it does with the gap closed. Tangents are those of
+    /// these formulas, up to second order.
+    pub(super) fn close_chatter(&mut self, side: Side, leaving: f64, observer: &mut impl Observer) {
+        let e = self.law.restitution;
+        if self.law.mesh_speed > NO_THRESHOLD * self.flow.speed || leaving == 0.0 || e >= 1.0 {
+            return;
+        }
+        let (flow, kick) = (self.flow, self.flow.kick);
+        let free = flow.domain(DomainKind::Free);
+        let [z, w, x, v] = self.q;
+        let closed = [z, 0.0, x, v + kick * w];
+        let sliding = Sliding::new(free, &closed, &self.phasor, flow.omega, kick);
+        let pressing = side.sign() * sliding.acceleration;
+        let whole = 2.0 * leaving / (pressing * (1.0 - e));
+        if !(pressing > 0.0 && whole < CLOSING_DURATION * free.unit) {
+            return;
+        }
+        let bend = side.sign() * sliding.acceleration_rate / (3.0 * pressing) + sliding.damping / 6.0;
+        let duration = whole * (1.0 - bend * whole);
+        // A series cut by the strobe goes on bouncing until it lies within one stretch.
+        if duration <= 0.0 || duration >= self.clock.remaining(self.goal) {
+            return;
+        }
+        let v = closed[3];
+        let Sliding { v_rate, v_jerk, gradient, v_gradient, .. } = sliding;
+        let x = x + duration * (v + duration * (v_rate / 2.0 + duration * v_jerk / 6.0));
+        self.q = [z, 0.0, x, v + duration * (v_rate + duration * v_jerk / 2.0)];
+        let s = side.sign();
+        let pressing_rate = s * sliding.acceleration_rate;
+        let per_speed = (1.0 - 2.0 * bend * whole) * whole / leaving;
+        let per_pressing = whole / pressing;
+        let pressing_at_end = pressing + duration * pressing_rate;
+        self.tangents = self.tangents.map(|[dz, dw, dx, dv]| {
+            // A neighbour leaves the wall `later`, and so at another speed and under another pressing
+            // acceleration; its series ends `late`. Until then it misses what presses it at the end.
+            // The centre of mass feels the way of the gap alone.
+            let (dx, dv) = (dx + kick * dz, dv + kick * dw);
+            let later = s * dz / leaving;
+            let leaves = -s * dw - (pressing + sliding.damping * leaving) * later;
+            let presses = s * (gradient[0] * dx + gradient[1] * dv) + pressing_rate * later;
+            let late = later + per_speed * leaves - per_pressing * presses;
+            let behind = -s * pressing_at_end * late;
+            let dv_rate = v_gradient[0] * dx + v_gradient[1] * dv;
+            [0.0, behind, dx + duration * dv, dv + duration * dv_rate - sliding.drag * dz - kick * behind]
+        });
+        self.clock.advance(duration);
+        let (sin, cos) = (flow.omega * self.clock.time()).sin_cos();
+        self.phasor = [cos, sin];
+        let before = self.q;
+        self.short_flight = false;
+        self.record(EventKind::MeshStart, side, before, observer);
+        self.start_meshing(side, 0.0);
+    }
+}

@@ -1,0 +1,297 @@
+//! What happens at a wall: impact, meshing, grazing, and the end of meshing.
+
+use super::{Crossing, EventKind, Happening, Mode, Observer, Trajectory};
+use crate::flow::{DomainKind, Gap, LinearFlow};
+use crate::model::Side;
+
+/// Approach speeds below this, relative to the scale of length and the rate of free motion
+/// and with the load pulling away, count as near grazing: the saltation matrix grows like
+/// its inverse.
+const GRAZING_SPEED: f64 = 4e-5;
+
+/// The gradient of the gap in gap coordinates.
+const ALONG_GAP: Gap = [1.0, 0.0, 0.0, 0.0];
+
+impl<const N: usize> Trajectory<'_, N> {
+    /// Finds out where the start lies.
+    pub(super) fn enter(&mut self) {
+        for side in Side::BOTH {
+            let beyond = side.sign() * (self.q[0] - self.flow.wall(side));
+            if beyond > 0.0 {
+                self.mode = Mode::Sustained(side);
+                self.origin = Some(side);
+            } else if beyond == 0.0 {
+                self.origin = Some(side);
+                let closing = side.sign() * self.q[1];
+                let into = closing > 0.0 || closing == 0.0 && self.presses(DomainKind::Free, side, &self.q);
+                if into {
+                    self.pending = Some(side);
+                } else {
+                    self.leave(side);
+                }
+            }
+        }
+    }
+
+    /// Acts on a crossing at the present state.
+    #[inline(always)]
+    pub(super) fn act(&mut self, crossing: Crossing, observer: &mut impl Observer) {
+        match crossing {
+            Crossing::Contact(side) => self.contact(side, observer),
+            Crossing::OnsetEnds(side) => {
+                self.q[0] = self.flow.wall(side);
+                self.mode = Mode::Sustained(side);
+                self.from_wall = Some((side, 1));
+            }
+            Crossing::MeshEnds(side) => {
+                self.q[0] = self.flow.wall(side);
+                let rate = self.q[1];
+                self.end_meshing(side, &ALONG_GAP, rate, observer);
+                self.leave(side);
+            }
+            Crossing::Through(side) => {
+                // Meshing ends at a contact with the opposite wall.
+                self.q[0] = self.flow.wall(side.mirrored());
+                let rate = self.q[1];
+                self.end_meshing(side, &ALONG_GAP, rate, observer);
+                self.contact(side.mirrored(), observer);
+            }
+            Crossing::PressingEnds(side) => {
+                let linear = self.flow.domain(DomainKind::Meshing(side));
+                let row = linear.acceleration_row();
+                let normal = [row[0], row[1], row[2], row[3]];
+                let rate = linear.acceleration_rates(&self.q, &self.phasor)[1];
+                self.end_meshing(side, &normal, rate, observer);
+                self.from_wall = None;
+            }
+        }
+    }
+
+    /// Free motion reaches a wall: the impact law, then meshing or not (22), (37).
+    #[inline(always)]
+    pub(super) fn contact(&mut self, side: Side, observer: &mut impl Observer) {
+        let e = self.law.restitution;
+        self.q[0] = self.flow.wall(side);
+        let before = self.q;
+        let approach = side.sign() * before[1];
+        let leaving = e * approach.abs();
+        let kick = self.flow.kick;
+        let reset = move |u: &Gap| [u[0], -e * u[1], u[2], u[3] + kick * (1.0 + e) * u[1]];
+        let after = reset(&before);
+
+        let free = self.flow.domain(DomainKind::Free);
+        let pressing = side.sign() * free.acceleration(&after, &self.phasor);
+        let pressed = pressing > 0.0 || pressing == 0.0 && self.presses(DomainKind::Free, side, &after);
+        let meshes = leaving <= self.law.mesh_speed
+            && pressed
+            && self.presses(DomainKind::Meshing(side), side, &after);
+        if approach < GRAZING_SPEED * self.flow.speed && !pressed {
+            self.near_grazing = true;
+        }
+        let (kind, next) = if meshes {
+            (EventKind::MeshStart, DomainKind::Meshing(side))
+        } else {
+            (EventKind::Impact, DomainKind::Free)
+        };
+        if N > 0 {
+            let field_before = free.field(&before, &self.phasor);
+            let field_after = self.flow.domain(next).field(&after, &self.phasor);
+            self.saltate(reset, &ALONG_GAP, before[1], &field_before, &field_after);
+        }
+        self.q = after;
+        self.record(kind, side, before, observer);
+        if meshes {
+            self.start_meshing(side, leaving);
+            let meshing = self.flow.domain(DomainKind::Meshing(side));
+            let pressing = side.sign() * meshing.acceleration(&after, &self.phasor);
+            self.short_flight = self.promises_short_flight(meshing, leaving, pressing);
+        } else {
+            self.work.impacts += 1;
+            self.leave(side);
+            self.short_flight = self.promises_short_flight(free, leaving, pressing);
+            if pressed {
+                self.close_chatter(side, leaving, observer);
+            }
+        }
+    }
+
+    pub(super) fn start_meshing(&mut self, side: Side, leaving: f64) {
+        if leaving > 0.0 {
+            self.mode = Mode::Onset(side);
+            self.from_wall = Some((side, 1));
+        } else {
+            self.mode = Mode::Sustained(side);
+            self.from_wall = Some((side, self.rest_order(DomainKind::Meshing(side))));
+        }
+    }
+
+    fn end_meshing(&mut self, side: Side, normal: &Gap, rate: f64, observer: &mut impl Observer) {
+        if N > 0 {
+            let before = self.flow.domain(DomainKind::Meshing(side)).field(&self.q, &self.phasor);
+            let after = self.flow.domain(DomainKind::Free).field(&self.q, &self.phasor);
+            self.saltate(|u| *u, normal, rate, &before, &after);
+        }
+        self.record(EventKind::MeshEnd, side, self.q, observer);
+        self.mode = Mode::Free;
+    }
+
+    /// Free motion starts on a wall.
+    fn leave(&mut self, side: Side) {
+        self.mode = Mode::Free;
+        let order = if self.q[1] == 0.0 { self.rest_order(DomainKind::Free) } else { 1 };
+        self.from_wall = Some((side, order));
+    }
+
+    /// Order of the root of the distance for a gap that rests on the wall.
+    fn rest_order(&self, kind: DomainKind) -> usize {
+        if self.flow.domain(kind).acceleration(&self.q, &self.phasor) == 0.0 { 3 } else { 2 }
+    }
+
+    /// Whether the relative acceleration, or else the first of its rates that is not zero,
+    /// points into the wall.
+    fn presses(&self, kind: DomainKind, side: Side, q: &Gap) -> bool {
+        let linear = self.flow.domain(kind);
+        let a = linear.acceleration(q, &self.phasor);
+        if a != 0.0 {
+            return side.sign() * a > 0.0;
+        }
+        let rates = linear.acceleration_rates(q, &self.phasor);
+        rates.iter().find(|&&rate| rate != 0.0).is_some_and(|rate| side.sign() * rate > 0.0)
+    }
+
+    /// The first flight of all comes from no wall and has no symbol.
+    pub(super) fn record(&mut self, kind: EventKind, side: Side, before: Gap, observer: &mut impl Observer) {
+        let symbol = match (self.mode, self.origin) {
+            (Mode::Onset(side) | Mode::Sustained(side), _) => {
+                Some(if side == Side::Right { b'1' } else { b'4' })
+            }
+            (Mode::Free, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
+            (Mode::Free, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
+            (Mode::Free, None) => None,
+        };
+        self.origin = Some(side);
+        self.work.events += 1;
+        self.events_in_period += 1;
+        observer.event(&Happening {
+            kind,
+            side,
+            symbol,
+            period: self.period,
+            t: self.clock.time(),
+            before,
+            after: self.q,
+        });
+    }
+
+    /// Mends a start of a step that rounding has put on or beyond its boundary: a strobe
+    /// taken within rounding of an event. True if there was something to mend.
+    pub(super) fn settle_start(&mut self, observer: &mut impl Observer) -> bool {
+        if self.from_wall.is_some() {
+            return false;
+        }
+        match self.mode {
+            Mode::Free => {
+                let beyond = |side: Side| side.sign() * (self.q[0] - self.flow.wall(side)) >= 0.0;
+                let Some(side) = Side::BOTH.into_iter().find(|&side| beyond(side)) else { return false };
+                self.touch(side, observer);
+            }
+            Mode::Sustained(side) => {
+                if side.sign() * (self.q[0] - self.flow.wall(side)) > 0.0 {
+                    return false;
+                }
+                if side.sign() * self.q[1] > 0.0 {
+                    self.act(Crossing::OnsetEnds(side), observer);
+                } else {
+                    self.act(Crossing::MeshEnds(side), observer);
+                }
+            }
+            Mode::Onset(side) => {
+                let onset_over = side.sign() * (self.q[0] - self.flow.wall(side)) >= 0.0;
+                let linear = self.flow.domain(DomainKind::Meshing(side));
+                let pulls = side.sign() * linear.acceleration(&self.q, &self.phasor) <= 0.0;
+                let through = side.sign() * (self.q[0] - self.flow.wall(side.mirrored())) <= 0.0;
+                if through && side.sign() * self.q[1] < 0.0 {
+                    self.act(Crossing::Through(side), observer);
+                    return true;
+                }
+                match (onset_over, pulls) {
+                    (true, _) => self.act(Crossing::OnsetEnds(side), observer),
+                    (false, true) => self.act(Crossing::PressingEnds(side), observer),
+                    (false, false) => return false,
+                }
+            }
+        }
+        true
+    }
+
+    /// The gap is on or beyond a wall by rounding: a contact if it closes, else a start
+    /// from the wall.
+    fn touch(&mut self, side: Side, observer: &mut impl Observer) {
+        self.q[0] = self.flow.wall(side);
+        if side.sign() * self.q[1] > 0.0 {
+            self.contact(side, observer);
+        } else {
+            self.origin = Some(side);
+            self.leave(side);
+        }
+    }
+
+    /// The shortest step is still undecided: whatever touches here does so within rounding.
+    /// Take the step; what it ends beyond is a contact, else the graze is no event.
+    pub(super) fn settle_graze(
+        &mut self,
+        linear: &LinearFlow,
+        h: f64,
+        until: f64,
+        observer: &mut impl Observer,
+    ) {
+        self.near_grazing = true;
+        let remaining = self.clock.remaining(until);
+        let s = h.min(remaining);
+        self.move_within(linear, s);
+        if s < remaining {
+            self.clock.advance(s);
+        } else {
+            self.clock.set(until);
+        }
+        self.from_wall = None;
+        self.settle_start(observer);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::flow::Flow;
+    use crate::model::{GearPair, Side};
+    use crate::reference::{EventKind, Happening, Trajectory};
+
+    /// With so small a backlash what starts meshing may reach the opposite wall first: it meets it.
+    #[test]
+    fn a_dip_does_not_go_through_the_opposite_wall() {
+        let mut met = 0;
+        for (b, mesh_speed) in [(1e-6, 0.01), (1e-5, 0.01), (1e-4, 0.05), (3e-4, 0.05)] {
+            for (e, omega) in [(0.3, 5.6), (0.6, 3.2), (0.8, 2.0)] {
+                let pair = GearPair { b, mesh_speed, omega, ..GearPair::paper(e) };
+                let flow = Flow::new(&pair.oscillator().unwrap());
+                let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0; 4]);
+                let mut events: Vec<Happening> = Vec::new();
+                for _ in 0..20 {
+                    trajectory.advance_period(&mut events).unwrap();
+                }
+                for pair in events.windows(2) {
+                    let [end, contact] = [&pair[0], &pair[1]];
+                    let wall = |side: Side| flow.wall(side);
+                    let short = end.side.sign() * (end.before[0] - wall(end.side.mirrored()));
+                    if end.kind == EventKind::MeshEnd {
+                        assert!(short >= 0.0, "through the opposite wall by {short:e} at {end:?}");
+                        if short == 0.0 {
+                            assert_eq!((contact.side, contact.t), (end.side.mirrored(), end.t));
+                            met += 1;
+                        }
+                    }
+                }
+            }
+        }
+        assert!(met > 10, "{met}");
+    }
+}

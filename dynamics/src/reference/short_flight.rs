@@ -1,0 +1,60 @@
+//! Flights pressed back to their wall before they have gone far: chatter, and the contact onset
+//! of meshing. Half of all flights are such where impacts are dense.
+
+use super::{Crossing, Mode, Observer, Stop, Trajectory};
+use crate::flow::{LinearFlow, SHORT, turned};
+use crate::model::Side;
+
+/// Flights that promise to last no more than this share of the longest are tried.
+const PROMISE: f64 = 0.9;
+
+/// Speeds gained in a Taylor step below this, relative to the scale of length and the rate of free
+/// motion, may be rounding: the certificate judges such flights.
+const PRESSING: f64 = 1e-6;
+
+impl<const N: usize> Trajectory<'_, N> {
+    /// Whether a flight that leaves a wall at a speed, under an acceleration back to it, promises
+    /// to be short.
+    #[inline(always)]
+    pub(super) fn promises_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
+        let gained = pressing * linear.unit;
+        2.0 * leaving < PROMISE * SHORT * gained && gained > PRESSING * self.flow.speed && leaving > 0.0
+    }
+
+    /// Flies back to the wall just left, if that is certain to be what comes next. False if not.
+    #[inline(always)]
+    pub(super) fn fly_back(
+        &mut self,
+        linear: &LinearFlow,
+        until: f64,
+        observer: &mut impl Observer,
+    ) -> Result<bool, Stop> {
+        let (side, crossing): (Side, Crossing) = match (self.mode, self.from_wall) {
+            (Mode::Free, Some((side, 1))) => (side, Crossing::Contact(side)),
+            (Mode::Onset(side), Some((_, 1))) => (side, Crossing::OnsetEnds(side)),
+            _ => return Ok(false),
+        };
+        let rise = linear.short_flight.from(&self.q, &self.phasor);
+        let [right, left] = self.flow.walls;
+        let Some(u) = rise.back(right - left) else { return Ok(false) };
+        let s = u * linear.unit;
+        if s >= self.clock.remaining(until) {
+            return Ok(false);
+        }
+        self.work.steps += 1;
+        self.work.root_iterations += 1;
+        self.steps_in_period += 1;
+        let [w, x, v] = rise.gained(u, linear.per_unit);
+        self.q = [self.flow.wall(side), self.q[1] + w, self.q[2] + x, self.q[3] + v];
+        self.phasor = turned(&self.phasor, linear.turn * u);
+        if N > 0 {
+            self.tangents = linear.grid.carry(u, self.tangents);
+        }
+        self.clock.advance(s);
+        self.count_meshing(s);
+        self.from_wall = None;
+        self.act(crossing, observer);
+        self.check_events()?;
+        Ok(true)
+    }
+}

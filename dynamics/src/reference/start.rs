@@ -1,0 +1,117 @@
+//! Where a trajectory begins: free, in contact or meshing.
+
+use super::clock::Clock;
+use super::{Mode, Trajectory, Work};
+use crate::flow::{DomainKind, Flow};
+use crate::model::{Law, Side, State};
+
+impl<'f> Trajectory<'f, 0> {
+    /// A trajectory that starts at phase 0 in the state `y`.
+    ///
+    /// A start beyond a wall is meshing on it; on a wall and closing it is a contact.
+    pub fn new(flow: &'f Flow, law: Law, y: State) -> Self {
+        Self::with_tangents(flow, law, y, [])
+    }
+
+    /// The same where the teeth are known to mesh, or not: a gap just short of a wall may be
+    /// in the contact onset.
+    pub fn meshing_from(flow: &'f Flow, law: Law, y: State, meshing: Option<Side>) -> Self {
+        let mut trajectory = Self::new(flow, law, y);
+        if let (Mode::Free, Some(side)) = (trajectory.mode, meshing) {
+            trajectory.mode = Mode::Onset(side);
+            trajectory.origin = Some(side);
+            trajectory.from_wall = None;
+            trajectory.pending = None;
+        }
+        trajectory
+    }
+}
+
+impl<'f, const N: usize> Trajectory<'f, N> {
+    /// A trajectory that carries tangent vectors, given in the coordinates of [`State`].
+    pub fn with_tangents(flow: &'f Flow, law: Law, y: State, tangents: [State; N]) -> Self {
+        let levels =
+            [DomainKind::Free, DomainKind::Meshing(Side::Right)].map(|d| flow.domain(d).taylor_level);
+        let mut trajectory = Trajectory {
+            flow,
+            law,
+            mode: Mode::Free,
+            origin: None,
+            from_wall: None,
+            short_flight: false,
+            pending: None,
+            q: flow.to_gap(y),
+            phasor: [1.0, 0.0],
+            clock: Clock::default(),
+            goal: 0.0,
+            period: 0,
+            level: levels,
+            tangents: tangents.map(|u| flow.to_gap(u)),
+            log_scale: 0.0,
+            events_in_period: 0,
+            steps_in_period: 0,
+            meshing_time: 0.0,
+            near_grazing: false,
+            work: Work::default(),
+        };
+        trajectory.enter();
+        trajectory
+    }
+
+    /// The same trajectory from here on with other tangent vectors.
+    pub fn carrying<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
+        Trajectory {
+            flow: self.flow,
+            law: self.law,
+            mode: self.mode,
+            origin: self.origin,
+            from_wall: self.from_wall,
+            short_flight: self.short_flight,
+            pending: self.pending,
+            q: self.q,
+            phasor: self.phasor,
+            clock: self.clock,
+            goal: self.goal,
+            period: self.period,
+            level: self.level,
+            tangents: tangents.map(|u| self.flow.to_gap(u)),
+            log_scale: 0.0,
+            events_in_period: self.events_in_period,
+            steps_in_period: self.steps_in_period,
+            meshing_time: self.meshing_time,
+            near_grazing: self.near_grazing,
+            work: self.work,
+        }
+    }
+
+    /// A trajectory from another state at phase 0, in the domain that this one is in.
+    ///
+    /// A state alone does not say whether a gap just short of a wall is free or in the contact onset
+    /// at the start of meshing; neighbours of a motion that is have to be told.
+    pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
+        Trajectory {
+            mode: self.mode,
+            origin: self.origin,
+            from_wall: None,
+            short_flight: false,
+            pending: None,
+            ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
+        }
+    }
+
+    /// Whether it is in the same domain as another one, and comes from the same wall.
+    pub(crate) fn stands_as(&self, other: &Trajectory<'_, N>) -> bool {
+        (self.mode, self.origin, self.from_wall) == (other.mode, other.origin, other.from_wall)
+    }
+
+    /// A trajectory from the mirror image of the present state at phase 0, in the mirrored domain:
+    /// half a period on, a motion goes on as this one does.
+    pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
+        let y = self.state().map(|value| -value);
+        Trajectory {
+            mode: self.mode.mirrored(),
+            origin: self.origin.map(Side::mirrored),
+            ..self.at(y, tangents)
+        }
+    }
+}

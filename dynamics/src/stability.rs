@@ -1,0 +1,235 @@
+//! Stability of periodic orbits: monodromy, Floquet multipliers, Newton on the strobe map,
+//! and Lyapunov exponents.
+//!
+//! The strobe map `P` takes the state at one phase 0 to the next. Its derivative is the
+//! product of flow and saltation matrices, carried along as four tangent vectors. For
+//! orbits that may be their own mirror image the half-period map `Q(y) = -P_{T/2}(y)` is
+//! used instead: `P = Q^2`, so at a pitchfork, where a multiplier of `P` is `+1`, that of
+//! `Q` is `-1` and `Q' - I` stays regular.
+
+mod exponent;
+mod newton;
+mod unit_circle;
+
+pub use exponent::{Exponent, FRESH_TANGENT, standard_error};
+pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
+pub use newton::{pitchfork, refine};
+
+use nalgebra::linalg::Schur;
+use nalgebra::{Matrix4, Vector4};
+
+use crate::model::State;
+use crate::reference::{Stop, Trajectory};
+
+/// The unit vectors: tangents that become the columns of a derivative.
+pub const UNIT: [State; 4] =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+/// Which map an orbit is a fixed point of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StrobeMap {
+    /// `P^p`: `p` forcing periods.
+    Periods(u32),
+    /// `Q^p`, `Q(y) = -P_{T/2}(y)`: `p` half periods, `p` odd, each followed by the mirror.
+    MirroredHalves(u32),
+}
+
+/// Image of a state and the derivative of the map there.
+#[derive(Clone, Copy, Debug)]
+pub struct Image {
+    /// The image.
+    pub state: State,
+    /// The derivative, but for the factor `exp(log_scale)`.
+    pub scaled: Matrix4<f64>,
+    /// Logarithm of the factor: over a long cycle derivatives leave the range of f64.
+    pub log_scale: f64,
+    /// Whether an event on the way was too near to grazing for the derivative to mean much.
+    pub near_grazing: bool,
+    /// The flow's unit of rates.
+    rate: f64,
+}
+
+impl Image {
+    /// The derivative with velocities in units of displacements: its norm and its pivots do not depend
+    /// on the unit of time.
+    pub(crate) fn balanced(&self) -> Matrix4<f64> {
+        balanced(&self.derivative(), self.rate)
+    }
+
+    /// The derivative of the map, zero or infinite where f64 cannot hold it.
+    pub fn derivative(&self) -> Matrix4<f64> {
+        self.scaled * self.log_scale.exp()
+    }
+}
+
+impl StrobeMap {
+    /// Applies the map to a state at phase 0 in the domain that `seed` is in.
+    ///
+    /// # Errors
+    /// A [`Stop`] if the trajectory cannot be continued.
+    pub fn apply(self, seed: &Trajectory<'_>, y: State) -> Result<Image, Stop> {
+        let rate = seed.flow().rate;
+        let mut image =
+            Image { state: y, scaled: Matrix4::identity(), log_scale: 0.0, near_grazing: false, rate };
+        match self {
+            StrobeMap::Periods(p) => {
+                let mut trajectory = seed.at(y, UNIT);
+                for _ in 0..p {
+                    trajectory.advance_period(&mut ())?;
+                }
+                image = read(&trajectory, 1.0);
+            }
+            StrobeMap::MirroredHalves(p) => {
+                // The points of the cycle need not lie in one domain.
+                let mut half = seed.at(y, UNIT);
+                for turn in 0..p {
+                    if turn > 0 {
+                        half = half.mirrored(UNIT);
+                    }
+                    half.advance_to(0.5 * seed.flow().period, &mut ())?;
+                    let step = read(&half, -1.0);
+                    let (scaled, log_scale) =
+                        unit_size(step.scaled * image.scaled, step.log_scale + image.log_scale);
+                    image = Image {
+                        state: step.state,
+                        scaled,
+                        log_scale,
+                        near_grazing: image.near_grazing || step.near_grazing,
+                        rate,
+                    };
+                }
+            }
+        }
+        Ok(image)
+    }
+
+    /// The monodromy matrix over the whole cycle and the logarithm of its factor, from the
+    /// derivative of this map.
+    fn monodromy(self, image: &Image) -> (Matrix4<f64>, f64) {
+        match self {
+            StrobeMap::Periods(_) => (image.scaled, image.log_scale),
+            StrobeMap::MirroredHalves(_) => unit_size(image.scaled * image.scaled, 2.0 * image.log_scale),
+        }
+    }
+
+    /// Half forcing periods that one application integrates.
+    fn half_periods(self) -> u32 {
+        match self {
+            StrobeMap::Periods(p) => 2 * p,
+            StrobeMap::MirroredHalves(p) => p,
+        }
+    }
+
+    /// Whether every fixed point of `other` is one of this map: all are powers of the mirrored half
+    /// period.
+    pub(crate) fn iterates(self, other: StrobeMap) -> bool {
+        self.half_periods().is_multiple_of(other.half_periods())
+    }
+
+    /// Forcing periods in a cycle.
+    fn cycle_periods(self) -> u32 {
+        match self {
+            StrobeMap::Periods(p) | StrobeMap::MirroredHalves(p) => p,
+        }
+    }
+}
+
+/// Takes the size of a matrix out of it, so that products and eigenvalues, which square its
+/// entries, stay in range.
+fn unit_size(matrix: Matrix4<f64>, log_scale: f64) -> (Matrix4<f64>, f64) {
+    let size = matrix.amax();
+    if size > 0.0 && size.is_finite() { (matrix / size, log_scale + size.ln()) } else { (matrix, log_scale) }
+}
+
+/// A matrix on states as one on states whose velocities are divided by `rate`, a power of two.
+fn balanced(matrix: &Matrix4<f64>, rate: f64) -> Matrix4<f64> {
+    let unit = |i: usize| if i % 2 == 1 { rate } else { 1.0 };
+    Matrix4::from_fn(|i, j| matrix[(i, j)] * (unit(j) / unit(i)))
+}
+
+fn read(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
+    let columns = trajectory.tangents().map(|u| sign * Vector4::from(u));
+    let (scaled, log_scale) = unit_size(Matrix4::from_columns(&columns), trajectory.log_scale());
+    Image {
+        state: trajectory.state().map(|value| sign * value),
+        scaled,
+        log_scale,
+        near_grazing: trajectory.near_grazing(),
+        rate: trajectory.flow().rate,
+    }
+}
+
+/// A periodic orbit.
+#[derive(Clone, Debug)]
+pub struct Cycle {
+    /// State at phase 0.
+    pub state: State,
+    /// Forcing periods per cycle.
+    pub period: u32,
+    /// Whether the orbit is its own mirror image.
+    pub symmetric: bool,
+    /// The monodromy matrix: derivative of the strobe map over one cycle.
+    pub monodromy: Matrix4<f64>,
+    /// Floquet multipliers `[re, im]`, largest modulus first.
+    pub multipliers: Vec<[f64; 2]>,
+    /// `ln |mu1|`, also where `mu1` itself is below the range of f64; minus infinity where
+    /// the orbit is superstable.
+    pub log_radius: f64,
+    /// Whether an event on it is too near to grazing for these to mean much.
+    pub near_grazing: bool,
+}
+
+impl Cycle {
+    /// Modulus of the largest multiplier: below 1 the orbit is stable.
+    pub fn spectral_radius(&self) -> f64 {
+        self.log_radius.exp()
+    }
+
+    /// Whether it is stable for all that f64 can tell: a multiplier of 1, as a pair without supports has
+    /// (both gears moved alike), is found on either side of it.
+    pub fn is_stable(&self) -> bool {
+        self.log_radius < -NEUTRAL * f64::from(self.period)
+    }
+
+    /// The same with the multipliers of the other degree of freedom alone: those of one that keeps at rest, whatever
+    /// the other does, say nothing of the motion.
+    pub(crate) fn beside_rest(&self, resting: usize) -> Option<Cycle> {
+        let mut monodromy = self.monodromy;
+        for i in [2 * resting, 2 * resting + 1] {
+            monodromy.row_mut(i).fill(0.0);
+            monodromy.column_mut(i).fill(0.0);
+        }
+        let mut multipliers = multipliers(&monodromy)?;
+        multipliers.truncate(2);
+        let log_radius = modulus(multipliers[0]).ln();
+        Some(Cycle { multipliers, log_radius, ..self.clone() })
+    }
+
+    /// `ln |mu1| / (p T)`, the largest Lyapunov exponent.
+    pub fn exponent(&self, forcing_period: f64) -> f64 {
+        self.log_radius / (f64::from(self.period) * forcing_period)
+    }
+}
+
+fn modulus([re, im]: [f64; 2]) -> f64 {
+    re.hypot(im)
+}
+
+/// Multipliers this near to 1 are 1 as far as one can tell, as a logarithm per forcing period: a double
+/// one scatters by the square root of rounding.
+const NEUTRAL: f64 = 1e-7;
+
+/// Sweeps of the QR iteration allowed.
+const EIGEN_CAP: usize = 1000;
+
+/// Eigenvalues `[re, im]`, largest modulus first, a conjugate pair with positive imaginary
+/// part first; none if the matrix is not finite or the iteration does not converge.
+pub fn multipliers(monodromy: &Matrix4<f64>) -> Option<Vec<[f64; 2]>> {
+    if !monodromy.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let schur = Schur::try_new(*monodromy, f64::EPSILON, EIGEN_CAP)?;
+    let mut list: Vec<[f64; 2]> = schur.complex_eigenvalues().iter().map(|m| [m.re, m.im]).collect();
+    list.sort_by(|a, b| modulus(*b).total_cmp(&modulus(*a)).then(b[1].total_cmp(&a[1])));
+    Some(list)
+}

@@ -1,0 +1,82 @@
+//! The independent program's table, `data/cells.csv`.
+
+use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::orbit::Class;
+use rattlemap_dynamics::word::Word;
+use serde::Deserialize;
+
+/// Decimals that are printed of cycles.
+pub(crate) const STROBE_DECIMALS: i32 = 8;
+pub(crate) const LYAPUNOV_DECIMALS: i32 = 5;
+pub(crate) const MESH_DECIMALS: i32 = 6;
+
+/// One row; fields that it leaves empty are absent.
+#[derive(Deserialize)]
+pub(crate) struct Row {
+    e: f64,
+    omega: f64,
+    class: Kind,
+    period: Option<u32>,
+    pub(crate) lyapunov: f64,
+    pub(crate) lyapunov_error: Option<f64>,
+    pub(crate) impacts_per_period: f64,
+    pub(crate) mesh_fraction: f64,
+    x1: Option<f64>,
+    v1: Option<f64>,
+    x2: Option<f64>,
+    v2: Option<f64>,
+    word: String,
+}
+
+#[derive(Clone, Copy, Deserialize, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    Periodic,
+    Chaotic,
+}
+
+impl Row {
+    pub(crate) fn pair(&self) -> GearPair {
+        super::paper(self.e, self.omega)
+    }
+
+    pub(crate) fn is_chaotic(&self) -> bool {
+        self.class == Kind::Chaotic
+    }
+
+    pub(crate) fn class(&self) -> Class {
+        match self.class {
+            Kind::Periodic => Class::Periodic { period: self.period.expect("a cycle has a period") },
+            Kind::Chaotic => Class::Chaotic,
+        }
+    }
+
+    /// The state of a cycle at phase 0, or of its symmetry-conjugate orbit.
+    pub(crate) fn strobe(&self) -> Option<State> {
+        Some([self.x1?, self.v1?, self.x2?, self.v2?])
+    }
+
+    /// The word of a cycle. An empty one is without events, unless they were too many to print.
+    pub(crate) fn word(&self) -> Option<Word> {
+        let printed = !self.word.is_empty() || self.impacts_per_period == 0.0;
+        (self.class == Kind::Periodic && printed).then(|| Word::cyclic(self.word.as_bytes()))
+    }
+
+    /// Which row it is.
+    pub(crate) fn place(&self) -> String {
+        format!("e = {}, omega = {}", self.e, self.omega)
+    }
+}
+
+/// All 40 rows.
+pub(crate) fn rows() -> Vec<Row> {
+    let mut reader = csv::Reader::from_reader(include_bytes!("../data/cells.csv").as_slice());
+    let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 40);
+    rows
+}
+
+/// Whether a number rounds to what the program printed with so many decimals.
+pub(crate) fn prints(value: f64, printed: f64, decimals: i32) -> bool {
+    (value - printed).abs() <= 0.5 * 10f64.powi(-decimals)
+}

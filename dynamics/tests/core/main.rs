@@ -1,0 +1,14 @@
+//! One motion: against published facts, an independent program, and what must hold of every motion.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod cells;
+mod flow;
+mod one_wall;
+mod orbits;
+mod paper;
+mod properties;
+mod stops;
+mod stress;
+mod tangents;

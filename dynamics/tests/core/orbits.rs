@@ -1,0 +1,229 @@
+//! Deciding what a motion is, where that is not straightforward.
+
+use crate::common::{REST, flow_of, paper as cell};
+use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::orbit::{Budget, Class, Orbit, Settings, Status, analyse, measure};
+use rattlemap_dynamics::reference::Trajectory;
+
+fn orbit(pair: &GearPair) -> Orbit {
+    analyse(pair, REST, &Settings::default()).unwrap()
+}
+
+/// State at half a period after the strobe, mirrored: a point of the symmetry-conjugate orbit at phase 0.
+fn conjugate(pair: &GearPair, strobe: State) -> State {
+    let flow = flow_of(pair);
+    let mut half = Trajectory::new(&flow, pair.law(), strobe);
+    half.advance_to(0.5 * flow.period, &mut ()).unwrap();
+    half.state().map(|value| -value)
+}
+
+#[test]
+fn a_strobe_inside_the_dip_of_meshing_is_decided() {
+    // At phase 0 the teeth mesh although the gap is still short of the wall by 1e-6: the
+    // state alone would be taken for free motion.
+    for (e, omega) in [(0.44, 2.05875), (0.27, 3.14375), (0.02, 3.96625)] {
+        let pair = cell(e, omega);
+        let orbit = orbit(&pair);
+        let gap = (orbit.strobe[0] - orbit.strobe[2]).abs();
+        assert!(gap < pair.b && pair.b - gap < 1e-5, "the strobe is not in a contact onset any more: {gap}");
+        assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e} {omega}");
+        assert_eq!(orbit.status, Status::Ok, "{e} {omega}");
+    }
+}
+
+#[test]
+fn symmetry_conjugate_orbits_share_everything_but_the_side() {
+    let pair = cell(0.56, 5.6);
+    let one = orbit(&pair);
+    let other = analyse(&pair, conjugate(&pair, one.strobe), &Settings::default()).unwrap();
+    assert_eq!((one.class, other.class), (Class::Periodic { period: 1 }, Class::Periodic { period: 1 }));
+    assert_eq!((one.symmetric, other.symmetric), (Some(false), Some(false)));
+    assert!((one.strobe[0] - other.strobe[0]).abs() > 1e-3, "the same orbit twice");
+    assert!((one.lyapunov - other.lyapunov).abs() < 1e-9);
+    assert_eq!(one.word.mirrored(), other.word);
+    // A symmetric orbit is its own conjugate.
+    let alone = orbit(&cell(0.2, 5.6));
+    let mirrored = conjugate(&cell(0.2, 5.6), alone.strobe);
+    assert!((0..4).all(|i| (mirrored[i] - alone.strobe[i]).abs() < 1e-12), "{mirrored:?}");
+}
+
+#[test]
+fn banded_chaos_beyond_a_grazing_is_chaos() {
+    // Close to a period-10 cycle for ever, yet nearby motions separate.
+    for e in [0.6054, 0.6058] {
+        let orbit = orbit(&GearPair::paper(e));
+        assert_eq!((orbit.class, orbit.status), (Class::Chaotic, Status::Ok), "{e}");
+        assert!(orbit.lyapunov > 3.0 * orbit.lyapunov_error.unwrap(), "{e}");
+    }
+}
+
+/// A band of chaos, 1 % of the motion wide, beside a stable cycle: by chance it comes nearer to the cycle from
+/// one check to the next.
+#[test]
+fn a_band_of_chaos_beside_a_cycle_is_chaos() {
+    let narrow = GearPair {
+        m1: 1.5100944943278496,
+        m2: 2.2228992243566275,
+        r1: 1.166979760399095,
+        r2: 0.4475983236152271,
+        k1: 48.95640243390158,
+        k2: 81.18240655778291,
+        r: 0.0,
+        k: 4.550185120183626,
+        force: 8.916912390336938,
+        b: 0.01034097498992998,
+        mesh_speed: 0.00020785654785843188,
+        ..cell(0.28434052631578943, 0.89809)
+    };
+    for pair in [cell(0.698037, 5.960782), narrow] {
+        for transient_periods in [400, 700, 701] {
+            let settings = Settings { transient_periods, ..Settings::default() };
+            assert_eq!(
+                analyse(&pair, REST, &settings).unwrap().class,
+                Class::Chaotic,
+                "after {transient_periods}"
+            );
+        }
+    }
+    // Within the budget of a map, too.
+    let budget = Budget {
+        settings: Settings::default(),
+        early_stop: true,
+        undecided_periods: 1584,
+        exponent: true,
+        shows_exponent: true,
+    };
+    for pair in [cell(0.6980392156862745, 5.96078431372549), narrow] {
+        let measured = measure(&flow_of(&pair), pair.law(), REST, &budget);
+        assert_eq!(measured.period, None);
+    }
+}
+
+/// A multiplier of 0.99995 shrinks little within any check; the motion about it is linear.
+#[test]
+fn a_slow_approach_is_seen_however_long_the_transient() {
+    for transient_periods in [5000, 20_000] {
+        let settings = Settings { transient_periods, ..Settings::default() };
+        let orbit = analyse(&cell(0.7941176470588235, 3.3294117647058825), REST, &settings).unwrap();
+        assert_eq!(orbit.class, Class::Periodic { period: 1 }, "after {transient_periods}");
+    }
+}
+
+#[test]
+fn an_escape_from_an_unstable_cycle_is_not_chaos() {
+    // Start on the symmetric orbit, which is unstable here: nearby motions separate for
+    // hundreds of periods before the unsymmetric orbit is reached.
+    let below = orbit(&GearPair::paper(0.541));
+    let pair = GearPair::paper(0.545);
+    let symmetric = below.strobe;
+    let orbit = analyse(&pair, symmetric, &Settings { transient_periods: 1, ..Settings::default() }).unwrap();
+    assert_eq!(orbit.class, Class::Periodic { period: 1 });
+    assert_eq!(orbit.symmetric, Some(false));
+}
+
+#[test]
+fn undamped_motion_is_undecided_and_says_so() {
+    let pair = GearPair { r1: 0.0, r2: 0.0, force: 1e-3, ..cell(0.5, 11.0) };
+    let orbit = analyse(&pair, REST, &Settings { transient_periods: 10, ..Settings::default() }).unwrap();
+    assert_eq!((orbit.class, orbit.status), (Class::Undecided, Status::Slow));
+}
+
+#[test]
+fn what_cannot_be_finished_is_failed_by_name() {
+    let pair = GearPair { b: 1e-9, ..cell(1.0, 5.6) };
+    let orbit = orbit(&pair);
+    assert_eq!((orbit.class, orbit.status), (Class::Failed, Status::CapEvents));
+    assert!(orbit.events.is_empty());
+}
+
+#[test]
+fn no_force_means_no_motion() {
+    let orbit = orbit(&GearPair { force: 0.0, ..cell(0.5, 5.6) });
+    assert_eq!(orbit.class, Class::Periodic { period: 1 });
+    assert_eq!(orbit.strobe, REST);
+    assert!(orbit.word.is_empty());
+    assert!((orbit.lyapunov + 0.15).abs() < 1e-9, "{}", orbit.lyapunov);
+}
+
+#[test]
+fn a_strobe_at_the_turning_point_is_no_noise() {
+    // Quasi-static: at phase 0 the gears stand still, and their velocities are rounding.
+    let orbit = orbit(&cell(0.5, 0.001));
+    assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 1 }, Some(true)));
+    assert_eq!(orbit.word.time_order(), "121213454546");
+}
+
+#[test]
+fn neutral_motion_is_not_chaos() {
+    // Unsupported and undamped gears that never meet: nearby motions separate in proportion to
+    // time.
+    let pair = GearPair { k1: 0.0, k2: 0.0, r1: 0.0, r2: 0.0, b: 5.0, ..cell(0.605, 5.6) };
+    assert_ne!(orbit(&pair).class, Class::Chaotic);
+}
+
+/// Without supports the pair's common translation keeps to itself: a tangent vector along it
+/// would never see that the teeth clatter chaotically.
+#[test]
+fn chaos_of_a_pair_without_supports_is_seen() {
+    let pair = GearPair {
+        m1: 16.0,
+        m2: 0.26,
+        r1: 0.0,
+        r2: 0.0,
+        k1: 0.0,
+        k2: 0.0,
+        force: -730.0,
+        b: 0.0155,
+        mesh_speed: 0.0,
+        ..cell(1.0, 7.3)
+    };
+    let clattering = GearPair { k1: 0.0, k2: 0.0, r1: 0.0, r2: 0.0, ..cell(0.605, 5.6) };
+    let settings = Settings { transient_periods: 20, observed_periods: 200, max_period: 64 };
+    for pair in [pair, clattering] {
+        let orbit = analyse(&pair, REST, &settings).unwrap();
+        assert_eq!(orbit.class, Class::Chaotic, "{pair:?}");
+        // Two motions themselves, a hair apart: their gaps part company.
+        let flow = flow_of(&pair);
+        let gap = |hair: f64| {
+            let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, hair, 0.0, 0.0]);
+            (0..200).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+            let [x1, _, x2, _] = trajectory.state();
+            x1 - x2
+        };
+        assert!((gap(1e-10) - gap(0.0)).abs() > 1e-3 * pair.b, "{pair:?}");
+    }
+}
+
+#[test]
+fn exponents_survive_periods_in_which_tangents_leave_the_range_of_f64() {
+    // Without contact the largest is that of the slower support, -0.15, however long the period.
+    for omega in [1.0, 0.01, 0.001] {
+        let orbit = orbit(&GearPair { b: 1e6, ..cell(0.5, omega) });
+        assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{omega}");
+        assert!((orbit.lyapunov + 0.15).abs() < 1e-9, "{omega}: {}", orbit.lyapunov);
+    }
+}
+
+/// A symmetric cycle of period 5 that is met in meshing at some strobes and free at others: half a period
+/// on, the mirror image lies in another domain.
+#[test]
+fn a_symmetric_cycle_may_change_domains_between_its_half_periods() {
+    let pair = GearPair {
+        m1: 0.19829369296457494,
+        m2: 0.16481503350571672,
+        r1: 0.7128113202276247,
+        r2: 0.04627789270791416,
+        k1: 0.1954662279504476,
+        k2: 4.405273555023123,
+        r: 0.006787690015440622,
+        k: 0.0,
+        force: -22.829526459853465,
+        omega: 0.7616376809036782,
+        b: 3.9759925668661555,
+        e: 0.9422111622332906,
+        mesh_speed: 60.746353712543986,
+    };
+    let orbit = analyse(&pair, [0.0; 4], &Settings::default()).unwrap();
+    assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 5 }, Some(true)));
+    assert_eq!(orbit.word, orbit.word.mirrored());
+}

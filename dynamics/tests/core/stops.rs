@@ -1,0 +1,252 @@
+//! The second model, and balls thrown against walls: every event in closed form.
+
+use crate::common::REST;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Domain, Law, Oscillator, Side, State, Stops};
+use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
+
+fn stops(e: f64) -> Stops {
+    Stops {
+        m: 1.5,
+        r: 0.0,
+        k: 0.0,
+        stop_damping: 1.0,
+        stop_stiffness: 1000.0,
+        force: 0.0,
+        omega: 1.0,
+        b: 0.5,
+        e,
+        mesh_speed: 0.0,
+    }
+}
+
+/// Time since the start.
+fn time(flow: &Flow, event: &Happening) -> f64 {
+    event.period as f64 * flow.period + event.t
+}
+
+fn events(flow: &Flow, law: Law, from: State, periods: u64) -> Vec<Happening> {
+    let mut trajectory = Trajectory::new(flow, law, from);
+    let mut events = Vec::new();
+    for _ in 0..periods {
+        trajectory.advance_period(&mut events).expect("an ordinary cell");
+    }
+    events
+}
+
+fn close(got: f64, want: f64, relative: f64) -> bool {
+    (got - want).abs() <= relative * want.abs().max(1.0)
+}
+
+#[test]
+fn an_elastic_free_particle_bounces_with_an_exact_period() {
+    let stops = stops(1.0);
+    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    let speed = 0.7;
+    let events = events(&flow, stops.law(), [0.0, speed, 0.0, 0.0], 200);
+    assert_eq!(events.len(), ((200.0 * flow.period * speed / stops.b - 1.0) / 2.0) as usize + 1);
+    for (n, event) in events.iter().enumerate() {
+        let want = (2 * n + 1) as f64 * stops.b / speed;
+        let got = time(&flow, event);
+        assert!(close(got, want, 1e-14), "impact {n} at {got}, not {want}");
+        assert_eq!(event.side, if n % 2 == 0 { Side::Right } else { Side::Left });
+        assert_eq!((event.kind, event.after[1]), (EventKind::Impact, -event.before[1]));
+        assert_eq!(event.before[1].abs(), speed, "impact {n}");
+    }
+}
+
+#[test]
+fn an_inelastic_free_particle_slows_down_geometrically() {
+    for e in [0.2, 0.5, 0.9, 0.999] {
+        let stops = stops(e);
+        let flow = Flow::new(&stops.oscillator().expect("valid"));
+        let events = events(&flow, stops.law(), [0.0, 40.0, 0.0, 0.0], 100);
+        assert!(events.len() >= 5, "e = {e}: {} impacts", events.len());
+        let (mut t, mut speed) = (stops.b / 40.0, 40.0);
+        for event in &events {
+            assert!(close(time(&flow, event), t, 1e-13), "e = {e}: {} is not {t}", time(&flow, event));
+            assert!(close(event.before[1].abs(), speed, 1e-13), "e = {e}");
+            speed *= e;
+            t += 2.0 * stops.b / speed;
+        }
+        assert!(t > 100.0 * flow.period, "e = {e}: the next impact, at {t}, was missed");
+    }
+}
+
+/// `x'' = -w^2 x` between stops: a flight from wall to wall takes `2 asin(w b / V) / w` with
+/// `V` the speed in the middle, and arrives as fast as it left.
+#[test]
+fn a_harmonic_oscillator_between_stops_keeps_its_tables() {
+    for e in [1.0, 0.99, 0.8] {
+        let stops = Stops { k: 6.0, m: 1.5, ..stops(e) };
+        let w = (stops.k / stops.m).sqrt();
+        let flow = Flow::new(&stops.oscillator().expect("valid"));
+        let start = 30.0;
+        let events = events(&flow, stops.law(), [0.0, start, 0.0, 0.0], 30);
+        let mut t = (w * stops.b / start).asin() / w;
+        let mut speed = (start * start - (w * stops.b).powi(2)).sqrt();
+        // A speed is known to rounding of the energy only, over the speed.
+        let fast_enough = events.iter().take_while(|event| event.before[1].abs() > 0.1);
+        for (n, event) in fast_enough.enumerate() {
+            assert!(
+                close(time(&flow, event), t, 1e-12),
+                "e = {e}: impact {n}: {} is not {t}",
+                time(&flow, event)
+            );
+            assert!(close(event.before[1].abs(), speed, 1e-12), "e = {e}: impact {n}");
+            speed *= e;
+            t += 2.0 * (w * stops.b / speed.hypot(w * stops.b)).asin() / w;
+        }
+        assert!(events.len() > 20, "e = {e}");
+    }
+}
+
+/// Slower than `w b` in the middle, it never reaches a wall; just faster, it does.
+#[test]
+fn the_slowest_impact_and_the_fastest_miss() {
+    let stops = Stops { k: 6.0, m: 1.5, ..stops(0.5) };
+    let (w, b) = ((stops.k / stops.m).sqrt(), stops.b);
+    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    for beyond in [1e-3, 1e-6, 1e-9, 1e-12] {
+        let miss = events(&flow, stops.law(), [0.0, w * b * (1.0 - beyond), 0.0, 0.0], 3);
+        assert!(miss.is_empty(), "{beyond:e} short of the wall: {miss:?}");
+        let hit = events(&flow, stops.law(), [0.0, w * b * (1.0 + beyond), 0.0, 0.0], 1);
+        assert!(!hit.is_empty(), "{beyond:e} past the wall: no impact");
+        // Near grazing its time is known to the root of rounding only.
+        let want = (1.0 / (1.0 + beyond)).asin() / w;
+        let known = 4.0 * f64::EPSILON / beyond.sqrt();
+        assert!((hit[0].t - want).abs() < known.max(1e-14), "{beyond:e}: {} is not {want}", hit[0].t);
+    }
+}
+
+/// A ball under gravity `g` towards the right wall, its stops damped or not: free flights
+/// are parabolas.
+fn ball(g: f64, damping: f64) -> Oscillator {
+    let zero = [[0.0; 2]; 2];
+    let free = Domain { damping: zero, stiffness: zero, load: [g, 0.0] };
+    let stop = |sign: f64| Domain {
+        damping: [[damping, 0.0], [0.0, 0.0]],
+        stiffness: [[1e4, 0.0], [0.0, 0.0]],
+        load: [g + sign * 1e4 * 0.5, 0.0],
+    };
+    Oscillator {
+        masses: [1.0, 1.0],
+        gap: [1.0, 0.0],
+        walls: [0.5, -0.5],
+        omega: 1.0,
+        force: [0.0, 0.0],
+        free,
+        meshing: [stop(1.0), stop(-1.0)],
+    }
+}
+
+/// Impacts after `2 v / g`, each `e` times the last, until the series is over: at
+/// `2 v / (g (1 - e))` the ball lies on the wall.
+#[test]
+fn a_bouncing_ball_comes_to_rest_where_the_series_ends() {
+    let (g, v) = (2.0, 1.0);
+    for e in [0.1, 0.5, 0.6, 0.9, 0.99] {
+        // Damped: on an undamped stop it swings back to touch the wall at no speed, for ever.
+        let flow = Flow::new(&ball(g, 20.0));
+        let law = Law { restitution: e, mesh_speed: 0.0 };
+        let (scale, top) = (1.0 - e, v * v / (2.0 * g));
+        assert!(top < 1.0, "it must not reach the other wall");
+        // Slower, where the series would outlast the period.
+        let v = if e > 0.9 { v * scale } else { v };
+        let events = events(&flow, law, [0.5, -v, 0.0, 0.0], 4);
+        let (mut t, mut speed) = (0.0, v);
+        let impacts = events.iter().filter(|event| event.kind == EventKind::Impact).count();
+        for event in &events[..impacts] {
+            t += 2.0 * speed / g;
+            assert!(close(time(&flow, event), t, 1e-13), "e = {e}: {} is not {t}", time(&flow, event));
+            assert!((event.before[1] - speed).abs() < 1e-12 * speed, "e = {e}: speed {}", event.before[1]);
+            speed *= e;
+        }
+        let rest = events.get(impacts).unwrap_or_else(|| panic!("e = {e}: never comes to rest"));
+        let end = 2.0 * v / (g * scale);
+        assert_eq!(rest.kind, EventKind::MeshStart, "e = {e}");
+        assert!((time(&flow, rest) - end).abs() < 1e-12 * end, "e = {e}: {} is not {end}", time(&flow, rest));
+        assert_eq!(rest.after[..2], [0.5, 0.0], "e = {e}");
+        assert_eq!(events.len(), impacts + 1, "e = {e}: {:?}", &events[impacts..]);
+    }
+}
+
+/// With a threshold, the last impact is the first whose leaving speed is not above it.
+#[test]
+fn a_bouncing_ball_meshes_at_the_threshold() {
+    let (g, v, e, threshold) = (2.0, 1.0, 0.6, 1e-3);
+    let flow = Flow::new(&ball(g, 0.0));
+    let law = Law { restitution: e, mesh_speed: threshold };
+    let events = events(&flow, law, [0.5, -v, 0.0, 0.0], 3);
+    let count = (1..).find(|&n| v * e.powi(n) <= threshold).expect("it slows down") as usize;
+    assert!(events[..count - 1].iter().all(|event| event.kind == EventKind::Impact), "{events:?}");
+    assert_eq!(events[count - 1].kind, EventKind::MeshStart, "{events:?}");
+    // An undamped stop throws it back: meshing ends with the speed it began with.
+    let end = &events[count];
+    assert_eq!(end.kind, EventKind::MeshEnd, "{events:?}");
+    assert!((end.before[1] + events[count - 1].after[1].abs()).abs() < 1e-11, "{end:?}");
+}
+
+/// A throw that just reaches the other wall, or just does not.
+#[test]
+fn a_throw_grazes_the_other_wall() {
+    let g = 2.0f64;
+    let flow = Flow::new(&ball(g, 0.0));
+    let law = Law { restitution: 0.5, mesh_speed: 0.0 };
+    let grazing = (2.0 * g).sqrt();
+    for beyond in [1e-4, 1e-8, 1e-11, 1e-13] {
+        let first = |v: f64| events(&flow, law, [0.5, -v, 0.0, 0.0], 1)[0];
+        let hit = first(grazing * (1.0 + beyond));
+        assert_eq!(hit.side, Side::Left, "{beyond:e} past the wall: {hit:?}");
+        let miss = first(grazing * (1.0 - beyond));
+        assert_eq!(miss.side, Side::Right, "{beyond:e} short of the wall: {miss:?}");
+    }
+    // Exactly there, `v^2 / (2 g) = 1`, rounding decides: no event, or an impact at the root
+    // of rounding, which is harmless and flagged.
+    let mut trajectory = Trajectory::new(&flow, law, [0.5, -2.0, 0.0, 0.0]);
+    let mut events: Vec<Happening> = Vec::new();
+    trajectory.advance_to(1.5, &mut events).expect("an ordinary cell");
+    assert!(trajectory.near_grazing());
+    assert!(events.iter().all(|event| event.before[1].abs() < 1e-7), "{events:?}");
+    // z = 0.5 - 2 t + t^2
+    assert!((trajectory.state()[0] + 0.25).abs() < 1e-7, "{:?}", trajectory.state());
+}
+
+#[test]
+fn nothing_moves_what_nothing_acts_on() {
+    let stops = stops(0.5);
+    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    let mut trajectory = Trajectory::new(&flow, stops.law(), REST);
+    for _ in 0..1000 {
+        trajectory.advance_period(&mut ()).expect("an ordinary cell");
+    }
+    assert_eq!(trajectory.state(), REST);
+    assert_eq!(trajectory.work().events, 0);
+}
+
+/// A series of impacts closed in one jump must not carry the motion past its goal.
+#[test]
+fn closing_a_series_stops_where_it_was_asked_to() {
+    let flow = Flow::new(&ball(2.0, 0.0));
+    let law = Law { restitution: 0.5, mesh_speed: 0.0 };
+    // The series ends at 2.
+    for short in [1e-3, 1e-4, 1e-5, 1e-6] {
+        let mut trajectory = Trajectory::new(&flow, law, [0.5, -1.0, 0.0, 0.0]);
+        trajectory.advance_to(2.0 - short, &mut ()).expect("an ordinary cell");
+        assert_eq!(trajectory.time_in_period(), 2.0 - short, "{short:e} before the end of the series");
+    }
+}
+
+/// A goal that lies one of the longest steps ahead exactly.
+#[test]
+fn a_step_may_end_on_its_goal() {
+    // The fastest rate is 1, so that steps are 1.25, 2.5, 5 and 10, each twice the last.
+    let stops = Stops { m: 1.0, k: 1.0, omega: 0.05, ..stops(0.5) };
+    let flow = Flow::new(&stops.oscillator().expect("valid"));
+    for goal in [1.25, 2.5, 3.75, 5.0, 8.75, 10.0, 18.75, 28.75, 38.75, 48.75] {
+        let mut trajectory = Trajectory::new(&flow, stops.law(), [0.1, 0.0, 0.0, 0.0]);
+        trajectory.advance_to(goal, &mut ()).expect("an ordinary cell");
+        let off = (trajectory.state()[0] - 0.1 * goal.cos()).abs();
+        assert!(off < 1e-14, "off by {off:.1e} at {goal}");
+    }
+}

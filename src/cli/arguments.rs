@@ -1,0 +1,319 @@
+//! The command line: what can be asked, and its help.
+
+use std::path::{Path, PathBuf};
+
+use crate::gpu::Precision;
+use crate::validate::DEFAULT_SAMPLES;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use rattlemap_dynamics::model::{REST, State};
+use rattlemap_dynamics::orbit::Settings;
+
+/// Restitution where `orbit` is not told any: the paper's last periodic motion before chaos.
+pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
+
+/// Motion of a gear pair with backlash: flights between the tooth surfaces in closed form, every
+/// contact located, cycles named by their word, and the Lyapunov exponent of each.
+///
+/// All quantities are dimensionless. Exit code 0: done; 1: the run or a validation failed; 2: bad usage or scene,
+/// and nothing was computed.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true)]
+#[command(after_help = "Examples:\n  \
+    rattlemap map scenes/e_omega.toml                periods and chaos over restitution and frequency\n  \
+    rattlemap orbit --set e=0.06                     the paper's motion with meshing on both sides\n  \
+    rattlemap bifurcation scenes/paper_fig5.toml     section points against restitution")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Map(Map),
+    Orbit(Orbit),
+    Bifurcation(Bifurcation),
+    /// What there is to compute on: adapters, precisions, limits, and what `--engine auto` takes
+    ///
+    /// A map is tried for a moment on each engine where nothing else decides. WGPU_ADAPTER_NAME (part of
+    /// a name) and WGPU_BACKEND (vulkan, metal, dx12) in the environment narrow the adapters down.
+    Devices,
+    Validate(Validate),
+    /// Measurements: how fast are maps on this machine's engines?
+    ///
+    /// Writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
+    #[command(subcommand)]
+    Bench(Bench),
+}
+
+/// What is measured.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Bench {
+    Engines(Engines),
+}
+
+/// The same scene on every engine: same answers, and where the time goes
+#[derive(Debug, Args)]
+#[command(after_help = "Lanes of the map scenes/e_omega.toml, from 10^3 to 10^7 as far as time and memory \
+    allow: on the CPU with 1 to all threads, and on every adapter in every precision. What is better: more periods \
+    per second. The answers are compared with each other and a sample of them with the reference; the exit code is 1 \
+    if more differs without a reason than one cell in 10,000 allows.")]
+pub(crate) struct Engines {
+    #[command(flatten)]
+    pub(crate) run: BenchOptions,
+
+    /// Seconds that all of it may take
+    #[arg(long, value_name = "SECONDS", default_value_t = 480, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) budget: u32,
+
+    /// Peak of the hardware adapter in f32, in 10^12 operations per second, if it is not known
+    #[arg(long, value_name = "TERA")]
+    pub(crate) peak_f32: Option<f64>,
+
+    /// The same in f64
+    #[arg(long, value_name = "TERA")]
+    pub(crate) peak_f64: Option<f64>,
+}
+
+/// Where measurements go, and how thorough they are.
+#[derive(Debug, Args)]
+pub(crate) struct BenchOptions {
+    /// Where to write [default: out/bench/<what is measured>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Replace the files of an earlier run; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Tiny sizes: does everything work? The figures mean nothing
+    #[arg(long)]
+    pub(crate) quick: bool,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl BenchOptions {
+    /// The folder to write to.
+    pub(crate) fn out(&self, what: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("out/bench").join(what))
+    }
+}
+
+/// A map over two parameters: what every cell's motion is
+///
+/// Integrates each cell of the scene's two axes and writes tables (cells.csv, cells.npy), figures
+/// (map.png and others), an interactive page (report.html) and manifest.json. Records go to
+/// records.bin as they are computed: after Ctrl-C (exit code 1) or a crash, --resume goes on from
+/// there, and every table and figure comes out byte for byte as if nothing had happened.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the main map with fewer cells:\n  \
+    rattlemap map scenes/e_omega.toml --set axis.0.count=128 --set axis.1.count=128")]
+pub(crate) struct Map {
+    #[command(flatten)]
+    pub(crate) run: SceneOptions,
+
+    #[command(flatten)]
+    pub(crate) engine: EngineOptions,
+
+    /// Go on with an interrupted run of the same scene
+    #[arg(long, conflicts_with = "force")]
+    pub(crate) resume: bool,
+}
+
+/// A scene, where its results go, and what to change about it.
+#[derive(Debug, Args)]
+pub(crate) struct SceneOptions {
+    /// The scene: a TOML file
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+
+    /// Where to write [default: out/<scene's name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Replace the files of an earlier run; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Override the scene: a parameter by name (k=800), anything else by its path
+    /// (integration.max_period=32, axis.0.count=200). An axis named here (axis.0.parameter=F)
+    /// replaces the scene's own value of that parameter. May be repeated
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl SceneOptions {
+    /// The folder to write to.
+    pub(crate) fn out(&self) -> PathBuf {
+        let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
+        self.out.clone().unwrap_or_else(default)
+    }
+}
+
+/// Who computes, and how precisely.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct EngineOptions {
+    /// Who computes
+    #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
+    pub(crate) engine: EngineChoice,
+
+    /// Precision of the motion: f32 or f64. A GPU takes f32 unless told otherwise, and f64 only
+    /// where it has double precision; the CPU is f64
+    #[arg(long, value_name = "PRECISION", value_parser = precision)]
+    pub(crate) precision: Option<Precision>,
+}
+
+fn precision(text: &str) -> Result<Precision, String> {
+    let named = Precision::ALL.into_iter().find(|precision| precision.name() == text);
+    named.ok_or_else(|| "it must be f32 or f64".to_owned())
+}
+
+/// Engines by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EngineChoice {
+    /// A hardware GPU if there is one, else the CPU; a software GPU where that is faster on long maps
+    Auto,
+    /// Lanes on a graphics device
+    Gpu,
+    /// The event-driven reference on all processor cores, f64
+    Cpu,
+}
+
+/// One motion: its class, word, exponent, multipliers and every event on the cycle
+///
+/// Starts at phase 0, lets the transient pass and reads what the motion settles on. A periodic
+/// motion is shown over one cycle, any other over its last 8 forcing periods.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the paper's meshing motion with its figures:\n  \
+    rattlemap orbit --set e=0.06 --out out/meshing")]
+pub(crate) struct Orbit {
+    /// Set a parameter; the others are the paper's Table 1, and e = 0.605. Any of m1 m2 r1 r2 k1 k2
+    /// r k F omega b e mesh_speed. May be repeated
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+
+    /// State at phase 0 to start from; at rest unless given
+    #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
+    pub(crate) start: Option<State>,
+
+    /// Forcing periods of the first check of the motion, 2 or more. No limit: while it is undecided, checks of
+    /// twice the length follow, up to 32768 periods or this many, each after up to 50 periods in which a
+    /// tangent vector turns. Cycles of up to half as many are found (at most 64)
+    #[arg(long, value_name = "N", default_value_t = Settings::default().observed_periods,
+          value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    pub(crate) periods: u32,
+
+    /// Forcing periods to let pass before the first check, 1 or more. All of them are integrated, and what
+    /// is undecided after the first check goes on
+    #[arg(long, value_name = "N", default_value_t = Settings::default().transient_periods,
+          value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    pub(crate) transient: u32,
+
+    /// Print one JSON object instead of a summary
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Also write orbit.json, phase portraits and time histories to this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Write even if the folder is not empty
+    #[arg(long, requires = "out")]
+    pub(crate) force: bool,
+}
+
+/// A state as `--start` takes it.
+fn state(text: &str) -> Result<State, String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| "it must be four finite numbers, such as 0.1,0,-0.2,1.5".to_owned())
+}
+
+impl Orbit {
+    /// The state to start from.
+    pub(crate) fn start(&self) -> State {
+        self.start.unwrap_or(REST)
+    }
+
+    /// How long to integrate: a cycle counts once it has come round twice.
+    pub(crate) fn settings(&self) -> Settings {
+        Settings {
+            transient_periods: self.transient,
+            observed_periods: self.periods,
+            max_period: Settings::default().max_period.min(self.periods / 2),
+        }
+    }
+}
+
+/// Every contact and end of meshing against one parameter, as in the paper's Fig. 5
+///
+/// Integrates each value of the scene's one axis on the event-driven reference and writes
+/// bifurcation.csv (one row per event), bifurcation.png and manifest.json. Each value is
+/// integrated until it is decided; steps_per_period, early_stop and quantities are for maps.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
+    rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200")]
+pub(crate) struct Bifurcation {
+    #[command(flatten)]
+    pub(crate) run: SceneOptions,
+}
+
+/// How right a finished map is: a sample of its cells, judged by what did not make them
+///
+/// Half of the sample is drawn from all integrated cells, a quarter at borders of classes, a quarter by
+/// status; rates come from the first. What a cell's start reaches is computed by the event-driven reference
+/// over the whole budget, without early stops; maps of the reference itself are judged by lanes in f64 too,
+/// or where no adapter has them by DOP853 with event location. A cell that differs is of one of five kinds:
+/// another attractor, a border within rounding, a budget too short, an engine's cap, or unexplained. Averages
+/// over chaos are compared as distributions, and states of many lanes after a few periods. The exit code is 1
+/// where more is unexplained than one cell in 10,000 allows. Writes validation.json and a section of
+/// report.html.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, a thousand cells of the main map:\n  \
+    rattlemap validate out/e_omega --samples 1000")]
+pub(crate) struct Validate {
+    /// The folder of a finished map
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+
+    /// Cells to replay, all if the map has fewer
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SAMPLES as u32,
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) samples: u32,
+
+    /// Decides which cells: the same seed, the same sample
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(crate) seed: u64,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_names_the_defaults_in_use() {
+        let help = Cli::command().find_subcommand_mut("orbit").unwrap().render_long_help().to_string();
+        assert!(help.contains(&format!("e = {DEFAULT_RESTITUTION}")), "{help}");
+        for parameter in rattlemap_dynamics::model::GearPair::PARAMETERS {
+            assert!(help.contains(&*parameter.name), "{} is not in the help", parameter.name);
+        }
+    }
+}

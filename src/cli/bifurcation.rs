@@ -1,0 +1,27 @@
+//! `rattlemap bifurcation`: how the attractor changes along one axis.
+
+use std::time::Instant;
+
+use rattlemap_dynamics::orbit::Class;
+
+use super::arguments::Bifurcation;
+use super::error::{Failure, fail_if};
+use super::progress::Progress;
+use super::scene_file;
+use crate::map::{bifurcation, scene};
+use crate::output::{self, Folder};
+
+pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
+    let ask = &ask.run;
+    let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
+    let folder = Folder::open(&ask.out(), ask.force)?;
+    let cells = scene.line();
+    let progress = Progress::new(cells.len(), 0, "columns", ask.quiet);
+    let clock = Instant::now();
+    let report = |done| progress.report(done, cells.len());
+    let columns = bifurcation::run(&cells, scene.start(), &scene.orbit_settings(), &report)?;
+    let files = output::bifurcation::write(&folder, &scene, &ask.set, &columns, clock.elapsed())?;
+    progress.finish(&format!("{}: {}", folder.path().display(), files.join(", ")));
+    let all_failed = columns.iter().all(|column| column.class == Class::Failed);
+    fail_if(all_failed, "every column failed; the status column says why")
+}

@@ -1,0 +1,110 @@
+//! Does a map fit this machine? Checked before anything is written or computed.
+
+use std::path::Path;
+
+use crate::map::scene::Scene;
+use crate::map::size::Size;
+use crate::output::RECORDS;
+use anyhow::anyhow;
+
+use crate::cli::arguments::EngineChoice;
+use crate::cli::error::Failure;
+use crate::cli::processor;
+
+/// What there is, in bytes; none where the system does not tell.
+struct Free {
+    memory: Option<u64>,
+    disk: Option<u64>,
+}
+
+/// Refuses a map that does not fit memory or disk, with figures. What the system does not
+/// tell is taken to be enough.
+pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(), Failure> {
+    let kept = out.join(RECORDS).metadata().map_or(0, |data| data.len());
+    let disk = free_disk(out).map(|free| free.saturating_add(kept));
+    judge(scene, engine, &Free { memory: free_memory(), disk })
+}
+
+fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
+    let size = Size::of(scene);
+    let threads = processor::cores() as u64;
+    let (cpu, gpu) = (size.on_cpu(threads), size.on_gpu());
+    let memory = match engine {
+        EngineChoice::Cpu => cpu,
+        EngineChoice::Gpu => gpu,
+        // Either may be chosen.
+        EngineChoice::Auto => cpu.max(gpu),
+    };
+    let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
+    let starts = if size.runs > size.cells { format!(", {} runs,", size.runs) } else { String::new() };
+    let map = format!("a map of {} = {} cells{starts}", counts.join(" x "), size.cells);
+    let refuse = |what: &str, needed: u64, available: u64| {
+        Err(Failure::Usage(anyhow!(
+            "{map} needs about {} of {what}, and {} are free; lower axis.0.count or axis.1.count{}",
+            bytes(needed),
+            bytes(available),
+            match what {
+                "disk" => ", or name another disk with --out",
+                _ if cpu < available => ", or ask for --engine cpu, which needs less",
+                _ => "",
+            }
+        )))
+    };
+    if !size.is_countable() {
+        return Err(Failure::Usage(anyhow!(
+            "{map} is too large: at most {} runs can be numbered; lower axis.0.count or axis.1.count",
+            u32::MAX
+        )));
+    }
+    match *free {
+        Free { memory: Some(free), .. } if free < memory => refuse("memory", memory, free),
+        Free { disk: Some(free), .. } if free < size.disk => refuse("disk", size.disk, free),
+        _ => Ok(()),
+    }
+}
+
+/// Memory that can still be had, container limits included.
+fn free_memory() -> Option<u64> {
+    let mut system = sysinfo::System::new();
+    system.refresh_memory();
+    let free = system.available_memory();
+    let limited = system.cgroup_limits().map_or(free, |limits| free.min(limits.free_memory));
+    (limited > 0).then_some(limited)
+}
+
+/// Room on the disk that will hold `out`, which need not exist yet.
+fn free_disk(out: &Path) -> Option<u64> {
+    let absolute = std::path::absolute(out).ok()?;
+    let existing = absolute.ancestors().find(|folder| folder.is_dir())?;
+    fs4::available_space(existing).ok()
+}
+
+fn bytes(count: u64) -> String {
+    let (unit, name) =
+        [(1e9, "GB"), (1e6, "MB")].into_iter().find(|&(unit, _)| count as f64 >= unit).unwrap_or((1e3, "kB"));
+    format!("{:.1} {name}", count as f64 / unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::scene::Purpose;
+
+    /// Half a million steps of tables for little more than a thousand cells.
+    const SLOW: &str = "[[axis]]\nparameter = 'e'\nmin = 0.1\nmax = 0.9\ncount = 2\n\
+                        [[axis]]\nparameter = 'omega'\nmin = 0.002\nmax = 0.003\ncount = 8000\n";
+
+    #[test]
+    fn constants_of_lanes_count_where_lanes_may_run() {
+        let scene = Scene::parse(SLOW, "s", &[], Purpose::Map).unwrap();
+        let free = Free { memory: Some(2_000_000_000), disk: None };
+        assert!(judge(&scene, EngineChoice::Cpu, &free).is_ok());
+        for engine in [EngineChoice::Gpu, EngineChoice::Auto] {
+            let Err(failure) = judge(&scene, engine, &free) else { panic!("{engine:?} was let through") };
+            let text = failure.to_string();
+            assert!(text.contains("GB of memory, and 2.0 GB are free"), "{text}");
+            assert!(text.contains("or ask for --engine cpu"), "{text}");
+        }
+        assert!(judge(&scene, EngineChoice::Gpu, &Free { memory: None, disk: None }).is_ok());
+    }
+}

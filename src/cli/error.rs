@@ -1,0 +1,86 @@
+//! Why a command stops, and the exit code that says so.
+
+use std::process::ExitCode;
+
+use crate::map::plan::NoMotion;
+use crate::map::scene::SceneError;
+use crate::output::{FolderError, OutputError, RecordFileError};
+use anyhow::anyhow;
+use rattlemap_dynamics::model::ModelError;
+
+use crate::cli::say;
+
+/// A command that did not do what was asked.
+#[derive(Debug)]
+pub enum Failure {
+    /// The request itself is at fault and nothing was computed: exit code 2.
+    Usage(anyhow::Error),
+    /// The run or its output failed: exit code 1.
+    Run(anyhow::Error),
+}
+
+impl Failure {
+    /// Says on stderr what went wrong, causes included, and returns the exit code.
+    pub fn report(&self) -> ExitCode {
+        say::note(format_args!("error: {self}"));
+        ExitCode::from(match self {
+            Failure::Usage(_) => 2,
+            Failure::Run(_) => 1,
+        })
+    }
+}
+
+/// A run that went through but came to nothing.
+pub fn fail_if(failed: bool, message: &'static str) -> Result<(), Failure> {
+    if failed { Err(Failure::Run(anyhow!(message))) } else { Ok(()) }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (Failure::Usage(error) | Failure::Run(error)) = self;
+        // The alternate form is the whole chain of causes on one line.
+        write!(f, "{error:#}")
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<ModelError> for Failure {
+    fn from(error: ModelError) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<NoMotion> for Failure {
+    fn from(error: NoMotion) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<OutputError> for Failure {
+    fn from(error: OutputError) -> Self {
+        Failure::Run(error.into())
+    }
+}
+
+impl From<FolderError> for Failure {
+    fn from(error: FolderError) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<RecordFileError> for Failure {
+    fn from(error: RecordFileError) -> Self {
+        Failure::Usage(error.into())
+    }
+}
+
+impl From<anyhow::Error> for Failure {
+    fn from(error: anyhow::Error) -> Self {
+        Failure::Run(error)
+    }
+}

@@ -1,0 +1,226 @@
+//! `rattlemap map`: a scene into a folder, resumable at every batch.
+
+mod interrupt;
+mod resume_command;
+mod summary;
+
+use std::error::Error;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use crate::gpu::Precision;
+use crate::map::coexistence;
+use crate::map::engine::Engine;
+use crate::map::plan::Plan;
+use crate::map::scene::{Purpose, Scene, Steps};
+use crate::map::schedule::Schedule;
+use crate::map::sweep::{self, SweepError};
+use crate::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError, unfinished};
+use crate::record::Record;
+use anyhow::anyhow;
+use rattlemap_dynamics::orbit::Class;
+
+use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
+use crate::cli::capacity;
+use crate::cli::engine_choice::{self, Chosen};
+use crate::cli::error::{Failure, fail_if};
+use crate::cli::progress::Progress;
+use crate::cli::{processor, say, scene_file};
+use interrupt::Interrupt;
+use resume_command::resume_command;
+use summary::summary;
+
+/// Asks, checks, computes, writes.
+pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
+    let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
+    engine_choice::check(&ask.engine)?;
+    capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
+    let plan = Plan::new(&scene);
+    plan.check()?;
+    let interrupt = Interrupt::listen(ask.run.quiet)?;
+    let folder = open_folder(ask)?;
+    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;
+    if !ask.run.quiet && !why.is_empty() {
+        say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
+    }
+    let lane_grid = engine.steps_per_period();
+    if let (false, Some(raised)) = (ask.run.quiet, raised_steps(&scene, lane_grid)) {
+        say::note(raised);
+    }
+    let mut work = Work::new(&plan);
+    let mut kept = open_records(ask, &folder, &scene, &mut work, &engine)?;
+    let resumed_cells = kept.file.count();
+    let total = work.schedule.expected();
+    let progress = match plan.refine() {
+        Some(_) => Progress::of_at_least(total, resumed_cells, unit(&plan), ask.run.quiet),
+        None => Progress::new(total, resumed_cells, unit(&plan), ask.run.quiet),
+    };
+    integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
+    let Work { schedule, mut records, .. } = work;
+    let refined = schedule.finish(&mut records);
+    let Kept { elapsed_before, clock, .. } = kept;
+    let elapsed = clock.elapsed();
+    let attractors = coexistence::attractors(&plan, &records);
+    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
+    let (device, lane_steps) = (engine.device(), engine.lane_steps());
+    let (engine, precision) = (engine.name(), engine.precision());
+    let run = output::map::Run {
+        sets: &ask.run.set,
+        engine,
+        precision,
+        device: &device,
+        processor: &processor::described(),
+        elapsed,
+        elapsed_before,
+        resumed_cells,
+        lane_grid,
+        refined: refined.clone(),
+    };
+    let files = output::map::write(&folder, &cells, &run)?;
+    progress.finish(&format!(
+        "{}\n{}: {}",
+        summary(&cells, &run, lane_steps, clock.elapsed().as_secs_f64()),
+        folder.path().display(),
+        files.join(", ")
+    ));
+    let all_failed = cells.classes().all(|class| class == Class::Failed);
+    fail_if(all_failed, "every cell failed; the status column says why")
+}
+
+/// A new folder, an earlier run's with `--force`, an interrupted one's with `--resume`.
+fn open_folder(ask: &Map) -> Result<Folder, Failure> {
+    let out = ask.run.out();
+    let is_new = out.read_dir().map_or(true, |mut entries| entries.next().is_none());
+    if ask.resume && !is_new && !out.join(RECORDS).is_file() {
+        return Err(RecordFileError::NothingToResume { folder: out }.into());
+    }
+    Ok(Folder::open(&out, ask.run.force || ask.resume)?)
+}
+
+/// The engine that was asked for; where that is left open, an interrupted run goes on with
+/// its own.
+fn engine_of(ask: &Map, folder: &Folder) -> EngineOptions {
+    let asked = ask.engine;
+    if !ask.resume || asked.engine != EngineChoice::Auto || asked.precision.is_some() {
+        return asked;
+    }
+    match Identity::read(&folder.path().join(RECORDS)) {
+        Ok(identity) if identity.engine() == "cpu" => EngineOptions { engine: EngineChoice::Cpu, ..asked },
+        Ok(identity) => {
+            let precision = Precision::ALL.into_iter().find(|p| p.name() == identity.precision());
+            EngineOptions { engine: EngineChoice::Gpu, precision }
+        }
+        // What is wrong with the file is said when it is resumed.
+        Err(_) => asked,
+    }
+}
+
+/// The record file, and what it holds already, by run.
+fn open_records<'f>(
+    ask: &Map,
+    folder: &'f Folder,
+    scene: &Scene,
+    work: &mut Work<'_>,
+    engine: &Engine<'_>,
+) -> Result<Kept<'f>, Failure> {
+    let path = folder.path().join(RECORDS);
+    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
+    let (file, elapsed_before) = if ask.resume && path.is_file() {
+        let Work { schedule, records, .. } = work;
+        let file = RecordFile::resume(&path, &identity, |batch| sweep::replay(schedule, records, batch))?;
+        if let Some(damage) = file.damage() {
+            let (path, count, unit) = (path.display(), file.count(), unit(work.plan));
+            say::note(format_args!(
+                "warning: {path}: {damage} and are dropped; {count} {unit} are kept, the others computed again"
+            ));
+        }
+        (file, unfinished::elapsed(folder))
+    } else {
+        (RecordFile::create(&path, &identity)?, Duration::ZERO)
+    };
+    // The manifest, which may have that time, too, goes next.
+    if elapsed_before.is_zero() {
+        unfinished::clear(folder)?;
+    } else {
+        unfinished::keep_elapsed(folder, elapsed_before)?;
+    }
+    output::map::clear(folder)?;
+    Ok(Kept { file, folder, elapsed_before, clock: Instant::now() })
+}
+
+/// What outlives a run that is interrupted.
+struct Kept<'f> {
+    file: RecordFile,
+    folder: &'f Folder,
+    /// How long earlier runs integrated, and since when this one has.
+    elapsed_before: Duration,
+    clock: Instant,
+}
+
+impl Kept<'_> {
+    fn keep(&mut self, batch: &[(u32, Record)]) -> Result<(), Box<dyn Error + Send + Sync>> {
+        self.file.append(batch)?;
+        Ok(unfinished::keep_elapsed(self.folder, self.elapsed_before + self.clock.elapsed())?)
+    }
+}
+
+/// What is to be done, and what has been.
+struct Work<'p> {
+    plan: &'p Plan,
+    schedule: Schedule,
+    /// By run.
+    records: Vec<Record>,
+}
+
+impl<'p> Work<'p> {
+    fn new(plan: &'p Plan) -> Work<'p> {
+        Work { plan, schedule: Schedule::new(plan), records: vec![Record::default(); plan.run_count()] }
+    }
+}
+
+/// Integrates what is left. Ctrl-C ends it once some cells have ended; those under way are computed again.
+fn integrate(
+    ask: &Map,
+    work: &mut Work<'_>,
+    engine: &mut Engine<'_>,
+    kept: &mut Kept<'_>,
+    progress: &Progress,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let Work { plan, schedule, records } = work;
+    let keep = |batch: &[(u32, Record)], known| {
+        kept.keep(batch)?;
+        progress.report(kept.file.count(), known);
+        Ok(if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    };
+    let swept = match interrupt.begin() {
+        true => pollster::block_on(sweep::run(plan, schedule, engine, records, keep)),
+        false => Ok(false),
+    };
+    let go_on = || {
+        let (done, total, unit) = (kept.file.count(), plan.run_count(), unit(plan));
+        let most = if plan.refine().is_some() { "at most " } else { "" };
+        format!("{done} of {most}{total} {unit} are kept; go on with: {}", resume_command(ask))
+    };
+    match swept {
+        Ok(true) => Ok(()),
+        Ok(false) => Err(Failure::Run(anyhow!("interrupted; {}", go_on()))),
+        Err(error @ SweepError::Engine(_)) => Err(Failure::Run(anyhow!("{error}; {}", go_on()))),
+        Err(error) => Err(Failure::Run(anyhow!("{error}; make room there; {}", go_on()))),
+    }
+}
+
+/// What is counted while a map is made.
+pub(crate) fn unit(plan: &Plan) -> &'static str {
+    if plan.start_count() > 1 { "runs" } else { "cells" }
+}
+
+/// What is to be said where lanes take more steps than the scene asks for.
+fn raised_steps(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Option<String> {
+    let Steps::PerPeriod(asked) = scene.integration().steps_per_period else { return None };
+    let [least, most] = lane_grid.filter(|&[_, most]| most > asked)?;
+    let taken = if least == most { most.to_string() } else { format!("{least} to {most}") };
+    Some(format!(
+        "integration.steps_per_period = {asked} is raised to {taken}: lanes need as many, and an even number"
+    ))
+}

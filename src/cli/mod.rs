@@ -1,0 +1,40 @@
+//! The commands, each a pipeline: ask, check, compute, write.
+
+mod arguments;
+pub mod bench;
+mod bifurcation;
+mod capacity;
+mod devices;
+mod engine_choice;
+mod error;
+mod map;
+mod orbit;
+mod processor;
+mod progress;
+mod say;
+mod scene_file;
+mod validate;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::{Bench, Cli, Command};
+
+pub use error::{Failure, fail_if};
+pub use processor::{cores, name as processor_name};
+pub use progress::Progress;
+pub use say::note;
+
+/// Runs the command that the process was started with, and says how it ended.
+pub fn run() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Map(ask) => map::run(&ask),
+        Command::Orbit(ask) => orbit::run(&ask),
+        Command::Bifurcation(ask) => bifurcation::run(&ask),
+        Command::Devices => devices::run(),
+        Command::Validate(ask) => validate::run(&ask),
+        Command::Bench(Bench::Engines(ask)) => bench::run(&ask),
+    };
+    done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
+}

@@ -1,0 +1,264 @@
+//! `rattlemap validate`: a finished map's folder in, its validation beside it.
+
+use std::fs;
+use std::path::Path;
+
+use crate::gpu::{self, AdapterChoice, Gpu, Precision};
+use crate::map::coexistence;
+use crate::map::plan::Plan;
+use crate::map::scene::{Purpose, Scene};
+use crate::map::schedule::{Refined, Schedule};
+use crate::map::sweep;
+use crate::output::map::{MANIFEST, Made, write_validation};
+use crate::output::{Cells, Extent, Folder, Identity, RECORDS, RecordFile, RecordFileError};
+use crate::record::Record;
+use crate::validate::{self, HORIZON, Judge, Kind, Lanes, Sample, StratumResult, Subject, Validation};
+use anyhow::{Context, anyhow};
+use serde::Deserialize;
+
+use crate::cli::arguments::Validate;
+use crate::cli::error::Failure;
+use crate::cli::map::unit;
+use crate::cli::progress::Progress;
+use crate::cli::say;
+
+/// What a manifest has to say.
+#[derive(Deserialize)]
+struct Manifest {
+    command: String,
+    crate_version: String,
+    engine: String,
+    precision: String,
+    device: String,
+    scene: String,
+    set: Vec<String>,
+}
+
+/// Reads, replays, writes.
+pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
+    let dir = &ask.folder;
+    let manifest = read_manifest(dir).map_err(Failure::Usage)?;
+    let name = dir.join(MANIFEST).display().to_string();
+    let scene = Scene::parse(&manifest.scene, &name, &manifest.set, Purpose::Map)?;
+    let plan = Plan::new(&scene);
+    let (records, refined) = read_records(dir, &manifest, &scene, &plan).map_err(Failure::Usage)?;
+    let folder = Folder::open(dir, true)?;
+    let subject = Subject {
+        plan: &plan,
+        records: &records,
+        precision: precision(&manifest).map_err(Failure::Usage)?,
+        is_lane: manifest.engine == "gpu",
+    };
+    let sample = validate::sample(&plan, &records, ask.samples as usize, ask.seed);
+    let count = sample.ids().len();
+    let tell = |what: &str| (!ask.quiet).then(|| say::note(format_args!("{what}")));
+    tell(&format!("running the lanes of {count} cells again"));
+    let (lanes, note) = run_again(&subject, &sample, &manifest.device)?;
+    tell(&format!("replaying {count} cells"));
+    let progress = Progress::new(count, 0, "cells replayed", ask.quiet);
+    let validation = validate::replay(&subject, &sample, &lanes, &|done| progress.report(done, count));
+    let attractors = coexistence::attractors(&plan, &records);
+    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
+    let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
+    let device = lanes.device.as_deref();
+    let files = write_validation(&folder, &cells, &made, device, &validation)?;
+    let summary = summary(&validation, device);
+    progress.finish(&format!("{summary}{note}\n{}: {}", dir.display(), files.join(", ")));
+    verdict(dir, &plan, &validation)
+}
+
+fn read_manifest(dir: &Path) -> anyhow::Result<Manifest> {
+    if !dir.is_dir() {
+        return Err(anyhow!("{}: there is no such folder; name the folder of a finished map", dir.display()));
+    }
+    let path = dir.join(MANIFEST);
+    if !path.is_file() {
+        let advice = if dir.join(RECORDS).is_file() {
+            "the run is unfinished: go on with `rattlemap map SCENE --resume`"
+        } else {
+            "it is not the folder of a map: `rattlemap map SCENE` makes one"
+        };
+        return Err(anyhow!("{}: there is no {MANIFEST}; {advice}", dir.display()));
+    }
+    let foreign = || format!("{}: this is not the manifest of a map", path.display());
+    let text = fs::read_to_string(&path).with_context(foreign)?;
+    let manifest: serde_json::Value = serde_json::from_str(&text).with_context(foreign)?;
+    if manifest["command"] != "map" {
+        let made = manifest["command"].as_str().unwrap_or("something else");
+        return Err(anyhow!("{}: this is not the manifest of a map, but of `{made}`", path.display()));
+    }
+    let manifest: Manifest = serde_json::from_value(manifest).with_context(foreign)?;
+    let own = env!("CARGO_PKG_VERSION");
+    if manifest.crate_version != own {
+        return Err(anyhow!(
+            "{}: the map was made by rattlemap {}, this is {own}; validate it with that version, or make it \
+             again with `rattlemap {} --force`",
+            path.display(),
+            manifest.crate_version,
+            manifest.command
+        ));
+    }
+    Ok(manifest)
+}
+
+fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
+    match (manifest.engine.as_str(), manifest.precision.as_str()) {
+        ("cpu" | "gpu", "f64") => Ok(Precision::F64),
+        ("gpu", "f32") => Ok(Precision::F32),
+        (engine, precision) => Err(anyhow!("{MANIFEST}: no engine `{engine}` computes in `{precision}`")),
+    }
+}
+
+/// One record per run, and what became of an adaptive map.
+fn read_records(
+    dir: &Path,
+    manifest: &Manifest,
+    scene: &Scene,
+    plan: &Plan,
+) -> anyhow::Result<(Vec<Record>, Option<Refined>)> {
+    let path = dir.join(RECORDS);
+    if !path.is_file() {
+        return Err(anyhow!(
+            "{}: there is no {RECORDS}; tables alone cannot be replayed: make the map again with \
+             `rattlemap map SCENE --force`",
+            dir.display()
+        ));
+    }
+    let identity = Identity::new(&manifest.engine, &manifest.precision, &manifest.device, scene.identity());
+    let mut schedule = Schedule::new(plan);
+    let mut records = vec![Record::default(); plan.run_count()];
+    let take = |batch: &[(u32, Record)]| sweep::replay(&mut schedule, &mut records, batch);
+    let again = "make the map again with `rattlemap map SCENE --force`";
+    let go_on = "`rattlemap map SCENE --resume` keeps them and computes the others";
+    let Extent { count, damage, .. } =
+        RecordFile::read(&path, &identity, take).map_err(|error| match error {
+            RecordFileError::OtherRun { path, differences } => {
+                anyhow!(
+                    "{} does not belong to the {MANIFEST} beside it: {differences}; {again}",
+                    path.display()
+                )
+            }
+            RecordFileError::Damaged { path, at, what } => {
+                anyhow!("{} is damaged at byte {at}: {what}; {again}", path.display())
+            }
+            other => other.into(),
+        })?;
+    if !schedule.is_finished() {
+        let (cells, unit) = (schedule.expected(), unit(plan));
+        let damage = damage.map_or(String::new(), |damage| format!("{damage}: "));
+        return Err(anyhow!("{}: {damage}{count} of {cells} {unit} are there; {go_on}", path.display()));
+    }
+    // Nothing is missing: it stands behind the last cell.
+    if let Some(damage) = damage {
+        say::note(format_args!(
+            "warning: {}: {damage}; all {count} {} are there",
+            path.display(),
+            unit(plan)
+        ));
+    }
+    let refined = schedule.finish(&mut records);
+    Ok((records, refined))
+}
+
+/// Runs the sample's lanes again, on the device that made the map or else on the best adapter there is; and in f64
+/// where that can. What is to be said about it, if anything.
+fn run_again(subject: &Subject<'_>, sample: &Sample, made_on: &str) -> Result<(Lanes, String), Failure> {
+    let open =
+        |precision: Precision, choice: &AdapterChoice| pollster::block_on(Gpu::open(precision, choice)).ok();
+    let own = AdapterChoice { name: Some(made_on.to_owned()) };
+    let (mut gpu, note) = match subject.is_lane {
+        true => match pollster::block_on(Gpu::open(subject.precision, &own)) {
+            Ok(gpu) => (Some(gpu), String::new()),
+            Err(why) => match open(subject.precision, &AdapterChoice::default()) {
+                Some(gpu) => {
+                    let device = gpu::describe(gpu.adapter());
+                    (Some(gpu), format!("\nlanes ran again on {device}, not on the map's own device: {why}"))
+                }
+                None => (None, format!("\nlanes were not run again: {why}")),
+            },
+        },
+        false => (None, String::new()),
+    };
+    let is_double = subject.is_lane && subject.precision == Precision::F64;
+    let mut double = match is_double {
+        true => None,
+        false => open(Precision::F64, &own).or_else(|| open(Precision::F64, &AdapterChoice::default())),
+    };
+    let lanes = pollster::block_on(Lanes::run(subject, sample, gpu.as_mut(), double.as_mut()))
+        .context("cannot run the sample's lanes again")?;
+    Ok((lanes, note))
+}
+
+/// Rates of the map, then what else was found.
+fn summary(validation: &Validation, device: Option<&str>) -> String {
+    let mut lines: Vec<String> =
+        validation.strata.iter().filter(|stratum| stratum.sampled > 0).map(told).collect();
+    let judge = match (validation.judge, device) {
+        (Judge::Reference, _) => "the event-driven reference, without early stops".to_owned(),
+        (Judge::Lanes, device) => {
+            format!("lanes in f64 on {}, and the reference", device.unwrap_or("a device"))
+        }
+        (Judge::Independent, _) => "DOP853 with event location, and the reference".to_owned(),
+    };
+    lines.push(format!("judged by {judge}"));
+    let [same, asked] = validation.again;
+    if asked > 0 {
+        lines.push(format!("computed again by the same engine: {same} of {asked} the same to the bit"));
+    }
+    if let Some(states) = &validation.states {
+        let (off, compared) = (states.off.len(), states.compared);
+        let rate = states.rate().text();
+        lines.push(format!("states after {HORIZON} periods: {off} of {compared} lanes are off ({rate})"));
+    }
+    if validation.filled > 0 {
+        let (filled, runs) = (validation.filled, validation.runs);
+        lines.push(format!("{filled} of {runs} were filled, not integrated, and not replayed"));
+    }
+    lines.join("\n")
+}
+
+/// One stratum: how many cells differ, of which kinds.
+fn told(stratum: &StratumResult) -> String {
+    let differing = stratum.differing();
+    let kinds: Vec<String> = Kind::ALL
+        .into_iter()
+        .filter(|&kind| kind != Kind::Unexplained && stratum.rate(kind).count > 0)
+        .map(|kind| format!("{} {}", kind.name(), stratum.rate(kind).count))
+        .collect();
+    let kinds = if kinds.is_empty() { String::new() } else { format!("; {}", kinds.join(", ")) };
+    let unexplained = stratum.rate(Kind::Unexplained);
+    format!(
+        "{}: {} of {} cells differ ({}); unexplained {} ({}){kinds}",
+        stratum.stratum.name(),
+        differing.count,
+        stratum.sampled,
+        differing.text(),
+        unexplained.count,
+        unexplained.text()
+    )
+}
+
+/// Cells that a message names; the file has all.
+const NAMED: usize = 8;
+
+fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), Failure> {
+    let faults = validation.faults();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    let unexplained = validation.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
+    let mut named: Vec<String> = unexplained
+        .map(|mismatch| {
+            let [i, j] = plan.indices(mismatch.id);
+            format!("({i}, {j})")
+        })
+        .collect();
+    let more = if named.len() > NAMED { ", ..." } else { "" };
+    named.truncate(NAMED);
+    let cells = if named.is_empty() { String::new() } else { format!(": cells {}{more}", named.join(" ")) };
+    Err(Failure::Run(anyhow!(
+        "{}{cells}; {} lists them, each with the command that replays it",
+        faults.join("; "),
+        dir.join("validation.json").display()
+    )))
+}

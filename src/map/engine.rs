@@ -1,0 +1,188 @@
+//! Engines: one interface between a plan and whoever computes it.
+//!
+//! An [`Engine`] takes up cells of a plan at any time and returns one record for each, in whatever order they
+//! end. A record depends on its cell, its start and the plan alone: not on what else is under way, the
+//! neighbours, or the number of threads.
+
+mod cpu;
+mod fake;
+mod flows;
+#[cfg(feature = "gpu")]
+mod gpu;
+
+use thiserror::Error;
+
+pub use cpu::Cpu;
+pub use cpu::record as measured_record;
+pub use fake::Fake;
+pub(crate) use flows::Flows;
+#[cfg(feature = "gpu")]
+pub use gpu::Gpu;
+pub(crate) use gpu::{keep, lane_settings};
+
+use crate::map::plan::Cell;
+use crate::record::Record;
+
+/// Why a batch was not computed.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum EngineError {
+    /// Cells do not fit the engine's memory; fewer may.
+    #[error("no memory on {device} for {cells} cells at a time")]
+    OutOfMemory {
+        /// The engine's device.
+        device: String,
+        /// Cells under way and those that were to be begun.
+        cells: usize,
+    },
+    /// The engine's device did not do what it was asked.
+    #[error("{device}: {reason}")]
+    Refused {
+        /// The engine's device.
+        device: String,
+        /// What happened.
+        reason: String,
+    },
+    /// The engine is gone and computes nothing any more.
+    #[error("{device} was lost ({reason})")]
+    Lost {
+        /// The engine's device.
+        device: String,
+        /// What its driver says.
+        reason: String,
+    },
+}
+
+/// What computes cells.
+pub enum Engine<'p> {
+    /// The event-driven reference on all processor cores, in f64.
+    Cpu(Cpu<'p>),
+    /// Lanes in WGSL on a graphics device, in f32 or f64.
+    #[cfg(feature = "gpu")]
+    Gpu(Box<Gpu<'p>>),
+    /// Records by rule, and failures on demand: for tests of everything around an engine.
+    Fake(Fake),
+}
+
+impl Engine<'_> {
+    /// The name in manifests and record files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Engine::Cpu(_) => "cpu",
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(_) => "gpu",
+            Engine::Fake(_) => "fake",
+        }
+    }
+
+    /// The precision in manifests and record files.
+    pub fn precision(&self) -> &'static str {
+        match self {
+            Engine::Cpu(_) | Engine::Fake(_) => "f64",
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.precision(),
+        }
+    }
+
+    /// What it runs on, in words: part of a record file's identity, since results are
+    /// bitwise the same on one device only.
+    pub fn device(&self) -> String {
+        match self {
+            Engine::Cpu(_) => "event-driven reference".to_owned(),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.device(),
+            Engine::Fake(_) => "fake".to_owned(),
+        }
+    }
+
+    /// The fewest cells that keep the engine busy: the size of the first batch.
+    pub fn least_batch(&self) -> usize {
+        match self {
+            Engine::Cpu(cpu) => cpu.least_batch(),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.least_batch(),
+            Engine::Fake(_) => 16,
+        }
+    }
+
+    /// Free steps that lanes have taken so far; none where there is no grid.
+    pub fn lane_steps(&self) -> Option<u64> {
+        match self {
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => Some(gpu.steps()),
+            Engine::Cpu(_) | Engine::Fake(_) => None,
+        }
+    }
+
+    /// The least and the most free steps that lanes take per forcing period, over all flows that they
+    /// can carry; none where there is no grid.
+    pub fn steps_per_period(&self) -> Option<[u32; 2]> {
+        match self {
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.steps_per_period(),
+            Engine::Cpu(_) | Engine::Fake(_) => None,
+        }
+    }
+
+    /// Cells that may be begun now: more would be refused for want of memory.
+    pub fn room(&self) -> usize {
+        match self {
+            Engine::Cpu(_) | Engine::Fake(_) => usize::MAX,
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.room(),
+        }
+    }
+
+    /// Takes up cells; their records come from [`Engine::advance`].
+    ///
+    /// # Errors
+    /// [`EngineError`], with none of these cells taken up.
+    pub async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
+        match self {
+            Engine::Cpu(cpu) => cpu.begin(cells),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.begin(cells).await?,
+            Engine::Fake(fake) => fake.begin(cells)?,
+        }
+        Ok(())
+    }
+
+    /// Computes until some of the cells under way have ended, best until no more than `until` are left: the records
+    /// of those that have, by id. None if no cell is under way.
+    ///
+    /// # Errors
+    /// [`EngineError`], after which nothing is under way.
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "for lanes alone"))]
+    pub async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
+        match self {
+            Engine::Cpu(cpu) => Ok(cpu.advance()),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.advance(until).await,
+            Engine::Fake(fake) => fake.advance(),
+        }
+    }
+
+    /// Computes cells: one record for each, in their order. Nothing else may be under way.
+    ///
+    /// # Errors
+    /// [`EngineError`], with none of them computed.
+    pub async fn run(&mut self, cells: &[Cell]) -> Result<Vec<Record>, EngineError> {
+        let ids = || cells.iter().map(|cell| cell.id as usize);
+        let (Some(first), Some(last)) = (ids().min(), ids().max()) else { return Ok(Vec::new()) };
+        let mut places = vec![0; last - first + 1];
+        ids().enumerate().for_each(|(place, id)| places[id - first] = place);
+        let mut records = vec![Record::default(); cells.len()];
+        let mut left = cells;
+        loop {
+            let (next, later) = left.split_at(left.len().min(self.room()));
+            self.begin(next).await?;
+            left = later;
+            let ended = self.advance(0).await?;
+            if ended.is_empty() {
+                break;
+            }
+            ended.into_iter().for_each(|(id, record)| records[places[id as usize - first]] = record);
+        }
+        // Cells that were asked for twice.
+        Ok(ids().map(|id| records[places[id - first]]).collect())
+    }
+}

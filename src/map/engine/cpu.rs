@@ -1,0 +1,94 @@
+//! The reference as an engine: one cell per task on all processor cores.
+
+use std::time::Duration;
+
+use rayon::prelude::*;
+use web_time::Instant;
+
+use super::flows::Flows;
+use crate::map::plan::{Cell, Needs, Plan};
+use crate::record::{Record, valid};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::orbit::{Measured, measure};
+
+/// Cells that have ended wait no longer than this for others to begin.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// The event-driven reference.
+pub struct Cpu<'p> {
+    plan: &'p Plan,
+    flows: Flows<'p>,
+    under_way: Vec<Cell>,
+}
+
+impl<'p> Cpu<'p> {
+    /// An engine for the cells of a plan.
+    pub fn new(plan: &'p Plan) -> Cpu<'p> {
+        Cpu { plan, flows: Flows::new(plan), under_way: Vec::new() }
+    }
+
+    pub(super) fn least_batch(&self) -> usize {
+        64 * rayon::current_num_threads()
+    }
+
+    pub(super) fn begin(&mut self, cells: &[Cell]) {
+        self.under_way.extend(cells);
+    }
+
+    pub(super) fn advance(&mut self) -> Vec<(u32, Record)> {
+        let cells = std::mem::take(&mut self.under_way);
+        let clock = Instant::now();
+        // Cells differ a thousandfold in cost: no task holds more than one, and where all are slow some are left.
+        let ended: Vec<Option<(u32, Record)>> = cells
+            .par_iter()
+            .with_max_len(1)
+            .enumerate()
+            .map(|(i, cell)| (i == 0 || clock.elapsed() < PATIENCE).then(|| (cell.id, self.cell(cell))))
+            .collect();
+        let left = cells.iter().zip(&ended).filter(|(_, ended)| ended.is_none());
+        self.under_way.extend(left.map(|(cell, _)| *cell));
+        ended.into_iter().flatten().collect()
+    }
+
+    fn cell(&self, cell: &Cell) -> Record {
+        let of = |flow: &Flow| measure(flow, self.plan.law(cell.law), cell.start, self.plan.budget());
+        let measured = self.flows.with(cell.flow, of);
+        record(&measured, self.plan.needs())
+    }
+}
+
+/// What somebody asked for of what was measured.
+pub fn record(measured: &Measured, needs: &Needs) -> Record {
+    let mut record = Record {
+        strobe: measured.strobe,
+        periods_run: measured.periods_run,
+        status: measured.status.code(),
+        valid: valid::STROBE,
+        ..Record::default()
+    };
+    if measured.status.is_failure() {
+        return record;
+    }
+    record.valid |= valid::PERIOD;
+    record.period = measured.period.unwrap_or(0);
+    if let (true, Some([lyapunov, error])) = (needs.exponent, measured.lyapunov) {
+        record.valid |= valid::LYAPUNOV;
+        (record.lyapunov, record.lyapunov_error) = (lyapunov, error);
+    }
+    if needs.impacts {
+        record.valid |= valid::IMPACTS;
+        record.impacts_per_period = measured.impacts_per_period;
+    }
+    if needs.mesh {
+        record.valid |= valid::MESH;
+        record.mesh_fraction = measured.mesh_fraction;
+    }
+    if let (true, Some(symmetric)) = (needs.symmetric, measured.symmetric) {
+        record.valid |= valid::SYMMETRIC;
+        record.symmetric = symmetric.into();
+    }
+    if let (true, Some(word)) = (needs.word, &measured.word) {
+        record.set_word(word);
+    }
+    record
+}

@@ -1,0 +1,66 @@
+//! An engine without physics.
+
+use super::EngineError;
+use crate::map::plan::Cell;
+use crate::record::Record;
+
+/// Makes records by a rule, has as much memory as it is told, and is lost when it is told.
+pub struct Fake {
+    /// The record of a cell.
+    pub rule: fn(&Cell) -> Record,
+    /// Advances that a cell is under way, at least one.
+    pub advances: fn(&Cell) -> u32,
+    /// Advances that it makes before it is lost; none means that it never is.
+    pub advances_left: Option<usize>,
+    /// Most cells under way that it has memory for.
+    pub memory_cells: usize,
+    /// With the advances that each has still to wait for.
+    under_way: Vec<(u32, Cell)>,
+}
+
+impl Fake {
+    /// An engine that never fails, and computes every cell at once.
+    pub fn new(rule: fn(&Cell) -> Record) -> Fake {
+        let under_way = Vec::new();
+        Fake { rule, advances: |_| 1, advances_left: None, memory_cells: usize::MAX, under_way }
+    }
+
+    /// One that is lost after so many advances.
+    pub fn lost_after(advances: usize, rule: fn(&Cell) -> Record) -> Fake {
+        Fake { advances_left: Some(advances), ..Fake::new(rule) }
+    }
+
+    /// One that has memory for so many cells.
+    pub fn with_memory(memory_cells: usize, rule: fn(&Cell) -> Record) -> Fake {
+        Fake { memory_cells, ..Fake::new(rule) }
+    }
+
+    /// One that takes as many advances for a cell as `advances` says.
+    pub fn slow(advances: fn(&Cell) -> u32, rule: fn(&Cell) -> Record) -> Fake {
+        Fake { advances, ..Fake::new(rule) }
+    }
+
+    pub(super) fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
+        let count = self.under_way.len() + cells.len();
+        if count > self.memory_cells {
+            return Err(EngineError::OutOfMemory { device: "fake".to_owned(), cells: count });
+        }
+        self.under_way.extend(cells.iter().map(|cell| ((self.advances)(cell).max(1), *cell)));
+        Ok(())
+    }
+
+    pub(super) fn advance(&mut self) -> Result<Vec<(u32, Record)>, EngineError> {
+        match &mut self.advances_left {
+            Some(0) => {
+                let (device, reason) = ("fake".to_owned(), "as it was told".to_owned());
+                return Err(EngineError::Lost { device, reason });
+            }
+            Some(left) => *left -= 1,
+            None => {}
+        }
+        let passed = self.under_way.iter().map(|&(left, _)| left).min().unwrap_or(0);
+        self.under_way.iter_mut().for_each(|(left, _)| *left -= passed);
+        let ended: Vec<_> = self.under_way.extract_if(.., |&mut (left, _)| left == 0).collect();
+        Ok(ended.iter().map(|(_, cell)| (cell.id, (self.rule)(cell))).collect())
+    }
+}

@@ -1,0 +1,328 @@
+//! Lanes on a graphics device as an engine.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::EngineError;
+use crate::gpu::{self, Constants, Ended, GpuError, Lane, LaneSettings, Pool, Tables};
+use crate::map::plan::{Cell, Needs, Plan};
+use crate::map::scene::Steps;
+use crate::record::{Record, valid};
+
+/// First batches: enough to keep a hardware device busy, or a software one for a second.
+const LEAST_ON_HARDWARE: usize = 1 << 16;
+const LEAST_IN_SOFTWARE: usize = 256;
+
+/// Cells with a flow of their own that a software device is given at a time: some seconds of work.
+const FLOWS_IN_SOFTWARE: usize = 8_192;
+
+/// Lanes on one device, in one precision.
+pub struct Gpu<'p> {
+    plan: &'p Plan,
+    device: gpu::Gpu,
+    settings: LaneSettings,
+    /// All flows and laws; none where there are too many of them to be kept.
+    tables: Option<Tables>,
+    /// Free steps taken so far.
+    steps: u64,
+    /// Cells under way, where there are tables.
+    pool: Option<Pool>,
+    /// And where there are none; so many of them are run at a time.
+    waiting: Vec<Cell>,
+    most_waiting: usize,
+}
+
+impl<'p> Gpu<'p> {
+    /// An engine for the cells of a plan on an open device.
+    ///
+    /// # Errors
+    /// [`EngineError`] if the device takes no constants.
+    pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+        let settings = lane_settings(plan);
+        let mut engine = Gpu {
+            plan,
+            device,
+            settings,
+            tables: None,
+            steps: 0,
+            pool: None,
+            waiting: Vec::new(),
+            most_waiting: gpu::MOST_FLOWS,
+        };
+        if !engine.is_hardware() {
+            engine.most_waiting = FLOWS_IN_SOFTWARE;
+        }
+        if plan.keeps_flows() {
+            let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
+            let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
+            engine.tables = match engine.load(&flows, &laws).await {
+                // Batches that need fewer of them may fit.
+                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
+                other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
+            };
+            // Compiled now, not while somebody waits for cells.
+            let pool = engine.device.pool(&settings).await;
+            engine.pool = Some(pool.map_err(|error| engine.error(error, 0))?);
+        }
+        Ok(engine)
+    }
+
+    /// The device, for another plan.
+    pub fn into_device(self) -> gpu::Gpu {
+        self.device
+    }
+
+    pub(super) fn precision(&self) -> &'static str {
+        self.device.precision().name()
+    }
+
+    pub(super) fn device(&self) -> String {
+        gpu::describe(self.device.adapter())
+    }
+
+    pub(super) fn least_batch(&self) -> usize {
+        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+    }
+
+    fn is_hardware(&self) -> bool {
+        gpu::is_hardware(self.device.adapter())
+    }
+
+    /// Free steps of all lanes so far.
+    pub(super) fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// The least and the most free steps per forcing period, over all flows that lanes can carry.
+    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
+        let (plan, asked) = (self.plan, self.settings.steps_per_period);
+        let steps = |flow| Constants::steps(&plan.oscillator(flow), asked);
+        let all = (0..plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
+        all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])
+    }
+
+    /// Cells that may be begun now.
+    pub(super) fn room(&self) -> usize {
+        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
+    }
+
+    pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
+        let (Some(tables), Some(pool)) = (&self.tables, &mut self.pool) else {
+            self.waiting.extend(cells);
+            return Ok(());
+        };
+        let count = pool.under_way() + cells.len();
+        let lanes: Vec<_> = cells.iter().map(|cell| (cell.id, lane(cell, cell.flow, cell.law))).collect();
+        self.device.begin(pool, tables, &lanes).await.map_err(|error| self.error(error, count))
+    }
+
+    pub(super) async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
+        let ended = match (&self.tables, &mut self.pool) {
+            (Some(tables), Some(pool)) => match self.device.advance(pool, tables, until).await {
+                Ok(ended) => {
+                    let constants = tables.constants();
+                    let told = |ended: &Ended| (ended.number(), ended.record(constants));
+                    let records: Vec<_> = ended.par_iter().map(told).collect();
+                    let steps = |id: u32| tables.steps_per_period(self.plan.cell(id).flow);
+                    self.steps += steps_of(records.iter().map(|(id, record)| (record, steps(*id))));
+                    Ok(records)
+                }
+                Err(error) => {
+                    pool.clear();
+                    Err(error)
+                }
+            },
+            _ => self.run_waiting().await,
+        };
+        let mut ended = ended.map_err(|error| self.error(error, self.waiting.len()))?;
+        ended.iter_mut().for_each(|(_, record)| keep(record, self.plan.needs()));
+        Ok(ended)
+    }
+
+    /// Some of the cells whose flows are too many to be kept all together, fewer where there is no memory for as
+    /// many.
+    async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
+        while !self.waiting.is_empty() {
+            let bytes = |cell: &Cell| {
+                gpu::table_bytes(&self.plan.oscillator(cell.flow), self.settings.steps_per_period)
+            };
+            let left = self.waiting.len() - fitting(self.waiting.iter().rev().map(bytes), self.most_waiting);
+            let cells = self.waiting[left..].to_vec();
+            match self.run_cells(&cells).await {
+                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if cells.len() > 1 => {
+                    self.most_waiting = cells.len() / 2;
+                }
+                Err(error) => return Err(error),
+                Ok(records) => {
+                    self.waiting.truncate(left);
+                    return Ok(cells.iter().map(|cell| cell.id).zip(records).collect());
+                }
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    async fn run_cells(&mut self, cells: &[Cell]) -> Result<Vec<Record>, GpuError> {
+        let (flows, laws, lanes) = renumbered(cells);
+        let tables = self.load(&flows, &laws).await?;
+        let records = self.device.run_on(&tables, &lanes, &self.settings).await?;
+        let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
+        self.steps += steps_of(records.iter().zip(steps));
+        Ok(records)
+    }
+
+    async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
+        let steps = self.settings.steps_per_period;
+        let derive = |&flow: &u32| Constants::new(&self.plan.oscillator(flow), steps);
+        let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
+        self.device.load_derived(flows.par_iter().map(derive).collect(), &laws).await
+    }
+
+    fn error(&self, error: GpuError, cells: usize) -> EngineError {
+        let device = self.device();
+        match error {
+            GpuError::OutOfMemory { .. } | GpuError::TooManyFlows { .. } => {
+                EngineError::OutOfMemory { device, cells }
+            }
+            GpuError::Lost { message } => EngineError::Lost { device, reason: message },
+            other => EngineError::Refused { device, reason: other.to_string() },
+        }
+    }
+}
+
+/// Free steps of lanes, by their records and by those of a period.
+fn steps_of<'r>(lanes: impl Iterator<Item = (&'r Record, u32)>) -> u64 {
+    lanes.map(|(record, steps)| u64::from(record.periods_run) * u64::from(steps)).sum()
+}
+
+/// How many things of these sizes are taken at a time: one at least, `most` at most, and between these as many as fit
+/// [`gpu::MOST_BYTES`].
+fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
+    let total = bytes.take(most).scan(0, |total, bytes| {
+        *total += bytes;
+        Some(*total)
+    });
+    total.take_while(|&total| total <= gpu::MOST_BYTES).count().max(1)
+}
+
+/// The flows and laws of these cells alone, and their lanes with indices among them.
+fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
+    let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
+    let lanes = cells.iter().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
+    (flows.list, laws.list, lanes)
+}
+
+fn lane(cell: &Cell, flow: u32, law: u32) -> Lane {
+    Lane { flow, law, start: cell.start }
+}
+
+/// Things in the order in which they were first met.
+#[derive(Default)]
+struct Numbering {
+    list: Vec<u32>,
+    places: HashMap<u32, u32>,
+}
+
+impl Numbering {
+    fn place(&mut self, thing: u32) -> u32 {
+        *self.places.entry(thing).or_insert_with(|| {
+            self.list.push(thing);
+            self.list.len() as u32 - 1
+        })
+    }
+}
+
+/// How lanes of a plan are run.
+pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
+    let budget = plan.budget();
+    let default = LaneSettings::default();
+    LaneSettings {
+        periods: budget.periods(),
+        transient_periods: budget.settings.transient_periods,
+        max_period: budget.settings.max_period,
+        early_stop: budget.early_stop,
+        undecided_periods: budget.undecided_periods,
+        exponent: budget.exponent,
+        word: plan.needs().word,
+        mesh: plan.needs().mesh,
+        symmetry: plan.needs().symmetric,
+        chatter: follows_chatter(plan),
+        exponent_from: budget.exponent_from(),
+        chaos_from: budget.chaos_from(),
+        chaos_errors: budget.chaos_errors() as f32,
+        steps_per_period: match plan.steps_per_period() {
+            Steps::Auto => None,
+            Steps::PerPeriod(steps) => Some(steps),
+        },
+        ..default
+    }
+}
+
+/// Whether any cell of the plan may follow chatter by short flights.
+fn follows_chatter(plan: &Plan) -> bool {
+    let speeds = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed);
+    let least = speeds.fold(f64::INFINITY, f64::min);
+    let follows = |flow| gpu::follows_chatter(&plan.oscillator(flow), least);
+    (0..plan.flow_count() as u32).into_par_iter().any(follows)
+}
+
+/// Leaves what somebody asked for.
+pub(crate) fn keep(record: &mut Record, needs: &Needs) {
+    let mut drop = |asked: bool, bits: u32, clear: fn(&mut Record)| {
+        if !asked {
+            record.valid &= !bits;
+            clear(record);
+        }
+    };
+    drop(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
+    drop(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
+    drop(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
+    drop(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
+    drop(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_taken_at_a_time_fits_the_memory() {
+        let third = gpu::MOST_BYTES / 3;
+        assert_eq!(fitting([third; 10].into_iter(), 8), 3);
+        assert_eq!(fitting([1; 10].into_iter(), 8), 8);
+        assert_eq!(fitting([1; 10].into_iter(), 80), 10);
+        assert_eq!(fitting([4 * third; 2].into_iter(), 8), 1);
+    }
+
+    #[test]
+    fn what_nobody_asked_for_is_not_in_the_record() {
+        let mut record = Record {
+            lyapunov: 1.0,
+            lyapunov_error: 1.0,
+            impacts_per_period: 1.0,
+            mesh_fraction: 1.0,
+            word: [1; 4],
+            word_hash: 1,
+            word_length: 1,
+            symmetric: 1,
+            valid: u32::MAX >> 25,
+            ..Record::default()
+        };
+        let whole = record;
+        keep(&mut record, &Needs::EVERYTHING);
+        assert_eq!(record, whole);
+        keep(
+            &mut record,
+            &Needs {
+                exponent: false,
+                lyapunov: false,
+                impacts: false,
+                mesh: false,
+                symmetric: false,
+                word: false,
+            },
+        );
+        assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });
+    }
+}

@@ -1,0 +1,24 @@
+//! Maps: many motions. A scene says what is asked ([`scene`]); its cells are numbered ([`plan`])
+//! and put in order ([`schedule`]); an engine takes them up and hands back records ([`engine`],
+//! [`sweep`]). Over one axis it is a bifurcation diagram ([`bifurcation`]); several starts per cell
+//! count attractors ([`coexistence`]). [`run`] does all of it at once.
+
+pub mod random;
+
+pub mod scene;
+
+pub mod plan;
+pub mod schedule;
+#[cfg(feature = "gpu")]
+pub mod size;
+
+pub mod engine;
+pub mod sweep;
+
+pub mod bifurcation;
+pub mod coexistence;
+
+#[cfg(not(target_arch = "wasm32"))]
+mod run;
+#[cfg(not(target_arch = "wasm32"))]
+pub use run::{Map, MapCell, MapError, Processor, run};

@@ -1,0 +1,136 @@
+//! Where runs begin. Pure.
+
+use crate::map::random::Random;
+use crate::map::scene::{Draw, Start};
+use crate::record::classify::status;
+use crate::record::{Record, valid};
+use rattlemap_dynamics::model::{Oscillator, REST, State};
+
+/// Displacements are drawn within this many scales of length of the middle, velocities within as
+/// many times what that is as a velocity: the attractors of the paper's plane lie inside.
+const REACH: f64 = 4.0;
+
+/// The starts of every cell, in units of the cell's own.
+#[derive(Clone, Debug)]
+pub(super) struct Starts {
+    policy: Start,
+    /// Further starts; the same in every cell, so that what differs between neighbours is the
+    /// cell and not the draw.
+    drawn: Vec<[f64; 4]>,
+}
+
+impl Starts {
+    pub(super) fn new(policy: Start, draw: Option<Draw>) -> Starts {
+        let Draw { count, seed } = draw.unwrap_or(Draw { count: 1, seed: 0 });
+        let mut random = Random::new(u64::from(seed));
+        let drawn = (1..count).map(|_| std::array::from_fn(|_| 2.0 * random.unit() - 1.0)).collect();
+        Starts { policy, drawn }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        1 + self.drawn.len()
+    }
+
+    pub(super) fn policy(&self) -> Start {
+        self.policy
+    }
+
+    /// The policy's own start.
+    pub(super) fn first(&self) -> State {
+        match self.policy {
+            Start::State(state) => state,
+            Start::Rest | Start::Up | Start::Down => REST,
+        }
+    }
+
+    /// The `nth` start, from 1 on, `l` the scale of length: the gap anywhere between the walls, or within
+    /// `2 l` of the only one, the second displacement within `4 l`, both velocities within `4 l omega`.
+    pub(super) fn drawn(&self, nth: usize, oscillator: &Oscillator) -> State {
+        let [gap, v1, x2, v2] = self.drawn[nth - 1];
+        let length = oscillator.length_scale();
+        let [right, left] = match oscillator.walls {
+            [f64::INFINITY, f64::NEG_INFINITY] => [length, -length],
+            [f64::INFINITY, left] => [left + 2.0 * length, left],
+            [right, f64::NEG_INFINITY] => [right, right - 2.0 * length],
+            both => both,
+        };
+        let (middle, half) = (0.5 * (right + left), 0.5 * (right - left));
+        let (z, x2) = (middle + half * gap, REACH * length * x2);
+        let speed = REACH * length * oscillator.omega;
+        let [g1, g2] = oscillator.gap;
+        [(z - g2 * x2) / g1, speed * v1, x2, speed * v2]
+    }
+}
+
+/// Where a run starts whose neighbour has this record.
+pub(crate) fn followed(record: Option<&Record>) -> State {
+    let usable = |record: &&Record| {
+        record.valid & valid::STROBE != 0
+            && !status(record).is_failure()
+            && record.strobe.iter().all(|x| x.is_finite())
+    };
+    record.filter(usable).map_or(REST, |record| record.strobe)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::GearPair;
+    use rattlemap_dynamics::orbit::Status;
+
+    #[test]
+    fn drawn_starts_lie_on_the_free_side_of_a_single_wall() {
+        let starts = Starts::new(Start::Rest, Some(Draw { count: 200, seed: 7 }));
+        let pair = GearPair::paper(0.5).oscillator().unwrap();
+        for (walls, [low, high]) in [
+            ([0.25, f64::NEG_INFINITY], [-3.75, 0.25]),
+            ([f64::INFINITY, 0.25], [0.25, 4.25]),
+            ([f64::INFINITY, f64::NEG_INFINITY], [-2.0, 2.0]),
+        ] {
+            let oscillator = Oscillator { walls, force: [64.0, 0.0], omega: 1.0, ..pair };
+            for nth in 1..200 {
+                let y = starts.drawn(nth, &oscillator);
+                let gap = y[0] - y[2];
+                assert!((low..=high).contains(&gap) && y.iter().all(|x| x.is_finite()), "{walls:?}: {y:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn drawn_starts_scale_with_the_cell_and_lie_between_the_walls() {
+        let starts = Starts::new(Start::Rest, Some(Draw { count: 200, seed: 7 }));
+        assert_eq!((starts.count(), starts.first()), (200, REST));
+        let of = |pair: GearPair| pair.oscillator().unwrap();
+        let small = of(GearPair::paper(0.5));
+        let large = of(GearPair { b: 1.0, omega: 2.0 * small.omega, ..GearPair::paper(0.5) });
+        let mut seen = [[0.0f64; 2]; 2];
+        for nth in 1..200 {
+            let (a, b) = (starts.drawn(nth, &small), starts.drawn(nth, &large));
+            let gap = a[0] - a[2];
+            assert!(gap.abs() < 0.5 && a[2].abs() < 2.0, "{a:?}");
+            // Twice the backlash and twice the frequency.
+            for (a, b, scale) in [(a[0], b[0], 2.0), (a[1], b[1], 4.0), (a[2], b[2], 2.0), (a[3], b[3], 4.0)]
+            {
+                assert!((b - scale * a).abs() < 1e-12 * (1.0 + b.abs()));
+            }
+            for (range, x) in seen.iter_mut().zip([gap / 0.5, a[3] / (2.0 * small.omega)]) {
+                *range = [range[0].min(x), range[1].max(x)];
+            }
+        }
+        assert!(seen.iter().all(|[low, high]| *low < -0.95 && *high > 0.95), "{seen:?}");
+        let other = Starts::new(Start::Rest, Some(Draw { count: 200, seed: 8 }));
+        assert_ne!(starts.drawn(1, &small), other.drawn(1, &small));
+    }
+
+    #[test]
+    fn a_neighbour_without_an_end_leaves_rest() {
+        let end = [1.0, 2.0, 3.0, 4.0];
+        let record = Record { strobe: end, valid: valid::STROBE, ..Record::default() };
+        assert_eq!(followed(Some(&record)), end);
+        let failed = Record { status: Status::CapEvents.code(), ..record };
+        let wild = Record { strobe: [f64::NAN; 4], ..record };
+        for record in [None, Some(&failed), Some(&wild), Some(&Record::default())] {
+            assert_eq!(followed(record), REST, "{record:?}");
+        }
+    }
+}

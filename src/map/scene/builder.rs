@@ -1,0 +1,254 @@
+//! A scene built in Rust. It is written down as TOML and read like any other: one set of rules,
+//! one set of errors, and a text for manifests.
+
+use std::fmt::Write;
+use std::ops::RangeInclusive;
+
+use super::document;
+use super::error::Place;
+use super::settings::{Continuous, Format, Integration, Quantity, Refine, Steps};
+use super::{Draw, Purpose, Scene, SceneError, Start};
+use rattlemap_dynamics::model::Model;
+
+/// What is asked, step by step; [`SceneBuilder::build`] looks at all of it. What is not said is as
+/// in a scene file that does not say it.
+///
+/// ```
+/// use rattlemap::map::scene::Scene;
+/// use rattlemap::model::GearPair;
+///
+/// let pair = GearPair { k: 800.0, ..GearPair::paper(0.5) };
+/// let scene = Scene::builder(pair).axis("e", 0.0..=1.0, 64).axis("omega", 1.0..=12.0, 64);
+/// assert_eq!(scene.build()?.cell_count(), 4096);
+/// let wrong = Scene::builder(pair).axis("e", 0.0..=1.5, 64).axis("omega", 1.0..=12.0, 64);
+/// let error = wrong.build().unwrap_err().to_string();
+/// assert_eq!(error, "scene: `axis.0.max = 1.5` is out of range: it must be between 0 and 1, as `e` is");
+/// # Ok::<(), rattlemap::map::scene::SceneError>(())
+/// ```
+#[derive(Clone, Debug)]
+#[must_use]
+pub struct SceneBuilder {
+    model: Box<dyn Model>,
+    title: Option<String>,
+    parameters: Vec<(String, f64)>,
+    axes: Vec<(String, RangeInclusive<f64>, u32)>,
+    integration: Option<Integration>,
+    start: Start,
+    draw: Option<Draw>,
+    refine: Option<Refine>,
+    quantities: Option<Vec<Quantity>>,
+    files: Option<Vec<Format>>,
+}
+
+impl SceneBuilder {
+    /// Cells have the model's values, but for those of the axes.
+    pub(super) fn new(model: Box<dyn Model>) -> SceneBuilder {
+        SceneBuilder {
+            model,
+            title: None,
+            parameters: Vec::new(),
+            axes: Vec::new(),
+            integration: None,
+            start: Start::Rest,
+            draw: None,
+            refine: None,
+            quantities: None,
+            files: None,
+        }
+    }
+
+    /// The heading of figures and reports.
+    pub fn title(mut self, title: &str) -> SceneBuilder {
+        self.title = Some(title.to_owned());
+        self
+    }
+
+    /// Sets a parameter that no axis sweeps.
+    pub fn parameter(mut self, name: &str, value: f64) -> SceneBuilder {
+        self.parameters.push((name.to_owned(), value));
+        self
+    }
+
+    /// Sweeps a parameter over `count` values, both ends included. The first axis is along columns.
+    pub fn axis(mut self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
+        self.axes.push((parameter.to_owned(), range, count));
+        self
+    }
+
+    /// How long each cell is integrated, and what for.
+    pub fn integration(mut self, integration: Integration) -> SceneBuilder {
+        self.integration = Some(integration);
+        self
+    }
+
+    /// Where cells start: at rest unless told.
+    pub fn start(mut self, start: Start) -> SceneBuilder {
+        self.start = start;
+        self
+    }
+
+    /// Several starts per cell, which are drawn beside the first.
+    pub fn draw(mut self, draw: Draw) -> SceneBuilder {
+        self.draw = Some(draw);
+        self
+    }
+
+    /// Makes the map adaptive.
+    pub fn refine(mut self, refine: Refine) -> SceneBuilder {
+        self.refine = Some(refine);
+        self
+    }
+
+    /// What is computed: class and Lyapunov exponent unless told.
+    pub fn quantities(mut self, quantities: &[Quantity]) -> SceneBuilder {
+        self.quantities = Some(quantities.to_vec());
+        self
+    }
+
+    /// What is written, if anything is: all kinds of file unless told.
+    pub fn files(mut self, files: &[Format]) -> SceneBuilder {
+        self.files = Some(files.to_vec());
+        self
+    }
+
+    /// The scene of a map over two axes.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first thing that is wrong.
+    pub fn build(self) -> Result<Scene, SceneError> {
+        self.build_for(Purpose::Map)
+    }
+
+    /// A scene for this purpose.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first thing that is wrong.
+    pub fn build_for(self, purpose: Purpose) -> Result<Scene, SceneError> {
+        let text = self.text();
+        let document = document::read(&text, "scene")?.placed(Place::Builder);
+        Scene::read(text, &document, &*self.model, purpose)
+    }
+
+    /// The scene in TOML.
+    fn text(&self) -> String {
+        let mut text = String::new();
+        let mut line = |line: String| {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{line}");
+        };
+        self.title.iter().for_each(|title| line(format!("title = {}", quoted(title))));
+        line(format!("model = {}", quoted(self.model.name())));
+        line("\n[parameters]".to_owned());
+        let mut parameters = self.parameters.clone();
+        for (index, parameter) in self.model.parameters().iter().enumerate() {
+            let (name, value) = (&*parameter.name, self.model.value(index));
+            let is_told = parameters.iter().any(|(told, _)| told == name)
+                || self.axes.iter().any(|(swept, ..)| swept == name);
+            if !is_told && parameter.default != Some(value) {
+                parameters.push((name.to_owned(), value));
+            }
+        }
+        // A later value wins over an earlier one.
+        for (i, (name, value)) in parameters.iter().enumerate() {
+            if !parameters[i + 1..].iter().any(|(later, _)| later == name) {
+                line(format!("{} = {}", quoted(name), number(*value)));
+            }
+        }
+        for (name, range, count) in &self.axes {
+            let (min, max) = (number(*range.start()), number(*range.end()));
+            line(format!(
+                "\n[[axis]]\nparameter = {}\nmin = {min}\nmax = {max}\ncount = {count}",
+                quoted(name)
+            ));
+        }
+        self.integration.iter().for_each(|integration| line(integration_table(integration)));
+        line(self.start_table());
+        self.refine.iter().for_each(|refine| line(refine_table(refine)));
+        line("\n[outputs]".to_owned());
+        let names = |names: Vec<&str>| names.into_iter().map(quoted).collect::<Vec<_>>().join(", ");
+        if let Some(quantities) = &self.quantities {
+            let list = names(quantities.iter().map(|quantity| quantity.name()).collect());
+            line(format!("quantities = [{list}]"));
+        }
+        if let Some(files) = &self.files {
+            line(format!("files = [{}]", names(files.iter().map(|format| format.name()).collect())));
+        }
+        text
+    }
+
+    fn start_table(&self) -> String {
+        let policy = match self.start {
+            Start::Rest => "\"rest\"".to_owned(),
+            Start::Up => "\"up\"".to_owned(),
+            Start::Down => "\"down\"".to_owned(),
+            Start::State(state) => {
+                // Components that the model has not are written only where somebody gave them, and then refused.
+                let count = self.model.state_names().len();
+                let is_its_own = state[count..].iter().all(|&x| x == 0.0);
+                let told = if is_its_own { &state[..count] } else { &state[..] };
+                let numbers: Vec<String> = told.iter().map(|&x| number(x)).collect();
+                format!("\"state\"\nstate = [{}]", numbers.join(", "))
+            }
+        };
+        let draw = self.draw.map(|Draw { count, seed }| format!("\ncount = {count}\nseed = {seed}"));
+        format!("\n[start]\npolicy = {policy}{}", draw.unwrap_or_default())
+    }
+}
+
+fn integration_table(integration: &Integration) -> String {
+    let Integration {
+        steps_per_period,
+        transient_periods,
+        observed_periods,
+        early_stop,
+        undecided_periods,
+        max_period,
+    } = integration;
+    let steps = match steps_per_period {
+        Steps::Auto => "\"auto\"".to_owned(),
+        Steps::PerPeriod(steps) => steps.to_string(),
+    };
+    format!(
+        "\n[integration]\nsteps_per_period = {steps}\ntransient_periods = {transient_periods}\n\
+         observed_periods = {observed_periods}\nearly_stop = {early_stop}\n\
+         undecided_periods = {undecided_periods}\nmax_period = {max_period}"
+    )
+}
+
+fn refine_table(refine: &Refine) -> String {
+    let Refine { minimum_grid, rounds, max_error, audit, word, continuous } = *refine;
+    let continuous = match continuous {
+        Continuous::Interpolated => "interpolated",
+        Continuous::Empty => "empty",
+    };
+    let max_error = number(max_error);
+    let optional = |name, value: Option<u32>| value.map_or(String::new(), |n| format!("\n{name} = {n}"));
+    format!(
+        "\n[refine]\nminimum_grid = {minimum_grid}\nmax_error = {max_error}\nword = {word}\n\
+         continuous = \"{continuous}\"{}{}",
+        optional("rounds", rounds),
+        optional("audit", audit)
+    )
+}
+
+/// A TOML string, or a key that any name fits.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from('"');
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if c.is_control() => {
+                // Writing to a String cannot fail.
+                let _ = write!(quoted, "\\u{:04X}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+/// The shortest decimal that reads back as the same number, as TOML writes it.
+fn number(x: f64) -> String {
+    if x.is_nan() { "nan".to_owned() } else { format!("{x:?}") }
+}

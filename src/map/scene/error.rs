@@ -1,0 +1,158 @@
+//! Why a scene is refused, with the place, the value and the remedy.
+
+use std::fmt;
+use std::sync::Arc;
+
+use rattlemap_dynamics::model::ModelError;
+use thiserror::Error;
+
+/// Where the text that has to change stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Place {
+    /// A spot in a scene file; line and column count from 1, columns in characters.
+    Text {
+        /// The file as it was named by the caller.
+        file: Arc<str>,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+    },
+    /// A `--set` argument, which wins over the file.
+    Set {
+        /// `NAME=VALUE` as it was given.
+        argument: Arc<str>,
+    },
+    /// A file that could not be read at all.
+    File {
+        /// The file as it was named by the caller.
+        file: Arc<str>,
+    },
+    /// A scene that was built without a file.
+    Builder,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Text { file, line, column } => write!(f, "{file}:{line}:{column}"),
+            Place::Set { argument } => write!(f, "--set {argument}"),
+            Place::File { file } => write!(f, "{file}"),
+            Place::Builder => write!(f, "scene"),
+        }
+    }
+}
+
+/// A scene that cannot be run; its text is one line that says how to mend it.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{place}: {problem}")]
+pub struct SceneError {
+    /// Where it stands.
+    pub place: Place,
+    /// What is wrong there.
+    pub problem: Problem,
+}
+
+/// What can be wrong with a scene. Fields are full paths as `--set` takes them.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum Problem {
+    /// The file could not be read.
+    #[error("cannot read the scene ({reason}); give the path of a TOML file such as scenes/smoke.toml")]
+    Unreadable {
+        /// The operating system's words.
+        reason: String,
+    },
+    /// The text is not TOML.
+    #[error("not valid TOML: {message}; the line reads `{line}`")]
+    Syntax {
+        /// The parser's words.
+        message: String,
+        /// The offending line.
+        line: String,
+    },
+    /// A `--set` argument without a name, a value, or the equals sign between them.
+    #[error("expected NAME=VALUE, such as e=0.6 or integration.max_period=32")]
+    NotAnAssignment,
+    /// A field that scenes do not have.
+    #[error("unknown field `{field} = {value}`; {remedy}")]
+    UnknownField {
+        /// The field.
+        field: String,
+        /// Its value as written.
+        value: String,
+        /// The nearest known name, and all of them.
+        remedy: String,
+    },
+    /// A value that must be one of a list of names and is not.
+    #[error("`{field} = {value}` is not known; {remedy}")]
+    UnknownName {
+        /// The field.
+        field: String,
+        /// Its value as written.
+        value: String,
+        /// The nearest known name, and all of them.
+        remedy: String,
+    },
+    /// A value of the wrong type.
+    #[error("`{field} = {value}` has the wrong type: it must be {expected}")]
+    WrongType {
+        /// The field.
+        field: String,
+        /// Its value as written.
+        value: String,
+        /// What it must be.
+        expected: String,
+    },
+    /// A value outside its range.
+    #[error("`{field} = {value}` is out of range: it must be {requirement}")]
+    OutOfRange {
+        /// The field.
+        field: String,
+        /// Its value as written.
+        value: String,
+        /// What it must be.
+        requirement: String,
+    },
+    /// A required field that is not there.
+    #[error("`{field}` is missing; {remedy}")]
+    Missing {
+        /// The field.
+        field: String,
+        /// What to write.
+        remedy: String,
+    },
+    /// Parameters that are fine one by one, and together make no oscillator.
+    #[error("{}{reason}; change the parameters", if .cell.is_empty() { String::new() } else { format!("at {cell}: ") })]
+    NoMotion {
+        /// The axes' values there; empty where there are no axes.
+        cell: String,
+        /// Why there is no motion.
+        reason: Box<ModelError>,
+    },
+    /// A value that is fine by itself but not beside another.
+    #[error("`{field} = {value}` does not fit: {remedy}")]
+    Conflict {
+        /// The field.
+        field: String,
+        /// Its value as written.
+        value: String,
+        /// The other value, and which one to change.
+        remedy: String,
+    },
+}
+
+/// The sentence for an unknown name: the nearest known one, if any is near, and all of them.
+pub(super) fn suggest(name: &str, known: &[&str]) -> String {
+    let distance =
+        |candidate: &str| strsim::damerau_levenshtein(&candidate.to_lowercase(), &name.to_lowercase());
+    let all = known.join(", ");
+    let length = name.chars().count();
+    // One slip per three letters; a name that is all slips resembles nothing.
+    let near = |slips: usize| slips <= (length / 3).max(1) && slips < length;
+    match known.iter().min_by_key(|candidate| distance(candidate)) {
+        Some(nearest) if near(distance(nearest)) => {
+            format!("did you mean `{nearest}`? valid names: {all}")
+        }
+        _ => format!("valid names: {all}"),
+    }
+}

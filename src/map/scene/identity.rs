@@ -1,0 +1,58 @@
+//! What makes two scenes the same to a computer: everything that a cell's record depends on.
+
+use super::{DEFAULT_MODEL, Scene, Start, Steps};
+
+impl Scene {
+    /// Names and values of all that records depend on, in a fixed order: axes, parameters,
+    /// integration, start and quantities. Title and kinds of file are left out.
+    pub fn identity(&self) -> Vec<(String, String)> {
+        let mut list = Vec::new();
+        let mut tell = |name: String, value: String| list.push((name, value));
+        let model = self.base();
+        if model.name() != DEFAULT_MODEL {
+            tell("model".into(), model.name().to_owned());
+        }
+        for (i, axis) in self.axes().iter().enumerate() {
+            tell(format!("axis.{i}.parameter"), axis.parameter().name.to_string());
+            tell(format!("axis.{i}.min"), format!("{:?}", axis.min()));
+            tell(format!("axis.{i}.max"), format!("{:?}", axis.max()));
+            tell(format!("axis.{i}.count"), axis.count().to_string());
+        }
+        for (name, value) in self.fixed() {
+            tell(format!("parameters.{name}"), format!("{value:?}"));
+        }
+        let integration = self.integration();
+        let steps = match integration.steps_per_period {
+            Steps::Auto => "auto".to_owned(),
+            Steps::PerPeriod(steps) => steps.to_string(),
+        };
+        tell("integration.steps_per_period".into(), steps);
+        tell("integration.transient_periods".into(), integration.transient_periods.to_string());
+        tell("integration.observed_periods".into(), integration.observed_periods.to_string());
+        tell("integration.early_stop".into(), integration.early_stop.to_string());
+        tell("integration.undecided_periods".into(), integration.undecided_periods.to_string());
+        tell("integration.max_period".into(), integration.max_period.to_string());
+        let start = match self.start() {
+            Start::Rest => "rest".to_owned(),
+            Start::State(state) => format!("state {state:?}"),
+            Start::Up => "up".to_owned(),
+            Start::Down => "down".to_owned(),
+        };
+        tell("start".into(), start);
+        if let Some(draw) = self.draw() {
+            tell("start.count".into(), draw.count.to_string());
+            tell("start.seed".into(), draw.seed.to_string());
+        }
+        if let Some(refine) = self.refine() {
+            tell("refine.minimum_grid".into(), refine.minimum_grid.to_string());
+            tell("refine.rounds".into(), refine.rounds.map_or("all".to_owned(), |n| n.to_string()));
+            tell("refine.word".into(), refine.word.to_string());
+            tell("refine.max_error".into(), format!("{:?}", refine.max_error));
+            tell("refine.audit".into(), refine.audit.map_or("default".to_owned(), |n| n.to_string()));
+        }
+        let mut quantities = self.outputs().quantities.clone();
+        quantities.sort_unstable();
+        tell("outputs.quantities".into(), format!("{quantities:?}").to_lowercase());
+        list
+    }
+}

@@ -1,0 +1,296 @@
+//! `[integration]`, `[refine]` and `[outputs]`.
+
+use super::Purpose;
+use super::document::Value;
+use super::error::SceneError;
+use super::section::Section;
+use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
+use rattlemap_dynamics::orbit;
+
+/// The most forcing periods that one field may ask for.
+const MAX_PERIODS: u32 = 1_000_000_000;
+
+/// How fine the lanes' time grid is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Steps {
+    /// Chosen per cell from its fastest motion.
+    Auto,
+    /// The same number of steps per forcing period everywhere.
+    PerPeriod(u32),
+}
+
+/// How long each cell is integrated, and what for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Integration {
+    /// Grid of the lane engines; the event-driven reference has none.
+    pub steps_per_period: Steps,
+    /// Forcing periods before anything is observed.
+    pub transient_periods: u32,
+    /// Forcing periods to observe.
+    pub observed_periods: u32,
+    /// Whether a lane may stop as soon as its class is certain.
+    pub early_stop: bool,
+    /// Periods that undecided cells get beyond these; with early stops alone.
+    pub undecided_periods: u32,
+    /// Longest cycle that is searched for, at most half the observed periods.
+    pub max_period: u32,
+}
+
+impl Default for Integration {
+    fn default() -> Self {
+        let orbit::Settings { transient_periods, observed_periods, max_period } = Default::default();
+        Integration {
+            steps_per_period: Steps::Auto,
+            transient_periods,
+            observed_periods,
+            early_stop: true,
+            undecided_periods: 0,
+            max_period,
+        }
+    }
+}
+
+impl From<&Integration> for orbit::Settings {
+    fn from(integration: &Integration) -> Self {
+        orbit::Settings {
+            transient_periods: integration.transient_periods,
+            observed_periods: integration.observed_periods,
+            max_period: integration.max_period,
+        }
+    }
+}
+
+/// Bounds of an adaptive map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refine {
+    /// Every this many cells along an axis one is integrated in any case.
+    pub minimum_grid: u32,
+    /// Times that blocks are halved at most; none for as many as it takes to come down to single cells.
+    /// Where the audit finds a wrong cell its block is cut down all the same.
+    pub rounds: Option<u32>,
+    /// Fraction of the filled cells that may be wrong, as the audit measures it.
+    pub max_error: f64,
+    /// Filled cells that one audit integrates at first, up to sixteen times as many where the result may be
+    /// chance; none for [`AUDIT`], or a quarter of the filled ones if that is less.
+    pub audit: Option<u32>,
+    /// Whether a change of the word alone is a border, where the scene asks for words. At low
+    /// frequencies words change from one cell to the next but few, while class, period and
+    /// symmetry stay.
+    pub word: bool,
+    /// What filled cells show of quantities that vary continuously.
+    pub continuous: Continuous,
+}
+
+/// Filled cells that one audit integrates unless told otherwise: enough to see an error of 0.3 %.
+pub const AUDIT: u32 = 2000;
+
+impl Default for Refine {
+    fn default() -> Self {
+        Refine {
+            minimum_grid: 8,
+            rounds: None,
+            max_error: 0.003,
+            audit: None,
+            word: false,
+            continuous: Continuous::Interpolated,
+        }
+    }
+}
+
+impl Refine {
+    /// How many of `filled` cells an audit integrates. Unless told it leaves three quarters of a
+    /// small map alone: to integrate all of it would be no refinement.
+    pub fn audited(&self, filled: usize) -> usize {
+        match self.audit {
+            Some(cells) => filled.min(cells as usize),
+            None => filled.div_ceil(4).min(AUDIT as usize),
+        }
+    }
+}
+
+/// What filled cells show of exponent, impacts and mesh fraction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Continuous {
+    /// The bilinear average of the corners around them.
+    Interpolated,
+    /// Nothing.
+    Empty,
+}
+
+/// What can be asked of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Periodic, chaotic, undecided or failed, and the period.
+    Class,
+    /// Largest Lyapunov exponent.
+    Lyapunov,
+    /// Impacts per forcing period.
+    Impacts,
+    /// Fraction of the time spent meshing.
+    Mesh,
+    /// Whether a periodic orbit is its own mirror image.
+    Symmetric,
+    /// Mapping word.
+    Word,
+}
+
+/// What can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Text table.
+    Csv,
+    /// Structured array.
+    Npy,
+    /// Figure.
+    Png,
+    /// Interactive report.
+    Html,
+}
+
+/// What is computed and written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outputs {
+    /// Quantities of a map's cells; a bifurcation diagram always has its section points.
+    pub quantities: Vec<Quantity>,
+    /// Kinds of file.
+    pub files: Vec<Format>,
+}
+
+const QUANTITIES: [(&str, Quantity); 6] = [
+    ("class", Quantity::Class),
+    ("lyapunov", Quantity::Lyapunov),
+    ("impacts", Quantity::Impacts),
+    ("mesh", Quantity::Mesh),
+    ("symmetric", Quantity::Symmetric),
+    ("word", Quantity::Word),
+];
+const FORMATS: [(&str, Format); 4] =
+    [("csv", Format::Csv), ("npy", Format::Npy), ("png", Format::Png), ("html", Format::Html)];
+
+impl Quantity {
+    /// The name in scenes.
+    pub fn name(self) -> &'static str {
+        name(&QUANTITIES, self)
+    }
+}
+
+impl Format {
+    /// The name in scenes.
+    pub fn name(self) -> &'static str {
+        name(&FORMATS, self)
+    }
+}
+
+fn name<T: PartialEq>(names: &[(&'static str, T)], thing: T) -> &'static str {
+    names.iter().find(|(_, named)| *named == thing).map_or("", |&(name, _)| name)
+}
+
+pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneError> {
+    let known = [
+        "steps_per_period",
+        "transient_periods",
+        "observed_periods",
+        "early_stop",
+        "undecided_periods",
+        "max_period",
+    ];
+    let section = root.section("integration", &known)?;
+    let periods = |name, default| match section.get(name) {
+        Some(field) => field.whole(1..=MAX_PERIODS),
+        None => Ok(default),
+    };
+    let default = Integration::default();
+    let transient_periods = periods("transient_periods", default.transient_periods)?;
+    let observed_periods = match section.get("observed_periods") {
+        // A cycle counts only once it has come round twice.
+        Some(field) => field.whole(2..=MAX_PERIODS)?,
+        None => default.observed_periods,
+    };
+    Ok(Integration {
+        steps_per_period: read_steps(&section)?,
+        transient_periods,
+        observed_periods,
+        early_stop: section.get("early_stop").map_or(Ok(default.early_stop), |field| field.flag())?,
+        undecided_periods: section
+            .get("undecided_periods")
+            .map_or(Ok(default.undecided_periods), |field| field.whole(0..=MAX_PERIODS))?,
+        max_period: read_max_period(&section, observed_periods)?,
+    })
+}
+
+fn read_steps(section: &Section<'_>) -> Result<Steps, SceneError> {
+    let Some(field) = section.get("steps_per_period") else { return Ok(Steps::Auto) };
+    match &field.node.value {
+        Value::Text(text) if text == "auto" => Ok(Steps::Auto),
+        Value::Integer(_) => Ok(Steps::PerPeriod(field.whole(1..=MOST_STEPS)?)),
+        _ => Err(field.wrong_type(&format!("\"auto\" or a whole number from 1 to {MOST_STEPS}"))),
+    }
+}
+
+fn read_max_period(section: &Section<'_>, observed_periods: u32) -> Result<u32, SceneError> {
+    let Some(field) = section.get("max_period") else {
+        return Ok(Integration::default().max_period.min(observed_periods / 2));
+    };
+    let max_period = field.whole(1..=LONGEST_CYCLE)?;
+    if max_period > observed_periods / 2 {
+        return Err(field.conflict(format!(
+            "a cycle has to come round twice, so `integration.observed_periods = {observed_periods}` must be at least {}",
+            2 * max_period
+        )));
+    }
+    Ok(max_period)
+}
+
+pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option<Refine>, SceneError> {
+    let known = ["minimum_grid", "rounds", "max_error", "audit", "word", "continuous"];
+    let section = root.section("refine", &known)?;
+    if !section.is_present() {
+        return Ok(None);
+    }
+    if let (Purpose::Bifurcation, Some(field)) = (purpose, root.get("refine")) {
+        return Err(field.conflict("`bifurcation` integrates every column; drop [refine]".into()));
+    }
+    let default = Refine::default();
+    let max_error = match section.get("max_error") {
+        Some(field) => {
+            let value = field.number()?;
+            if !(value > 0.0 && value < 1.0) {
+                return Err(field.out_of_range("a fraction between 0 and 1, ends excluded"));
+            }
+            value
+        }
+        None => default.max_error,
+    };
+    let minimum_grid =
+        section.get("minimum_grid").map_or(Ok(default.minimum_grid), |field| field.whole(1..=1024))?;
+    let rounds = section.get("rounds").map(|field| field.whole(0..=32)).transpose()?;
+    let audit = section.get("audit").map(|field| field.whole(1..=10_000_000)).transpose()?;
+    let word = section.get("word").map_or(Ok(default.word), |field| field.flag())?;
+    let continuous = match section.get("continuous") {
+        Some(field) => {
+            field.choice(&[("interpolated", Continuous::Interpolated), ("empty", Continuous::Empty)])?
+        }
+        None => default.continuous,
+    };
+    Ok(Some(Refine { minimum_grid, rounds, max_error, audit, word, continuous }))
+}
+
+pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {
+    let section = root.section("outputs", &["quantities", "files"])?;
+    let quantities = match section.get("quantities") {
+        Some(field) => field.choices(&QUANTITIES)?,
+        None => vec![Quantity::Class, Quantity::Lyapunov],
+    };
+    // A diagram's points have no fixed number per column, so there is no array of it.
+    let writable = match purpose {
+        Purpose::Map => vec![Format::Csv, Format::Npy, Format::Png, Format::Html],
+        Purpose::Bifurcation => vec![Format::Csv, Format::Png],
+    };
+    let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: writable }) };
+    let files = field.choices(&FORMATS)?;
+    if let Some(i) = files.iter().position(|format| !writable.contains(format)) {
+        let name = files[i].name();
+        return Err(field.conflict(format!("`bifurcation` writes csv and png; drop \"{name}\"")));
+    }
+    Ok(Outputs { quantities, files })
+}

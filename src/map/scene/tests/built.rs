@@ -1,0 +1,142 @@
+use rattlemap_dynamics::model::{
+    Boxed, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Stops,
+};
+
+use super::*;
+use crate::map::plan::Plan;
+use crate::map::scene::{Continuous, Draw, Integration, Refine, SceneBuilder};
+
+fn built() -> SceneBuilder {
+    Scene::builder(GearPair::paper(0.5)).axis("e", 0.0..=1.0, 4).axis("omega", 1.0..=12.0, 8)
+}
+
+fn refusal(builder: SceneBuilder) -> String {
+    builder.build().unwrap_err().to_string()
+}
+
+/// What is built is what the same scene in TOML is, and its own text says so.
+#[test]
+fn a_built_scene_is_the_one_that_its_text_describes() {
+    let pair = GearPair { k: 900.0, ..GearPair::paper(0.5) };
+    let scene = Scene::builder(pair)
+        .title("A \"map\" \u{3c9}\\")
+        .parameter("F", 41.0)
+        .parameter("F", 40.0)
+        .axis("e", 0.0..=1.0, 4)
+        .axis("omega", 1.0..=12.0, 8)
+        .integration(Integration { steps_per_period: Steps::PerPeriod(512), ..Integration::default() })
+        .start(Start::State([0.1, -1e-7, 1e300, 0.0]))
+        .quantities(&[Quantity::Word, Quantity::Class])
+        .files(&[Format::Npy])
+        .build()
+        .unwrap();
+    assert_eq!(*scene.base(), GearPair { force: 40.0, omega: 1.0, e: 0.0, ..pair });
+    assert_eq!(
+        (scene.title(), scene.start()),
+        ("A \"map\" \u{3c9}\\", Start::State([0.1, -1e-7, 1e300, 0.0]))
+    );
+    let read = Scene::parse(scene.text(), "s.toml", &[], Purpose::Map).unwrap();
+    assert_eq!(read.identity(), scene.identity());
+    assert_eq!((read.title(), read.outputs()), (scene.title(), scene.outputs()));
+    let refine =
+        Refine { rounds: Some(3), audit: Some(9), continuous: Continuous::Empty, ..Refine::default() };
+    for builder in
+        [built().refine(refine), built().draw(Draw { count: 3, seed: 7 }), built().start(Start::Up), built()]
+    {
+        let scene = builder.build().unwrap();
+        let read = Scene::parse(scene.text(), "s.toml", &[], Purpose::Map).unwrap();
+        assert_eq!((read.identity(), read.refine()), (scene.identity(), scene.refine()));
+    }
+}
+
+/// The same rules as for files, with the remedy and without a place in a text that nobody wrote.
+#[test]
+fn what_is_wrong_with_a_built_scene_is_said() {
+    for (builder, expected) in [
+        (built().parameter("mass", 1.0), "scene: unknown field `parameters.mass = 1.0`"),
+        (built().parameter("k", f64::NAN), "scene: `parameters.k = nan` is out of range"),
+        (built().parameter("e", 0.5), "scene: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`"),
+        (built().axis("k", 1.0..=2.0, 2), "`map` needs 2 axes"),
+        (built().quantities(&[]), "scene: `outputs.quantities = []` is out of range"),
+        (
+            built().integration(Integration { observed_periods: 10, ..Integration::default() }),
+            "scene: `integration.max_period = 64` does not fit",
+        ),
+        (built().start(Start::Up).draw(Draw { count: 2, seed: 1 }), "one start each"),
+        (
+            Scene::builder(GearPair::paper(2.0)).axis("k", 1.0..=2.0, 2).axis("r", 1.0..=2.0, 2),
+            "`parameters.e = 2.0`",
+        ),
+        (
+            Scene::builder(GearPair::paper(0.5)).axis("k", 2.0..=1.0, 2).axis("r", 1.0..=2.0, 2),
+            "`axis.0.max = 1.0`",
+        ),
+    ] {
+        assert_says(&refusal(builder), &[expected]);
+    }
+    let stops =
+        Scene::builder(Stops::with_restitution(0.5)).axis("F", 1.0..=2.0, 2).axis("omega", 1.0..=2.0, 2);
+    assert_says(&refusal(stops.start(Start::State([0.0, 0.0, 1.0, 0.0]))), &["two finite numbers, [x, v]"]);
+}
+
+/// A model whose parameters may be in range and make no oscillator: damping that is negative up to `wrong_to`.
+#[derive(Clone, Debug, PartialEq)]
+struct Driven(Stops, [f64; 2]);
+
+impl Model for Driven {
+    fn name(&self) -> &str {
+        "driven"
+    }
+
+    fn title(&self) -> &str {
+        "Driven"
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        Stops::PARAMETERS
+    }
+
+    fn value(&self, index: usize) -> f64 {
+        self.0.value(index)
+    }
+
+    fn assign(&mut self, index: usize, value: f64) {
+        self.0.assign(index, value);
+    }
+
+    fn oscillator(&self) -> Result<Oscillator, ModelError> {
+        let mut oscillator = self.0.oscillator()?;
+        if (self.1[0]..self.1[1]).contains(&self.0.omega) {
+            oscillator.free.damping[0][0] = -1.0;
+        }
+        Ok(oscillator)
+    }
+
+    fn law(&self) -> Law {
+        self.0.law()
+    }
+
+    fn state_names(&self) -> Vec<&str> {
+        vec!["x", "v"]
+    }
+}
+
+/// Nothing is computed where the model has no motion: a corner is refused with the scene, the rest by the plan.
+#[test]
+fn cells_without_motion_are_named_before_anything_is_computed() {
+    let scene = |wrong: [f64; 2]| {
+        let model = Driven(Stops::with_restitution(0.5), wrong);
+        assert_eq!(*model.boxed(), model);
+        Scene::builder(model).axis("F", 1.0..=2.0, 3).axis("omega", 1.0..=3.0, 5).build()
+    };
+    let corner = scene([0.0, 1.2]).unwrap_err();
+    assert_says(
+        &corner.to_string(),
+        &["scene: at F = 1.0, omega = 1.0: damping in free motion", "semidefinite"],
+    );
+    let plan = Plan::new(&scene([1.8, 2.2]).unwrap());
+    let inside = plan.check().unwrap_err();
+    assert!(matches!(inside.reason, ModelError::Oscillator(OscillatorError::NotSemidefinite { .. })));
+    assert_says(&inside.to_string(), &["omega = 2.0: damping in free motion"]);
+    assert_eq!(Plan::new(&scene([9.0, 9.5]).unwrap()).check(), Ok(()));
+}

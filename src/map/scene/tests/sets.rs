@@ -1,0 +1,92 @@
+//! `--set`: what it changes, and that its messages name the argument.
+
+use super::*;
+
+fn set_refusal(set: &str) -> String {
+    parse(GOOD, &[set]).expect_err(set).to_string()
+}
+
+#[test]
+fn sets_win_over_the_text() {
+    let sets =
+        ["F=40", "parameters.omega=.7", "axis.0.count=8", "integration.max_period=2", "title=Set", "F=41"];
+    let scene = parse(GOOD, &sets).unwrap();
+    assert_eq!((scene.base().get("F"), scene.base().get("omega")), (Ok(41.0), Ok(0.7)));
+    assert_eq!((scene.axes()[0].count(), scene.title()), (8, "Set"));
+    assert_eq!(scene.integration().max_period, 2);
+    let scene = parse(GOOD, &["start.policy=state", "start.state=[1,2,3,4]", "axis.0.max = 0.5"]).unwrap();
+    assert_eq!((scene.start(), scene.axes()[0].max()), (Start::State([1.0, 2.0, 3.0, 4.0]), 0.5));
+}
+
+#[test]
+fn bad_sets_name_themselves_instead_of_a_line() {
+    let cases = [
+        ("axis.0.count=1", "--set axis.0.count=1: `axis.0.count = 1` is out of range"),
+        ("F=fifty", "--set F=fifty: `parameters.F = fifty` has the wrong type: it must be a number"),
+        ("e=0.5", "--set e=0.5: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`; set `axis.0.min`"),
+        ("omgea=1", "--set omgea=1: unknown field `parameters.omgea = 1`; did you mean `omega`?"),
+        (
+            "integraton.x=1",
+            "--set integraton.x=1: unknown field `integraton = { ... }`; did you mean `integration`?",
+        ),
+        (
+            "axis.1.count=4",
+            "--set axis.1.count=4: unknown field `axis.1.count = 4`; `1` must be a number below 1",
+        ),
+        ("axis.x=4", "`x` must be a number below 1"),
+        ("title.x=4", "--set title.x=4: unknown field `title.x = 4`; `\"A scene\"` has no fields; drop `.x`"),
+        (
+            "start.state=[1,2,nan,4]",
+            "--set start.state=[1,2,nan,4]: `start.state = [1,2,nan,4]` does not fit",
+        ),
+        (
+            "integration=3",
+            "--set integration=3: `integration = 3` has the wrong type: it must be a table, [integration]",
+        ),
+        ("e", "--set e: expected NAME=VALUE"),
+        ("=3", "--set =3: expected NAME=VALUE"),
+        ("F=", "--set F=: expected NAME=VALUE"),
+        ("axis..count=3", "--set axis..count=3: expected NAME=VALUE"),
+    ];
+    for (set, expected) in cases {
+        assert_says(&set_refusal(set), &[expected]);
+    }
+}
+
+#[test]
+fn single_cells_come_from_sets_alone() {
+    let sets = |sets: &[&str]| single_cell(0.605, &sets.iter().map(ToString::to_string).collect::<Vec<_>>());
+    assert_eq!(*sets(&[]).unwrap(), GearPair::paper(0.605));
+    let other = GearPair { k: 900.0, ..GearPair::paper(0.06) };
+    assert_eq!(*sets(&["e=0.06", "parameters.k=900"]).unwrap(), other);
+    assert_says(
+        &sets(&["e=1.5"]).unwrap_err().to_string(),
+        &["--set e=1.5: `parameters.e = 1.5` is out of range"],
+    );
+    assert_says(
+        &sets(&["start.policy=up"]).unwrap_err().to_string(),
+        &["--set start.policy=up: unknown field"],
+    );
+}
+
+/// Arguments win over the text, so an axis that one names does over the text's value.
+#[test]
+fn an_axis_named_by_an_argument_replaces_the_value_of_the_text() {
+    let sets = ["e=0.5", "axis.0.parameter=F", "axis.0.min=40", "axis.0.max=60"];
+    let scene = parse(GOOD, &sets).unwrap();
+    assert_eq!(scene.axes()[0].parameter().name, "F");
+    assert_eq!((scene.base().get("F"), scene.base().get("e")), (Ok(40.0), Ok(0.5)));
+    let both = [&sets[..], &["F=50"]].concat();
+    assert_says(
+        &parse(GOOD, &both).unwrap_err().to_string(),
+        &["--set F=50: `parameters.F = 50` does not fit: axis 0 sweeps `F`"],
+    );
+    // What was the axis has no value any more.
+    assert_says(&parse(GOOD, &sets[1..]).unwrap_err().to_string(), &["restitution", "no default"]);
+    // Text against text stays an error, whatever else of the axis an argument changes.
+    let text = GOOD.replace("\"e\"", "\"F\"");
+    assert_says(
+        &parse(&text, &["e=0.5", "axis.0.max=60"]).unwrap_err().to_string(),
+        &["s.toml:5:5: `parameters.F = 50.0` does not fit: axis 0 sweeps `F`"],
+    );
+}

@@ -1,0 +1,199 @@
+//! Which cells are integrated, in which order, and which need not be. Pure.
+//!
+//! Without `[refine]` every cell is, in Morton order. With it the map is adaptive: cells of a
+//! coarse grid first, then what lies in blocks in which cells are known to differ (in
+//! class, period, and symmetry or word where they are asked for), or that touch one whose corners do,
+//! down to single cells. The rest is filled from the corners around it. An audit then
+//! integrates a random sample of the filled cells. If it finds too many of them wrong, and more
+//! than chance may put there, blocks filled with what is wrong are halved and the audit is
+//! repeated; if not, only the blocks with wrong cells are refined on.
+//!
+//! Where cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells
+//! starts from the last states of the row before. Several starts per cell are
+//! further runs over all cells, one start after the other: what runs side by side starts alike.
+//!
+//! What is asked for follows from the records that have come, not from their order. So nobody waits for the
+//! slowest cell but what depends on it, and a run that was interrupted goes on by replaying its records.
+
+mod adaptive;
+mod audit;
+mod blocks;
+mod errors;
+mod fill;
+mod follow;
+mod label;
+#[cfg(test)]
+mod tests;
+mod tiling;
+
+pub use audit::Audit;
+pub use errors::{Deviation, Errors};
+
+use adaptive::Adaptive;
+use follow::Follow;
+
+use crate::map::plan::{Cell, Plan};
+use crate::record::Record;
+
+/// The order of work on a map: which cells are asked for, and which of them have their records.
+pub struct Schedule {
+    /// Cells in the order in which they were asked for.
+    sequence: Vec<u32>,
+    /// Places of it that were handed out, and how many had been before the last time.
+    begun: usize,
+    begun_before: usize,
+    /// How many records have come.
+    come: usize,
+    /// By run.
+    states: Vec<State>,
+    /// Where the last row begins.
+    row: usize,
+    rule: Rule,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    Unasked,
+    Asked,
+    Come,
+}
+
+/// What asks for cells.
+enum Rule {
+    /// All are asked for from the beginning.
+    Whole,
+    /// Rows that follow each other.
+    Follow(Follow),
+    /// Blocks that differ.
+    Adaptive(Box<Adaptive>),
+}
+
+/// What became of an adaptive map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refined {
+    /// Cells that were integrated.
+    pub integrated: usize,
+    /// Cells that were filled.
+    pub filled: usize,
+    /// Steps that had to follow each other: the coarse grid, the halvings of the block that was halved most, the
+    /// samples of the audits.
+    pub rounds: usize,
+    /// Fraction of the filled cells that the scene lets be wrong.
+    pub max_error: f64,
+    /// Audits in order; the last one found no more wrong cells than the scene allows, unless
+    /// nothing was left to refine or blocks had been halved as often as they may.
+    pub audits: Vec<Audit>,
+}
+
+impl Schedule {
+    /// The schedule of a plan.
+    pub fn new(plan: &Plan) -> Schedule {
+        let mut sequence = Vec::new();
+        let rule = match plan.refine() {
+            Some(refine) => Rule::Adaptive(Box::new(Adaptive::new(plan, refine, &mut sequence))),
+            None if plan.policy().follows() => {
+                let follow = Follow::new(plan);
+                sequence = follow.row();
+                Rule::Follow(follow)
+            }
+            None => {
+                sequence = (0..plan.run_count()).map(|place| plan.run_at(place)).collect();
+                Rule::Whole
+            }
+        };
+        let states = vec![State::Unasked; plan.run_count()];
+        let mut schedule = Schedule { sequence, begun: 0, begun_before: 0, come: 0, states, row: 0, rule };
+        schedule.note_asked(0);
+        schedule
+    }
+
+    /// Ids of the cells to integrate, as far as they are known by now.
+    pub fn sequence(&self) -> &[u32] {
+        &self.sequence
+    }
+
+    /// Up to `count` cells to begin next; none while what comes next depends on cells under way, or if
+    /// the map is finished.
+    pub fn next(&mut self, plan: &Plan, count: usize) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        self.begun_before = self.begun;
+        while cells.len() < count && self.begun < self.sequence.len() {
+            if self.states[self.sequence[self.begun] as usize] == State::Asked {
+                cells.push(self.cell(plan, self.begun));
+            }
+            self.begun += 1;
+        }
+        cells
+    }
+
+    /// Takes back what [`Schedule::next`] handed out last, which could not be begun.
+    pub fn take_back(&mut self) {
+        self.begun = self.begun_before;
+    }
+
+    /// Whether a cell is asked for and has no record yet.
+    pub fn waits_for(&self, id: u32) -> bool {
+        self.states.get(id as usize) == Some(&State::Asked)
+    }
+
+    /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included.
+    pub fn take(&mut self, id: u32, records: &[Record]) {
+        self.states[id as usize] = State::Come;
+        self.come += 1;
+        let end = self.sequence.len();
+        if let Rule::Adaptive(adaptive) = &mut self.rule {
+            adaptive.take(id, &records[id as usize], &mut self.sequence);
+        }
+        if self.come == self.sequence.len() {
+            match &mut self.rule {
+                Rule::Whole => {}
+                Rule::Follow(follow) => {
+                    self.sequence.extend(follow.next(records));
+                    self.row = end;
+                }
+                Rule::Adaptive(adaptive) => adaptive.settle(records, &mut self.sequence),
+            }
+        }
+        self.note_asked(end);
+    }
+
+    fn note_asked(&mut self, from: usize) {
+        for &id in &self.sequence[from..] {
+            self.states[id as usize] = State::Asked;
+        }
+    }
+
+    /// Whether every cell that is asked for has its record.
+    pub fn is_finished(&self) -> bool {
+        self.come == self.sequence.len()
+    }
+
+    /// Runs that there will be, as far as is known by now.
+    pub fn expected(&self) -> usize {
+        match &self.rule {
+            Rule::Follow(follow) => follow.cell_count(),
+            Rule::Whole | Rule::Adaptive(_) => self.sequence.len(),
+        }
+    }
+
+    fn cell(&self, plan: &Plan, place: usize) -> Cell {
+        let cell = plan.cell(self.sequence[place]);
+        match &self.rule {
+            Rule::Follow(follow) => Cell { start: follow.start(place - self.row), ..cell },
+            Rule::Whole | Rule::Adaptive(_) => cell,
+        }
+    }
+
+    /// Fills what was not integrated and says how it went; none where every cell was.
+    pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
+        let Rule::Adaptive(adaptive) = &self.rule else { return None };
+        let filled = adaptive.fill(records);
+        Some(Refined {
+            integrated: self.sequence.len(),
+            filled,
+            rounds: adaptive.rounds(),
+            max_error: adaptive.max_error(),
+            audits: adaptive.audits().to_vec(),
+        })
+    }
+}

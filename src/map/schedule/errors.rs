@@ -1,0 +1,124 @@
+//! How far what is filled is from what integration shows.
+
+use crate::map::plan::Needs;
+use crate::record::{Record, valid};
+
+/// Impacts are counted: what is off by less than this has the same count.
+const HALF_AN_IMPACT: f64 = 0.5;
+
+/// Counts per period that differ by one are a rounding away from it.
+const ROUNDING: f64 = 1e-9;
+
+/// Errors of the continuous quantities of audited cells; none where the scene does not ask for a quantity, or
+/// leaves it empty in filled cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Errors {
+    /// Of the largest Lyapunov exponent.
+    pub lyapunov: Option<Deviation>,
+    /// Of the impacts per forcing period.
+    pub impacts: Option<Deviation>,
+    /// Of the fraction of time spent meshing.
+    pub mesh: Option<Deviation>,
+}
+
+/// Absolute differences between filled and integrated values.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// Cells that have both values.
+    pub compared: usize,
+    /// Cells that have a value of their own and were filled with none.
+    pub empty: usize,
+    /// The median difference: half of those compared have no larger one.
+    pub median: f64,
+    /// 95 % of those compared have no larger one.
+    pub p95: f64,
+    /// The largest.
+    pub worst: f64,
+    /// Cells whose values differ by 1 or more.
+    pub off_by_one: usize,
+}
+
+impl Errors {
+    /// Of pairs of records: as filled, as integrated.
+    pub(super) fn new(pairs: &[(Record, &Record)], needs: &Needs) -> Errors {
+        let deviation = |bit, field: fn(&Record) -> f64| {
+            let value = |record: &Record| {
+                Some(field(record)).filter(|value| record.valid & bit != 0 && value.is_finite())
+            };
+            let values = pairs.iter().map(|(filled, own)| (value(filled), value(own)));
+            Deviation::new(values)
+        };
+        Errors {
+            lyapunov: needs.lyapunov.then(|| deviation(valid::LYAPUNOV, |record| record.lyapunov)),
+            impacts: needs.impacts.then(|| deviation(valid::IMPACTS, |record| record.impacts_per_period)),
+            mesh: needs.mesh.then(|| deviation(valid::MESH, |record| record.mesh_fraction)),
+        }
+    }
+}
+
+impl Deviation {
+    /// Of pairs of values: as filled, as integrated.
+    fn new(pairs: impl Iterator<Item = (Option<f64>, Option<f64>)>) -> Deviation {
+        let (mut differences, mut empty) = (Vec::new(), 0);
+        for pair in pairs {
+            match pair {
+                (Some(filled), Some(own)) => differences.push((filled - own).abs()),
+                (None, Some(_)) => empty += 1,
+                (_, None) => {}
+            }
+        }
+        differences.sort_by(f64::total_cmp);
+        let rank = |share: f64| {
+            let place = (share * differences.len() as f64).ceil() as usize;
+            differences.get(place.saturating_sub(1)).copied().unwrap_or(0.0)
+        };
+        Deviation {
+            compared: differences.len(),
+            empty,
+            median: rank(0.5),
+            p95: rank(0.95),
+            worst: rank(1.0),
+            off_by_one: differences.iter().filter(|&&difference| difference >= 1.0 - ROUNDING).count(),
+        }
+    }
+
+    /// The fraction of the compared cells that is off by 1 or more.
+    pub fn off_by_one_rate(&self) -> f64 {
+        self.off_by_one as f64 / self.compared.max(1) as f64
+    }
+
+    /// Its 95 % interval, as [`Audit::interval`](super::Audit::interval).
+    pub fn off_by_one_interval(&self) -> [f64; 2] {
+        super::audit::score_interval(self.off_by_one, self.compared, super::audit::TWO_SIDED_95)
+    }
+}
+
+/// Whether cycles of one period make the same number of impacts.
+pub(super) fn same_count(cycle: &Record, other: &Record) -> bool {
+    let difference = (cycle.impacts_per_period - other.impacts_per_period).abs();
+    difference * f64::from(cycle.period) < HALF_AN_IMPACT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_ranked_and_absent_values_counted_apart() {
+        let pairs = (1..=100).map(|k| (Some(f64::from(k) * 0.125), Some(0.0)));
+        let absent = [(None, Some(1.0)), (Some(1.0), None), (None, None)];
+        let deviation = Deviation::new(pairs.chain(absent));
+        let expected =
+            Deviation { compared: 100, empty: 1, median: 6.25, p95: 11.875, worst: 12.5, off_by_one: 93 };
+        assert_eq!(deviation, expected);
+        assert_eq!(Deviation::new(std::iter::empty()), Deviation::default());
+        let [low, high] = deviation.off_by_one_interval();
+        assert!(low < deviation.off_by_one_rate() && deviation.off_by_one_rate() < high);
+    }
+
+    #[test]
+    fn counts_over_several_periods_that_differ_by_one_a_period_are_off_by_one() {
+        let thirds = (0..30).map(|k| (Some(f64::from(k + 3) / 3.0), Some(f64::from(k) / 3.0)));
+        assert_eq!(Deviation::new(thirds).off_by_one, 30);
+    }
+}

@@ -1,0 +1,148 @@
+//! Filling a block whose corners agree.
+
+use super::blocks::Block;
+use super::errors::same_count;
+use super::label::word_of;
+use crate::record::classify::classify;
+use crate::record::{Record, valid};
+use rattlemap_dynamics::orbit::Class;
+
+/// What fills one block: what does not depend on the cell is found once.
+pub(super) struct Filling<'r> {
+    block: Block,
+    corners: [&'r Record; 4],
+    /// What all corners know, by the bits of [`valid`].
+    valid: u32,
+    /// Whether the cells next to each corner get averages.
+    averages: [bool; 4],
+}
+
+impl<'r> Filling<'r> {
+    /// From the records of a block's corners, in the order of [`Block::corners`].
+    pub(super) fn new(block: &Block, corners: [&'r Record; 4]) -> Filling<'r> {
+        let common = corners.iter().fold(u32::MAX, |bits, corner| bits & corner.valid);
+        let mut valid = common & !valid::STROBE | valid::FILLED;
+        let first = word_of(corners[0]);
+        if corners[1..].iter().any(|corner| word_of(corner) != first) {
+            valid &= !valid::WORD;
+        }
+        let averages = corners.map(|nearest| {
+            let class = classify(&Record { valid, ..*nearest });
+            // Of undecided cells an average might be a decision.
+            let decided = matches!(class, Class::Periodic { .. } | Class::Chaotic);
+            decided && corners.iter().all(|corner| classify(corner) == class)
+        });
+        Filling { block: *block, corners, valid, averages }
+    }
+
+    /// The record of a cell of the block: the nearest corner's, with bilinear averages of what
+    /// varies continuously inside a region. A word is filled where all corners have the same, and so are the
+    /// impacts of cycles: whole numbers over the period, which no average of others is.
+    pub(super) fn record(&self, [i, j]: [usize; 2]) -> Record {
+        let share = |at: usize, [from, to]: [usize; 2]| {
+            if to > from { (at - from) as f64 / (to - from) as f64 } else { 0.0 }
+        };
+        let (u, v) = (share(i, self.block.i), share(j, self.block.j));
+        let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+        let nearest = usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5);
+        let average = |field: fn(&Record) -> f64| {
+            self.corners.iter().zip(weights).map(|(corner, weight)| weight * field(corner)).sum::<f64>()
+        };
+        let filled = Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
+        if !self.averages[nearest] {
+            return filled;
+        }
+        let averaged = Record {
+            lyapunov: average(|corner| corner.lyapunov),
+            lyapunov_error: average(|corner| corner.lyapunov_error),
+            impacts_per_period: average(|corner| corner.impacts_per_period),
+            mesh_fraction: average(|corner| corner.mesh_fraction),
+            ..filled
+        };
+        if !matches!(classify(&filled), Class::Periodic { .. }) {
+            return averaged;
+        }
+        // A corner beyond the edge on which a cell lies has no part in it.
+        let mut beside = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
+        if beside.all(|(corner, _)| same_count(&filled, corner)) {
+            Record { impacts_per_period: filled.impacts_per_period, ..averaged }
+        } else {
+            Record { impacts_per_period: 0.0, valid: averaged.valid & !valid::IMPACTS, ..averaged }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::word::Word;
+
+    fn corner(lyapunov: f64) -> Record {
+        let valid = valid::PERIOD | valid::LYAPUNOV | valid::STROBE;
+        Record { period: 2, lyapunov, valid, periods_run: 99, ..Record::default() }
+    }
+
+    #[test]
+    fn continuous_quantities_are_interpolated() {
+        let block = Block { i: [0, 4], j: [0, 2] };
+        let corners = [0.0, 4.0, 2.0, 6.0].map(corner);
+        for [i, j] in block.cells() {
+            let record = Filling::new(&block, corners.each_ref()).record([i, j]);
+            assert!((record.lyapunov - (i + j) as f64).abs() < 1e-12);
+            assert_eq!((record.period, record.periods_run), (2, 0));
+            assert_eq!(record.valid, valid::PERIOD | valid::LYAPUNOV | valid::FILLED);
+        }
+    }
+
+    #[test]
+    fn what_one_corner_does_not_know_is_not_filled() {
+        let block = Block { i: [0, 2], j: [0, 2] };
+        let mut corners = [0.0; 4].map(corner);
+        corners[3].valid &= !valid::LYAPUNOV;
+        assert_eq!(Filling::new(&block, corners.each_ref()).record([0, 0]).valid & valid::LYAPUNOV, 0);
+    }
+
+    /// On an edge only its own corners count.
+    #[test]
+    fn impacts_of_cycles_are_filled_where_the_corners_beside_a_cell_agree() {
+        let block = Block { i: [0, 2], j: [0, 2] };
+        let impacting = |count: f64, valid: u32| Record {
+            impacts_per_period: count / 3.0,
+            mesh_fraction: count / 16.0,
+            period: 3,
+            valid: valid | valid::IMPACTS | valid::MESH,
+            ..Record::default()
+        };
+        let impacts = |corners: &[Record; 4], at| {
+            let record = Filling::new(&block, corners.each_ref()).record(at);
+            (record.valid & valid::IMPACTS != 0).then_some(record.impacts_per_period)
+        };
+        let mut corners = [impacting(7.0, valid::PERIOD); 4];
+        assert_eq!(impacts(&corners, [1, 1]), Some(7.0 / 3.0));
+        corners[3] = impacting(8.0, valid::PERIOD);
+        assert_eq!(impacts(&corners, [1, 1]), None);
+        assert_eq!(impacts(&corners, [1, 0]), Some(7.0 / 3.0));
+        let record = Filling::new(&block, corners.each_ref()).record([1, 1]);
+        assert_eq!((record.mesh_fraction, record.impacts_per_period), (29.0 / 64.0, 0.0));
+        // The mean of chaos is no count.
+        let chaos = |count| Record { period: 0, lyapunov: 1.0, ..impacting(count, valid::LYAPUNOV) };
+        let corners = [7.5, 7.5, 7.5, 9.0].map(chaos);
+        let mean = impacts(&corners, [1, 1]).unwrap();
+        assert!((mean - 31.5 / 12.0).abs() < 1e-12, "{mean}");
+    }
+
+    #[test]
+    fn words_are_filled_where_all_corners_agree() {
+        let block = Block { i: [0, 2], j: [0, 2] };
+        let spelled = |symbols: &[u8]| {
+            let mut record = corner(0.0);
+            record.set_word(&Word::cyclic(symbols));
+            record
+        };
+        let word = |corners: &[Record; 4]| Filling::new(&block, corners.each_ref()).record([1, 1]).word();
+        let mut corners = [spelled(b"25"); 4];
+        assert_eq!(word(&corners), corners[0].word());
+        corners[2] = spelled(b"255");
+        assert_eq!(word(&corners), None);
+    }
+}

@@ -1,0 +1,191 @@
+//! How large a map is, estimated before anything is allocated.
+
+use crate::gpu;
+use crate::map::plan::keeps_flows;
+use crate::map::scene::{Axis, Format, Scene, Steps};
+use crate::record::Record;
+
+/// Bytes per cell in memory beside its record: its place in the order, and what the outputs
+/// make of it.
+const MEMORY_BESIDE: u64 = 64;
+
+/// Bytes per period of one cell under way: strobe state and growth of a tangent vector.
+const PER_PERIOD: u64 = 40;
+
+/// Bytes per flow that the reference keeps.
+const FLOW: u64 = 100_000;
+
+/// Flows that are sampled to estimate the constants of all.
+const FLOWS_LOOKED_AT: usize = 256;
+
+/// Bytes per cell on disk of each output.
+const CSV: u64 = 190;
+const NPY: u64 = 132;
+const HTML: u64 = 24;
+/// Starts of cells that follow their neighbours, in the report.
+const HTML_START: u64 = 44;
+
+/// The size of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Number of cells.
+    pub cells: u64,
+    /// Number of runs: cells times starts per cell.
+    pub runs: u64,
+    /// Bytes of memory that records and outputs need, about.
+    pub memory: u64,
+    /// Bytes of memory for every thread of the reference.
+    pub memory_per_thread: u64,
+    /// Bytes of memory for the flows that the reference keeps.
+    pub flows: u64,
+    /// Bytes of memory for the constants that lanes read, while they are handed to the device.
+    pub lane_tables: u64,
+    /// Bytes on disk, about.
+    pub disk: u64,
+}
+
+impl Size {
+    /// The size of a scene's map.
+    pub fn of(scene: &Scene) -> Size {
+        let (cells, runs) = (scene.cell_count(), scene.run_count());
+        let record = size_of::<Record>() as u64;
+        let per_file = |format: &Format| match format {
+            Format::Csv => CSV,
+            Format::Npy => NPY,
+            Format::Html if scene.start().follows() => HTML + HTML_START,
+            Format::Html => HTML,
+            Format::Png => 1,
+        };
+        let settings = scene.orbit_settings();
+        let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
+        let one_cell = periods * PER_PERIOD;
+        Size {
+            cells,
+            runs,
+            memory: runs.saturating_mul(record + MEMORY_BESIDE),
+            memory_per_thread: one_cell,
+            flows: if keeps_flows(flow_count(scene), runs) { flow_count(scene) * FLOW } else { 0 },
+            lane_tables: lane_tables(scene, runs),
+            disk: runs.saturating_mul(record)
+                + cells * scene.outputs().files.iter().map(per_file).sum::<u64>(),
+        }
+    }
+
+    /// Bytes of memory that a run on the CPU needs, about.
+    pub fn on_cpu(&self, threads: u64) -> u64 {
+        self.memory.saturating_add(self.flows).saturating_add(self.memory_per_thread.saturating_mul(threads))
+    }
+
+    /// Bytes of the host's memory that a run on a graphics device needs, about.
+    pub fn on_gpu(&self) -> u64 {
+        self.memory.saturating_add(self.lane_tables)
+    }
+
+    /// Whether a `u32` can number the runs.
+    pub fn is_countable(&self) -> bool {
+        self.runs <= u64::from(u32::MAX)
+    }
+}
+
+/// Distinct flows: one per value of the axes that are no contact law's.
+fn flow_count(scene: &Scene) -> u64 {
+    flow_axes(scene).map(|axis| axis.count() as u64).product()
+}
+
+fn flow_axes(scene: &Scene) -> impl Iterator<Item = &Axis> {
+    scene.axes().iter().filter(|axis| axis.parameter().shapes.oscillator())
+}
+
+/// Bytes of the constants that lanes read at a time, from flows spread over the map. Where there
+/// are too many to be kept, those at hand are neighbours, and may all be as large as the largest.
+fn lane_tables(scene: &Scene, runs: u64) -> u64 {
+    let flows = flow_count(scene);
+    let steps = match scene.integration().steps_per_period {
+        Steps::Auto => None,
+        Steps::PerPeriod(steps) => Some(steps),
+    };
+    let looked_at = flows.min(FLOWS_LOOKED_AT as u64);
+    let bytes = |nth: u64| {
+        // Both ends are among them.
+        let mut flow = (flows - 1) * nth / (looked_at - 1).max(1);
+        let index = |axis: &Axis| {
+            if !axis.parameter().shapes.oscillator() {
+                return 0;
+            }
+            let i = flow % axis.count() as u64;
+            flow /= axis.count() as u64;
+            i as usize
+        };
+        let indices: Vec<usize> = scene.axes().iter().map(index).collect();
+        scene.cell(&indices).oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
+    };
+    if keeps_flows(flows, runs) {
+        let sum: u64 = (0..looked_at).map(bytes).sum();
+        (sum as f64 / looked_at as f64 * flows as f64) as u64
+    } else {
+        let largest = (0..looked_at).map(bytes).max().unwrap_or(0);
+        (flows.min(gpu::MOST_FLOWS as u64) * largest).min(gpu::MOST_BYTES.max(largest))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::Constants;
+    use crate::map::plan::Plan;
+    use crate::map::scene::Purpose;
+    use rattlemap_dynamics::flow::Flow;
+
+    fn scene(second: &str, min: f64, max: f64, counts: [usize; 2]) -> Scene {
+        let [columns, rows] = counts;
+        let text = format!(
+            "[[axis]]\nparameter = 'e'\nmin = 0.25\nmax = 0.75\ncount = {columns}\n\
+             [[axis]]\nparameter = '{second}'\nmin = {min:?}\nmax = {max:?}\ncount = {rows}\n"
+        );
+        Scene::parse(&text, "s", &[], Purpose::Map).unwrap()
+    }
+
+    /// What the flows of a map take in truth, against what is said of them before.
+    #[test]
+    fn flows_and_constants_take_no_more_than_was_said() {
+        for (second, min, max) in
+            [("omega", 1.0, 12.0), ("omega", 0.01, 0.02), ("k", 1e3, 1e7), ("r1", 0.0, 9.0)]
+        {
+            let scene = scene(second, min, max, [5, 400]);
+            let (size, plan) = (Size::of(&scene), Plan::new(&scene));
+            assert!(plan.keeps_flows());
+            let oscillators: Vec<_> =
+                (0..plan.flow_count() as u32).map(|flow| plan.oscillator(flow)).collect();
+            let flows: usize = oscillators.iter().map(|oscillator| Flow::new(oscillator).bytes()).sum();
+            let ratio = size.flows as f64 / flows as f64;
+            assert!((1.0..2.0).contains(&ratio), "{second}: {} said, {flows} taken", size.flows);
+            let of = |constants: Constants| {
+                size_of::<Constants>() + size_of::<[f64; 2]>() * constants.phasors.capacity()
+            };
+            let one_copy: usize =
+                oscillators.iter().filter_map(|oscillator| Constants::new(oscillator, None)).map(of).sum();
+            let copies = size.lane_tables as f64 / one_copy as f64;
+            assert!((4.5..5.5).contains(&copies), "{second}: {copies} copies");
+        }
+    }
+
+    #[test]
+    fn only_what_is_at_hand_at_a_time_is_counted() {
+        let one = |scene: &Scene| gpu::table_bytes(&scene.base().oscillator().unwrap(), None);
+        // A single flow; e and mesh_speed are laws.
+        let single = scene("mesh_speed", 0.001, 0.01, [300, 300]);
+        assert_eq!(Size::of(&single).lane_tables, one(&single));
+        assert_eq!(Size::of(&single).flows, FLOW);
+        // Too many to be kept: the reference solves them one by one, lanes get some at a time.
+        let many = scene("k", 1e3, 1e4, [2, 100_000]);
+        assert_eq!(Size::of(&many).lane_tables, gpu::MOST_FLOWS as u64 * one(&many));
+        let large = scene("omega", 0.002, 0.003, [2, 10_000]);
+        assert_eq!(Size::of(&large).lane_tables, gpu::MOST_BYTES);
+        assert_eq!(Size::of(&many).flows, 0);
+        // As slow a forcing as lanes can follow, times every cell, is not forgotten.
+        let flows = 8_000;
+        let slow = scene("omega", 0.002, 0.003, [2, flows]);
+        assert!(Size::of(&slow).on_gpu() > 650_000 * flows as u64, "{:?}", Size::of(&slow));
+        assert!(Size::of(&slow).on_cpu(2) < 1_000_000_000, "{:?}", Size::of(&slow));
+    }
+}

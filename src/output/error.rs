@@ -1,0 +1,96 @@
+//! Why results were not written down.
+
+use std::error::Error;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::{BitMapBackend, DrawingBackend};
+use rattlemap_dynamics::model::ModelError;
+
+/// A result that was not written; its text is one line with the file and the reason.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// A file could not be written.
+    #[error("cannot write {}: {reason}", .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong with it.
+        reason: WriteError,
+    },
+    /// A file of an earlier run could not be removed.
+    #[error("cannot replace {}: {reason}", .path.display())]
+    Replace {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's words.
+        reason: io::Error,
+    },
+    /// Text could not be printed.
+    #[error("cannot write to stdout: {0}")]
+    Stdout(io::Error),
+    /// A result could not be put into JSON.
+    #[error("cannot put the result into JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A figure could not be made.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// What was to be shown has no motion.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// What can go wrong with one file.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The operating system will not have it.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// A table.
+    #[error(transparent)]
+    Table(#[from] csv::Error),
+    /// JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// The type of an array's field.
+    #[error(transparent)]
+    Array(#[from] npyz::ParseTypeStrError),
+    /// A figure.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+}
+
+/// A figure that was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum FigureError {
+    /// It could not be drawn.
+    #[error("cannot draw the figure {}: {reason}", .path.display())]
+    Draw {
+        /// The file that it was to be.
+        path: PathBuf,
+        /// What went wrong.
+        reason: DrawError,
+    },
+    /// It could not be saved.
+    #[error("cannot write the figure {}: {reason}", .path.display())]
+    Save {
+        /// The file.
+        path: PathBuf,
+        /// What the encoder or the operating system says.
+        reason: Box<dyn Error + Send + Sync>,
+    },
+}
+
+/// What drawing on a canvas may come to.
+pub type DrawError = DrawingAreaErrorKind<<BitMapBackend<'static> as DrawingBackend>::ErrorType>;
+
+impl FigureError {
+    pub(super) fn draw(path: &Path, reason: DrawError) -> FigureError {
+        FigureError::Draw { path: path.to_owned(), reason }
+    }
+
+    pub(super) fn save(path: &Path, reason: impl Error + Send + Sync + 'static) -> FigureError {
+        FigureError::Save { path: path.to_owned(), reason: reason.into() }
+    }
+}

@@ -1,0 +1,35 @@
+//! Results, written down: files in a guarded folder, and text for the terminal.
+
+pub mod bifurcation;
+mod bifurcation_csv;
+pub mod bifurcation_figure;
+mod bifurcation_manifest;
+mod cells;
+mod cells_csv;
+mod cells_npy;
+mod error;
+pub mod folder;
+mod layers;
+pub mod manifest;
+pub mod map;
+mod map_figure;
+mod map_manifest;
+mod names;
+pub mod orbit;
+pub mod orbit_figures;
+mod orbit_json;
+mod orbit_summary;
+pub mod parameters;
+pub mod plot_style;
+mod record_file;
+mod replay;
+mod report;
+mod stdout;
+pub mod unfinished;
+mod validation_json;
+
+pub use cells::Cells;
+pub use error::{DrawError, FigureError, OutputError, WriteError};
+pub use folder::{Folder, FolderError};
+pub use record_file::{Damage, Extent, Identity, RECORDS, RecordFile, RecordFileError};
+pub use stdout::print;

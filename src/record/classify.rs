@@ -1,0 +1,81 @@
+//! What a cell is, from what it measured. Pure: the same record always has the same class.
+//!
+//! A motion is
+//!
+//! - `failed` if the integration could not be continued (`cap_events`, `cap_root`,
+//!   `too_stiff`, `non_finite`);
+//! - `periodic` if the engine confirmed a period: recurrence of strobe states alone is not
+//!   enough, the orbit has to be stable;
+//! - `chaotic` if there is none, the exponent exceeds zero by [`CHAOS_ERRORS`] standard
+//!   errors, and the engine did not see it stay near a cycle (status `slow`);
+//! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than
+//!   `max_period`, where the exponent is far below zero, on tori (quasi-periodic motion), and where a
+//!   multiplier is 1, as for pairs without supports.
+//!
+//! This misleads in two ways that are known: transient chaos that outlives the budget, and growth that
+//! is not bounded for good, as of undamped elastic pairs, are called chaotic.
+
+use crate::record::{Record, valid};
+pub use rattlemap_dynamics::orbit::CHAOS_ERRORS;
+use rattlemap_dynamics::orbit::{Class, Status};
+
+/// The class of a record.
+pub fn classify(record: &Record) -> Class {
+    match status(record) {
+        status if status.is_failure() => Class::Failed,
+        _ if record.valid & valid::PERIOD != 0 && record.period > 0 => {
+            Class::Periodic { period: record.period }
+        }
+        Status::Slow => Class::Undecided,
+        _ if grows(record) => Class::Chaotic,
+        _ => Class::Undecided,
+    }
+}
+
+/// How a record's integration ended. An unknown code can only come from a damaged record;
+/// it counts as not finite.
+pub fn status(record: &Record) -> Status {
+    Status::from_code(record.status).unwrap_or(Status::NonFinite)
+}
+
+fn grows(record: &Record) -> bool {
+    record.valid & valid::LYAPUNOV != 0 && record.lyapunov > CHAOS_ERRORS * record.lyapunov_error
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(status: Status, period: u32, lyapunov: f64, lyapunov_error: f64) -> Record {
+        let valid = valid::PERIOD | valid::LYAPUNOV;
+        Record { status: status.code(), period, lyapunov, lyapunov_error, valid, ..Record::default() }
+    }
+
+    #[test]
+    fn every_class_has_its_records() {
+        let cases = [
+            (record(Status::Ok, 3, -0.1, 0.0), Class::Periodic { period: 3 }),
+            (record(Status::Slow, 2, -0.1, 0.0), Class::Periodic { period: 2 }),
+            (record(Status::StrobeOnEvent, 0, 0.2, 0.01), Class::Chaotic),
+            (record(Status::Ok, 0, 0.02, 0.01), Class::Undecided),
+            (record(Status::Ok, 0, 0.2, f64::INFINITY), Class::Undecided),
+            (record(Status::Ok, 0, f64::NAN, 0.0), Class::Undecided),
+            (record(Status::Slow, 0, 0.2, 0.01), Class::Undecided),
+        ];
+        for (record, class) in cases {
+            assert_eq!(classify(&record), class, "{record:?}");
+        }
+        let unmeasured = Record { valid: valid::PERIOD, ..record(Status::Ok, 0, 0.2, 0.01) };
+        assert_eq!(classify(&unmeasured), Class::Undecided);
+    }
+
+    #[test]
+    fn four_statuses_fail_and_no_other() {
+        let failures = [Status::CapEvents, Status::CapRoot, Status::TooStiff, Status::NonFinite];
+        for status in Status::ALL {
+            let failed = classify(&record(status, 1, 0.2, 0.01)) == Class::Failed;
+            assert_eq!(failed, failures.contains(&status), "{status:?}");
+        }
+        assert_eq!(classify(&Record { status: 99, ..Record::default() }), Class::Failed);
+    }
+}

@@ -1,0 +1,247 @@
+//! One cell, and what the reference can be asked about it.
+
+use super::Subject;
+use super::compare::{Answer, Bars, farther};
+use crate::gpu::Precision;
+use crate::map::engine::measured_record;
+use crate::map::plan::Needs;
+use crate::map::random::Random;
+use crate::record::Record;
+use crate::record::classify::{classify, status};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Law, Model, State};
+use rattlemap_dynamics::orbit::{Budget, Class, Status, measure};
+use rattlemap_dynamics::reference::Trajectory;
+
+/// What a precision resolves of a motion or a parameter, relative to its size: some roundings, since errors gather
+/// over the steps of a period.
+pub(super) fn resolution(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-6,
+        Precision::F64 => 1e-12,
+    }
+}
+
+/// No rounding moves the meshing speed by more than this share, however fast the motion is.
+const MOST_OF_MESH_SPEED: f64 = 2e-3;
+
+/// Motions that show what the resolution makes of a cycle, and how much farther a lane may be off: it rounds at
+/// every step.
+const TURNS: u64 = 6;
+const FACTOR: f64 = 8.0;
+
+/// A cycle that is approached slowly is followed for so many times the budget: to be seen near it is not to reach it.
+const FOLLOWED: u32 = 8;
+
+/// A cell of a finished map.
+pub(super) struct Cell<'a> {
+    pub(super) record: &'a Record,
+    model: Box<dyn Model>,
+    pub(super) flow: Box<Flow>,
+    pub(super) law: Law,
+    pub(super) start: State,
+    budget: Budget,
+    pub(super) bars: Bars,
+    resolution: f64,
+    seed: u64,
+}
+
+/// A cell that is the same within the engine's resolution.
+pub(super) struct Moved {
+    flow: Box<Flow>,
+    law: Law,
+    start: State,
+    resolution: f64,
+    random: Random,
+}
+
+impl<'a> Cell<'a> {
+    pub(super) fn new(subject: &Subject<'a>, id: u32) -> Cell<'a> {
+        let plan = subject.plan;
+        let cell = plan.cell(id);
+        let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
+        let budget = *plan.budget();
+        Cell {
+            record: &subject.records[id as usize],
+            model: plan.model(id),
+            law: plan.law(cell.law),
+            start: plan.start(id, subject.records),
+            budget,
+            bars: Bars::new(subject.precision, flow.period, &budget),
+            resolution: resolution(subject.precision),
+            seed: u64::from(id) << 32,
+            flow,
+        }
+    }
+
+    /// The plan's budget, all of it: a cell stops before in no case, and one that is undecided takes what the plan
+    /// gives undecided cells.
+    fn whole_budget(&self, times: u32) -> Budget {
+        let mut budget = Budget { early_stop: false, ..self.budget };
+        let observed = budget.settings.observed_periods;
+        let periods = budget.periods().saturating_mul(times);
+        budget.settings.transient_periods = periods.saturating_sub(observed);
+        budget
+    }
+
+    /// Forcing periods that the plan allows one run.
+    pub(super) fn longest(&self) -> u32 {
+        self.budget.longest()
+    }
+
+    /// What the engine of the reference says of the cell, early stops and all.
+    pub(super) fn again(&self, needs: &Needs) -> Record {
+        measured_record(&measure(&self.flow, self.law, self.start, &self.budget), needs)
+    }
+
+    /// A budget of so many periods.
+    fn budget_of(&self, periods: u32) -> Budget {
+        let mut budget = Budget { early_stop: false, ..self.budget };
+        let observed = budget.settings.observed_periods.min(periods / 2);
+        budget.settings.observed_periods = observed;
+        budget.settings.max_period = budget.settings.max_period.min(observed / 2).max(1);
+        budget.settings.transient_periods = periods - observed;
+        budget
+    }
+
+    /// What the cell's start reaches within the whole budget.
+    pub(super) fn truth(&self) -> Answer {
+        self.reached(&self.flow, self.law, self.start)
+    }
+
+    fn reached(&self, flow: &Flow, law: Law, start: State) -> Answer {
+        let answer = answer(flow, law, start, &self.whole_budget(1));
+        let followed = || self::answer(flow, law, start, &self.whole_budget(FOLLOWED));
+        match classify(&answer.record) {
+            Class::Periodic { .. } if status(&answer.record) == Status::Slow => {
+                let later = followed();
+                if classify(&later.record) == classify(&answer.record) { answer } else { later }
+            }
+            Class::Undecided => self::answer(flow, law, start, &self.budget_of(self.budget.longest())),
+            _ => answer,
+        }
+    }
+
+    /// What another start of the same cell reaches.
+    pub(super) fn starting_at(&self, start: State) -> Answer {
+        self.reached(&self.flow, self.law, start)
+    }
+
+    /// What it reaches from where it is the same within the resolution; `shaken` where every period rounds.
+    pub(super) fn moved_truth(&self, k: u64, shaken: bool) -> Option<Answer> {
+        let mut moved = self.moved(k)?;
+        if shaken {
+            moved.start = moved.shaken(self.budget.settings.transient_periods)?;
+        }
+        Some(self.reached(&moved.flow, moved.law, moved.start))
+    }
+
+    /// The same after so many periods.
+    pub(super) fn moved_after(&self, k: u64, periods: u32) -> Option<Answer> {
+        let moved = self.moved(k)?;
+        Some(answer(&moved.flow, moved.law, moved.start, &self.budget_of(periods)))
+    }
+
+    /// The same when it may take far longer than the plan allows.
+    pub(super) fn moved_at_leisure(&self, k: u64) -> Option<Answer> {
+        let moved = self.moved(k)?;
+        Some(answer(&moved.flow, moved.law, moved.start, &self.whole_budget(FOLLOWED)))
+    }
+
+    /// Averages over the periods that a record of chaos averages, from a start that is the same within the resolution.
+    pub(super) fn averages(&self, k: u64, periods: u32) -> Option<Record> {
+        let moved = self.moved(k)?;
+        let mut budget = self.budget_of(periods);
+        let from = self.budget.exponent_from().min(periods / 2);
+        (budget.settings.transient_periods, budget.settings.observed_periods) = (from, periods - from);
+        Some(answer(&moved.flow, moved.law, moved.start, &budget).record)
+    }
+
+    /// Where the reference is after so many periods, and where it is from starts that are the same within the
+    /// resolution if every period rounds.
+    pub(super) fn states(&self, count: u64, periods: u32) -> Option<(State, Vec<State>)> {
+        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start);
+        (0..periods).try_for_each(|_| trajectory.advance_period(&mut ())).ok()?;
+        let moved = (0..count).filter_map(|k| self.moved(k)?.shaken(periods));
+        Some((trajectory.state(), moved.collect()))
+    }
+
+    /// Whether a cycle through a state closes before so many periods, by no more than the resolution makes of it.
+    pub(super) fn closes_earlier(&self, state: State, period: u32) -> bool {
+        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, state);
+        let mut earlier = f64::INFINITY;
+        for n in 1..period {
+            if trajectory.advance_period(&mut ()).is_err() {
+                return false;
+            }
+            if period.is_multiple_of(n) {
+                earlier = earlier.min(self.apart(&trajectory.state(), &state));
+            }
+        }
+        let turned = |k| {
+            let moved = self.moved(k)?;
+            Moved { start: state, ..moved }.shaken(period)
+        };
+        let ends = (0..TURNS).filter_map(turned);
+        let spread = ends.map(|end| self.apart(&end, &state)).fold(self.resolution, farther);
+        spread.is_finite() && earlier <= FACTOR * spread
+    }
+
+    /// The distance of two states relative to the size of the motion, but not less than the walls' distance.
+    pub(super) fn apart(&self, a: &State, b: &State) -> f64 {
+        let [position, velocity] = self.units(a);
+        let by = |i: usize| super::compare::apart(a[i], b[i]) / [position, velocity][i % 2];
+        (0..4).map(by).fold(0.0, farther)
+    }
+
+    fn units(&self, y: &State) -> [f64; 2] {
+        let reach = 0.5 * (self.flow.walls[0] - self.flow.walls[1]);
+        let position = y[0].abs().max(y[2].abs()).max(reach);
+        [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
+    }
+
+    /// The `k`th cell, at random, that is the same within the resolution: every parameter and the start are moved.
+    fn moved(&self, k: u64) -> Option<Moved> {
+        let mut random = Random::new(self.seed ^ k);
+        let mut model = self.model.clone();
+        let units = self.units(&self.record.strobe);
+        for (index, parameter) in self.model.parameters().iter().enumerate() {
+            let share = match &*parameter.name {
+                // Leaving speeds carry the rounding of the whole motion's velocity.
+                "mesh_speed" => {
+                    let velocity = units[1].max(self.law.mesh_speed);
+                    (self.resolution * velocity / self.law.mesh_speed.max(f64::MIN_POSITIVE))
+                        .min(MOST_OF_MESH_SPEED)
+                }
+                _ => self.resolution,
+            };
+            let value = self.model.value(index);
+            // At the end of its range a parameter stays where it is.
+            let _ = model.set_at(index, value * (1.0 + share * (2.0 * random.unit() - 1.0)));
+        }
+        let units = self.units(&self.start);
+        let start = std::array::from_fn(|i| {
+            self.start[i] + self.resolution * units[i % 2] * (2.0 * random.unit() - 1.0)
+        });
+        let flow = Box::new(Flow::new(&model.oscillator().ok()?));
+        Some(Moved { flow, law: model.law(), start, resolution: self.resolution, random })
+    }
+}
+
+impl Moved {
+    /// Where it is after so many periods if the state is moved within the resolution at each.
+    fn shaken(&mut self, periods: u32) -> Option<State> {
+        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start);
+        for _ in 0..periods {
+            trajectory.advance_period(&mut ()).ok()?;
+            let shares = std::array::from_fn(|_| self.resolution * (2.0 * self.random.unit() - 1.0));
+            trajectory.shake(shares);
+        }
+        Some(trajectory.state())
+    }
+}
+
+fn answer(flow: &Flow, law: Law, start: State, budget: &Budget) -> Answer {
+    let measured = measure(flow, law, start, budget);
+    Answer::new(measured_record(&measured, &Needs::EVERYTHING), measured.word.as_ref())
+}

@@ -1,0 +1,132 @@
+//! Averages over chaos, compared as distributions over the class.
+//!
+//! What one chaotic cell averages within its budget scatters by itself. So every chaotic cell of the uniform sample
+//! is averaged twice more on the reference, over as many periods and from starts that are the same within the
+//! engine's resolution. The record's differences from the first of these are distributed as those of the second are,
+//! if the engine is right: the two samples are compared by the statistic of Kolmogorov and Smirnov.
+
+use super::cell::Cell;
+use super::compare::Field;
+use crate::record::classify::classify;
+use crate::record::{Record, valid};
+use rattlemap_dynamics::orbit::Class;
+
+/// Fewer cells than this tell nothing.
+const FEWEST: usize = 8;
+
+/// Probability that an average of a right map is found wrong.
+const CHANCE: f64 = 1e-4;
+
+/// Averages that are compared: the exponent, the logarithm of its error, impacts, meshing.
+const COUNT: usize = 4;
+
+/// One average over all chaotic cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChaosTest {
+    /// What is compared.
+    pub name: &'static str,
+    /// Chaotic cells.
+    pub cells: usize,
+    /// The largest distance of the two distributions.
+    pub distance: f64,
+    /// The distance that chance exceeds once in 10,000 times; none where there are too few cells to tell.
+    pub bar: Option<f64>,
+    /// Mean differences from the reference: the map's, and the reference's own.
+    pub means: [f64; 2],
+}
+
+impl ChaosTest {
+    /// Whether the map's averages are not those of the reference.
+    pub fn fails(&self) -> bool {
+        self.bar.is_some_and(|bar| self.distance > bar)
+    }
+}
+
+/// Differences of one cell from the reference: the record's, and the reference's own. None of those that a side lacks.
+pub(super) type Differences = [Option<[f64; 2]>; COUNT];
+
+/// What one chaotic cell adds; none if it is not chaotic on all sides.
+pub(super) fn differences(cell: &Cell<'_>) -> Option<Differences> {
+    let record = cell.record;
+    // Starts of their own: those of `explain` begin at zero.
+    let [first, second] = [1 << 16, 1 << 17].map(|k| cell.averages(k, record.periods_run));
+    let (first, second) = (first?, second?);
+    if [record, &first, &second].iter().any(|side| classify(side) != Class::Chaotic) {
+        return None;
+    }
+    let of = |field: Field, scale: f64, value: fn(&Record) -> f64| {
+        let bit = if field == Field::Exponent {
+            valid::LYAPUNOV
+        } else if field == Field::Impacts {
+            valid::IMPACTS
+        } else {
+            valid::MESH
+        };
+        let known = record.valid & bit != 0;
+        known.then(|| [record, &second].map(|side| (value(side) - value(&first)) / scale))
+    };
+    Some([
+        of(Field::Exponent, first.lyapunov_error, |record| record.lyapunov),
+        of(Field::Exponent, 1.0, |record| record.lyapunov_error.ln()),
+        of(Field::Impacts, first.impacts_per_period, |record| record.impacts_per_period),
+        of(Field::Mesh, 1.0, |record| record.mesh_fraction),
+    ])
+}
+
+/// Every average, over all chaotic cells.
+pub(super) fn tests(all: &[Differences]) -> Vec<ChaosTest> {
+    let names = ["lyapunov", "lyapunov_error", "impacts_per_period", "mesh_fraction"];
+    names
+        .into_iter()
+        .enumerate()
+        .map(|(i, name)| {
+            let pairs: Vec<[f64; 2]> = all.iter().filter_map(|cell| cell[i]).collect();
+            let [map, own] = [0, 1].map(|side| pairs.iter().map(|pair| pair[side]).collect::<Vec<f64>>());
+            let cells = pairs.len();
+            let bar = (0.5 * (2.0 / CHANCE).ln()).sqrt() * (2.0 / cells as f64).sqrt();
+            ChaosTest {
+                name,
+                cells,
+                distance: distance(map.clone(), own.clone()),
+                bar: (cells >= FEWEST).then_some(bar),
+                means: [map, own].map(|list| list.iter().sum::<f64>() / cells.max(1) as f64),
+            }
+        })
+        .collect()
+}
+
+/// The largest distance of the distribution functions of two samples of one size. What is not a number lies at the
+/// far end.
+fn distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
+    let count = a.len().max(1) as f64;
+    a.sort_by(f64::total_cmp);
+    b.sort_by(f64::total_cmp);
+    let below = |list: &[f64], x: f64| list.partition_point(|y| y.total_cmp(&x).is_le()) as f64;
+    a.iter().chain(&b).map(|&x| (below(&a, x) - below(&b, x)).abs() / count).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distributions_differ_by_their_largest_distance() {
+        let line = |from: f64| (0..10).map(|i| from + f64::from(i)).collect::<Vec<f64>>();
+        assert_eq!(distance(line(0.0), line(0.0)), 0.0);
+        assert_eq!(distance(line(0.0), line(3.0)), 0.3);
+        assert_eq!(distance(line(0.0), line(90.0)), 1.0);
+        assert_eq!(distance(vec![f64::NAN; 10], line(0.0)), 1.0, "not a number");
+        assert_eq!(distance(Vec::new(), Vec::new()), 0.0);
+    }
+
+    #[test]
+    fn a_shift_of_all_cells_is_found() {
+        let cells = |shift: f64| -> Vec<Differences> {
+            (0..40).map(|i| [Some([f64::from(i) + shift, f64::from(i)]), None, None, None]).collect()
+        };
+        let first = |shift| tests(&cells(shift))[0];
+        assert!(!first(0.0).fails() && !first(10.0).fails() && first(25.0).fails());
+        assert_eq!((first(25.0).means, first(25.0).cells), ([44.5, 19.5], 40));
+        assert!(!tests(&cells(1.0)[..3])[0].fails(), "too few to tell");
+    }
+}

@@ -1,0 +1,319 @@
+//! Where two records of one cell differ.
+
+use serde::Serialize;
+
+use crate::gpu::Precision;
+use crate::record::classify::{classify, status};
+use crate::record::{Record, Spelling, valid};
+use rattlemap_dynamics::orbit::{Budget, Class, Status};
+use rattlemap_dynamics::word::Word;
+
+/// What is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Field {
+    /// Periodic, chaotic, undecided or failed.
+    Class,
+    /// The period, where both are periodic.
+    Period,
+    /// The word, up to mirror image, where the period agrees.
+    Word,
+    /// Whether the cycle is its own mirror image, where the period agrees.
+    Symmetric,
+    /// The exponent: by the largest multiplier of cycles, within wide bars otherwise.
+    Exponent,
+    /// Impacts per forcing period.
+    Impacts,
+    /// Fraction of time spent meshing.
+    Mesh,
+    /// How the integration ended.
+    Status,
+    /// Forcing periods integrated: no more than the plan allows.
+    Periods,
+    /// The whole record: the same lane on the same device gives it again, to the bit.
+    Again,
+}
+
+impl Field {
+    /// Every field, in the order in which they are told.
+    pub const ALL: [Field; 10] = [
+        Field::Class,
+        Field::Period,
+        Field::Word,
+        Field::Symmetric,
+        Field::Exponent,
+        Field::Impacts,
+        Field::Mesh,
+        Field::Status,
+        Field::Periods,
+        Field::Again,
+    ];
+
+    /// Its name in files, that of the record's field where there is one.
+    pub fn name(self) -> &'static str {
+        match self {
+            Field::Class => "class",
+            Field::Period => "period",
+            Field::Word => "word",
+            Field::Symmetric => "symmetric",
+            Field::Exponent => "lyapunov",
+            Field::Impacts => "impacts_per_period",
+            Field::Mesh => "mesh_fraction",
+            Field::Status => "status",
+            Field::Periods => "periods_run",
+            Field::Again => "again",
+        }
+    }
+}
+
+/// A value of one side.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A class, a status or a word.
+    Text(String),
+    /// An exponent or an average.
+    Number(f64),
+    /// A number of periods.
+    Count(u32),
+    /// A symmetry.
+    Flag(bool),
+}
+
+/// One field in which a record and its judge differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Which.
+    pub field: Field,
+    /// What the record says.
+    pub record: Value,
+    /// What the judge says.
+    pub judge: Value,
+}
+
+/// A field that was compared, and what differs in it if anything does.
+pub(super) type Compared = (Field, Option<Difference>);
+
+/// What a computation says of a cell.
+#[derive(Clone, Debug)]
+pub(super) struct Answer {
+    pub(super) record: Record,
+    /// The word's mirror image, as a record would keep it; of a long word no record tells it.
+    mirrored: Option<Spelling>,
+}
+
+impl Answer {
+    pub(super) fn new(record: Record, word: Option<&Word>) -> Answer {
+        let own = record.word();
+        let mirrored = word.or(own.as_ref()).map(|word| {
+            let mut other = Record::default();
+            other.set_word(&word.mirrored());
+            other.spelling().unwrap_or_else(|| Spelling::Whole(word.mirrored()))
+        });
+        Answer { record, mirrored }
+    }
+
+    /// Whether a spelling is that of the word or of its mirror image.
+    fn spells(&self, ours: &Spelling) -> bool {
+        let length = |spelling: &Spelling| match spelling {
+            Spelling::Whole(word) => word.len() as u32,
+            Spelling::Hashed { length, .. } => *length,
+        };
+        match (self.record.spelling(), &self.mirrored) {
+            (Some(own), Some(mirrored)) => *ours == own || ours == mirrored,
+            (Some(own), None) => length(ours) == length(&own),
+            (None, _) => true,
+        }
+    }
+}
+
+/// How far numbers may differ and still count as the same.
+///
+/// Lanes read a cycle where they have come near it, not on it, and carry tangents in their own precision. Of cycles
+/// over the plane 99 % are within 3e-4 (f32) and 4e-6 (f64) of the reference's multiplier, all but those whose
+/// multiplier is close to 1 or which had not settled within 6e-3 and 3e-3; their meshing within 2e-6 and 3e-8.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bars {
+    /// Natural logarithm of the largest multiplier, per forcing period and at least per five: every period of a
+    /// cycle adds its own error.
+    multiplier: f64,
+    /// Multipliers below this are rounding of the monodromy matrix: as good as zero.
+    no_multiplier: f64,
+    mesh: f64,
+    forcing_period: f64,
+    /// Periods that one run of the plan takes, and may take where it is undecided by then.
+    periods: u32,
+    longest: u32,
+}
+
+/// Growth or decay, as a logarithm, that takes rounding to the size of the motion or back: what has had less of it by
+/// the end of its budget cannot be told from neutral.
+const TELLING: f64 = 40.0;
+
+/// Impacts are counted: nothing but the division rounds.
+const IMPACTS_BAR: f64 = 1e-9;
+
+/// Averages of one chaotic cell may differ by so many standard errors of both. This finds what is out of all
+/// proportion; what is systematic is found over the class ([`super::chaos`]).
+const ERRORS: f64 = 8.0;
+/// Beside that: an exponent per forcing period, and shares of impacts and of time.
+const CHAOS_BARS: [f64; 3] = [0.1, 0.5, 0.25];
+
+impl Bars {
+    pub(super) fn new(precision: Precision, forcing_period: f64, budget: &Budget) -> Bars {
+        let (periods, longest) = (budget.periods(), budget.longest());
+        let (multiplier, no_multiplier, mesh) = match precision {
+            Precision::F32 => (4e-3, 1e-2, 2e-5),
+            Precision::F64 => (1e-3, 1e-5, 1e-6),
+        };
+        Bars { multiplier, no_multiplier, mesh, forcing_period, periods, longest }
+    }
+
+    /// Compares a record with what its judge says, field by field as far as both have them.
+    pub(super) fn compare(&self, record: &Record, answer: &Answer) -> Vec<Compared> {
+        let judge = &answer.record;
+        let [ours, theirs] = [record, judge].map(classify);
+        let mut list = vec![
+            compared(Field::Class, ours.index() == theirs.index(), || texts(ours.name(), theirs.name())),
+            compared(Field::Periods, record.periods_run <= self.longest, || {
+                (Value::Count(record.periods_run), Value::Count(self.longest))
+            }),
+        ];
+        if ours.index() == theirs.index() {
+            let statuses = [record, judge].map(status);
+            list.push(compared(Field::Status, self.is_same_status(ours, statuses, judge), || {
+                texts(statuses[0].name(), statuses[1].name())
+            }));
+        }
+        match (ours, theirs) {
+            (Class::Periodic { period: ours }, Class::Periodic { period: theirs }) => {
+                let counts = || (Value::Count(ours), Value::Count(theirs));
+                list.push(compared(Field::Period, ours == theirs, counts));
+                if ours == theirs {
+                    self.compare_cycle(record, answer, f64::from(ours), &mut list);
+                }
+            }
+            (Class::Chaotic, Class::Chaotic) | (Class::Undecided, Class::Undecided) => {
+                self.compare_averages(record, judge, &mut list);
+            }
+            _ => {}
+        }
+        list
+    }
+
+    /// Whether two ends of motion of one class are the same. Lanes call an approach slow where they stand farther than
+    /// 1e-4 from the cycle, the reference farther than 1e-8: of motion that settles slowly both may be said.
+    fn is_same_status(&self, class: Class, statuses: [Status; 2], judge: &Record) -> bool {
+        match class {
+            // That it is at no cycle is its class.
+            Class::Chaotic | Class::Undecided => true,
+            _ => {
+                let graded = [Status::Ok, Status::Slow];
+                let is_grade = statuses.iter().all(|status| graded.contains(status));
+                statuses[0] == statuses[1] || is_grade && !self.is_told(judge)
+            }
+        }
+    }
+
+    /// Whether the motion of a record settles or separates, within the budget, by enough to be told from neutral.
+    pub(super) fn is_told(&self, judge: &Record) -> bool {
+        let has = judge.valid & valid::LYAPUNOV != 0;
+        has && judge.lyapunov.abs() * self.forcing_period * f64::from(self.periods) >= TELLING
+    }
+
+    /// Whether a record says the same in every field.
+    pub(super) fn agree(&self, record: &Record, answer: &Answer) -> bool {
+        self.compare(record, answer).iter().all(|(_, differs)| differs.is_none())
+    }
+
+    fn compare_cycle(&self, record: &Record, answer: &Answer, period: f64, list: &mut Vec<Compared>) {
+        let judge = &answer.record;
+        let both = record.valid & judge.valid;
+        if let (Some(ours), Some(theirs)) = (record.spelling(), judge.spelling()) {
+            let shown = || (Value::Text(ours.text()), Value::Text(theirs.text()));
+            list.push(compared(Field::Word, answer.spells(&ours), shown));
+        }
+        if both & valid::SYMMETRIC != 0 {
+            let flags = [record, judge].map(|side| side.symmetric != 0);
+            let shown = || (Value::Flag(flags[0]), Value::Flag(flags[1]));
+            list.push(compared(Field::Symmetric, flags[0] == flags[1], shown));
+        }
+        let logs = [record, judge].map(|side| side.lyapunov * period * self.forcing_period);
+        let is_none = logs.iter().all(|log| *log <= self.no_multiplier.ln());
+        let is_same = is_none || apart(logs[0], logs[1]) <= self.multiplier * period.max(5.0);
+        self.push(
+            list,
+            (Field::Exponent, valid::LYAPUNOV),
+            [record, judge].map(|r| r.lyapunov),
+            both,
+            is_same,
+        );
+        self.push_averages(list, record, judge, [IMPACTS_BAR, self.mesh]);
+    }
+
+    fn compare_averages(&self, record: &Record, judge: &Record, list: &mut Vec<Compared>) {
+        let exponents = [record, judge].map(|side| side.lyapunov);
+        // Only the judge's error counts: what a record says of itself widens no bar.
+        let own = if judge.lyapunov_error.is_finite() { judge.lyapunov_error } else { 0.0 };
+        let bar = ERRORS * std::f64::consts::SQRT_2 * own + CHAOS_BARS[0] / self.forcing_period;
+        let is_same = apart(exponents[0], exponents[1]) <= bar;
+        let both = record.valid & judge.valid;
+        self.push(list, (Field::Exponent, valid::LYAPUNOV), exponents, both, is_same);
+        let impacts = CHAOS_BARS[1] * judge.impacts_per_period + 1.0;
+        self.push_averages(list, record, judge, [impacts, CHAOS_BARS[2]]);
+    }
+
+    fn push_averages(&self, list: &mut Vec<Compared>, record: &Record, judge: &Record, bars: [f64; 2]) {
+        let both = record.valid & judge.valid;
+        let of = [
+            ((Field::Impacts, valid::IMPACTS), [record, judge].map(|side| side.impacts_per_period)),
+            ((Field::Mesh, valid::MESH), [record, judge].map(|side| side.mesh_fraction)),
+        ];
+        for ((field, values), bar) in of.into_iter().zip(bars) {
+            self.push(list, field, values, both, apart(values[0], values[1]) <= bar);
+        }
+    }
+
+    /// Notes a number that both sides have.
+    fn push(
+        &self,
+        list: &mut Vec<Compared>,
+        (field, bit): (Field, u32),
+        [record, judge]: [f64; 2],
+        both: u32,
+        is_same: bool,
+    ) {
+        if both & bit != 0 {
+            list.push(compared(field, is_same, || (Value::Number(record), Value::Number(judge))));
+        }
+    }
+}
+
+/// The distance of two numbers; two equal infinities are the same number, and what is not finite otherwise is
+/// infinitely far from anything.
+pub(super) fn apart(a: f64, b: f64) -> f64 {
+    let distance = (a - b).abs();
+    if a == b {
+        0.0
+    } else if distance.is_nan() {
+        f64::INFINITY
+    } else {
+        distance
+    }
+}
+
+/// The larger distance; `f64::max` would drop what is not a number.
+pub(super) fn farther(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
+}
+
+pub(super) fn compared(field: Field, same: bool, shown: impl FnOnce() -> (Value, Value)) -> Compared {
+    let differs = (!same).then(|| {
+        let (record, judge) = shown();
+        Difference { field, record, judge }
+    });
+    (field, differs)
+}
+
+fn texts(record: &str, judge: &str) -> (Value, Value) {
+    (Value::Text(record.into()), Value::Text(judge.into()))
+}

@@ -1,0 +1,214 @@
+//! A cell by an adaptive ODE library with event location, which shares nothing with the reference but the
+//! description of the oscillator.
+//!
+//! The motion is followed over the whole budget. It is on a cycle where its strobe states recur, and the cycle is
+//! stable: its multipliers are those of differences of motions beside it. It is chaotic where a motion beside it
+//! separates. Where neither is seen, as on the way to a cycle that is slow, nothing is claimed.
+
+pub mod dop853;
+pub mod flight;
+
+use nalgebra::Matrix4;
+
+use crate::map::plan::Plan;
+use crate::record::classify::CHAOS_ERRORS;
+use crate::record::{Record, valid};
+use dop853::Solver;
+use flight::{Ended, Flight};
+use rattlemap_dynamics::model::{Law, Oscillator, Side, State};
+use rattlemap_dynamics::orbit::{Budget, Status};
+use rattlemap_dynamics::reference::EventKind;
+use rattlemap_dynamics::stability::{multipliers, standard_error};
+use rattlemap_dynamics::word::Word;
+
+/// Relative and absolute tolerance of one step.
+const TOLERANCE: f64 = 1e-12;
+
+/// Strobe states this close, relative to the motion, are the same.
+const RECURS: f64 = 1e-7;
+
+/// And those that come this close may be in the end.
+const NEARLY: f64 = 1e-4;
+
+/// How far beside it, relative to the motion, another one starts.
+const BESIDE: f64 = 1e-7;
+
+/// Multipliers below this are rounding of such differences.
+const LEAST_MULTIPLIER: f64 = 1e-4;
+
+/// A motion that is followed from strobe to strobe.
+#[derive(Clone)]
+struct Strobed {
+    solver: Solver,
+    period: f64,
+    flight: Flight,
+    /// The last event before this period.
+    before: Option<Ended>,
+    tally: Tally,
+}
+
+/// What was met on the way.
+#[derive(Clone, Debug, Default)]
+struct Tally {
+    impacts: usize,
+    meshing_time: f64,
+    symbols: Vec<u8>,
+}
+
+impl Strobed {
+    fn new(oscillator: &Oscillator, law: Law, start: State) -> Strobed {
+        Strobed {
+            solver: Solver { omega: oscillator.omega, tolerance: TOLERANCE },
+            period: oscillator.period(),
+            flight: Flight::new(oscillator, law, start),
+            before: None,
+            tally: Tally::default(),
+        }
+    }
+
+    /// One forcing period; none for a motion that is lost.
+    fn advance(&mut self) -> Option<()> {
+        let meshed = self.flight.meshing().is_some();
+        self.solver.advance(&mut self.flight, 0.0, self.period)?;
+        let mut meshing_since = meshed.then_some(0.0);
+        for ended in std::mem::take(&mut self.flight.events) {
+            match ended.kind {
+                EventKind::Impact => self.tally.impacts += 1,
+                EventKind::MeshStart => meshing_since = Some(ended.t),
+                EventKind::MeshEnd => {
+                    self.tally.meshing_time += ended.t - meshing_since.take().unwrap_or(ended.t);
+                }
+            }
+            self.tally.symbols.extend(self.before.map(|before| symbol(before, ended.side)));
+            self.before = Some(ended);
+        }
+        self.tally.meshing_time += meshing_since.map_or(0.0, |since| self.period - since);
+        Some(())
+    }
+}
+
+/// The name of a flight between two events.
+fn symbol(before: Ended, side: Side) -> u8 {
+    match (before.kind, before.side, side) {
+        (EventKind::MeshStart, Side::Right, _) => b'1',
+        (EventKind::MeshStart, Side::Left, _) => b'4',
+        (_, Side::Right, Side::Right) => b'2',
+        (_, Side::Right, Side::Left) => b'3',
+        (_, Side::Left, Side::Left) => b'5',
+        (_, Side::Left, Side::Right) => b'6',
+    }
+}
+
+/// What a run's cell is; none where nothing is claimed of it.
+pub fn record(plan: &Plan, id: u32, records: &[Record]) -> Option<Record> {
+    let cell = plan.cell(id);
+    follow(&plan.oscillator(cell.flow), plan.law(cell.law), plan.start(id, records), plan.budget())
+}
+
+fn follow(oscillator: &Oscillator, law: Law, start: State, budget: &Budget) -> Option<Record> {
+    let mut motion = Strobed::new(oscillator, law, start);
+    let kept = 2 * budget.settings.max_period as usize + 1;
+    let mut strobes = Vec::new();
+    for _ in 0..budget.periods() {
+        motion.advance()?;
+        strobes.push(motion.flight.q);
+    }
+    let window = &strobes[strobes.len().saturating_sub(kept)..];
+    let largest = |i: usize| window.iter().map(|q| q[i].abs().max(q[i + 2].abs())).fold(0.0, f64::max);
+    let position = largest(0).max(0.5 * (oscillator.walls[0] - oscillator.walls[1]));
+    let units = [position, largest(1).max(oscillator.omega * position)];
+    let apart = |a: &[f64; 4], b: &[f64; 4]| {
+        (0..4).map(|i| (a[i] - b[i]).abs() / units[i % 2]).fold(0.0, super::compare::farther)
+    };
+    let recurs = |lag: usize, within: f64| {
+        (lag..window.len()).rev().take(lag).all(|n| apart(&window[n], &window[n - lag]) < within)
+    };
+    let lags = 1..=window.len() / 2;
+    let record = match lags.clone().find(|&lag| recurs(lag, RECURS)) {
+        // It comes to its cycle from either side in turn, or to one of a shorter period.
+        Some(lag) if lags.clone().any(|part| part < lag && lag % part == 0 && recurs(part, NEARLY)) => {
+            return None;
+        }
+        Some(lag) => cycle(&motion, lag as u32, units)?,
+        None => chaos(motion, budget.settings.observed_periods, units)?,
+    };
+    Some(Record { periods_run: budget.periods(), ..record })
+}
+
+/// The derivative of one period, by differences of motions to either side.
+fn derivative(on: &Strobed, units: [f64; 2]) -> Option<Matrix4<f64>> {
+    let image = |j: usize, by: f64| {
+        let mut other = on.clone();
+        other.flight.q[j] += by;
+        other.advance()?;
+        Some(other.flight.q)
+    };
+    let mut derivative = Matrix4::zeros();
+    for j in 0..4 {
+        let by = BESIDE * units[j % 2];
+        let (ahead, behind) = (image(j, by)?, image(j, -by)?);
+        (0..4).for_each(|i| derivative[(i, j)] = (ahead[i] - behind[i]) / (2.0 * by));
+    }
+    Some(derivative)
+}
+
+/// A cycle, if it is stable.
+fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
+    let span = f64::from(period) * on.period;
+    let mut motion = on.clone();
+    motion.tally = Tally::default();
+    let mut monodromy = Matrix4::identity();
+    for _ in 0..period {
+        monodromy = derivative(&motion, units)? * monodromy;
+        motion.advance()?;
+    }
+    let [re, im] = *multipliers(&monodromy)?.first()?;
+    let (radius, tally) = (re.hypot(im), &motion.tally);
+    let mut record = Record {
+        period,
+        lyapunov: radius.ln() / span,
+        impacts_per_period: tally.impacts as f64 / f64::from(period),
+        mesh_fraction: tally.meshing_time / span,
+        strobe: on.flight.state(),
+        status: Status::Ok.code(),
+        valid: valid::PERIOD | valid::IMPACTS | valid::MESH | valid::STROBE,
+        ..Record::default()
+    };
+    record.set_word(&Word::cyclic(&tally.symbols));
+    if radius > LEAST_MULTIPLIER {
+        record.valid |= valid::LYAPUNOV;
+    }
+    (radius < 1.0).then_some(record)
+}
+
+/// Chaos, if a motion beside it separates from it on average.
+fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
+    motion.tally = Tally::default();
+    let mut other = motion.clone();
+    other.flight.q[0] += BESIDE * units[0];
+    let mut growth = Vec::new();
+    for _ in 0..periods {
+        motion.advance()?;
+        other.advance()?;
+        let difference: [f64; 4] =
+            std::array::from_fn(|i| (other.flight.q[i] - motion.flight.q[i]) / units[i % 2]);
+        let length = difference.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        growth.push((length / BESIDE).ln());
+        // In its domain, and as near as it was.
+        other = motion.clone();
+        (0..4).for_each(|i| other.flight.q[i] += BESIDE * units[i % 2] * difference[i] / length);
+    }
+    let mean = growth.iter().sum::<f64>() / growth.len().max(1) as f64;
+    let error = standard_error(&growth);
+    let span = f64::from(periods);
+    let record = Record {
+        lyapunov: mean / motion.period,
+        lyapunov_error: error / motion.period,
+        impacts_per_period: motion.tally.impacts as f64 / span,
+        mesh_fraction: motion.tally.meshing_time / (span * motion.period),
+        status: Status::Ok.code(),
+        valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH,
+        ..Record::default()
+    };
+    (mean > CHAOS_ERRORS * error).then_some(record)
+}

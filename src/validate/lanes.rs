@@ -1,0 +1,137 @@
+//! Lanes of a sample, run again on a device.
+
+use std::collections::HashMap;
+
+use super::Subject;
+use super::sample::Sample;
+use super::states::HORIZON;
+use crate::gpu::{self, Gpu, GpuError, Lane, LaneSettings};
+use crate::map::engine::{keep, lane_settings};
+use crate::map::plan::Plan;
+use crate::record::Record;
+use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::orbit::Status;
+
+/// What lanes said when they were run again; empty where there is no device.
+#[derive(Clone, Debug, Default)]
+pub struct Lanes {
+    /// What ran them.
+    pub device: Option<String>,
+    /// The same lanes, by run; of a map of lanes alone.
+    again: HashMap<u32, Record>,
+    /// The same without early stops, where there are lanes in double precision to compare them with.
+    whole: HashMap<u32, Record>,
+    /// In double precision without early stops, by run: the arbiter of single precision, and the judge of the reference.
+    double: HashMap<u32, Record>,
+    /// States after [`HORIZON`] periods; none for a lane that failed.
+    states: Vec<(u32, Option<State>)>,
+}
+
+impl Lanes {
+    /// Runs the lanes of a sample again. `single` has the map's precision, `double` is in f64 where the adapter can; of
+    /// a map of the reference it alone is used.
+    ///
+    /// # Errors
+    /// A [`GpuError`].
+    pub async fn run(
+        subject: &Subject<'_>,
+        sample: &Sample,
+        single: Option<&mut Gpu>,
+        double: Option<&mut Gpu>,
+    ) -> Result<Lanes, GpuError> {
+        let Subject { plan, records, .. } = *subject;
+        let ids = sample.ids();
+        let own = lane_settings(plan);
+        let whole = LaneSettings { early_stop: false, ..own };
+        let brief = LaneSettings { steps_per_period: whole.steps_per_period, ..LaneSettings::only(HORIZON) };
+        let mut lanes = Lanes::default();
+        if let Some(gpu) = single {
+            lanes.device = Some(gpu::describe(gpu.adapter()));
+            let mut again = run_lanes(gpu, plan, records, &ids, &own).await?;
+            again.iter_mut().for_each(|record| keep(record, plan.needs()));
+            lanes.again = ids.iter().copied().zip(again).collect();
+            if double.is_some() {
+                let records = run_lanes(gpu, plan, records, &ids, &whole).await?;
+                lanes.whole = ids.iter().copied().zip(records).collect();
+            }
+            lanes.states = states(gpu, subject, &sample.states, &brief).await?;
+        }
+        if let Some(gpu) = double {
+            lanes.device.get_or_insert_with(|| gpu::describe(gpu.adapter()));
+            let records = run_lanes(gpu, plan, records, &ids, &whole).await?;
+            lanes.double = ids.iter().copied().zip(records).collect();
+            if lanes.states.is_empty() {
+                lanes.states = states(gpu, subject, &sample.states, &brief).await?;
+            }
+        }
+        Ok(lanes)
+    }
+
+    pub(super) fn again(&self, id: u32) -> Option<&Record> {
+        self.again.get(&id)
+    }
+
+    pub(super) fn whole(&self, id: u32) -> Option<&Record> {
+        self.whole.get(&id)
+    }
+
+    pub(super) fn double(&self, id: u32) -> Option<&Record> {
+        self.double.get(&id)
+    }
+
+    pub(super) fn states(&self) -> &[(u32, Option<State>)] {
+        &self.states
+    }
+
+    /// Whether there are lanes in double precision.
+    pub(super) fn has_double(&self) -> bool {
+        !self.double.is_empty()
+    }
+}
+
+async fn states(
+    gpu: &mut Gpu,
+    subject: &Subject<'_>,
+    ids: &[u32],
+    settings: &LaneSettings,
+) -> Result<Vec<(u32, Option<State>)>, GpuError> {
+    let records = run_lanes(gpu, subject.plan, subject.records, ids, settings).await?;
+    let state = |record: &Record| (record.status == Status::Ok.code()).then_some(record.strobe);
+    Ok(ids.iter().copied().zip(records.iter().map(state)).collect())
+}
+
+/// Runs lanes of a plan's runs: one record per id. `records` are as for [`Plan::start`].
+///
+/// # Errors
+/// A [`GpuError`].
+pub async fn run_lanes(
+    gpu: &mut Gpu,
+    plan: &Plan,
+    records: &[Record],
+    ids: &[u32],
+    settings: &LaneSettings,
+) -> Result<Vec<Record>, GpuError> {
+    if ids.is_empty() {
+        return Ok(Vec::new());
+    }
+    let cells: Vec<_> = ids.iter().map(|&id| plan.cell(id)).collect();
+    let numbered = |of: fn(&crate::map::plan::Cell) -> u32| {
+        let mut list: Vec<u32> = cells.iter().map(of).collect();
+        list.sort_unstable();
+        list.dedup();
+        list
+    };
+    let (flows, laws) = (numbered(|cell| cell.flow), numbered(|cell| cell.law));
+    let place = |list: &[u32], index: u32| list.partition_point(|&other| other < index) as u32;
+    let lanes: Vec<Lane> = cells
+        .iter()
+        .map(|cell| Lane {
+            flow: place(&flows, cell.flow),
+            law: place(&laws, cell.law),
+            start: plan.start(cell.id, records),
+        })
+        .collect();
+    let flows: Vec<_> = flows.iter().map(|&flow| plan.oscillator(flow)).collect();
+    let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
+    gpu.run(&flows, &laws, &lanes, settings).await
+}

@@ -1,0 +1,129 @@
+//! Rates with their intervals, and how much may be left unexplained.
+
+/// Unexplained cells that are tolerated: one in so many.
+pub const TOLERATED: f64 = 1e-4;
+
+/// A stratum fails where as many would be unexplained by chance less often than this.
+const CHANCE: f64 = 0.01;
+
+/// Probability that an interval does not hold the true rate.
+const OUTSIDE: f64 = 0.05;
+
+/// A share of cells that were drawn at random, with its 95 % interval (Clopper and Pearson).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    /// Cells that have the property.
+    pub count: usize,
+    /// Cells that were drawn.
+    pub among: usize,
+    /// Ends of the interval; one-sided where `count` is none or all.
+    pub interval: [f64; 2],
+}
+
+impl Rate {
+    /// The rate of `count` cells among so many.
+    pub fn new(count: usize, among: usize) -> Rate {
+        if among == 0 {
+            return Rate { count, among, interval: [0.0, 1.0] };
+        }
+        let (none, all) = (count == 0, count == among);
+        let tail = if none || all { OUTSIDE } else { 0.5 * OUTSIDE };
+        let low = if none { 0.0 } else { bisect(|p| at_least(count, among, p) < tail) };
+        let high = if all { 1.0 } else { bisect(|p| at_least(count + 1, among, p) < 1.0 - tail) };
+        Rate { count, among, interval: [low, high] }
+    }
+
+    /// In words, as a percentage: `0.5 %, 0.06 to 1.8`; `below 0.75 %` where there is none.
+    pub fn text(&self) -> String {
+        let [low, high] = self.interval.map(|end| percent(100.0 * end));
+        match self.count {
+            0 => format!("below {high} %"),
+            count => {
+                format!("{} %, {low} to {high}", percent(100.0 * count as f64 / self.among.max(1) as f64))
+            }
+        }
+    }
+
+    /// Whether so many unexplained cells are too many: more than one cell in 10,000 allows at 99 % confidence.
+    pub fn is_too_many(&self) -> bool {
+        self.count > 0 && at_least(self.count, self.among, TOLERATED) < CHANCE
+    }
+}
+
+/// Two significant digits, and whole numbers from ten on.
+fn percent(value: f64) -> String {
+    if value == 0.0 || value >= 9.95 {
+        return format!("{value:.0}");
+    }
+    let decimals = (1.0 - value.log10().floor()).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// The probability of `count` successes or more among so many, each of probability `p`.
+fn at_least(count: usize, among: usize, p: f64) -> f64 {
+    // Terms of the binomial distribution, each from the one before, as logarithms.
+    let (success, failure) = (p.ln(), (-p).ln_1p());
+    let mut term = among as f64 * failure;
+    let mut below = 0.0;
+    for k in 0..count {
+        below += term.exp();
+        term += ((among - k) as f64 / (k + 1) as f64).ln() + success - failure;
+    }
+    // Where the sum is all but 1 it says nothing: the other tail is summed.
+    if below < 0.5 {
+        return 1.0 - below;
+    }
+    let mut above = 0.0;
+    for k in count..=among {
+        above += term.exp();
+        if k < among {
+            term += ((among - k) as f64 / (k + 1) as f64).ln() + success - failure;
+        }
+    }
+    above
+}
+
+/// The least probability at which `is_below` no longer holds.
+fn bisect(is_below: impl Fn(f64) -> bool) -> f64 {
+    let [mut low, mut high] = [0.0, 1.0];
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if is_below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_the_published_ones() {
+        // Clopper and Pearson (1934), and the rule of three.
+        for (count, among, low, high) in [
+            (2, 400, 6.06e-4, 0.017943),
+            (0, 400, 0.0, 0.0074612),
+            (5, 10, 0.18709, 0.81291),
+            (10, 10, 0.74113, 1.0),
+        ] {
+            let Rate { interval, .. } = Rate::new(count, among);
+            assert!((interval[0] - low).abs() < 1e-5 && (interval[1] - high).abs() < 1e-5, "{interval:?}");
+        }
+        assert_eq!(Rate::new(2, 400).text(), "0.5 %, 0.061 to 1.8");
+        assert_eq!(Rate::new(0, 400).text(), "below 0.75 %");
+        assert_eq!(Rate::new(0, 0).interval, [0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_stratum_fails_by_what_chance_does_not_allow() {
+        let fails = |count, among| Rate::new(count, among).is_too_many();
+        // One in 100 is less likely than 1 % at a rate of 1e-4; of 200 cells one may be unexplained, not two.
+        assert!(fails(1, 100) && !fails(1, 200) && fails(2, 200));
+        assert!(!fails(0, 0) && !fails(4, 10_000) && fails(5, 10_000) && fails(262_144, 262_144));
+    }
+}

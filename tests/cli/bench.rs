@@ -1,0 +1,74 @@
+//! The instruments of `rattlemap bench` at tiny sizes: they must not rot.
+//!
+//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+
+use std::collections::HashMap;
+use std::fs;
+
+use assert_cmd::Command;
+
+type Row = HashMap<String, String>;
+
+fn rows(path: &std::path::Path) -> Vec<Row> {
+    csv::Reader::from_path(path).unwrap().deserialize().map(|row| row.unwrap()).collect()
+}
+
+#[test]
+fn engines_agree_and_say_where_their_time_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("rattlemap").unwrap();
+        command.current_dir(folder.path()).args(["bench", "engines", "--quick"]).args(arguments).assert()
+    };
+    let said = run(&[]).success().stdout("").get_output().stderr.clone();
+    let said = String::from_utf8(said).unwrap();
+    assert!(said.contains("largest map on each engine") && said.contains(" 0 unexplained"), "{said}");
+    let out = folder.path().join("out/bench/engines");
+    let mut names: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["engines.csv", "engines.png", "manifest.json", "runs.csv", "stages.png"]);
+
+    let table = rows(&out.join("engines.csv"));
+    let number = |row: &Row, name: &str| row[name].parse::<f64>().unwrap_or(f64::NAN);
+    for (engine, precision) in [("cpu", "f64"), ("gpu", "f32"), ("gpu", "f64")] {
+        let of = |row: &&Row| row["engine"] == engine && row["precision"] == precision;
+        let sizes: Vec<&str> = table.iter().filter(of).map(|row| row["lanes"].as_str()).take(2).collect();
+        assert_eq!(sizes, ["36", "81"], "{engine} {precision}");
+    }
+    for row in &table {
+        let classes: f64 =
+            ["periodic", "chaotic", "undecided", "failed"].map(|name| number(row, name)).iter().sum();
+        assert_eq!(classes, number(row, "lanes"), "{row:?}");
+        let [low, median, high] = ["lane_periods_per_s_low", "lane_periods_per_s", "lane_periods_per_s_high"]
+            .map(|name| number(row, name));
+        assert!(0.0 < low && low <= median && median <= high, "{row:?}");
+        let is_gpu = row["engine"] == "gpu";
+        assert_eq!(row["threads"].is_empty(), is_gpu);
+        assert_eq!(number(row, "lane_steps_per_s") > 0.0, is_gpu, "{row:?}");
+        assert_eq!(number(row, "upload_s") > 0.0 && number(row, "read_s") > 0.0, is_gpu, "{row:?}");
+        // No class differs on so few cells; the first series is what others are compared with.
+        assert!(row["cells_differing"].is_empty() || row["cells_differing"] == "0", "{row:?}");
+        if !row["device_share"].is_empty() {
+            assert!((0.01..1.01).contains(&number(row, "device_share")), "{row:?}");
+        }
+    }
+    let runs = rows(&out.join("runs.csv"));
+    assert_eq!(runs.len(), 2 * table.len());
+
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    assert_eq!((&manifest["command"], &manifest["quick"]), (&"bench engines".into(), &true.into()));
+    let series = manifest["series"].as_array().unwrap();
+    assert!(series.iter().filter(|series| series["check"]["faults"] == serde_json::json!([])).count() >= 3);
+    let work = series.iter().map(|series| &series["work"]).find(|work| !work.is_null()).unwrap();
+    // About thirty steps per period and a hundred instructions each, as benches/README.md says.
+    let [steps, least, most] =
+        ["scan_steps", "operations_at_least", "operations_at_most"].map(|name| work[name].as_f64().unwrap());
+    assert!((10.0..200.0).contains(&steps) && least > 50.0 * steps && most > 1.2 * least, "{work}");
+    for (name, width) in [("engines.png", 1700), ("stages.png", 1700)] {
+        let picture = image::open(out.join(name)).unwrap().to_rgb8();
+        let colors: std::collections::HashSet<_> = picture.pixels().collect();
+        assert!(picture.width() == width && colors.len() > 30, "{name}");
+    }
+    run(&[]).code(2);
+}

@@ -1,0 +1,298 @@
+//! The command line as scripts see it: exit codes, messages, files.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use tempfile::TempDir;
+
+const SMOKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke.toml");
+
+/// The binary, run inside `folder`.
+fn rattlemap(folder: &TempDir) -> Command {
+    let mut command = Command::cargo_bin("rattlemap").unwrap();
+    command.current_dir(folder.path());
+    command
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
+    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
+    predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
+}
+
+/// Asserts that a parsed `orbit --json` object has exactly the fields of the contract.
+fn assert_orbit_fields(orbit: &serde_json::Value) {
+    let fields = "class e events floquet impacts_per_period lyapunov lyapunov_error mesh_fraction omega \
+                  parameters period periods_run status strobe symmetric word";
+    assert_eq!(keys(orbit), fields);
+    for event in orbit["events"].as_array().expect("events is a list") {
+        assert_eq!(keys(event), "after before kind side t t_mod_period");
+    }
+    assert_eq!(orbit["strobe"].as_array().map(Vec::len), Some(4));
+}
+
+/// The names in a folder, sorted.
+fn file_names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+fn keys(object: &serde_json::Value) -> String {
+    let mut keys: Vec<&str> = object.as_object().expect("an object").keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    keys.join(" ")
+}
+
+/// Runs a changed smoke scene and expects exit code 2, all of `parts` in the message,
+/// nothing on stdout and no output folder.
+#[track_caller]
+fn refuses(old: &str, new: &str, parts: &[&str]) {
+    let folder = folder();
+    let text = fs::read_to_string(SMOKE).unwrap();
+    assert!(text.contains(old), "{old:?} is not in the smoke scene");
+    fs::write(folder.path().join("bad.toml"), text.replacen(old, new, 1)).unwrap();
+    let run = rattlemap(&folder).args(["bifurcation", "bad.toml"]).assert();
+    run.code(2).stdout("").stderr(says(parts));
+    assert!(!folder.path().join("out").exists(), "an output folder was made");
+}
+
+#[test]
+fn unknown_field_is_refused() {
+    refuses("count = 5", "cuont = 5", &["bad.toml:11:1", "`axis.0.cuont = 5`", "did you mean `count`?"]);
+}
+
+#[test]
+fn value_out_of_range_is_refused() {
+    refuses("max = 0.8", "max = 1.5", &["bad.toml:10:7", "`axis.0.max = 1.5`", "between 0 and 1"]);
+}
+
+#[test]
+fn not_a_number_is_refused() {
+    refuses("min = 0.4", "min = nan", &["bad.toml:9:7", "`axis.0.min = nan`", "between 0 and 1"]);
+    refuses("min = 0.4", "min = \"low\"", &["bad.toml:9:7", "`axis.0.min = \"low\"`", "it must be a number"]);
+    refuses("min = 0.4", "min = low", &["bad.toml:9:7", "min = low", "not valid TOML"]);
+}
+
+#[test]
+fn empty_axis_is_refused() {
+    refuses("count = 5", "count = 0", &["bad.toml:11:9", "`axis.0.count = 0`", "from 2 to"]);
+    refuses("max = 0.8", "max = 0.4", &["bad.toml:10:7", "`axis.0.max = 0.4`", "greater than `axis.0.min"]);
+}
+
+#[test]
+fn scene_for_another_command_is_refused() {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/e_omega.toml");
+    let run = rattlemap(&folder()).args(["bifurcation", scene]).assert();
+    run.code(2).stderr(says(&["e_omega.toml:17:1", "`axis = 2 tables`", "needs 1 axis"]));
+}
+
+#[test]
+fn missing_scene_is_refused() {
+    let folder = folder();
+    let run = rattlemap(&folder).args(["bifurcation", "scenes/none.toml"]).assert();
+    run.code(2).stdout("").stderr(says(&["scenes/none.toml: cannot read", "give the path of a TOML file"]));
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn bad_set_is_refused_and_names_itself() {
+    for (set, part) in [
+        ("axis.0.count=1", "`axis.0.count = 1` is out of range"),
+        ("e=0.6", "`parameters.e = 0.6` does not fit: axis 0 sweeps `e`"),
+        ("omgea=6", "did you mean `omega`?"),
+        ("omega", "expected NAME=VALUE"),
+    ] {
+        let folder = folder();
+        let run = rattlemap(&folder).args(["bifurcation", SMOKE, "--set", set]).assert();
+        run.code(2).stdout("").stderr(says(&[&format!("--set {set}: "), part]));
+        assert!(!folder.path().join("out").exists());
+    }
+}
+
+#[test]
+fn bad_orbit_requests_are_refused() {
+    let cases: [(&[&str], &str); 7] = [
+        (&["--start", "0,0,0"], "it must be four finite numbers"),
+        (&["--start", "0,0,0,inf"], "it must be four finite numbers"),
+        (
+            &["--set", "e=1.5"],
+            "--set e=1.5: `parameters.e = 1.5` is out of range: it must be between 0 and 1",
+        ),
+        (&["--set", "e=nan"], "`parameters.e = nan` is out of range"),
+        (&["--set", "mass=1"], "--set mass=1: unknown field `parameters.mass = 1`; valid names: m1"),
+        (&["--periods", "1"], "2..=10000000"),
+        (&["--force"], "--out <DIR>"),
+    ];
+    for (arguments, part) in cases {
+        let run = rattlemap(&folder()).arg("orbit").args(arguments).assert();
+        run.code(2).stdout("").stderr(says(&[part]));
+    }
+}
+
+#[test]
+fn files_in_the_way_of_the_output_are_refused() {
+    let folder = folder();
+    fs::write(folder.path().join("taken"), "precious").unwrap();
+    for arguments in [["bifurcation", SMOKE].as_slice(), &["orbit"]] {
+        for (out, part) in [("taken", "there is a file of this name"), ("taken/below", "cannot write there")]
+        {
+            let run = rattlemap(&folder).args(arguments).args(["--out", out, "--force"]).assert();
+            run.code(2).stdout("").stderr(says(&[&format!("--out {out}: {part}"), "choose another folder"]));
+        }
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("taken")).unwrap(), "precious");
+}
+
+#[test]
+fn full_output_folders_are_refused() {
+    let folder = folder();
+    let out = folder.path().join("out/smoke");
+    fs::create_dir_all(&out).unwrap();
+    fs::write(out.join("notes.txt"), "precious").unwrap();
+    let run = rattlemap(&folder).args(["bifurcation", SMOKE]).assert();
+    run.code(2).stdout("").stderr(says(&["out/smoke: the folder is not empty", "--force"]));
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "something was written");
+    let run = rattlemap(&folder).args(["orbit", "--out", "out/smoke"]).assert();
+    run.code(2).stdout("").stderr(says(&["--out out/smoke: the folder is not empty"]));
+}
+
+#[cfg(unix)]
+#[test]
+fn read_only_output_folders_are_refused() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = folder();
+    let closed = folder.path().join("closed");
+    fs::create_dir(&closed).unwrap();
+    fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
+    // Root may write anywhere, and then there is nothing to refuse.
+    if fs::write(closed.join("probe"), "").is_ok() {
+        return;
+    }
+    let run = rattlemap(&folder).args(["bifurcation", SMOKE, "--out", "closed"]).assert();
+    run.code(2).stdout("").stderr(says(&["--out closed: cannot write there"]));
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    for (command, example) in [
+        ("orbit", "rattlemap orbit --set"),
+        ("bifurcation", "rattlemap bifurcation scenes/"),
+        ("map", "rattlemap map scenes/"),
+    ] {
+        let run = rattlemap(&folder()).args([command, "--help"]).assert();
+        run.success().stdout(says(&["Example", example]));
+    }
+}
+
+#[test]
+fn orbit_json_has_the_fields_of_the_contract() {
+    let run = rattlemap(&folder()).args(["orbit", "--json"]).assert().success();
+    let printed = &run.get_output().stdout;
+    let orbit: serde_json::Value = serde_json::from_slice(printed).unwrap();
+    assert_orbit_fields(&orbit);
+    assert_eq!(orbit["e"], 0.605);
+    assert_eq!(orbit["omega"], 5.6);
+    assert_eq!(orbit["parameters"]["F"], 50.0);
+    assert_eq!(orbit["class"], "periodic");
+    assert_eq!(orbit["period"], 1);
+    assert_eq!(orbit["word"], "36");
+    assert_eq!(orbit["lyapunov_error"], serde_json::Value::Null);
+    assert_eq!(orbit["events"].as_array().unwrap().len(), 2);
+    // The transient, a turning tangent vector, one check.
+    assert_eq!(orbit["periods_run"], 400 + 50 + 128);
+}
+
+#[test]
+fn orbit_summary_is_for_the_eye() {
+    let run = rattlemap(&folder()).args(["orbit", "--set", "e=0.06"]).assert();
+    run.success().stderr("").stdout(says(&[
+        "periodic, period 1",
+        "e=0.06",
+        "mesh_start",
+        "mesh_end",
+        "Floquet",
+    ]));
+}
+
+#[test]
+fn orbit_folder_is_written_once_and_again_with_force() {
+    let folder = folder();
+    let orbit =
+        |arguments: &[&str]| rattlemap(&folder).args(["orbit", "--out", "o"]).args(arguments).assert();
+    orbit(&[]).success();
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("o/orbit.json")).unwrap()).unwrap();
+    assert_orbit_fields(&json);
+    let names = file_names(&folder.path().join("o"));
+    assert!(names.iter().any(|name| name.ends_with(".png")), "{names:?}");
+    orbit(&[]).code(2);
+    orbit(&["--force"]).success();
+    assert_eq!(file_names(&folder.path().join("o")), names);
+}
+
+#[test]
+fn bifurcation_writes_table_figure_and_manifest() {
+    let folder = folder();
+    let run = rattlemap(&folder).args(["bifurcation", SMOKE, "--set", "omega=5.6"]).assert();
+    run.success().stdout("").stderr(says(&["5 of 5 columns", "bifurcation.csv"]));
+    let out = folder.path().join("out/smoke");
+    assert_eq!(file_names(&out), ["bifurcation.csv", "bifurcation.png", "manifest.json"]);
+    assert!(fs::read(out.join("bifurcation.png")).unwrap().starts_with(b"\x89PNG"));
+    check_table(&out.join("bifurcation.csv"));
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    assert!(!manifest.contains(env!("CARGO_MANIFEST_DIR")), "a path of this machine: {manifest}");
+    let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    assert_eq!(manifest["scene"], fs::read_to_string(SMOKE).unwrap());
+    assert_eq!(manifest["set"], serde_json::json!(["omega=5.6"]));
+    assert_eq!(manifest["engine"], "reference f64");
+    assert_eq!(manifest["crate_version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(manifest["start"]["policy"], "rest");
+    assert!(manifest["elapsed_seconds"].as_f64().unwrap() > 0.0);
+}
+
+fn check_table(path: &Path) {
+    let mut table = csv::Reader::from_path(path).unwrap();
+    let header =
+        "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2";
+    assert_eq!(table.headers().unwrap().iter().collect::<Vec<_>>().join(","), header);
+    let rows: Vec<csv::StringRecord> = table.records().collect::<Result<_, _>>().unwrap();
+    let mut values: Vec<&str> = rows.iter().map(|row| &row[0]).collect();
+    values.dedup();
+    assert_eq!((values.len(), values[0], values[4]), (5, "0.4", "0.8"));
+    assert_eq!(rows[0].iter().skip(1).take(3).collect::<Vec<_>>(), ["periodic", "1", "ok"]);
+    let period = std::f64::consts::TAU / 5.6;
+    for row in &rows {
+        let numbers: Vec<f64> = row.iter().skip(6).map(|field| field.parse().unwrap()).collect();
+        assert!((0.0..period).contains(&numbers[0]), "{row:?}");
+        let (side, gap): (f64, f64) = (row[4].parse().unwrap(), numbers[5] - numbers[7]);
+        assert!((gap - 0.5 * side).abs() < 1e-9, "not on a wall: {row:?}");
+    }
+}
+
+#[test]
+fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
+    let folder = folder();
+    let run = |arguments: &[&str]| {
+        rattlemap(&folder).args(["bifurcation", SMOKE, "--set", "axis.0.count=2"]).args(arguments).assert()
+    };
+    run(&["--quiet"]).success().stdout("").stderr("");
+    let out = folder.path().join("out/smoke");
+    fs::write(out.join("notes.txt"), "precious").unwrap();
+    run(&[]).code(2).stderr(says(&["the folder is not empty"]));
+    run(&["--force", "--set", "outputs.files=[\"csv\"]"]).success();
+    assert_eq!(file_names(&out), ["bifurcation.csv", "manifest.json", "notes.txt"]);
+}
+
+#[test]
+fn orbit_help_says_that_periods_are_no_limit() {
+    let run = rattlemap(&folder()).args(["orbit", "--help"]).assert();
+    run.success().stdout(says(&["No limit", "All of them are integrated"]));
+}

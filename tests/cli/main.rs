@@ -1,0 +1,5 @@
+//! The program as scripts see it.
+
+mod bench;
+mod commands;
+mod map;

@@ -1,0 +1,261 @@
+//! `rattlemap map` as scripts see it: files of the contract, refusals, resumption.
+
+mod adaptive;
+mod engines;
+mod interrupts;
+mod records;
+mod streams;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command as Process, Stdio};
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use tempfile::TempDir;
+
+const SCENE: &str = r#"title = "A <small> map"
+
+[[axis]]
+parameter = "e"
+min = 0.0
+max = 1.0
+count = 20
+
+[[axis]]
+parameter = "omega"
+min = 1.0
+max = 12.0
+count = 16
+
+[outputs]
+quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]
+"#;
+
+/// Files that a resumed run must give byte for byte.
+const SAME: [&str; 8] = [
+    "cells.csv",
+    "cells.npy",
+    "map.png",
+    "lyapunov.png",
+    "impacts.png",
+    "mesh.png",
+    "word.png",
+    "report.html",
+];
+
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    folder
+}
+
+fn command(folder: &TempDir, arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("rattlemap").unwrap();
+    command.current_dir(folder.path()).args(arguments);
+    // Without it Mesa's loader complains on stderr, which is not the program's doing.
+    command.env("XDG_RUNTIME_DIR", folder.path());
+    command
+}
+
+/// A map on the CPU, unless the arguments say otherwise.
+fn map(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let engine: &[&str] = if arguments.contains(&"--engine") { &[] } else { &["--engine", "cpu"] };
+    command(folder, &[&["map", "s.toml"], engine, arguments].concat()).assert()
+}
+
+fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
+    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
+    predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
+}
+
+fn rows(path: &Path) -> (String, Vec<Vec<String>>) {
+    let mut table = csv::Reader::from_path(path).unwrap();
+    let header = table.headers().unwrap().iter().collect::<Vec<_>>().join(",");
+    let row = |row: csv::Result<csv::StringRecord>| row.unwrap().iter().map(ToOwned::to_owned).collect();
+    (header, table.records().map(row).collect())
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = folder
+        .read_dir()
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_map_writes_the_files_of_the_contract() {
+    let folder = folder();
+    map(&folder, &["--engine", "cpu"]).success().stdout("").stderr(says(&[
+        "320 cells on cpu (f64)",
+        "cells/s",
+        "periods/s",
+        "periodic",
+        "out/s: cells.csv, cells.npy, map.png, lyapunov.png, impacts.png, mesh.png, word.png, report.html",
+    ]));
+    let out = folder.path().join("out/s");
+    let (header, rows) = rows(&out.join("cells.csv"));
+    assert_eq!(
+        header,
+        "i,j,e,omega,class,period,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,word,\
+         status,periods_run,source"
+    );
+    assert_eq!(rows.len(), 320);
+    rows.iter().enumerate().for_each(|(id, row)| check_row(id, row));
+    check_npy(&fs::read(out.join("cells.npy")).unwrap(), &rows);
+    check_manifest(&out, &rows);
+    for name in SAME.iter().filter(|name| name.ends_with("png")) {
+        let picture = image::open(out.join(name)).unwrap().to_rgb8();
+        let colors: std::collections::HashSet<_> = picture.pixels().collect();
+        assert!(picture.width() > 1400 && colors.len() > 30, "{name}");
+    }
+}
+
+fn check_row(id: usize, row: &[String]) {
+    let (i, j) = (id % 20, id / 20);
+    assert_eq!((row[0].parse(), row[1].parse()), (Ok(i), Ok(j)));
+    assert_eq!(row[2].parse::<f64>().unwrap(), if i == 19 { 1.0 } else { i as f64 / 19.0 });
+    assert_eq!(row[3].parse::<f64>().unwrap(), if j == 15 { 12.0 } else { 1.0 + 11.0 * j as f64 / 15.0 });
+    let is_periodic = row[4] == "periodic";
+    assert!(is_periodic || row[4] == "chaotic" || row[4] == "undecided", "{row:?}");
+    assert_eq!(row[5].parse::<u32>().is_ok_and(|period| (1..=64).contains(&period)), is_periodic, "{row:?}");
+    let lyapunov: f64 = row[6].parse().unwrap();
+    assert_eq!(row[7].is_empty(), is_periodic, "{row:?}");
+    if row[4] == "chaotic" {
+        assert!(lyapunov > 3.0 * row[7].parse::<f64>().unwrap(), "{row:?}");
+    }
+    let (impacts, mesh): (f64, f64) = (row[8].parse().unwrap(), row[9].parse().unwrap());
+    assert!(impacts >= 0.0 && (0.0..=1.0).contains(&mesh), "{row:?}");
+    // Lanes on a slow approach do not know the symmetry yet.
+    let is_known = row[10] == "true" || row[10] == "false";
+    assert!(is_known == is_periodic || row[12] != "ok" && row[10].is_empty(), "{row:?}");
+    let is_word = row[11].starts_with('#') || row[11].chars().all(|c| ('1'..='6').contains(&c));
+    assert!(is_word && (is_periodic || row[11].is_empty()), "{row:?}");
+    assert!(["ok", "slow", "near_grazing", "strobe_on_event"].contains(&row[12].as_str()), "{row:?}");
+    assert!((1..=528).contains(&row[13].parse::<u32>().unwrap()), "{row:?}");
+    assert_eq!(row[14], "integrated");
+}
+
+/// The array's bytes against the table's rows.
+fn check_npy(bytes: &[u8], rows: &[Vec<String>]) {
+    assert!(bytes.starts_with(b"\x93NUMPY"));
+    let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = String::from_utf8_lossy(&bytes[10..header_end]);
+    for part in ["('omega', '<f8')", "('class', '|i1')", "('word', '|S64')", "(320, )"] {
+        assert!(header.contains(part), "{header}");
+    }
+    let size = (bytes.len() - header_end) / rows.len();
+    assert_eq!(size, 4 + 4 + 8 + 8 + 1 + 2 + 4 * 8 + 1 + 64 + 1 + 4 + 1);
+    for (row, packed) in rows.iter().zip(bytes[header_end..].chunks(size)) {
+        let float = |at: usize| f64::from_le_bytes(packed[at..at + 8].try_into().unwrap());
+        assert_eq!(format!("{:?}", float(8)), row[2]);
+        assert_eq!(format!("{:?}", float(16)), row[3]);
+        let classes = ["periodic", "chaotic", "undecided", "failed"];
+        assert_eq!(classes[usize::from(packed[24])], row[4]);
+        let period = u16::from_le_bytes([packed[25], packed[26]]);
+        assert_eq!(period, row[5].parse().unwrap_or(0));
+        for (at, field) in [(27, 6), (35, 7), (43, 8), (51, 9)] {
+            let (value, text) = (float(at), &row[field]);
+            assert!(if text.is_empty() { value.is_nan() } else { format!("{value:?}") == *text }, "{row:?}");
+        }
+        assert_eq!(
+            i8::from_le_bytes([packed[59]]),
+            match row[10].as_str() {
+                "true" => 1,
+                "false" => 0,
+                _ => -1,
+            }
+        );
+        let word = String::from_utf8_lossy(&packed[60..124]);
+        assert_eq!(word.trim_end_matches('\0'), row[11]);
+        assert_eq!(u32::from_le_bytes(packed[125..129].try_into().unwrap()), row[13].parse::<u32>().unwrap());
+    }
+}
+
+fn check_manifest(out: &Path, rows: &[Vec<String>]) {
+    let text = fs::read_to_string(out.join("manifest.json")).unwrap();
+    assert!(!text.contains(env!("CARGO_MANIFEST_DIR")), "a path of this machine: {text}");
+    let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(manifest["command"], "map");
+    assert_eq!(manifest["scene"], SCENE);
+    assert_eq!((&manifest["engine"], &manifest["precision"]), (&"cpu".into(), &"f64".into()));
+    assert_eq!(manifest["cells"], 320);
+    let commit = manifest["commit"].as_str().unwrap();
+    let of = commit.strip_suffix("-modified").unwrap_or(commit);
+    let is_hash = of.len() == 40 && of.chars().all(|c| c.is_ascii_hexdigit());
+    assert!(is_hash || commit == "unknown", "{commit}");
+    assert_eq!(manifest["codes"]["class"]["chaotic"], 1);
+    assert_eq!(manifest["codes"]["status"]["slow"], 1);
+    assert_eq!(manifest["codes"]["source"]["integrated"], 0);
+    assert_eq!(manifest["start"]["policy"], "rest");
+    assert_eq!(manifest["axes"][1]["parameter"], "omega");
+    for class in ["periodic", "chaotic", "undecided", "failed"] {
+        let count = rows.iter().filter(|row| row[4] == class).count();
+        assert_eq!(manifest["classes"][class], count);
+    }
+    let mut files: Vec<String> = serde_json::from_value(manifest["files"].clone()).unwrap();
+    files.push("records.bin".to_owned());
+    files.sort();
+    assert_eq!(files, names(out));
+}
+
+#[test]
+fn what_is_not_asked_for_is_empty_and_not_written() {
+    let folder = folder();
+    let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--quiet"];
+    let sets = ["--set", "outputs.quantities=[\"mesh\"]", "--set", "outputs.files=[\"csv\",\"png\"]"];
+    map(&folder, &[&few[..], &sets].concat()).success().stderr("");
+    let out = folder.path().join("out/s");
+    assert_eq!(names(&out), ["cells.csv", "manifest.json", "mesh.png", "records.bin"]);
+    for row in rows(&out.join("cells.csv")).1 {
+        assert!([4, 5, 6, 7, 8, 10, 11].iter().all(|&field| row[field].is_empty()), "{row:?}");
+        assert!(!row[9].is_empty() && row[14] == "integrated", "{row:?}");
+    }
+}
+
+#[test]
+fn folders_are_guarded() {
+    let folder = folder();
+    let few = ["--quiet", "--set", "axis.0.count=2", "--set", "axis.1.count=2"];
+    // Nothing there yet: --resume begins, so that scripts may always give it.
+    map(&folder, &[&few[..], &["--resume"]].concat()).success();
+    map(&folder, &few).code(2).stdout("").stderr(says(&["out/s: the folder is not empty", "--force"]));
+    map(&folder, &["--resume", "--force"]).code(2).stderr(says(&["cannot be used with"]));
+    let other = folder.path().join("other");
+    fs::create_dir(&other).unwrap();
+    fs::write(other.join("notes.txt"), "precious").unwrap();
+    let run = map(&folder, &[&few[..], &["--out", "other", "--resume"]].concat());
+    run.code(2).stderr(says(&["there is no records.bin in other", "leave --resume out"]));
+    map(&folder, &[&few[..], &["--out", "other", "--force"]].concat()).success();
+    assert_eq!(fs::read_to_string(other.join("notes.txt")).unwrap(), "precious");
+}
+
+#[test]
+fn maps_that_do_not_fit_are_refused_with_figures() {
+    let folder = folder();
+    let count = |count: &str| [format!("axis.0.count={count}"), format!("axis.1.count={count}")];
+    let [a, b] = count("1000000");
+    let run = map(&folder, &["--set", &a, "--set", &b]);
+    run.code(2).stdout("").stderr(says(&["1000000 x 1000000 = 1000000000000 cells is too large"]));
+    let [a, b] = count("65000");
+    let run = map(&folder, &["--set", &a, "--set", &b]);
+    run.code(2).stdout("").stderr(says(&["4225000000 cells needs about 9", "GB of memory, and", "are free"]));
+    assert!(!folder.path().join("out").exists(), "an output folder was made");
+}
+
+#[test]
+fn scenes_that_maps_cannot_do_are_refused() {
+    let folder = folder();
+    for (set, part) in [
+        ("start.count=300", "`start.count = 300` is out of range: it must be a whole number from 1 to 255"),
+        ("refine.max_error=0", "`refine.max_error = 0` is out of range"),
+        ("e=0.5", "`parameters.e = 0.5` does not fit: axis 0 sweeps `e`"),
+    ] {
+        let run = map(&folder, &["--set", set]);
+        run.code(2).stdout("").stderr(says(&[&format!("--set {set}: "), part]));
+    }
+    assert!(!folder.path().join("out").exists());
+}

@@ -1,0 +1,72 @@
+//! What people read: links lead somewhere, and the two first texts stay short.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Every Markdown file of the repository that is its own.
+fn texts() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folders = ["", "docs", "results", "benches", "benches/peers", "fuzz"];
+    let mut texts = Vec::new();
+    for folder in folders.map(|folder| root.join(folder)) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "md") {
+                texts.push(path);
+            }
+        }
+    }
+    assert!(texts.len() >= 9, "{texts:?}");
+    texts
+}
+
+/// Targets of `[text](target)` in a text, code blocks left out.
+fn links(text: &str) -> Vec<&str> {
+    let prose = text.split("\n```").step_by(2);
+    let starts = prose.flat_map(|part| part.split("](").skip(1));
+    starts.filter_map(|rest| rest.split_once(')')).map(|(target, _)| target).collect()
+}
+
+/// The anchor that a heading gets: lower case, spaces as hyphens, without punctuation.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim_start_matches('#').trim().chars();
+    let kept = kept.filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    kept.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut seen = 0;
+    for path in texts() {
+        let text = fs::read_to_string(&path).unwrap();
+        for link in links(&text).into_iter().filter(|link| !link.starts_with("https://")) {
+            let (file, fragment) = link.split_once('#').unwrap_or((link, ""));
+            let target = if file.is_empty() { path.clone() } else { path.parent().unwrap().join(file) };
+            assert!(target.exists(), "{}: nothing at {link}", path.display());
+            if !fragment.is_empty() {
+                let there = fs::read_to_string(&target).unwrap();
+                let has = there.lines().any(|line| line.starts_with('#') && anchor(line) == fragment);
+                assert!(has, "{}: no heading for {link}", path.display());
+            }
+            seen += 1;
+        }
+    }
+    assert!(seen > 50, "{seen} links");
+}
+
+#[test]
+fn readme_and_map_of_the_code_stay_short() {
+    for name in ["README.md", "ARCHITECTURE.md"] {
+        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+        assert!(text.lines().count() <= 150, "{name} has more than 150 lines");
+    }
+}
+
+#[test]
+fn anchors_are_as_readers_of_markdown_make_them() {
+    assert_eq!(
+        anchor("## Where the attractor changes, omega = 5.6"),
+        "where-the-attractor-changes-omega--56"
+    );
+    assert_eq!(links("[a](b) c\n```\n[d](e)\n```\n[f](g#h)"), ["b", "g#h"]);
+}

@@ -1,0 +1,224 @@
+//! Scenes at random: mutated, and made up of what scenes can say. None makes the parser panic,
+//! what is accepted is valid, and what is refused is told where, what and how to mend it.
+
+use proptest::prelude::*;
+use rattlemap::map::scene::{Axis, Place, Problem, Purpose, Scene, SceneError, Steps};
+use rattlemap_dynamics::model::{GearPair, Parameter};
+
+const SCENES: [&str; 4] = [
+    include_str!("../../scenes/e_omega.toml"),
+    include_str!("../../scenes/paper_fig5.toml"),
+    include_str!("../../scenes/smoke.toml"),
+    include_str!("../../scenes/adaptive.toml"),
+];
+
+/// Values of every type, most of them out of place.
+const VALUES: [&str; 28] = [
+    "0",
+    "-0.0",
+    "1",
+    "2",
+    "64",
+    "0.5",
+    "1e-300",
+    "1e308",
+    "-1e308",
+    "1e400",
+    "inf",
+    "-inf",
+    "nan",
+    "1_000_000_000",
+    "9223372036854775807",
+    "99999999999999999999",
+    "0x7f",
+    "true",
+    "false",
+    "\"auto\"",
+    "\"e\"",
+    "\"omega\"",
+    "'state'",
+    "[]",
+    "[1, 2, 3, 4]",
+    "{ a = 1 }",
+    "1979-05-27",
+    "\"\u{fffd}\\u0000\"",
+];
+
+/// Names that scenes know, and some that they do not.
+fn names() -> Vec<&'static str> {
+    let fields = "title model parameters axis integration start refine outputs parameter min max count \
+                  steps_per_period transient_periods observed_periods early_stop undecided_periods max_period policy \
+                  state minimum_grid rounds max_error audit word continuous quantities files axis.0.min axis.1.count \
+                  axis.9.min integration.max_period K Omega eps \u{3c9} a.b.c";
+    fields.split_whitespace().chain(GearPair::PARAMETERS.iter().map(|p: &Parameter| &*p.name)).collect()
+}
+
+#[derive(Clone, Debug)]
+enum Mutation {
+    Drop(prop::sample::Index),
+    Repeat(prop::sample::Index),
+    Swap(prop::sample::Index, prop::sample::Index),
+    Value(prop::sample::Index, &'static str),
+    Name(prop::sample::Index, &'static str),
+    Insert(prop::sample::Index, String),
+    Character(prop::sample::Index, char),
+    Cut(prop::sample::Index),
+}
+
+fn mutations() -> impl Strategy<Value = Vec<Mutation>> {
+    let at = any::<prop::sample::Index>;
+    let value = prop::sample::select(VALUES.to_vec());
+    let name = prop::sample::select(names());
+    let one = prop_oneof![
+        1 => at().prop_map(Mutation::Drop),
+        1 => at().prop_map(Mutation::Repeat),
+        1 => (at(), at()).prop_map(|(a, b)| Mutation::Swap(a, b)),
+        4 => (at(), value.clone()).prop_map(|(a, v)| Mutation::Value(a, v)),
+        2 => (at(), name.clone()).prop_map(|(a, n)| Mutation::Name(a, n)),
+        2 => (at(), name, value).prop_map(|(a, n, v)| Mutation::Insert(a, format!("{n} = {v}"))),
+        1 => (at(), any::<char>()).prop_map(|(a, c)| Mutation::Character(a, c)),
+        1 => at().prop_map(Mutation::Cut),
+    ];
+    prop::collection::vec(one, 1..4)
+}
+
+fn mutated(scene: &str, mutations: &[Mutation]) -> String {
+    let mut lines: Vec<String> = scene.lines().map(str::to_owned).collect();
+    for mutation in mutations {
+        if lines.is_empty() {
+            break;
+        }
+        let count = lines.len();
+        let at = |index: &prop::sample::Index| index.index(count);
+        match mutation {
+            Mutation::Drop(i) => drop(lines.remove(at(i))),
+            Mutation::Repeat(i) => lines.insert(at(i), lines[at(i)].clone()),
+            Mutation::Swap(i, j) => lines.swap(at(i), at(j)),
+            Mutation::Value(i, value) => {
+                if let Some((name, _)) = lines[at(i)].split_once('=') {
+                    lines[at(i)] = format!("{name}= {value}");
+                }
+            }
+            Mutation::Name(i, name) => {
+                if let Some((_, value)) = lines[at(i)].split_once('=') {
+                    lines[at(i)] = format!("{name} ={value}");
+                }
+            }
+            Mutation::Insert(i, line) => lines.insert(at(i), line.clone()),
+            Mutation::Character(i, c) => {
+                let place = lines[at(i)].char_indices().nth(at(i)).map_or(0, |(place, _)| place);
+                lines[at(i)].insert(place, *c);
+            }
+            Mutation::Cut(i) => lines.truncate(at(i)),
+        }
+    }
+    lines.join("\n")
+}
+
+/// What an accepted scene promises.
+fn check_scene(scene: &Scene, purpose: Purpose) -> Result<(), TestCaseError> {
+    let axes = scene.axes();
+    prop_assert_eq!(axes.len(), if purpose == Purpose::Map { 2 } else { 1 });
+    for ends in 0..1usize << axes.len() {
+        let index = |(i, axis): (usize, &Axis)| if ends >> i & 1 == 0 { 0 } else { axis.count() - 1 };
+        let pair = scene.cell(&axes.iter().enumerate().map(index).collect::<Vec<_>>());
+        prop_assert!(pair.oscillator().is_ok(), "{:?}", pair);
+        for (i, axis) in axes.iter().enumerate() {
+            prop_assert!(axis.min() < axis.max() && axis.count() >= 2);
+            let end = if ends >> i & 1 == 0 { axis.min() } else { axis.max() };
+            prop_assert_eq!(pair.get(&axis.parameter().name).unwrap(), end);
+        }
+    }
+    let integration = scene.integration();
+    prop_assert!(integration.transient_periods >= 1 && integration.max_period >= 1);
+    prop_assert!(2 * u64::from(integration.max_period) <= u64::from(integration.observed_periods));
+    if let Steps::PerPeriod(steps) = integration.steps_per_period {
+        prop_assert!(steps >= 1);
+    }
+    Ok(())
+}
+
+/// A refusal is one line, lies in the text (or names its argument), and says how to go on.
+fn check_refusal(error: &SceneError, text: &str, sets: &[String]) -> Result<(), TestCaseError> {
+    let said = error.to_string();
+    prop_assert!(!said.contains('\n'), "more than a line: {said:?}");
+    match &error.place {
+        Place::Text { line, column, .. } => {
+            prop_assert!(*line >= 1 && *line <= text.lines().count().max(1) + 1, "{}", said);
+            prop_assert!(*column >= 1, "{}", said);
+        }
+        Place::Set { argument } => prop_assert!(sets.iter().any(|set| **set == **argument), "{}", said),
+        Place::Builder => return Err(TestCaseError::fail(format!("nothing was built: {said}"))),
+        Place::File { .. } => return Err(TestCaseError::fail(format!("no file was read: {said}"))),
+    }
+    let remedy = match &error.problem {
+        Problem::Syntax { message, .. } => message,
+        Problem::NoMotion { reason, .. } => &reason.to_string(),
+        Problem::NotAnAssignment => return Ok(()),
+        Problem::UnknownField { remedy, .. }
+        | Problem::UnknownName { remedy, .. }
+        | Problem::Missing { remedy, .. }
+        | Problem::Conflict { remedy, .. } => remedy,
+        Problem::WrongType { expected, .. } => expected,
+        Problem::OutOfRange { requirement, .. } => requirement,
+        Problem::Unreadable { .. } => return Err(TestCaseError::fail(format!("no file was read: {said}"))),
+    };
+    prop_assert!(remedy.len() > 3 && said.contains(remedy.as_str()), "no remedy: {said:?}");
+    Ok(())
+}
+
+fn check(text: &str, sets: &[String]) -> Result<(), TestCaseError> {
+    for purpose in [Purpose::Map, Purpose::Bifurcation] {
+        match Scene::parse(text, "scene.toml", sets, purpose) {
+            Ok(scene) => check_scene(&scene, purpose)?,
+            Err(error) => check_refusal(&error, text, sets)?,
+        }
+    }
+    Ok(())
+}
+
+/// Some `NAME=VALUE` arguments, and some that are none.
+fn arguments() -> impl Strategy<Value = Vec<String>> {
+    let known = (prop::sample::select(names()), prop::sample::select(VALUES.to_vec()));
+    let one = prop_oneof![6 => known.prop_map(|(name, value)| format!("{name}={value}")), 1 => "\\PC{0,12}".boxed()];
+    prop::collection::vec(one, 0..2)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn mutated_scenes_are_refused_with_a_remedy_or_valid(
+        scene in prop::sample::select(SCENES.to_vec()), mutations in mutations(), sets in arguments(),
+    ) {
+        check(&mutated(scene, &mutations), &sets)?;
+    }
+
+    #[test]
+    fn any_text_is_refused_with_a_remedy(text in "\\PC{0,80}(\\n\\PC{0,40}){0,6}") {
+        check(&text, &[])?;
+    }
+}
+
+/// Enough of the mutants are accepted, and every kind of refusal is met.
+#[test]
+fn mutants_reach_both_sides() {
+    use proptest::strategy::ValueTree;
+    use proptest::test_runner::TestRunner;
+    let mut runner = TestRunner::deterministic();
+    let (mut accepted, mut kinds) = (0, std::collections::BTreeSet::new());
+    let strategy = (prop::sample::select(SCENES.to_vec()), mutations(), arguments());
+    for _ in 0..3000 {
+        let (scene, mutations, sets) = strategy.new_tree(&mut runner).unwrap().current();
+        match Scene::parse(&mutated(scene, &mutations), "scene.toml", &sets, Purpose::Map) {
+            Ok(_) => accepted += 1,
+            Err(error) => {
+                let kind = format!("{:?}", error.problem);
+                kinds.insert(kind.split([' ', '{']).next().unwrap_or_default().to_owned());
+            }
+        }
+    }
+    println!("{accepted} accepted, refused: {kinds:?}");
+    assert!(accepted > 60, "{accepted}");
+    assert_eq!(kinds.len(), 8, "{kinds:?}");
+}

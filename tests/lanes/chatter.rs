@@ -1,0 +1,235 @@
+//! Chatter on lanes: ever shorter flights are followed by shorter series, impact by impact. That
+//! changes nothing beyond rounding, and errs as `shaders/chatter.wgsl` says.
+
+use crate::common::gpu::{open, run_from_rest as run};
+use crate::common::{REST, apart, flow_of, paper};
+use rattlemap::cli::bench::measure::counting;
+use rattlemap::gpu::{LaneSettings, Precision, follows_chatter};
+use rattlemap::record::Record;
+use rattlemap::record::classify::classify;
+use rattlemap_dynamics::model::{GearPair, Model, State};
+use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
+use rattlemap_dynamics::reference::{Stop, Trajectory};
+use rayon::prelude::*;
+
+/// Forcing periods from rest: chaos has not yet amplified rounding.
+const HORIZON: u32 = 3;
+
+const MESH_SPEEDS: [f64; 6] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0];
+
+/// Where impacts pile up: restitution by frequency by meshing speed.
+fn cells() -> Vec<GearPair> {
+    let plane = [0.3, 0.5, 0.7, 0.9].map(|e| [1.0, 1.5, 2.7].map(|omega| paper(e, omega)));
+    let at = |pair: GearPair| MESH_SPEEDS.map(|mesh_speed| GearPair { mesh_speed, ..pair });
+    plane.into_iter().flatten().flat_map(at).collect()
+}
+
+/// The reference after the horizon, and its impacts.
+fn reference(pair: &GearPair) -> Result<(State, u64), Stop> {
+    let flow = flow_of(pair);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
+    for _ in 0..HORIZON {
+        trajectory.advance_period(&mut ())?;
+    }
+    Ok((trajectory.state(), trajectory.work().impacts))
+}
+
+/// How far the reference ends from where it does if the speed that every impact leaves, the
+/// force, a stiffness or the walls change by a share; at least that share.
+fn sensitivity(pair: &GearPair, share: f64) -> f64 {
+    let (end, _) = reference(pair).unwrap();
+    let moved = |name: &str, by: f64| {
+        let mut moved = *pair;
+        moved.set(name, pair.get(name).unwrap() * (1.0 + by)).unwrap();
+        apart(reference(&moved).unwrap().0, end)
+    };
+    let names = ["e", "F", "k1", "k2", "b"];
+    names.iter().flat_map(|name| [moved(name, share), moved(name, -share)]).fold(share, f64::max)
+}
+
+/// Half a unit in the last place of 1.
+fn ulp(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 6e-8,
+        Precision::F64 => 1.2e-16,
+    }
+}
+
+/// Roundings of every constant and at every impact that may add up: without short flights lanes
+/// come to 20 of them.
+const ROUNDINGS: f64 = 32.0;
+
+/// What rounding may do to a cell.
+fn bar(pair: &GearPair, precision: Precision) -> f64 {
+    // The reference itself is right to about 1e-13.
+    sensitivity(pair, (ROUNDINGS * ulp(precision)).max(1e-13))
+}
+
+/// The same impacts, and states within rounding: no farther off than without short flights.
+#[test]
+fn chatter_is_that_of_the_reference() {
+    let cells = cells();
+    let truth: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap()).collect();
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
+        let ordinary = run(&mut gpu, &cells, &LaneSettings { chatter: false, ..LaneSettings::only(HORIZON) });
+        gpu.rewrite_shaders(counting("follow_chatter"));
+        let followed = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
+        let bars: Vec<_> = cells.par_iter().map(|pair| bar(pair, precision)).collect();
+        let (mut short, mut all) = ([0.0; MESH_SPEEDS.len()], [0.0; MESH_SPEEDS.len()]);
+        let mut errors = [Vec::new(), Vec::new()];
+        for (i, pair) in cells.iter().enumerate() {
+            let (e, omega, mesh_speed) = (pair.e, pair.omega, pair.mesh_speed);
+            let at = format!("{precision:?}, e = {e}, omega = {omega}, mesh_speed = {mesh_speed}");
+            let (record, (end, impacts)) = (&records[i], truth[i]);
+            assert_eq!(record.status, Status::Ok.code(), "{at}");
+            let counted = (record.impacts_per_period * f64::from(HORIZON)).round() as u64;
+            assert_eq!(counted, impacts, "{at}: impacts");
+            let error = apart(record.strobe, end);
+            assert!(error <= bars[i], "{at}: off by {error:.2e}, rounding may make {:.2e}", bars[i]);
+            if follows_chatter(&pair.oscillator().unwrap(), mesh_speed) {
+                errors[0].push(error / bars[i]);
+                errors[1].push(apart(ordinary[i].strobe, end) / bars[i]);
+            }
+            short[i % MESH_SPEEDS.len()] += (followed[i].impacts_per_period * f64::from(HORIZON)).round();
+            all[i % MESH_SPEEDS.len()] += impacts as f64;
+        }
+        let [with, without] = errors.map(median);
+        println!("{precision:?}: {short:?} short flights of {all:?} impacts, by meshing speed");
+        println!(
+            "{precision:?}: median error {with:.3} of what rounding may make, {without:.3} without them"
+        );
+        assert!(with < 1.5 * without, "{precision:?}: {with} {without}");
+        assert_eq!(short[0], 0.0, "{precision:?}: too few to pay at the model's own meshing speed");
+        for (short, all) in short.iter().zip(&all).skip(1) {
+            assert!(*short > 0.4 * all, "{precision:?}: {short} short flights of {all} impacts");
+        }
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Cells that chatter: class, word, impacts and exponent; tangent vectors go through every short
+/// flight.
+#[test]
+fn classes_words_and_exponents_agree() {
+    let plane = [(0.3, 1.3), (0.5, 1.0), (0.56, 1.5), (0.72, 1.5), (0.2, 2.0), (0.5, 2.4), (0.8, 1.2)];
+    let cells: Vec<_> = plane
+        .into_iter()
+        .flat_map(|(e, omega)| [1e-3, 1e-4, 1e-6, 0.0].map(|mesh_speed| (e, omega, mesh_speed)))
+        .collect();
+    let pairs: Vec<_> =
+        cells.iter().map(|&(e, omega, mesh_speed)| GearPair { mesh_speed, ..paper(e, omega) }).collect();
+    let truth: Vec<_> =
+        pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
+    let periodic = truth.iter().filter(|orbit| matches!(orbit.class, Class::Periodic { .. })).count();
+    assert!(periodic >= 20 && periodic < cells.len(), "{periodic} cycles, and chaos");
+    for precision in Precision::ALL {
+        let exponent_bar = match precision {
+            Precision::F32 => 1e-5,
+            Precision::F64 => 1e-9,
+        };
+        let records = run(&mut open(precision), &pairs, &LaneSettings::default());
+        for ((record, orbit), cell) in records.iter().zip(&truth).zip(&cells) {
+            let at = format!("{precision:?}, e, omega, mesh_speed = {cell:?}");
+            assert_eq!(classify(record), orbit.class, "{at}");
+            let apart = (record.lyapunov - orbit.lyapunov).abs();
+            if orbit.class == Class::Chaotic {
+                let errors = record.lyapunov_error.hypot(orbit.lyapunov_error.unwrap());
+                println!("{at}: {} {} +- {errors}", record.lyapunov, orbit.lyapunov);
+                assert!(apart < 5.0 * errors, "{at}: {} {} +- {errors}", record.lyapunov, orbit.lyapunov);
+                continue;
+            }
+            assert!(apart < exponent_bar, "{at}: {} {}", record.lyapunov, orbit.lyapunov);
+            assert!((record.impacts_per_period - orbit.impacts_per_period).abs() < 1e-9, "{at}");
+            let mut spelled = Record::default();
+            spelled.set_word(&orbit.word);
+            assert_eq!(record.spelling(), spelled.spelling(), "{at}");
+        }
+    }
+}
+
+/// The shader with another number where it says what is short.
+fn short_to(source: &str, short: f64) -> String {
+    let (before, rest) = source.split_once("const SHORT: Real = ").expect("the shader says what is short");
+    let (_, after) = rest.split_once(';').expect("a declaration ends");
+    format!("{before}const SHORT: Real = {short};{after}")
+}
+
+/// Flights of up to 0.8 steps taken for short.
+fn too_long(source: String) -> String {
+    short_to(&source, 0.8)
+}
+
+/// Where flights are followed that are longer than precision allows, errors stay below the bound
+/// that the shader states.
+#[test]
+fn errors_stay_below_the_stated_bound() {
+    let cells: Vec<_> = cells().into_iter().filter(|pair| pair.mesh_speed == 1e-3).collect();
+    // ULP is left out at this length; the terms, less two, are the power with which it grows.
+    for (precision, short, power) in [(Precision::F32, 0.198, 6), (Precision::F64, 0.191, 11)] {
+        let mut gpu = open(precision);
+        let shipped = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
+        gpu.rewrite_shaders(too_long);
+        let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
+        let left_out = ulp(precision) * f64::powi(0.8 / short, power);
+        let mut beyond = 0;
+        for ((record, shipped), pair) in records.iter().zip(&shipped).zip(&cells) {
+            let end = reference(pair).unwrap().0;
+            let [error, usual] = [record, shipped].map(|record| apart(record.strobe, end));
+            let share = left_out / (1.0 - pair.e.powi(power));
+            let bound = sensitivity(pair, share) + bar(pair, precision);
+            let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
+            println!("{at}: {error:.2e}, else {usual:.2e}, bound {bound:.2e}");
+            assert!(error < bound, "{at}: off by {error:.2e}, bound {bound:.2e}");
+            beyond += u32::from(error > 10.0 * usual);
+        }
+        assert!(beyond > 0, "{precision:?}: nothing but rounding was seen");
+    }
+}
+
+/// A form of the lane whose short flights keep `TERMS` terms, up to `HUNDREDTHS / 100` of a step.
+fn cut<const TERMS: usize, const HUNDREDTHS: u32>(source: String) -> String {
+    let call = "        expand_short();\n";
+    assert!(source.contains(call), "short flights are expanded");
+    let dropped: String = (TERMS..13)
+        .map(|k| format!("        gap_terms[{k}] = 0.0;\n        x_terms[{k}] = 0.0;\n"))
+        .collect();
+    short_to(&source.replace(call, &format!("{call}{dropped}")), f64::from(HUNDREDTHS) / 100.0)
+}
+
+/// With fewer terms than it takes, errors fall with the length of flights by the order of the
+/// series: n terms beyond the start leave out a share `t^(n-1)` of a speed that is itself in
+/// proportion to t. With e = 0.5 half the length leaves out exactly the longest flight.
+#[test]
+fn errors_fall_by_the_order_of_the_series() {
+    errors_fall_by(5.0, [cut::<6, 16>, cut::<6, 4>]);
+}
+
+/// The same with fewer terms.
+#[test]
+#[ignore = "compiles two shaders more; scripts/test.sh --all"]
+fn errors_fall_by_a_lower_order_of_the_series() {
+    errors_fall_by(3.0, [cut::<4, 16>, cut::<4, 4>]);
+}
+
+/// With flights of up to 16 and of up to 4 hundredths of a step.
+fn errors_fall_by(order: f64, forms: [fn(String) -> String; 2]) {
+    let cells = [1.0, 1.2, 1.4, 1.6, 1.8].map(|omega| GearPair { mesh_speed: 1e-3, ..paper(0.5, omega) });
+    let truth: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap().0).collect();
+    let mut gpu = open(Precision::F64);
+    let errors = forms.map(|form| {
+        gpu.rewrite_shaders(form);
+        let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
+        records.iter().zip(&truth).map(|(r, truth)| apart(r.strobe, *truth)).collect::<Vec<_>>()
+    });
+    let slopes: Vec<f64> =
+        errors[0].iter().zip(&errors[1]).map(|(long, short)| 0.5 * (long / short).log2()).collect();
+    println!("order {order}: errors {errors:?}, slopes {slopes:.2?}");
+    let slope = median(slopes);
+    assert!((slope - order).abs() < 0.3, "order {slope:.2} instead of {order}");
+}

@@ -1,0 +1,133 @@
+//! Cycles of the main plane that lanes once did not find.
+//!
+//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+
+use crate::common::gpu::{open, run, run_from_rest};
+use crate::common::paper as pair;
+use rattlemap::gpu::{LaneSettings, Precision};
+use rattlemap::record::Record;
+use rattlemap::record::classify::classify;
+use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::orbit::Class;
+
+/// Seven points within a thousandth of the motion: shorter lags recur, and Newton's method leaves the motion's
+/// branch from there. Lanes that set out from the same point again, as if nothing had happened, did so for ever.
+#[test]
+fn a_cycle_of_close_points_is_found_where_newton_leads_elsewhere() {
+    let pairs = [pair(5.0 / 9.0, 17.0 / 9.0), pair(238.0 / 511.0, 1.0 + 11.0 * 44.0 / 511.0)];
+    for (precision, pairs) in [(Precision::F64, &pairs[..]), (Precision::F32, &pairs[..1])] {
+        for record in run_from_rest(&mut open(precision), pairs, &LaneSettings::default()) {
+            assert_eq!(classify(&record), Class::Periodic { period: 7 }, "{precision:?}: {record:?}");
+        }
+    }
+}
+
+/// Motion that takes thousands of periods to its cycle recurs, and the cycle is read again and again on the way. With a
+/// fresh tangent vector after each reading the exponent was 0.17, by 25 standard errors, and the motion chaos.
+#[test]
+fn cycles_read_on_the_way_leave_the_exponent_alone() {
+    let slow = [pair(441.0 / 511.0, 1.0 + 11.0 * 155.0 / 511.0)];
+    for precision in Precision::ALL {
+        let with =
+            |early_stop| LaneSettings { early_stop, undecided_periods: 1584, ..LaneSettings::default() };
+        let mut gpu = open(precision);
+        let [on_the_way, undisturbed] =
+            [true, false].map(|early_stop| run_from_rest(&mut gpu, &slow, &with(early_stop))[0]);
+        assert_eq!(classify(&on_the_way), Class::Undecided, "{precision:?}: {on_the_way:?}");
+        // Both decrease with time: 2,112 periods and 528.
+        for (record, least) in [(on_the_way, -0.0007), (undisturbed, -0.0011)] {
+            assert!((least..-0.0005).contains(&record.lyapunov), "{precision:?}: {record:?}");
+            assert!(record.lyapunov_error < 1e-4, "{precision:?}: {record:?}");
+        }
+    }
+}
+
+/// A cycle of period 3 with a multiplier of -0.9985, at the end of long chaos that comes close to other cycles of period
+/// 3. Motion that comes to it from either side in turn recurs best after six, and one of the others, which repels, made
+/// that its period.
+#[test]
+fn a_cycle_approached_from_either_side_in_turn_is_not_its_double() {
+    let cell = pair(0.948, 5.64);
+    let starts = [
+        [-0.053144306447458156, 2.713737059448592, -0.24326969921312358, -2.0849732837656756],
+        [-0.49640028439788964, 4.566288023660416, -0.7606548398185529, 6.393597386904993],
+        [0.7334643848582618, -6.355003281405908, 0.7944278876389996, 2.7450908084078485],
+        [0.2591010529126554, -7.413808352146448, 0.5947944251521922, 7.04170930985307],
+    ];
+    let settings = LaneSettings { periods: 1456, transient_periods: 1200, ..LaneSettings::default() };
+    for precision in Precision::ALL {
+        for record in run(&mut open(precision), &starts.map(|start| (cell, start)), &settings) {
+            let class = classify(&record);
+            // Chaos amplifies rounding: not every lane gets there in time.
+            let is_known = matches!(class, Class::Periodic { period: 3 } | Class::Chaotic | Class::Undecided);
+            assert!(is_known, "{precision:?}: {record:?}");
+        }
+    }
+}
+
+/// The same motion in other units: of length `2^length`, of time `2^time`.
+fn in_units(pair: GearPair, length: i32, time: i32) -> GearPair {
+    let (length, time) = (f64::from(length).exp2(), f64::from(time).exp2());
+    GearPair {
+        r1: pair.r1 / time,
+        r2: pair.r2 / time,
+        k1: pair.k1 / (time * time),
+        k2: pair.k2 / (time * time),
+        r: pair.r / time,
+        k: pair.k / (time * time),
+        force: pair.force * length / (time * time),
+        omega: pair.omega / time,
+        b: pair.b * length,
+        mesh_speed: pair.mesh_speed * length / time,
+        ..pair
+    }
+}
+
+/// Powers of two are exact: in another unit of length lanes do the same to the last bit. The flow's series is cut by
+/// a norm that adds rates to displacements, so that another unit of time may round differently, and no more.
+#[test]
+fn answers_do_not_depend_on_the_units_of_length_and_time() {
+    let plane: Vec<_> =
+        (0..24 * 24).map(|n| pair(f64::from(n % 24) / 23.0, 1.0 + 11.0 * f64::from(n / 24) / 23.0)).collect();
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        // Which lanes follow chatter is a question of speeds, too.
+        let settings = LaneSettings::default();
+        let expected = run_from_rest(&mut gpu, &plane, &settings);
+        for (length, time) in [(-20, 0), (20, 0), (0, -10), (0, 10), (-10, 10)] {
+            let (far, long) = (f64::from(length).exp2(), f64::from(time).exp2());
+            let pairs: Vec<_> = plane.iter().map(|&pair| in_units(pair, length, time)).collect();
+            let records = run_from_rest(&mut gpu, &pairs, &settings);
+            let differ = expected.iter().zip(records).filter(|&(&expected, mut record)| {
+                record.strobe =
+                    [0, 1, 2, 3].map(|i| record.strobe[i] / if i % 2 == 0 { far } else { far / long });
+                (record.lyapunov, record.lyapunov_error) =
+                    (record.lyapunov * long, record.lyapunov_error * long);
+                let says = |record: &Record| (classify(record), record.period, record.status);
+                if time == 0 { record != expected } else { says(&record) != says(&expected) }
+            });
+            assert_eq!(differ.count(), 0, "{precision:?}, length 2^{length}, time 2^{time}");
+        }
+    }
+}
+
+/// Newton's method leads to a stable cycle that the motion does not approach: there is a fold of the strobe
+/// map or another cycle's basin between them. What the start reaches was computed with 80 bits by an independent program.
+#[test]
+fn a_stable_cycle_that_the_motion_leaves_is_not_its_cycle() {
+    let settings = LaneSettings { undecided_periods: 1584, ..LaneSettings::default() };
+    for (e, omega, period, impacts) in [(0.8, 5.745098039215686, 2, 2.5), (0.3254901960784314, 3.2, 1, 16.0)]
+    {
+        let cells = [(0.0, 0.0), (1e-6, 0.0), (0.0, 1e-6), (1e-6, 1e-6)].map(|(d, w)| pair(e + d, omega + w));
+        for precision in Precision::ALL {
+            for record in run_from_rest(&mut open(precision), &cells, &settings) {
+                assert_eq!(
+                    classify(&record),
+                    Class::Periodic { period },
+                    "{precision:?}, {e} {omega}: {record:?}"
+                );
+                assert_eq!(record.impacts_per_period, impacts, "{precision:?}, {e} {omega}: {record:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! The same cells on the reference and on the lanes, in both precisions.
+//!
+//! No adapter is a failure: install a software driver (see `scripts/test.sh`).
+
+use crate::common::gpu::{open, run};
+use crate::common::table::{Row, rows};
+use crate::common::{REST, apart, flow_of, paper as pair};
+use rattlemap::gpu::{LaneSettings, Precision};
+use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
+use rattlemap_dynamics::reference::{EventKind, Happening, Observer, Trajectory};
+use rayon::prelude::*;
+
+/// Strobe states of the reference after `periods` and one more.
+fn reference(pair: &GearPair, start: State, periods: u32) -> [State; 2] {
+    let flow = flow_of(pair);
+    let mut trajectory = Trajectory::new(&flow, pair.law(), start);
+    for _ in 0..periods {
+        trajectory.advance_period(&mut ()).unwrap();
+    }
+    let at = trajectory.state();
+    trajectory.advance_period(&mut ()).unwrap();
+    [at, trajectory.state()]
+}
+
+/// Room for devices, drivers and processors that round otherwise than those measured: llvmpipe with AVX2.
+const ROOM: f64 = 5.0;
+
+/// The error allowed where so much was measured in f32 and in f64.
+fn bar(measured: [f64; 2], precision: Precision) -> f64 {
+    let [f32, f64] = measured;
+    ROOM * match precision {
+        Precision::F32 => f32,
+        Precision::F64 => f64,
+    }
+}
+
+/// How far the reference itself ends from where it does, if its start is moved by about the
+/// rounding of a precision: large where a chaotic transient chooses between attractors.
+fn sensitivity(pair: &GearPair, horizon: u32, precision: Precision) -> f64 {
+    let perturbation = match precision {
+        Precision::F32 => 1e-6,
+        Precision::F64 => 1e-14,
+    };
+    let centre = reference(pair, REST, horizon)[0];
+    let ends = (0..8).map(|i| {
+        let mut start = REST;
+        start[i % 4] = if i < 4 { perturbation } else { -perturbation };
+        apart(reference(pair, start, horizon)[0], centre)
+    });
+    ends.fold(0.0, f64::max)
+}
+
+/// Compares cells after `horizon` periods; the worst were `measured` so far off the reference in f32 and in f64.
+fn check(cells: &[(GearPair, State)], horizon: u32, measured: [f64; 2]) {
+    let truth: Vec<_> = cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
+    for precision in Precision::ALL {
+        let records = run(&mut open(precision), cells, &LaneSettings::only(horizon));
+        let mut worst = 0.0f64;
+        for ((record, truth), (pair, start)) in records.iter().zip(&truth).zip(cells) {
+            let at = format!("{precision:?}, e = {}, omega = {} from {start:?}", pair.e, pair.omega);
+            assert_eq!(record.status, Status::Ok.code(), "{at}");
+            assert_eq!(record.periods_run, horizon, "{at}");
+            let error = apart(record.strobe, *truth);
+            let bar = bar(measured, precision);
+            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {truth:?}", record.strobe);
+            worst = worst.max(error);
+        }
+        println!("{precision:?}: {} cells after {horizon} periods, worst {worst:.2e}", cells.len());
+    }
+}
+
+/// The strobe state of stable period-1 cells over the plane.
+#[test]
+fn stable_cells_of_the_plane_agree() {
+    const HORIZON: u32 = 200;
+    const SIDE: u32 = 27;
+    let step = |i: u32, lo: f64, hi: f64| lo + (hi - lo) * f64::from(i) / f64::from(SIDE - 1);
+    let all: Vec<_> =
+        (0..SIDE * SIDE).map(|i| (pair(step(i % SIDE, 0.0, 1.0), step(i / SIDE, 1.0, 12.0)), REST)).collect();
+    let (cells, truth): (Vec<_>, Vec<State>) = all
+        .into_par_iter()
+        .filter_map(|cell| {
+            let [at, next] = reference(&cell.0, cell.1, HORIZON);
+            (apart(at, next) < 1e-10).then_some((cell, at))
+        })
+        .unzip();
+    // Of 484.
+    assert!(cells.len() >= 470, "{} stable cells are too few", cells.len());
+    // Measured in f64: median 4.0e-15, 99 % 9.4e-14, worst 1.6e-12; in f32: 8.6e-7 and 2.3e-5, where the worst is a
+    // transient that ends on another attractor. Five times that, and a good twice the median in f32.
+    for (precision, median_bar, bar_99, worst_bar) in
+        [(Precision::F64, 2e-14, 5e-13, 8e-12), (Precision::F32, 2e-6, 1.2e-4, 1e-3)]
+    {
+        let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
+        let mut errors: Vec<_> = records
+            .iter()
+            .zip(&truth)
+            .zip(&cells)
+            .map(|((record, truth), (pair, _))| (apart(record.strobe, *truth), pair.e, pair.omega))
+            .collect();
+        errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let at = |share: usize| errors[(errors.len() - 1) * share / 100];
+        println!(
+            "{precision:?}: {} cells, median {:?}, 99 % {:?}, worst {:?}",
+            errors.len(),
+            at(50),
+            at(99),
+            at(100)
+        );
+        assert!(at(50).0 < median_bar, "{precision:?}: median {:?}", at(50));
+        assert!(at(99).0 < bar_99, "{precision:?}: 99 % {:?}", at(99));
+        for &(error, e, omega) in errors.iter().filter(|(error, ..)| *error > worst_bar) {
+            let own = sensitivity(&pair(e, omega), HORIZON, precision);
+            assert!(
+                own > 0.1 * error,
+                "{precision:?}, e = {e}, omega = {omega}: off by {error:.2e}, sensitive to {own:.2e}"
+            );
+        }
+    }
+}
+
+/// Every kind of motion over a horizon short enough for chaos.
+#[test]
+fn scenarios_agree() {
+    let on_wall = |w: f64| [0.25, 0.5 + w, -0.25, 0.5];
+    let cells = [
+        (pair(0.5, 11.5), REST),                 // no contact
+        (pair(0.605, 5.6), REST),                // impacts on both walls
+        (pair(0.06, 5.6), REST),                 // meshing on both sides
+        (pair(0.0, 2.0), REST),                  // meshing without restitution
+        (pair(0.56, 1.5), REST),                 // chatter into meshing
+        (pair(0.72, 1.5), REST),                 // long chatter
+        (pair(0.7, 5.4), REST),                  // chaos
+        (pair(0.606, 5.6), REST),                // grazing chaos
+        (pair(0.5, 5.6), on_wall(1.0)),          // starts on the wall, closing
+        (pair(0.5, 5.6), on_wall(-1.0)),         // starts on the wall, leaving
+        (pair(0.5, 5.6), on_wall(0.0)),          // starts at rest on the wall
+        (pair(0.3, 4.0), [0.4, 0.0, -0.2, 0.0]), // starts meshing on the right
+        (pair(0.3, 4.0), [-0.4, 0.0, 0.2, 0.0]), // starts meshing on the left
+    ];
+    check(&cells, 6, [5.0e-6, 1.3e-14]);
+    // No loss at the walls: errors grow twentyfold in a period.
+    check(&[(pair(1.0, 3.0), REST)], 2, [1.9e-5, 1.2e-13]);
+}
+
+/// Impacts of the reference.
+struct Impacts(u32);
+
+impl Observer for Impacts {
+    fn event(&mut self, happening: &Happening) {
+        self.0 += u32::from(happening.kind == EventKind::Impact);
+    }
+}
+
+/// Without a meshing speed infinite series of impacts are closed by their limit: the same
+/// states, and as many impacts before.
+#[test]
+fn closed_chatter_agrees() {
+    const HORIZON: u32 = 4;
+    let endless = |e: f64, omega: f64| GearPair { mesh_speed: 0.0, ..pair(e, omega) };
+    let rows = [0.05, 0.2, 0.4, 0.6, 0.75].map(|e| [0.3, 1.0, 1.7, 2.5, 5.6].map(|omega| endless(e, omega)));
+    let cells: Vec<_> = rows.into_iter().flatten().map(|pair| (pair, REST)).collect();
+    check(&cells, HORIZON, [1.4e-4, 8.6e-14]);
+    let truth: Vec<u32> = cells
+        .iter()
+        .map(|(pair, start)| {
+            let flow = flow_of(pair);
+            let mut trajectory = Trajectory::new(&flow, pair.law(), *start);
+            let mut impacts = Impacts(0);
+            (0..HORIZON).for_each(|_| trajectory.advance_period(&mut impacts).unwrap());
+            impacts.0
+        })
+        .collect();
+    let meshing = run(&mut open(Precision::F64), &cells, &LaneSettings::only(HORIZON));
+    assert!(meshing.iter().filter(|record| record.mesh_fraction > 0.0).count() > 10, "too little chatter");
+    for precision in Precision::ALL {
+        let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
+        for ((record, &impacts), (pair, _)) in records.iter().zip(&truth).zip(&cells) {
+            let counted = record.impacts_per_period * f64::from(HORIZON);
+            let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
+            assert!((counted - f64::from(impacts)).abs() < 0.5, "{at}: {counted} impacts, {impacts}");
+        }
+    }
+}
+
+/// The exponent of cycles that mesh after infinite series: the tangent goes through the limit.
+#[test]
+fn exponents_through_closed_chatter_agree() {
+    let cells: Vec<_> = [(0.3, 1.3), (0.2, 2.0), (0.1, 5.6), (0.5, 1.0)]
+        .map(|(e, omega)| (GearPair { mesh_speed: 0.0, ..pair(e, omega) }, REST))
+        .into();
+    for precision in Precision::ALL {
+        let records = run(&mut open(precision), &cells, &LaneSettings::default());
+        for (record, (pair, start)) in records.iter().zip(&cells) {
+            let truth = analyse(pair, *start, &Settings::default()).unwrap();
+            let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
+            println!("{at}: {} {} {:?}", record.lyapunov, truth.lyapunov, truth.class);
+            assert_eq!(Class::Periodic { period: record.period }, truth.class, "{at}");
+            assert!((record.impacts_per_period - truth.impacts_per_period).abs() < 1e-9, "{at}");
+            assert_eq!(record.word().as_ref(), Some(&truth.word), "{at}");
+            let error = (record.lyapunov - truth.lyapunov).abs();
+            assert!(error < bar([1.3e-7, 3.4e-13], precision), "{at}: {error:.2e}");
+        }
+    }
+}
+
+/// `z = A cos(omega t)` with the amplitude a hair below or above the wall: free flight that
+/// misses it by less than any grid shows, and one that touches it.
+#[test]
+fn a_graze_is_neither_missed_nor_made_up() {
+    let e = 0.8;
+    for hair in [1e-3, 1e-5] {
+        for sign in [-1.0, 1.0] {
+            let omega = 10.5;
+            let stiff = GearPair { k1: 30.0, r1: 0.0, r2: 0.0, ..pair(e, omega) };
+            // The steady response of gear 1 alone; gear 2 is at rest.
+            let unit = 1.0 / (stiff.k1 - stiff.m1 * omega * omega);
+            let amplitude = -(stiff.b + sign * hair);
+            let grazing = GearPair { force: amplitude / unit, ..stiff };
+            let start = [amplitude, 0.0, 0.0, 0.0];
+            // Starts a turn away from the wall in phase where it is beyond it.
+            let start = if sign > 0.0 { [0.0; 4] } else { start };
+            let truth = reference(&grazing, start, 2)[0];
+            for precision in Precision::ALL {
+                let record = run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
+                let error = apart(record.strobe, truth);
+                assert!(
+                    error < bar([1.7e-6, 2.7e-15], precision),
+                    "{precision:?}, {hair} {sign}: {error:.2e}"
+                );
+                if sign < 0.0 {
+                    assert_eq!(record.impacts_per_period, 0.0, "{precision:?}: an impact made up");
+                }
+            }
+        }
+    }
+}
+
+/// Every row of the independent program's table: from rest over a short horizon, and the
+/// periodic ones after a long transient.
+#[test]
+fn every_row_of_the_table_agrees() {
+    let from_rest = |row: &Row| (row.pair(), REST);
+    let rows = rows();
+    check(&rows.iter().map(from_rest).collect::<Vec<_>>(), 4, [1.3e-4, 1.2e-13]);
+    let periodic: Vec<_> = rows.iter().filter(|row| !row.is_chaotic()).map(from_rest).collect();
+    check(&periodic, 300, [2.9e-5, 1.3e-13]);
+}
+
+/// Batch size, dispatch length and workgroup size change nothing, to the bit; in f32 `independence` cuts up more.
+#[test]
+fn results_do_not_depend_on_how_the_work_is_cut() {
+    let cells: Vec<_> = rows().iter().map(|row| (row.pair(), REST)).collect();
+    let mut gpu = open(Precision::F64);
+    let everything = LaneSettings { periods: 80, transient_periods: 20, ..LaneSettings::default() };
+    let settings = LaneSettings { exponent_from: 10, ..everything };
+    let whole = run(&mut gpu, &cells, &settings);
+    for (batch, iterations, workgroup) in [(Some(7), 4000, 64), (None, 333, 64), (Some(33), 1000, 32)] {
+        let cut = run(&mut gpu, &cells, &LaneSettings { batch, iterations, workgroup, ..settings });
+        assert!(whole == cut, "batch {batch:?}, iterations {iterations}, workgroup {workgroup}");
+    }
+}
+
+/// Hostile parameters end in a status of their own and leave their neighbours alone.
+#[test]
+fn hostile_lanes_end_in_a_status() {
+    let ordinary: Vec<_> = (0..9).map(|i| (pair(0.1 * f64::from(i), 5.6), REST)).collect();
+    let hostile = [
+        (GearPair { k: 1e13, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
+        (GearPair { omega: 1e-6, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
+        (GearPair { mesh_speed: 0.0, ..pair(0.9999, 0.1) }, REST, Status::CapEvents),
+        (GearPair { force: 1e300, ..pair(0.5, 5.6) }, REST, Status::NonFinite),
+        (pair(0.5, 5.6), [f64::NAN, 0.0, 0.0, 0.0], Status::NonFinite),
+    ];
+    let mut mixed = Vec::new();
+    for (i, cell) in ordinary.iter().enumerate() {
+        mixed.push(*cell);
+        if let Some(&(pair, start, _)) = hostile.get(i) {
+            mixed.push((pair, start));
+        }
+    }
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        let alone = run(&mut gpu, &ordinary, &LaneSettings::only(5));
+        let together = run(&mut gpu, &mixed, &LaneSettings::only(5));
+        for (i, record) in alone.iter().enumerate() {
+            let at = if i <= hostile.len() { 2 * i } else { i + hostile.len() };
+            assert!(*record == together[at], "{precision:?}: ordinary lane {i} was disturbed");
+        }
+        for (i, (pair, _, status)) in hostile.iter().enumerate() {
+            let record = &together[2 * i + 1];
+            assert_eq!(record.status, status.code(), "{precision:?}: {pair:?}");
+            assert!(record.strobe.iter().all(|x| x.is_finite()), "{precision:?}: {pair:?}");
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What a lane gives depends on its own cell alone: properties over random cells, batches,
+//! dispatch lengths and workgroups.
+
+use std::cell::RefCell;
+
+use crate::common::{REST, gpu, paper};
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use rattlemap::gpu::{Ended, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::record::Record;
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
+
+/// A cell anywhere in the plane, stiff or soft, with a start that may lie beyond a wall.
+fn cell() -> impl Strategy<Value = (GearPair, State)> {
+    let pair = (0.0..=1.0, 1.0..12.0, 100.0..3000.0, prop_oneof![Just(0.0), 1e-4..0.1])
+        .prop_map(|(e, omega, k, mesh_speed)| GearPair { k, mesh_speed, ..paper(e, omega) });
+    let start = prop_oneof![Just(REST), prop::array::uniform4(-0.6..0.6)];
+    (pair, start)
+}
+
+/// How the work is cut up.
+#[derive(Debug)]
+struct Cut {
+    batch: usize,
+    iterations: u32,
+    workgroup: u32,
+    /// Where the order of the lanes begins.
+    turn: usize,
+}
+
+fn cut() -> impl Strategy<Value = Cut> {
+    (1..40usize, 60..4000u32, prop::sample::select(vec![32, 64]), 0..24usize)
+        .prop_map(|(batch, iterations, workgroup, turn)| Cut { batch, iterations, workgroup, turn })
+}
+
+fn records(
+    device: &mut Gpu,
+    (flows, laws): (&[Oscillator], &[Law]),
+    lanes: &[Lane],
+    settings: &LaneSettings,
+) -> Vec<Record> {
+    pollster::block_on(device.run(flows, laws, lanes, settings)).unwrap()
+}
+
+#[test]
+fn records_do_not_depend_on_how_the_work_is_cut() {
+    check_cuts(Precision::F32);
+}
+
+/// What differs in f64 are the layouts, which `engines_agree` cuts up, too.
+#[test]
+#[ignore = "compiles a dozen shaders; scripts/test.sh --all"]
+fn records_in_f64_do_not_depend_on_how_the_work_is_cut() {
+    check_cuts(Precision::F64);
+}
+
+/// Every field of every record, to the bit, whatever the batch size, the dispatch length, the
+/// workgroup size and the neighbours.
+fn check_cuts(precision: Precision) {
+    let mut runner = TestRunner::new(ProptestConfig { cases: 10, ..ProptestConfig::default() });
+    let device = RefCell::new(gpu::open(precision));
+    let cases = (prop::collection::vec(cell(), 24), cut(), any::<bool>(), any::<bool>());
+    runner
+        .run(&cases, |(cells, cut, early_stop, exponent)| {
+            let (flows, laws, mut lanes) = gpu::lanes(&cells);
+            // Long enough for chaos to be called, and for cycles to be read without success.
+            let budget = LaneSettings {
+                periods: 60,
+                transient_periods: 20,
+                undecided_periods: 200,
+                chaos_from: 40,
+                ..LaneSettings::default()
+            };
+            let settings = LaneSettings { exponent_from: 10, early_stop, exponent, ..budget };
+            let device = &mut device.borrow_mut();
+            let mut whole = records(device, (&flows, &laws), &lanes, &settings);
+            lanes.rotate_left(cut.turn);
+            whole.rotate_left(cut.turn);
+            let Cut { batch, iterations, workgroup, .. } = cut;
+            let settings = LaneSettings { batch: Some(batch), iterations, workgroup, ..settings };
+            prop_assert_eq!(records(device, (&flows, &laws), &lanes, &settings), whole);
+            Ok(())
+        })
+        .unwrap();
+}
+
+/// Lanes that are begun while others are under way, in slots that others have left or in a pool that has
+/// grown meanwhile, give what they give together; with short rounds and one variant, as on hardware of their own, too.
+#[test]
+fn records_do_not_depend_on_when_lanes_are_begun() {
+    let pair = |i: u32| paper(f64::from(i * 23 % 60) / 60.0, 1.0 + f64::from(i * 37 % 60) / 6.0);
+    let cells: Vec<_> = (0..60).map(|i| (pair(i), REST)).collect();
+    let (flows, laws, together) = gpu::lanes(&cells);
+    let lanes: Vec<(u32, Lane)> = (1000..).zip(together.iter().copied()).collect();
+    let settings = LaneSettings { iterations: 500, ..LaneSettings::default() };
+    for (precision, is_dedicated) in
+        [(Precision::F32, false), (Precision::F64, false), (Precision::F32, true)]
+    {
+        let mut device = gpu::open(precision);
+        if is_dedicated {
+            device.drive_as_dedicated();
+        }
+        let expected = records(&mut device, (&flows, &laws), &together, &settings);
+        let tables = pollster::block_on(device.load(&flows, &laws, None)).unwrap();
+        let mut pool = pollster::block_on(device.pool(&settings)).unwrap();
+        let mut ended = Vec::new();
+        // Five are begun first, then more than the pool has slots for, then as many as have ended.
+        for (from, to, left) in [(0, 5, 3), (5, 9, 6), (9, 40, 12), (40, 48, 10), (48, 60, 1), (60, 60, 0)] {
+            pollster::block_on(device.begin(&mut pool, &tables, &lanes[from..to])).unwrap();
+            let some = pollster::block_on(device.advance(&mut pool, &tables, left)).unwrap();
+            // Short rounds lose patience before.
+            let is_enough = pool.under_way() <= left || (is_dedicated && !some.is_empty());
+            assert!(is_enough, "{} of {left} are left", pool.under_way());
+            ended.extend(some);
+            assert_eq!(ended.len() + pool.under_way(), to);
+        }
+        assert!(pollster::block_on(device.advance(&mut pool, &tables, 0)).unwrap().is_empty());
+        assert_eq!(pool.under_way(), 0);
+        ended.sort_by_key(Ended::number);
+        let numbers: Vec<u32> = ended.iter().map(Ended::number).collect();
+        assert_eq!(numbers, (1000..1060).collect::<Vec<_>>());
+        for (ended, expected) in ended.iter().zip(&expected) {
+            assert_eq!(ended.record(tables.constants()), *expected, "{precision:?}, lane {}", ended.number());
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! Lanes on a device, against the reference and against themselves.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod chatter;
+mod classes;
+mod counters;
+mod early_stops;
+mod engines_agree;
+mod independence;
+mod shaders;

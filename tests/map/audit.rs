@@ -1,0 +1,108 @@
+//! What an adaptive map says of filled values, against a map in which every cell is integrated.
+
+use std::sync::LazyLock;
+
+use rattlemap::map::engine::{Cpu, Engine};
+use rattlemap::map::plan::Plan;
+use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::map::schedule::{Audit, Deviation, Schedule};
+use rattlemap::record::classify::classify;
+use rattlemap::record::{Record, valid};
+use rattlemap_dynamics::orbit::Class;
+
+/// Cycles whose count of impacts changes from band to band, a window of the main plane.
+const SCENE: &str = "[[axis]]
+parameter = 'e'
+min = 0.2
+max = 0.5
+count = 65
+[[axis]]
+parameter = 'omega'
+min = 3.0
+max = 8.0
+count = 65
+[outputs]
+quantities = ['class', 'lyapunov', 'impacts', 'mesh']
+";
+
+fn plan(refine: &str) -> Plan {
+    Plan::new(&Scene::parse(&format!("{SCENE}{refine}"), "test", &[], Purpose::Map).unwrap())
+}
+
+/// Every cell of the map, by id.
+static WHOLE: LazyLock<Vec<Record>> = LazyLock::new(|| {
+    let plan = plan("");
+    let cells = plan.cells(0..plan.cell_count());
+    let computed = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&cells)).unwrap();
+    let mut records = vec![Record::default(); cells.len()];
+    cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
+    records
+});
+
+/// The map in which so many filled cells are audited, and what the only audit said.
+fn adaptive(audited: usize) -> (Vec<Record>, Audit) {
+    let whole = &*WHOLE;
+    let plan = plan(&format!("[refine]\nminimum_grid = 8\nmax_error = 0.5\naudit = {audited}"));
+    let mut schedule = Schedule::new(&plan);
+    let mut records = vec![Record::default(); whole.len()];
+    while !schedule.is_finished() {
+        for cell in schedule.next(&plan, usize::MAX) {
+            records[cell.id as usize] = whole[cell.id as usize];
+            schedule.take(cell.id, &records);
+        }
+    }
+    let refined = schedule.finish(&mut records).unwrap();
+    let [audit] = refined.audits[..] else { panic!("{refined:?}") };
+    (records, audit)
+}
+
+/// An audit of all that is filled has what a table of both maps shows; beside one that looked at a single cell
+/// nearly all is still filled.
+#[test]
+fn the_audit_of_all_filled_cells_is_what_both_maps_show() {
+    let (_, audit) = adaptive(WHOLE.len());
+    assert_eq!(audit.sampled, audit.filled);
+    let (filled, single) = adaptive(1);
+    assert_eq!((single.sampled, single.filled, single.wrong), (1, audit.filled, 0));
+    type Quantity = (u32, fn(&Record) -> f64, Option<Deviation>);
+    let quantities: [Quantity; 3] = [
+        (valid::LYAPUNOV, |record| record.lyapunov, audit.errors.lyapunov),
+        (valid::IMPACTS, |record| record.impacts_per_period, audit.errors.impacts),
+        (valid::MESH, |record| record.mesh_fraction, audit.errors.mesh),
+    ];
+    for (bit, field, deviation) in quantities {
+        let deviation = deviation.unwrap();
+        let own =
+            filled.iter().zip(&*WHOLE).filter(|(cell, own)| cell.valid & valid::FILLED & !own.valid != 0);
+        let (with, without): (Vec<_>, Vec<_>) = own.partition(|(cell, _)| cell.valid & bit != 0);
+        let mut differences: Vec<f64> =
+            with.iter().map(|(cell, own)| (field(cell) - field(own)).abs()).collect();
+        differences.sort_by(f64::total_cmp);
+        // All but the one that was integrated.
+        assert_eq!(differences.len() + without.len() + 1, audit.filled);
+        assert!(deviation.compared - differences.len() <= 1, "{deviation:?}");
+        assert!(deviation.empty - without.len() <= 1, "{deviation:?}");
+        let off = differences.iter().filter(|&&difference| difference >= 1.0 - 1e-9).count();
+        assert!(deviation.off_by_one - off <= 1, "{deviation:?}, {off}");
+        for (share, said) in [(0.5, deviation.median), (0.95, deviation.p95), (1.0, deviation.worst)] {
+            let place = (share * differences.len() as f64).ceil() as usize - 1;
+            let around = differences[place - 1]..=differences[(place + 1).min(differences.len() - 1)];
+            assert!(around.contains(&said), "{share}: {said}, {around:?}");
+        }
+    }
+}
+
+/// Impacts of cycles are whole numbers over the period, also where they were filled; where bands with other
+/// counts meet they are left empty.
+#[test]
+fn filled_cycles_have_a_count_of_impacts_or_none() {
+    let (records, audit) = adaptive(1);
+    let (mut counted, mut empty) = (0, 0);
+    for record in records.iter().filter(|record| record.valid & valid::FILLED != 0) {
+        let Class::Periodic { period } = classify(record) else { continue };
+        let count = record.impacts_per_period * f64::from(period);
+        assert!((count - count.round()).abs() < 1e-9, "{record:?}");
+        *if record.valid & valid::IMPACTS != 0 { &mut counted } else { &mut empty } += 1;
+    }
+    assert!(counted > audit.filled / 4 && empty > audit.filled / 20, "{counted} counted, {empty} empty");
+}

@@ -1,0 +1,306 @@
+//! Maps through the library: classes against single orbits, and independence of how the
+//! work was cut up.
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+
+use rattlemap::map::engine::{Cpu, Engine, EngineError, Fake};
+use rattlemap::map::plan::{Cell, Plan};
+use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::map::schedule::Schedule;
+use rattlemap::map::sweep::{self, SweepError};
+use rattlemap::record::classify::classify;
+use rattlemap::record::{Record, valid};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{GearPair, REST};
+use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
+use rattlemap_dynamics::reference::Trajectory;
+use rayon::prelude::*;
+
+const QUANTITIES: &str =
+    "outputs.quantities=[\"class\",\"lyapunov\",\"impacts\",\"mesh\",\"symmetric\",\"word\"]";
+
+/// A map over restitution and frequency with as many cells along each axis.
+fn scene(count: usize, sets: &[&str]) -> Scene {
+    let axis = |name, min, max| {
+        format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = {count}\n")
+    };
+    let text = axis("e", 0.0, 1.0) + &axis("omega", 1.0, 12.0);
+    let sets: Vec<String> = [QUANTITIES].iter().chain(sets).map(ToString::to_string).collect();
+    Scene::parse(&text, "test", &sets, Purpose::Map).unwrap()
+}
+
+/// All records by id, computed in batches of `size`.
+fn records(plan: &Plan, engine: &mut Engine<'_>, size: usize) -> Vec<Record> {
+    let mut records = vec![Record::default(); plan.cell_count()];
+    for from in (0..records.len()).step_by(size) {
+        let cells = plan.cells(from..records.len().min(from + size));
+        let computed = pollster::block_on(engine.run(&cells)).unwrap();
+        assert_eq!(computed.len(), cells.len());
+        cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
+    }
+    records
+}
+
+fn on_cpu(scene: &Scene) -> Vec<Record> {
+    let plan = Plan::new(scene);
+    records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), 64)
+}
+
+/// Whether the motion from rest is still far from an orbit after `periods`.
+fn is_elsewhere(pair: &GearPair, orbit: &Orbit, periods: u32) -> bool {
+    let flow = Flow::new(&pair.oscillator().unwrap());
+    let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
+    for _ in 0..periods {
+        trajectory.advance_period(&mut ()).unwrap();
+    }
+    let end = trajectory.state();
+    let mut cycle = Trajectory::new(&flow, pair.law(), orbit.strobe);
+    (0..orbit.cycle_periods).all(|_| {
+        let y = cycle.state();
+        cycle.advance_period(&mut ()).unwrap();
+        (0..4).any(|i| (y[i] - end[i]).abs() > 1e-3)
+    })
+}
+
+#[test]
+fn cells_are_what_single_orbits_are() {
+    let scene = scene(24, &[]);
+    let plan = Plan::new(&scene);
+    let records = on_cpu(&scene);
+    let settings = Settings::default();
+    let differing: Vec<String> = (0..plan.cell_count() as u32)
+        .into_par_iter()
+        .filter_map(|id| {
+            let (record, pair) = (&records[id as usize], crate::common::pair_at(&plan, id));
+            let class = classify(record);
+            // The budget may not suffice, and says so; a single orbit goes on.
+            if class == Class::Undecided {
+                return None;
+            }
+            let orbit = analyse(&pair, REST, &settings).unwrap();
+            let at = format!("e = {}, omega = {}: {class:?}, {:?}", pair.e, pair.omega, orbit.class);
+            if orbit.class != class {
+                // Transient chaos that outlives the cell; a single orbit waits for its end.
+                let transient = class == Class::Chaotic && is_elsewhere(&pair, &orbit, record.periods_run);
+                return (!transient).then_some(at);
+            }
+            if let Class::Periodic { .. } = class {
+                let near = |a: f64, b: f64| (a - b).abs() < 1e-6 * (1.0 + b.abs()) || a == b;
+                assert!(
+                    near(record.lyapunov, orbit.lyapunov),
+                    "{at}: {} {}",
+                    record.lyapunov,
+                    orbit.lyapunov
+                );
+                assert!(near(record.mesh_fraction, orbit.mesh_fraction), "{at}");
+                assert_eq!(record.impacts_per_period, orbit.impacts_per_period, "{at}");
+                assert_eq!(record.symmetric == 1, orbit.symmetric.unwrap(), "{at}");
+            }
+            None
+        })
+        .collect();
+    assert!(differing.is_empty(), "{differing:#?}");
+    let undecided = records.iter().filter(|record| classify(record) == Class::Undecided).count();
+    assert!(undecided <= 6, "{undecided} of 576 cells undecided");
+}
+
+#[test]
+fn without_early_stops_every_cell_runs_its_whole_budget() {
+    let full = on_cpu(&scene(12, &["integration.early_stop=false"]));
+    assert!(full.iter().all(|record| record.periods_run == 528));
+    let early = on_cpu(&scene(12, &[]));
+    let same = full.iter().zip(&early).filter(|(full, early)| {
+        classify(full) == classify(early) && (full.period == 0 || full.word == early.word)
+    });
+    // tests/lanes/early_stops.rs looks at those that differ.
+    assert!(same.count() >= 142);
+    assert!(early.iter().filter(|record| record.periods_run < 300).count() > 130);
+}
+
+#[test]
+fn records_do_not_depend_on_batches_or_threads() {
+    let scene = scene(10, &[]);
+    let plan = Plan::new(&scene);
+    let with = |threads: usize, size: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), size))
+    };
+    let one = with(1, 1);
+    for (threads, size) in [(1, 100), (2, 7), (5, 33)] {
+        assert_eq!(with(threads, size), one, "{threads} threads, batches of {size}");
+    }
+    let rule = |size| records(&plan, &mut Engine::Fake(Fake::new(by_id)), size);
+    assert_eq!(rule(1), rule(64));
+}
+
+#[test]
+fn nothing_is_recorded_that_nobody_asks_for() {
+    let only = |quantities: &str| on_cpu(&scene(4, &[&format!("outputs.quantities=[{quantities}]")]));
+    let bits = valid::STROBE | valid::PERIOD;
+    for record in only("\"mesh\"") {
+        assert_eq!(record.valid, bits | valid::MESH);
+        assert_eq!((record.lyapunov, record.impacts_per_period, record.word), (0.0, 0.0, [0; 4]));
+    }
+    // A class needs the exponent, but not the other way round.
+    assert!(only("\"class\"").iter().all(|record| record.valid == bits | valid::LYAPUNOV));
+}
+
+/// A cell's own number, so that a misplaced record shows.
+fn by_id(cell: &Cell) -> Record {
+    Record { period: cell.id + 1, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
+}
+
+/// Sweeps with a fake from where `before` ends; returns what it says and what it kept, in order.
+fn sweep(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, Vec<u32>) {
+    let (mut schedule, mut kept) = (Schedule::new(plan), Vec::new());
+    let mut records = vec![Record::default(); plan.cell_count()];
+    let done: Vec<_> = before.iter().map(|&id| (id, by_id(&plan.cell(id)))).collect();
+    assert!(sweep::replay(&mut schedule, &mut records, &done));
+    let engine = &mut Engine::Fake(fake);
+    let keep = |batch: &[(u32, Record)], _| {
+        assert!(batch.iter().all(|(id, record)| record.period == id + 1));
+        kept.extend(batch.iter().map(|(id, _)| *id));
+        Ok(ControlFlow::Continue(()))
+    };
+    let end = pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, keep));
+    (end, kept)
+}
+
+#[test]
+fn a_lost_engine_leaves_what_was_done_and_the_next_goes_on() {
+    let scene = scene(20, &[]);
+    let plan = Plan::new(&scene);
+    let (end, kept) = sweep(&plan, Fake::lost_after(2, by_id), &[]);
+    assert!(matches!(end, Err(SweepError::Engine(EngineError::Lost { .. }))), "{end:?}");
+    assert!(!kept.is_empty() && kept.len() < plan.cell_count());
+    let (end, rest) = sweep(&plan, Fake::new(by_id), &kept);
+    assert!(end.unwrap());
+    assert_eq!([kept, rest].concat(), plan.order());
+}
+
+#[test]
+fn batches_shrink_to_the_memory_there_is() {
+    let scene = scene(20, &[]);
+    let plan = Plan::new(&scene);
+    let (end, kept) = sweep(&plan, Fake::with_memory(3, by_id), &[]);
+    assert!(end.unwrap());
+    assert_eq!(kept, plan.order());
+    let (end, kept) = sweep(&plan, Fake::with_memory(0, by_id), &[]);
+    assert!(matches!(end, Err(SweepError::Engine(EngineError::OutOfMemory { cells: 1, .. }))), "{end:?}");
+    assert!(kept.is_empty());
+}
+
+#[test]
+fn records_that_nobody_asked_for_are_refused() {
+    let plan = Plan::new(&scene(41, &["refine.minimum_grid=8"]));
+    let replay = |ids: &[u32]| {
+        let mut records = vec![Record::default(); plan.cell_count()];
+        let kept: Vec<_> = ids.iter().map(|&id| (id, Record::default())).collect();
+        sweep::replay(&mut Schedule::new(&plan), &mut records, &kept)
+    };
+    assert!(replay(&[0, 8, 16]));
+    for wrong in [&[0, 8, 8][..], &[1], &[41 * 41], &[u32::MAX]] {
+        assert!(!replay(wrong), "{wrong:?}");
+    }
+}
+
+/// Cells whose neighbours take a hundred times as long: nobody waits for them, and the map is the same.
+#[test]
+fn slow_cells_hold_up_nobody() {
+    let adaptive = ["refine.minimum_grid=8", "refine.max_error=0.05", "refine.audit=50"];
+    for sets in [&[][..], &adaptive] {
+        let scene = scene(41, sets);
+        let plan = Plan::new(&scene);
+        let disc = |cell: &Cell| {
+            let [i, j] = [cell.id % 41, cell.id / 41];
+            let period = 1 + u32::from(i * i + j * j < 400);
+            Record { period, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
+        };
+        let run = |fake: Fake| {
+            let (mut schedule, mut kept) = (Schedule::new(&plan), Vec::new());
+            let mut records = vec![Record::default(); plan.cell_count()];
+            let keep = |batch: &[(u32, Record)], _| {
+                kept.extend(batch.iter().map(|(id, _)| *id));
+                Ok(ControlFlow::Continue(()))
+            };
+            let engine = &mut Engine::Fake(fake);
+            let end = pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, keep));
+            assert!(end.unwrap());
+            let refined = schedule.finish(&mut records);
+            (kept, records, refined)
+        };
+        let (mut kept, records, refined) = run(Fake::new(disc));
+        let is_slow = |id: u32| id % 7 == 3;
+        let fake = Fake::slow(|cell| if cell.id % 7 == 3 { 100 } else { 1 + cell.id % 2 }, disc);
+        let (mut late, same_records, same_refined) = run(fake);
+        // A coarse cell that is slow comes after what its neighbours ask for.
+        let first_slow = late.iter().position(|&id| is_slow(id)).unwrap();
+        assert!(refined.is_none() || first_slow > 36, "{first_slow}");
+        assert_eq!(refined, same_refined);
+        assert!(records == same_records);
+        kept.sort_unstable();
+        late.sort_unstable();
+        assert_eq!(kept, late);
+    }
+}
+
+/// When cells under way end, and which.
+type Ends = BTreeSet<(u32, u32)>;
+
+/// Periods until the last of an adaptive map's cells has ended, on a device that runs as many side by side as there
+/// are: if records are taken up one by one, once half of what is under way has ended, as the sweep does, and once
+/// all has; and if a device is checked every 64 periods, while the next 64 are under way, and what has ended is taken
+/// up after four checks at the latest, as on hardware of its own.
+#[test]
+fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_often() {
+    let sets = ["refine.minimum_grid=8", "refine.max_error=0.02", "integration.undecided_periods=1584"];
+    let plan = Plan::new(&scene(256, &sets));
+    let mut measured = vec![Record::default(); plan.cell_count()];
+    let engine = &mut Engine::Cpu(Cpu::new(&plan));
+    let go_on = |_: &[(u32, Record)], _| Ok(ControlFlow::Continue(()));
+    let mut schedule = Schedule::new(&plan);
+    assert!(pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, go_on)).unwrap());
+    let mut integrated = schedule.sequence().to_vec();
+    integrated.sort_unstable();
+    let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();
+    // `wait` says when what has ended by then is taken up, from when each of those under way will.
+    let periods = |wait: &dyn Fn(u32, &Ends) -> u32| {
+        let mut schedule = Schedule::new(&plan);
+        let mut records = vec![Record::default(); plan.cell_count()];
+        let (mut now, mut under_way) = (0, BTreeSet::new());
+        while !schedule.is_finished() {
+            let next = schedule.next(&plan, usize::MAX);
+            under_way.extend(next.iter().map(|cell| (now + measured[cell.id as usize].periods_run, cell.id)));
+            now = wait(now, &under_way);
+            let left = under_way.split_off(&(now + 1, 0));
+            for (_, id) in std::mem::replace(&mut under_way, left) {
+                records[id as usize] = measured[id as usize];
+                schedule.take(id, &records);
+            }
+        }
+        let mut asked = schedule.sequence().to_vec();
+        asked.sort_unstable();
+        assert_eq!(asked, integrated);
+        now
+    };
+    let end = |under_way: &Ends, n: usize| under_way.iter().nth(n).unwrap().0;
+    let singly = periods(&|_, under_way| end(under_way, 0));
+    let by_halves = periods(&|_, under_way| end(under_way, (under_way.len() - 1) / 2));
+    let in_rounds = periods(&|_, under_way| end(under_way, under_way.len() - 1));
+    let by_checks = periods(&|now, under_way| {
+        let enough = |check: u32| {
+            let ended = under_way.range(..(now + 64 * check + 1, 0)).count();
+            2 * ended >= under_way.len() || check >= 4 && ended > 0
+        };
+        now + 64 * (1 + (1..).find(|&check| enough(check)).unwrap())
+    });
+    println!(
+        "slowest cell {slowest} periods; all cells {singly}, by halves {by_halves}, in rounds {in_rounds}, by checks \
+         {by_checks}"
+    );
+    let figures = (slowest, singly, by_halves, in_rounds, by_checks);
+    assert!(singly < 4 * slowest && 2 * singly < in_rounds, "{figures:?}");
+    assert!(by_halves < 5 * slowest && 3 * by_halves < 2 * in_rounds, "{figures:?}");
+    assert!(5 * by_checks < 6 * singly, "{figures:?}");
+}

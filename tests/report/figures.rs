@@ -1,0 +1,203 @@
+//! The figures are written, show what they should, and survive poor data.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use image::RgbImage;
+use rattlemap::map::bifurcation::{Column, SectionPoint};
+use rattlemap::output::{bifurcation_figure, orbit_figures};
+use rattlemap_dynamics::model::{GearPair, Side, State};
+use rattlemap_dynamics::orbit::{Class, Event, EventKind, Orbit, Sample, Status};
+use rattlemap_dynamics::word::Word;
+
+const RIGHT: [u8; 3] = [0xd5, 0x5e, 0x00];
+const LEFT: [u8; 3] = [0x00, 0x72, 0xb2];
+const MESHING: [u8; 3] = [0x00, 0x9e, 0x73];
+const PERIOD: f64 = TAU / 5.6;
+
+/// Two sinusoids whose gap just touches the right wall and sinks into the left one.
+fn state(turns: f64) -> State {
+    let common = |phase: f64| 0.9 * phase.cos() + 0.1 * (3.0 * phase).sin();
+    let common_speed = |phase: f64| 5.6 * (-0.9 * phase.sin() + 0.3 * (3.0 * phase).cos());
+    let phase = TAU * turns;
+    let (z, w) = (0.5 * (1.025 * phase.sin() - 0.025), 0.5 * 5.6 * 1.025 * phase.cos());
+    let (x, v) = (common(phase), common_speed(phase));
+    [x + z / 2.0, v + w / 2.0, x - z / 2.0, v - w / 2.0]
+}
+
+/// When that gap passes the left wall, in turns.
+fn meshing() -> [f64; 2] {
+    let angle = (0.975f64 / 1.025).asin() / TAU;
+    [0.5 + angle, 1.0 - angle]
+}
+
+fn orbit(events: Vec<Event>) -> Orbit {
+    Orbit {
+        class: Class::Periodic { period: 1 },
+        status: Status::Ok,
+        lyapunov: -0.15,
+        lyapunov_error: None,
+        floquet: None,
+        symmetric: Some(false),
+        word: Word::default(),
+        impacts_per_period: 1.0,
+        mesh_fraction: 0.1,
+        strobe: state(0.0),
+        strobe_meshing: None,
+        events,
+        cycle_periods: 1,
+        forcing_period: PERIOD,
+        periods_run: 0,
+    }
+}
+
+fn meshing_orbit() -> (Orbit, Vec<Sample>) {
+    let event = |kind, side, turns: f64, kick: f64| {
+        let before = state(turns);
+        let after = [before[0], before[1] - kick, before[2], before[3] + 2.0 * kick];
+        Event { kind, side, t: turns * PERIOD, t_mod_period: turns * PERIOD, before, after }
+    };
+    let [start, end] = meshing();
+    let events = vec![
+        event(EventKind::Impact, Side::Right, 0.25, 1.5),
+        event(EventKind::MeshStart, Side::Left, start, 0.0),
+        event(EventKind::MeshEnd, Side::Left, end, 0.0),
+    ];
+    let sample = |turns: f64| Sample {
+        t: turns * PERIOD,
+        state: state(turns),
+        meshing: (start..end).contains(&turns).then_some(Side::Left),
+    };
+    (orbit(events), (0..=400).map(|i| sample(f64::from(i) / 400.0)).collect())
+}
+
+fn read(path: &Path) -> RgbImage {
+    image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).to_rgb8()
+}
+
+fn count(picture: &RgbImage, color: [u8; 3]) -> usize {
+    picture.pixels().filter(|pixel| pixel.0 == color).count()
+}
+
+/// Pixels in the inner half of the picture, where data lie, that are darker than the grid.
+fn ink(picture: &RgbImage) -> usize {
+    let (w, h) = picture.dimensions();
+    let inner = |(x, y, _): &(u32, u32, &image::Rgb<u8>)| {
+        (w / 4..3 * w / 4).contains(x) && (h / 4..3 * h / 4).contains(y)
+    };
+    let dark = |p: &image::Rgb<u8>| p.0.iter().map(|c| u32::from(*c)).sum::<u32>() < 600;
+    picture.enumerate_pixels().filter(inner).filter(|(_, _, pixel)| dark(pixel)).count()
+}
+
+fn distinct_colors(picture: &RgbImage) -> usize {
+    picture.pixels().map(|pixel| pixel.0).collect::<std::collections::HashSet<_>>().len()
+}
+
+#[test]
+fn orbit_figures_show_motion_meshing_and_events() {
+    let dir = tempfile::tempdir().unwrap();
+    let (orbit, trace) = meshing_orbit();
+    let files = orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace).unwrap();
+    let names: Vec<_> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect();
+    assert_eq!(names, ["phase_plane.png", "time_history.png", "gap.png"]);
+    for file in &files {
+        let picture = read(file);
+        assert_eq!(picture.width(), 1600, "{}", file.display());
+        assert!(distinct_colors(&picture) > 100, "{}", file.display());
+        assert!(ink(&picture) > 2000, "{}: {}", file.display(), ink(&picture));
+        for wall in [RIGHT, LEFT] {
+            // More than the legend's patch alone, which takes 38 by 18.
+            assert!(count(&picture, wall) > 38 * 18 + 50, "{}: {}", file.display(), count(&picture, wall));
+        }
+    }
+    for file in [&files[0], &files[2]] {
+        assert!(count(&read(file), MESHING) > 300, "{}", file.display());
+    }
+}
+
+#[test]
+fn motion_without_contact_without_data_or_without_numbers_is_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    let rest = |t: f64| Sample {
+        t,
+        state: [0.3 * (5.6 * t).cos(), -1.68 * (5.6 * t).sin(), 0.0, 0.0],
+        meshing: None,
+    };
+    let free: Vec<Sample> = (0..=300).map(|i| rest(f64::from(i) / 300.0 * PERIOD)).collect();
+    let blown_up = [
+        rest(0.0),
+        Sample { state: [f64::NAN, f64::INFINITY, 0.0, 1e308], ..rest(0.1) },
+        Sample { state: [-1e308, 1e308, 0.0, 0.0], ..rest(0.2) },
+    ];
+    for (trace, class) in [
+        (&free[..], Class::Periodic { period: 1 }),
+        (&[], Class::Undecided),
+        (&free[..1], Class::Chaotic),
+        (&blown_up, Class::Failed),
+    ] {
+        let orbit = Orbit { class, lyapunov: f64::NAN, ..orbit(vec![]) };
+        let files = orbit_figures::write(dir.path(), &GearPair::paper(0.5), &orbit, trace).unwrap();
+        files.iter().for_each(|file| assert!(distinct_colors(&read(file)) > 10, "{}", file.display()));
+    }
+}
+
+fn columns(count: u32, points: u32) -> Vec<Column> {
+    let column = |i: u32| {
+        let value = f64::from(i) / f64::from(count);
+        let class = if i % 50 == 7 { Class::Undecided } else { Class::Chaotic };
+        let point = |j: u32| {
+            let side = Side::BOTH[(j % 2) as usize];
+            // Golden-section points fill a band that widens with the axis.
+            let spread = (f64::from(j) * 0.618_034).fract() * value;
+            let at = [-side.sign() * (1.0 - 0.4 * spread), 0.0, -side.sign() * (1.4 - 0.4 * spread), 0.0];
+            SectionPoint { side, kind: EventKind::Impact, t_mod_period: 0.0, before: at, after: at }
+        };
+        let points = if class == Class::Chaotic { (0..points).map(point).collect() } else { vec![] };
+        Column { value, class, status: Status::Ok, points }
+    };
+    (0..count).map(column).collect()
+}
+
+#[test]
+fn bifurcation_figure_shows_both_walls() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("bifurcation.png");
+    bifurcation_figure::write(&path, "Bifurcation", "coefficient of restitution, e", &columns(1000, 200))
+        .unwrap();
+    let picture = read(&path);
+    assert_eq!(picture.dimensions(), (1600, 1400));
+    assert!(ink(&picture) > 5000, "{}", ink(&picture));
+    // Single dots are not opaque, so hues are counted here and not exact colours.
+    let warm = picture.pixels().filter(|p| p.0[0] > p.0[2].saturating_add(60)).count();
+    let cold = picture.pixels().filter(|p| p.0[2] > p.0[0].saturating_add(60)).count();
+    assert!(warm > 20_000 && cold > 20_000, "{warm} {cold}");
+}
+
+#[test]
+fn bifurcation_figure_survives_poor_data() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut wild = columns(3, 4);
+    wild[0].value = f64::NAN;
+    wild[1].points[0].before = [f64::INFINITY, 0.0, f64::NAN, 0.0];
+    let long = "a title that no figure has room for, ".repeat(12);
+    for (name, title, columns) in [
+        ("none", "", vec![]),
+        ("one", "one column", columns(1, 1)),
+        ("empty", "no points", columns(9, 0)),
+        ("wild", &long, wild),
+    ] {
+        let path = dir.path().join(format!("{name}.png"));
+        bifurcation_figure::write(&path, title, "e", &columns).unwrap();
+        assert_eq!(read(&path).width(), 1600);
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_named() {
+    let dir = tempfile::tempdir().unwrap().path().join("absent");
+    let error = bifurcation_figure::write(&dir.join("b.png"), "", "e", &[]).unwrap_err();
+    assert!(format!("{error:#}").contains("b.png"), "{error:#}");
+    let (orbit, trace) = meshing_orbit();
+    let error = orbit_figures::write(&dir, &GearPair::paper(0.5), &orbit, &trace).unwrap_err();
+    assert!(format!("{error:#}").contains("phase_plane.png"), "{error:#}");
+}

@@ -1,0 +1,4 @@
+//! What people look at: the report in a browser, figures pixel by pixel.
+
+mod figures;
+mod page;

@@ -1,0 +1,12 @@
+//! How right is a finished map: maps that are right, and maps with planted errors.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod computed;
+mod judged;
+mod short_cells;
+
+mod classes_agree;
+mod independent;
+mod replay;
+mod short_lanes;

@@ -1,0 +1,557 @@
+//! `rattlemap validate`: what agrees, what is told apart, and that planted errors are found.
+//!
+//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::common::gpu::{fresh, open};
+use crate::computed::computed;
+use crate::judged::{first, only, unexplained, validated};
+use assert_cmd::Command;
+use rattlemap::gpu::Precision;
+use rattlemap::map::engine::{self, Engine};
+use rattlemap::map::plan::Plan;
+use rattlemap::map::scene::{Purpose, Scene};
+use rattlemap::output::{Identity, RECORDS, RecordFile};
+use rattlemap::record::classify::classify;
+use rattlemap::record::{Record, valid};
+use rattlemap::validate::{Kind, Lanes, Sample, Stratum, Subject, Validation, replay, sample};
+use rattlemap_dynamics::orbit::{Class, Status};
+use rattlemap_dynamics::word::Word;
+
+fn scene_text(columns: usize, rows: usize) -> String {
+    format!(
+        "[[axis]]\nparameter = \"e\"\nmin = 0.0\nmax = 1.0\ncount = {columns}\n\n\
+         [[axis]]\nparameter = \"omega\"\nmin = 1.0\nmax = 12.0\ncount = {rows}\n\n\
+         [outputs]\nquantities = [\"class\", \"lyapunov\", \"impacts\", \"mesh\", \"symmetric\", \"word\"]\n\
+         files = [\"html\"]\n"
+    )
+}
+
+fn scene(columns: usize, rows: usize) -> Scene {
+    Scene::parse(&scene_text(columns, rows), "s", &[], Purpose::Map).unwrap()
+}
+
+/// Restitution against frequency, between these.
+fn planned([least, most]: [f64; 2], [slow, fast]: [f64; 2], count: usize, sets: &[&str]) -> Plan {
+    let sets: Vec<String> = [
+        format!("axis.0.min={least:?}"),
+        format!("axis.0.max={most:?}"),
+        format!("axis.1.min={slow:?}"),
+        format!("axis.1.max={fast:?}"),
+    ]
+    .into_iter()
+    .chain(sets.iter().map(ToString::to_string))
+    .collect();
+    Plan::new(&Scene::parse(&scene_text(count, count), "s", &sets, Purpose::Map).unwrap())
+}
+
+fn settled(record: &Record) -> bool {
+    record.period == 1
+        && record.status == Status::Ok.code()
+        && record.lyapunov.abs() > 0.15
+        && record.impacts_per_period > 0.0
+}
+
+fn chaotic(record: &Record) -> bool {
+    classify(record) == Class::Chaotic && record.lyapunov > 0.2
+}
+
+// ---- single records
+
+/// Wrong records of a map that is right otherwise.
+struct Planted {
+    what: &'static str,
+    /// Whether a record can be made wrong in this way.
+    fits: fn(&Record) -> bool,
+    spoil: fn(&mut Record),
+}
+
+const PLANTED: [Planted; 19] = [
+    Planted { what: "period", fits: settled, spoil: |record| record.period += 1 },
+    Planted {
+        what: "class",
+        fits: settled,
+        spoil: |record| (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01),
+    },
+    Planted { what: "word", fits: settled, spoil: |record| record.set_word(&Word::cyclic(b"1435")) },
+    Planted { what: "lyapunov", fits: settled, spoil: |record| record.lyapunov *= 1.3 },
+    Planted { what: "lyapunov", fits: settled, spoil: |record| record.lyapunov = f64::NAN },
+    Planted { what: "impacts_per_period", fits: settled, spoil: |record| record.impacts_per_period += 1.0 },
+    Planted { what: "mesh_fraction", fits: settled, spoil: |record| record.mesh_fraction = f64::NAN },
+    Planted { what: "symmetric", fits: settled, spoil: |record| record.symmetric ^= 1 },
+    Planted { what: "status", fits: settled, spoil: |record| record.status = Status::NearGrazing.code() },
+    Planted { what: "status", fits: settled, spoil: |record| record.status = Status::StrobeOnEvent.code() },
+    Planted { what: "class", fits: settled, spoil: |record| record.status = Status::CapEvents.code() },
+    Planted { what: "status", fits: settled, spoil: |record| record.status = Status::BelowResolution.code() },
+    Planted { what: "periods_run", fits: settled, spoil: |record| record.periods_run = 529 },
+    Planted { what: "lyapunov", fits: chaotic, spoil: |record| record.lyapunov *= 5.0 },
+    Planted { what: "impacts_per_period", fits: chaotic, spoil: |record| record.impacts_per_period *= 3.0 },
+    Planted { what: "mesh_fraction", fits: chaotic, spoil: |record| record.mesh_fraction += 0.5 },
+    // What a record says of itself excuses nothing.
+    Planted {
+        what: "class",
+        fits: settled,
+        spoil: |record| {
+            (record.period, record.periods_run, record.status) = (0, 528, Status::Slow.code());
+        },
+    },
+    Planted {
+        what: "class",
+        fits: chaotic,
+        spoil: |record| (record.status, record.periods_run) = (Status::Slow.code(), 528),
+    },
+    Planted {
+        what: "class",
+        fits: settled,
+        spoil: |record| {
+            (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01);
+            (record.periods_run, record.strobe) = (400, [0.0; 4]);
+        },
+    },
+];
+
+/// Spoils one record in each way; the ids, and what is wrong there.
+fn plant(records: &mut [Record]) -> Vec<(u32, &'static str)> {
+    let mut wrong: Vec<(u32, &'static str)> = Vec::new();
+    for (k, planted) in PLANTED.iter().enumerate() {
+        let from = k * records.len() / PLANTED.len();
+        let ids = (0..records.len()).map(|n| (from + n) % records.len());
+        let taken = |id: usize| wrong.iter().any(|&(other, _)| other as usize == id);
+        let id = ids.into_iter().find(|&id| !taken(id) && (planted.fits)(&records[id])).unwrap();
+        (planted.spoil)(&mut records[id]);
+        wrong.push((id as u32, planted.what));
+    }
+    wrong.sort_unstable();
+    wrong
+}
+
+/// Without a device that could tell that they are not its own.
+#[test]
+fn wrong_records_are_found_whatever_the_engine() {
+    let plan = Plan::new(&scene(12, 12));
+    let mut records = computed(&plan);
+    let right = validated(&plan, &records, Precision::F64, true);
+    assert!(unexplained(&right).is_empty() && right.mismatches.len() < 3, "{:?}", right.mismatches);
+    let wrong = plant(&mut records);
+    let ids: Vec<u32> = wrong.iter().map(|&(id, _)| id).collect();
+    for precision in Precision::ALL {
+        let found = validated(&plan, &records, precision, true);
+        assert_eq!(unexplained(&found), ids, "{precision:?}: {wrong:?} {:?}", found.mismatches);
+        for &(id, what) in &wrong {
+            let mismatch = found.mismatches.iter().find(|mismatch| mismatch.id == id).unwrap();
+            assert!(mismatch.differences.iter().any(|d| d.field.name() == what), "{what}: {mismatch:?}");
+        }
+        assert!(!found.faults().is_empty());
+    }
+}
+
+/// Cells that trade places, and a map from another start.
+#[test]
+fn another_cells_record_is_found() {
+    let plan = Plan::new(&scene(14, 14));
+    let mut records = computed(&plan);
+    let moved: Vec<usize> =
+        (0..records.len()).filter(|&id| settled(&records[id])).step_by(7).take(12).collect();
+    for pair in moved.chunks_exact(2) {
+        records.swap(pair[0], pair[1]);
+    }
+    let found = unexplained(&validated(&plan, &records, Precision::F32, true));
+    assert!(moved.iter().all(|&id| found.contains(&(id as u32))), "{moved:?} {found:?}");
+    let start = ["start.policy=state", "start.state=[0.4, 1.0, -0.2, -3.0]"];
+    let elsewhere = computed(&planned([0.0, 1.0], [1.0, 12.0], 14, &start));
+    let found = validated(&plan, &elsewhere, Precision::F64, true);
+    let without = unexplained(&found).len();
+    println!("wrong start: {} differ, {without} without a reason", found.mismatches.len());
+    assert!(found.mismatches.len() > 20 && 10 * without > 9 * found.mismatches.len());
+}
+
+/// What early stops once named, status ok, and what the start reaches by an independent program in 80 bit.
+#[test]
+fn cycles_that_the_start_never_reaches_are_found() {
+    // e, omega; period and impacts as they were named.
+    let named = [
+        // Period 2 with 8.5 impacts, and chaos, of which the reference said period 1.
+        (0.5949119373776908, 3.7984344422700587, 1, Some(8.0)),
+        (0.5610367892976589, 3.8959866220735786, 1, None),
+        // Period 2, of which lanes said 3; 16 impacts, symmetric, of which they said 15, unsymmetric.
+        (0.8, 5.745098039215686, 3, None),
+        (0.3254901960784314, 3.2, 1, Some(15.0)),
+    ];
+    for (e, omega, period, impacts) in named {
+        let plan = planned([e, 1.0], [omega, 20.0], 2, &["integration.undecided_periods=1584"]);
+        let record = Record {
+            period,
+            impacts_per_period: impacts.unwrap_or(0.0),
+            periods_run: 45,
+            valid: valid::PERIOD | impacts.map_or(0, |_| valid::IMPACTS),
+            ..Record::default()
+        };
+        for precision in Precision::ALL {
+            let found = first(&plan, record, precision);
+            assert_eq!(unexplained(&found), [0], "{precision:?}: {e} {omega}: {:?}", found.mismatches);
+            assert!(!found.faults().is_empty(), "{precision:?}: {e} {omega}");
+        }
+    }
+}
+
+/// Approached so slowly that one is near it by the end of the budget, and then left.
+#[test]
+fn to_be_near_a_cycle_is_not_to_reach_it() {
+    let plan = planned([0.4637964774951076, 1.0], [1.7749510763209393, 20.0], 2, &[]);
+    let record = Record {
+        period: 1,
+        status: Status::Slow.code(),
+        periods_run: 528,
+        valid: valid::PERIOD,
+        ..Record::default()
+    };
+    let subject = Subject { plan: &plan, records: &[record; 4], precision: Precision::F64, is_lane: true };
+    let found = replay(&subject, &only(vec![0]), &Lanes::default(), &|_| {});
+    assert_eq!(found.mismatches.len(), 1, "{:?}", found.agreement);
+}
+
+// ---- a whole map
+
+/// Averages over chaos that are wrong in every cell, by less than one cell would show.
+#[test]
+fn averages_over_chaos_are_compared_over_the_class() {
+    let plan = planned([0.62, 0.98], [3.4, 6.2], 9, &[]);
+    let right = computed(&plan);
+    let failing = |spoil: fn(&mut Record)| -> Vec<&'static str> {
+        let mut records = right.clone();
+        records.iter_mut().filter(|record| classify(record) == Class::Chaotic).for_each(spoil);
+        let found = validated(&plan, &records, Precision::F64, true);
+        found.chaos.iter().filter(|test| test.fails()).map(|test| test.name).collect()
+    };
+    assert_eq!(failing(|_| {}), Vec::<&str>::new());
+    type Spoil = fn(&mut Record);
+    let wrong: [(&str, Spoil); 4] = [
+        ("lyapunov", |record| {
+            record.lyapunov_error = 0.6 * record.lyapunov;
+            record.lyapunov *= 2.5;
+        }),
+        ("lyapunov_error", |record| record.lyapunov_error *= 0.1),
+        ("impacts_per_period", |record| record.impacts_per_period *= 1.35),
+        ("mesh_fraction", |record| record.mesh_fraction += 0.095),
+    ];
+    for (name, spoil) in wrong {
+        assert!(failing(spoil).contains(&name), "{name}: {:?}", failing(spoil));
+    }
+}
+
+/// Lanes of a map, validated with the very device that made it.
+fn by_lanes(plan: &Plan, precision: Precision, rewrite: Option<fn(String) -> String>) -> (Validation, usize) {
+    let mut gpu = fresh(precision);
+    gpu.rewrite_shaders(rewrite.unwrap_or(|source| source));
+    let mut engine = Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, gpu)).unwrap()));
+    let cells = plan.cells(0..plan.cell_count());
+    let mut records = vec![Record::default(); plan.cell_count()];
+    for (cell, record) in cells.iter().zip(pollster::block_on(engine.run(&cells)).unwrap()) {
+        records[cell.id as usize] = record;
+    }
+    let Engine::Gpu(gpu) = engine else { unreachable!() };
+    let mut gpu = gpu.into_device();
+    let subject = Subject { plan, records: &records, precision, is_lane: true };
+    let mut drawn = sample(plan, &records, usize::MAX, 1);
+    drawn.states = (0..records.len() as u32).collect();
+    let mut double = (precision == Precision::F32 && rewrite.is_none()).then(|| open(Precision::F64));
+    let lanes =
+        pollster::block_on(Lanes::run(&subject, &drawn, Some(&mut gpu), double.as_deref_mut())).unwrap();
+    (replay(&subject, &drawn, &lanes, &|_| {}), records.len())
+}
+
+#[test]
+fn lanes_that_are_right_pass() {
+    let plan = Plan::new(&scene(20, 20));
+    for precision in Precision::ALL {
+        let (found, cells) = by_lanes(&plan, precision, None);
+        println!("{precision:?}: {:?} {:?}", found.strata, found.mismatches);
+        assert_eq!(found.faults(), Vec::<String>::new(), "{:?}", found.mismatches);
+        assert!(found.mismatches.len() * 20 < cells, "{precision:?}: many differ");
+        let states = found.states.unwrap();
+        // Most of them are foreseen, and not all exact: a bar that no error comes near would find nothing.
+        assert!(states.compared * 10 > 9 * cells && states.off.is_empty() && states.distances[1] > 0.0);
+        assert_eq!(found.again, [cells, cells]);
+    }
+}
+
+/// The law of one contact in ten thousand is not applied. Lanes come to the same attractors, and most records are right.
+#[test]
+fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
+    let rewrite = |source: String| {
+        let law = "    motion.q = after;\n    if pressed && leaving";
+        let miss = "    if ((bitcast<u32>(f32(closing)) * 2654435761u) >> 8u) % 10000u == 0u {\n\
+                    \x20       motion.q[1] = -motion.q[1];\n        return jump;\n    }\n";
+        assert!(source.contains(law));
+        source.replace(law, &format!("{miss}{law}"))
+    };
+    let plan = planned([0.1, 0.9], [1.0, 8.0], 96, &["integration.transient_periods=60"]);
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        gpu.rewrite_shaders(rewrite);
+        let ids: Vec<u32> = (0..plan.cell_count() as u32).collect();
+        let records = vec![Record::default(); ids.len()];
+        let subject = Subject { plan: &plan, records: &records, precision, is_lane: true };
+        let drawn = Sample { states: ids, ..only(Vec::new()) };
+        let lanes = pollster::block_on(Lanes::run(&subject, &drawn, Some(&mut gpu), None)).unwrap();
+        let states = replay(&subject, &drawn, &lanes, &|_| {}).states.unwrap();
+        println!("{precision:?}: {} of {} are off", states.off.len(), states.compared);
+        assert!(states.rate().is_too_many(), "{precision:?}: {states:?}");
+    }
+}
+
+/// Chatter meshes one impact sooner in one series of a hundred.
+#[test]
+fn a_threshold_that_is_off_by_a_hundredth_is_found() {
+    let plan = planned([0.2, 0.6], [1.0, 2.5], 20, &[]);
+    let rewrite = |source: String| {
+        assert!(source.contains("leaving <= law.mesh_speed * h"));
+        source.replace("leaving <= law.mesh_speed * h", "leaving <= Real(1.01) * law.mesh_speed * h")
+    };
+    for precision in Precision::ALL {
+        let (found, _) = by_lanes(&plan, precision, Some(rewrite));
+        println!(
+            "{precision:?}: {:?}, {} lanes off",
+            found.faults(),
+            found.states.as_ref().unwrap().off.len()
+        );
+        assert!(!found.faults().is_empty(), "{precision:?}: {:?}", found.mismatches);
+    }
+    // Of the reference, too.
+    let other = computed(&planned([0.2, 0.6], [1.0, 2.5], 20, &["mesh_speed=0.0101"]));
+    let found = validated(&plan, &other, Precision::F64, false);
+    assert!(!found.faults().is_empty(), "{:?}", found.mismatches);
+}
+
+/// A map of the reference, judged by an ODE library that shares nothing with it.
+#[test]
+fn a_map_of_the_reference_is_judged_by_an_independent_program() {
+    use rattlemap::validate::{Judge, independent};
+    let plan = planned([0.05, 0.95], [1.2, 11.0], 7, &["integration.transient_periods=150"]);
+    let records = computed(&plan);
+    let found = validated(&plan, &records, Precision::F64, false);
+    assert_eq!((found.judge, found.faults()), (Judge::Independent, Vec::new()), "{:?}", found.mismatches);
+    let judged = (0..49).filter_map(|id| independent::record(&plan, id, &records)).collect::<Vec<_>>();
+    let claims = |class: fn(&Record) -> bool| judged.iter().filter(|record| class(record)).count();
+    println!("judged: {} cycles, {} chaotic", claims(|r| r.period > 0), claims(|r| r.period == 0));
+    assert!(claims(|r| r.period > 0) > 30 && claims(|r| r.period == 0) > 2, "{judged:?}");
+}
+
+#[test]
+fn samples_have_their_strata_and_repeat() {
+    let plan = Plan::new(&scene(40, 40));
+    // Three stripes of period 1, 2, 1; one column is slow.
+    let record = |id: usize| {
+        let i = id % 40;
+        let status = if i == 5 { Status::Slow } else { Status::Ok };
+        let period = if (10..25).contains(&i) { 2 } else { 1 };
+        Record { status: status.code(), period, valid: valid::PERIOD, ..Record::default() }
+    };
+    let records: Vec<Record> = (0..1600).map(record).collect();
+    let drawn = sample(&plan, &records, 400, 7);
+    assert_eq!(drawn, sample(&plan, &records, 400, 7));
+    assert_ne!(drawn.draws, sample(&plan, &records, 400, 8).draws);
+    let counts: Vec<_> = drawn.draws.iter().map(|draw| (draw.stratum, draw.runs, draw.ids.len())).collect();
+    // What statuses are short of is drawn from all.
+    let expected = [(Stratum::Uniform, 1600, 260), (Stratum::Border, 160, 100), (Stratum::Status, 40, 40)];
+    assert_eq!(counts, expected);
+    assert!(drawn.draws[1].ids.iter().all(|id| [9, 10, 24, 25].contains(&(id % 40))));
+    assert!(drawn.draws.iter().all(|draw| draw.ids.is_sorted_by(|a, b| a < b)), "a cell was drawn twice");
+    assert_eq!(sample(&plan, &records, 5000, 7).ids().len(), 1600);
+}
+
+#[test]
+fn kinds_have_distinct_names() {
+    let names: std::collections::HashSet<_> = Kind::ALL.iter().map(|kind| kind.name()).collect();
+    assert_eq!(names.len(), Kind::ALL.len());
+}
+
+// ---- the command
+
+fn rattlemap(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("rattlemap").unwrap().current_dir(folder).args(arguments).assert()
+}
+
+/// A folder with a finished map `o` of 24 x 24 cells.
+fn finished() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), scene_text(24, 24)).unwrap();
+    rattlemap(folder.path(), &["map", "s.toml", "--engine", "cpu", "--out", "o", "--quiet"]).success();
+    let out = folder.path().join("o");
+    (folder, out)
+}
+
+fn said(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8_lossy(&assert.get_output().stderr).into_owned()
+}
+
+fn json(out: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(out.join("validation.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn a_map_is_validated_and_its_report_says_so() {
+    let (folder, out) = finished();
+    let run = |arguments: &[&str]| rattlemap(folder.path(), &[&["validate", "o"], arguments].concat());
+    let text = said(&run(&["--samples", "150", "--seed", "3"]).success().stdout(""));
+    for part in
+        ["uniform: 0 of ", "unexplained 0 (below ", "judged by lanes in f64 on ", "the same to the bit"]
+    {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(text.contains("o: validation.json, report.html"), "{text}");
+    let found = json(&out);
+    assert_eq!(
+        (&found["seed"], &found["cells"], &found["judge"]),
+        (&3.into(), &576.into(), &"lanes_f64".into())
+    );
+    assert_eq!((&found["faults"], &found["identical"]), (&serde_json::json!([]), &found["samples"]));
+    let uniform = &found["strata"][0];
+    assert_eq!((&uniform["name"], &uniform["kinds"]["unexplained"]["count"]), (&"uniform".into(), &0.into()));
+    let sampled: u64 =
+        found["strata"].as_array().unwrap().iter().map(|s| s["sampled"].as_u64().unwrap()).sum();
+    assert_eq!(sampled, 150);
+    assert_eq!(found["states"]["off"]["count"], 0);
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("\"validation\":{\"format\":1,\"command\":\"validate\""), "no section");
+    // The same seed, the same bytes.
+    let first = fs::read(out.join("validation.json")).unwrap();
+    run(&["--samples", "150", "--seed", "3", "--quiet"]).success().stderr("");
+    assert!(fs::read(out.join("validation.json")).unwrap() == first);
+    run(&["--samples", "150", "--seed", "4", "--quiet"]).success();
+    assert!(fs::read(out.join("validation.json")).unwrap() != first);
+    // A map that is written again has not been validated.
+    rattlemap(folder.path(), &["map", "s.toml", "--out", "o", "--quiet", "--resume"]).success();
+    assert!(!out.join("validation.json").exists());
+    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("\"validation\":null"));
+}
+
+#[test]
+fn planted_records_fail_the_validation_by_name() {
+    let (folder, out) = finished();
+    let plan = Plan::new(&scene(24, 24));
+    let scene = scene(24, 24);
+    let identity = Identity::new("cpu", "f64", "event-driven reference", scene.identity());
+    let path = out.join(RECORDS);
+    let mut records = vec![Record::default(); plan.cell_count()];
+    let count = RecordFile::read(&path, &identity, |batch| {
+        batch.iter().for_each(|&(id, record)| records[id as usize] = record);
+        true
+    });
+    assert_eq!(count.unwrap().count, 576);
+    let wrong = plant(&mut records);
+    let spoilt: Vec<(u32, Record)> = (0..).zip(records).collect();
+    RecordFile::create(&path, &identity).unwrap().append(&spoilt).unwrap();
+
+    let run = rattlemap(folder.path(), &["validate", "o", "--samples", "576", "--quiet"]).code(1).stdout("");
+    let text = said(&run);
+    assert!(
+        text.contains(&format!("{} of 576 cells (uniform) differ, unexplained", PLANTED.len())),
+        "{text}"
+    );
+    // The message names the first ones.
+    for &(id, _) in &wrong[..8] {
+        let [i, j] = plan.indices(id);
+        assert!(text.contains(&format!("({i}, {j})")), "{text}");
+    }
+    assert!(text.contains("o/validation.json"), "{text}");
+    let mismatches = json(&out)["mismatches"].clone();
+    let mismatches = mismatches.as_array().unwrap().iter().filter(|m| m["kind"] == "unexplained");
+    let ids: Vec<u64> = mismatches.clone().map(|mismatch| mismatch["id"].as_u64().unwrap()).collect();
+    assert!(wrong.iter().map(|&(id, _)| u64::from(id)).eq(ids), "{wrong:?}");
+    let mut commands = mismatches.map(|mismatch| mismatch["replay"].as_str().unwrap());
+    let arguments: Vec<&str> = commands.next().unwrap().split(' ').skip(1).chain(["--json"]).collect();
+    rattlemap(folder.path(), &arguments).success();
+}
+
+/// A validation that looked at nothing, as of a map whose cells were all filled, is none.
+#[test]
+fn nothing_replayed_is_a_failure() {
+    let plan = Plan::new(&scene(3, 3));
+    let filled = vec![Record { valid: valid::FILLED, ..Record::default() }; 9];
+    let drawn = sample(&plan, &filled, 400, 1);
+    let subject = Subject { plan: &plan, records: &filled, precision: Precision::F64, is_lane: true };
+    let found = replay(&subject, &drawn, &Lanes::default(), &|_| {});
+    assert_eq!((found.replayed, found.filled), (0, 9));
+    assert_eq!(found.faults(), ["none of 9 cells was replayed"]);
+}
+
+/// Another device than the map's may round differently: whoever reads the result is told.
+#[test]
+fn lanes_of_another_device_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("o");
+    fs::write(folder.path().join("s.toml"), scene_text(4, 3)).unwrap();
+    let map = ["map", "s.toml", "--out", "o", "--engine", "gpu", "--quiet"];
+    rattlemap(folder.path(), &map).success();
+    let validated = || said(&rattlemap(folder.path(), &["validate", "o"]).success());
+    let text = validated();
+    assert!(!text.contains("not on the map's own device"), "{text}");
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let made: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    let found = json(&out);
+    assert_eq!((&found["same_device"], &found["again_on"]), (&true.into(), &made["device"]));
+    // The same map, as if it came from elsewhere.
+    let device = made["device"].as_str().unwrap();
+    let scene = scene(4, 3);
+    let identity = |device| Identity::new("gpu", "f32", device, scene.identity());
+    let mut records = Vec::new();
+    let take = |batch: &[(u32, Record)]| {
+        records.extend_from_slice(batch);
+        true
+    };
+    RecordFile::read(&out.join(RECORDS), &identity(device), take).unwrap();
+    RecordFile::create(&out.join(RECORDS), &identity("Faraway card")).unwrap().append(&records).unwrap();
+    fs::write(out.join("manifest.json"), manifest.replace(device, "Faraway card")).unwrap();
+    let text = validated();
+    assert!(
+        text.contains(&format!("lanes ran again on {device}, not on the map's own device: no")),
+        "{text}"
+    );
+    assert!(text.contains("called Faraway card"), "{text}");
+    let found = json(&out);
+    assert_eq!((&found["device"], &found["same_device"]), (&"Faraway card".into(), &false.into()));
+    assert_eq!(found["again_on"], device);
+}
+
+#[test]
+fn what_is_no_finished_map_is_refused() {
+    let (folder, out) = finished();
+    let refused = |arguments: &[&str], parts: &[&str]| {
+        let run = rattlemap(folder.path(), &[&["validate"], arguments].concat()).code(2).stdout("");
+        parts.iter().for_each(|part| assert!(said(&run).contains(part), "{part}: {}", said(&run)));
+    };
+    refused(&["nowhere"], &["nowhere: there is no such folder"]);
+    refused(&["."], &["there is no manifest.json", "not the folder of a map"]);
+    refused(&["o", "--samples", "0"], &["--samples"]);
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let with = |from: &str, to: &str| {
+        assert!(manifest.contains(from), "{from}");
+        fs::write(out.join("manifest.json"), manifest.replace(from, to)).unwrap();
+    };
+    let version = format!("\"crate_version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    with(&version, "\"crate_version\": \"0.0.1\"");
+    refused(&["o"], &["made by rattlemap 0.0.1", "--force"]);
+    with("\"command\": \"map\"", "\"command\": \"bifurcation\"");
+    refused(&["o"], &["not the manifest of a map, but of `bifurcation`"]);
+    with("max = 12.0", "max = 11.0");
+    refused(&["o"], &["records.bin does not belong to the manifest.json", "`axis.1.max` was 12.0, now 11.0"]);
+    with("\"precision\": \"f64\"", "\"precision\": \"f16\"");
+    refused(&["o"], &["f16"]);
+    with("{", "");
+    refused(&["o"], &["not the manifest of a map"]);
+    fs::remove_file(out.join("manifest.json")).unwrap();
+    refused(&["o"], &["the run is unfinished", "--resume"]);
+    fs::write(out.join("manifest.json"), &manifest).unwrap();
+    let records = fs::read(out.join(RECORDS)).unwrap();
+    fs::write(out.join(RECORDS), &records[..records.len() - 1]).unwrap();
+    refused(&["o"], &["of 576 cells"]);
+    let mut bad = records.clone();
+    bad[20] ^= 0x10;
+    fs::write(out.join(RECORDS), bad).unwrap();
+    refused(&["o"], &["is damaged at byte 16", "--force"]);
+    fs::remove_file(out.join(RECORDS)).unwrap();
+    refused(&["o"], &["there is no records.bin"]);
+}
