@@ -112,13 +112,14 @@ const PLANTED: [Planted; 19] = [
     },
 ];
 
-/// Spoils one record in each way; the ids, and what is wrong there.
-fn plant(records: &mut [Record]) -> Vec<(u32, &'static str)> {
+/// Spoils one record in each way, none of those that `differ` anyway; the ids, and what is wrong there.
+fn plant(records: &mut [Record], differ: &[u32]) -> Vec<(u32, &'static str)> {
     let mut wrong: Vec<(u32, &'static str)> = Vec::new();
     for (k, planted) in PLANTED.iter().enumerate() {
         let from = k * records.len() / PLANTED.len();
         let ids = (0..records.len()).map(|n| (from + n) % records.len());
-        let taken = |id: usize| wrong.iter().any(|&(other, _)| other as usize == id);
+        let taken =
+            |id: usize| wrong.iter().map(|(other, _)| other).chain(differ).any(|&other| other as usize == id);
         let id = ids.into_iter().find(|&id| !taken(id) && (planted.fits)(&records[id])).unwrap();
         (planted.spoil)(&mut records[id]);
         wrong.push((id as u32, planted.what));
@@ -134,7 +135,8 @@ fn wrong_records_are_found_whatever_the_engine() {
     let mut records = computed(&plan);
     let right = validated(&plan, &records, Precision::F64, true);
     assert!(unexplained(&right).is_empty() && right.mismatches.len() < 3, "{:?}", right.mismatches);
-    let wrong = plant(&mut records);
+    let differ: Vec<u32> = right.mismatches.iter().map(|mismatch| mismatch.id).collect();
+    let wrong = plant(&mut records, &differ);
     let ids: Vec<u32> = wrong.iter().map(|&(id, _)| id).collect();
     for precision in Precision::ALL {
         let found = validated(&plan, &records, precision, true);
@@ -152,8 +154,10 @@ fn wrong_records_are_found_whatever_the_engine() {
 fn another_cells_record_is_found() {
     let plan = Plan::new(&scene(14, 14));
     let mut records = computed(&plan);
-    let moved: Vec<usize> =
-        (0..records.len()).filter(|&id| settled(&records[id])).step_by(7).take(12).collect();
+    // Those of few impacts trade places with those of many.
+    let mut settled: Vec<usize> = (0..records.len()).filter(|&id| settled(&records[id])).collect();
+    settled.sort_by(|&a, &b| records[a].impacts_per_period.total_cmp(&records[b].impacts_per_period));
+    let moved: Vec<usize> = (0..6).flat_map(|k| [settled[7 * k], settled[settled.len() - 1 - k]]).collect();
     for pair in moved.chunks_exact(2) {
         records.swap(pair[0], pair[1]);
     }
@@ -170,16 +174,17 @@ fn another_cells_record_is_found() {
 /// What early stops once named, status ok, and what the start reaches by an independent program in 80 bit.
 #[test]
 fn cycles_that_the_start_never_reaches_are_found() {
-    // e, omega; period and impacts as they were named.
+    // e, omega; period and impacts as they were named; what validation says of it in single precision.
     let named = [
         // Period 2 with 8.5 impacts, and chaos, of which the reference said period 1.
-        (0.5949119373776908, 3.7984344422700587, 1, Some(8.0)),
-        (0.5610367892976589, 3.8959866220735786, 1, None),
-        // Period 2, of which lanes said 3; 16 impacts, symmetric, of which they said 15, unsymmetric.
-        (0.8, 5.745098039215686, 3, None),
-        (0.3254901960784314, 3.2, 1, Some(15.0)),
+        (0.5949119373776908, 3.7984344422700587, 1, Some(8.0), Kind::Unexplained),
+        (0.5610367892976589, 3.8959866220735786, 1, None, Kind::Unexplained),
+        // Period 2, of which lanes said 3; 16 impacts, symmetric, of which they said 15, unsymmetric: both are stable,
+        // and what is the same within single precision reaches one or the other.
+        (0.8, 5.745098039215686, 3, None, Kind::Unexplained),
+        (0.3254901960784314, 3.2, 1, Some(15.0), Kind::Border),
     ];
-    for (e, omega, period, impacts) in named {
+    for (e, omega, period, impacts, single) in named {
         let plan = planned([e, 1.0], [omega, 20.0], 2, &["integration.undecided_periods=1584"]);
         let record = Record {
             period,
@@ -189,9 +194,11 @@ fn cycles_that_the_start_never_reaches_are_found() {
             ..Record::default()
         };
         for precision in Precision::ALL {
+            let expected = if precision == Precision::F32 { single } else { Kind::Unexplained };
             let found = first(&plan, record, precision);
-            assert_eq!(unexplained(&found), [0], "{precision:?}: {e} {omega}: {:?}", found.mismatches);
-            assert!(!found.faults().is_empty(), "{precision:?}: {e} {omega}");
+            let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
+            assert_eq!(kinds, [expected], "{precision:?}: {e} {omega}: {:?}", found.mismatches);
+            assert_eq!(found.faults().is_empty(), expected == Kind::Border, "{precision:?}: {e} {omega}");
         }
     }
 }
@@ -371,7 +378,10 @@ fn kinds_have_distinct_names() {
 // ---- the command
 
 fn rattlemap(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    Command::cargo_bin("rattlemap").unwrap().current_dir(folder).args(arguments).assert()
+    let mut command = Command::cargo_bin("rattlemap").unwrap();
+    // Without it a driver writes an error of its own.
+    command.env("XDG_RUNTIME_DIR", folder);
+    command.current_dir(folder).args(arguments).assert()
 }
 
 /// A folder with a finished map `o` of 24 x 24 cells.
@@ -441,7 +451,7 @@ fn planted_records_fail_the_validation_by_name() {
         true
     });
     assert_eq!(count.unwrap().count, 576);
-    let wrong = plant(&mut records);
+    let wrong = plant(&mut records, &[]);
     let spoilt: Vec<(u32, Record)> = (0..).zip(records).collect();
     RecordFile::create(&path, &identity).unwrap().append(&spoilt).unwrap();
 

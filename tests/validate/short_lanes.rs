@@ -6,11 +6,11 @@ use crate::judged::kind;
 use crate::short_cells::{Cell, cell, cells, lane};
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
-use rattlemap::record::classify::classify;
+use rattlemap::record::classify::{classify, status};
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::Kind;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::orbit::{Class, Measured, measure};
+use rattlemap_dynamics::orbit::{Class, Measured, Status, measure};
 
 /// The first cell of a plan on the reference.
 fn reference(plan: &Plan) -> Measured {
@@ -84,7 +84,7 @@ fn symmetry_is_told_where_the_cycle_is_near_enough() {
 /// for half of a thousandth of a step.
 #[test]
 fn a_wall_is_met_however_short_the_stretch_beyond_it() {
-    for (cell, impacts) in cells("short_flights", 2).iter().zip([216.0, 112.0]) {
+    for (cell, impacts) in cells("short_flights", 2).iter().zip([216.0, 126.0]) {
         let plan = cell.plan();
         assert_eq!(reference(&plan).impacts_per_period, impacts);
         for precision in Precision::ALL {
@@ -92,6 +92,18 @@ fn a_wall_is_met_however_short_the_stretch_beyond_it() {
             assert_eq!(record.impacts_per_period, impacts, "{precision:?}: {record:?}");
             assert_eq!(kind(&plan, record, precision), None, "{precision:?}: {record:?}");
         }
+    }
+}
+
+/// A contact onset so fast, between walls so close, that it swings through the other wall, for which the model has no
+/// rule: the lane ends there and says so. At half the meshing speed (the second of `short_flights`) it turns before.
+#[test]
+fn an_onset_through_the_other_wall_ends_the_lane() {
+    let plan = cell("through_backlash").plan();
+    for precision in Precision::ALL {
+        let record = lane(&plan, precision);
+        assert_eq!(status(&record), Status::TooStiff, "{precision:?}: {record:?}");
+        assert!(record.periods_run < 10, "{precision:?}: {record:?}");
     }
 }
 
@@ -103,9 +115,7 @@ fn a_gap_at_rest_is_let_go_once() {
     for precision in Precision::ALL {
         let record = lane(&plan, precision);
         assert_eq!(classify(&record), Class::Undecided, "{precision:?}: {record:?}");
-        // Its growth goes up and down: the means of two periods make four times the standard error of those of four.
-        let open = Some(Kind::Budget);
-        assert_eq!(kind(&plan, record, precision), open, "{precision:?}: {record:?}");
+        assert_eq!(kind(&plan, record, precision), None, "{precision:?}: {record:?}");
     }
 }
 
@@ -145,11 +155,12 @@ fn damped_modes_are_summed_to_rounding() {
     // 484 impacts in a period. Rounding at every step, of the state, not of tangents, moves the exponent of the
     // reference's -0.1390 by 0.0025 (one standard deviation of 1,373 motions) and by 0.0089 at most; lanes from 48
     // starts that are the same within rounding read -0.1454, and scatter by 0.0020. In double precision all of
-    // them read what the reference has, to ten digits.
+    // them read what the reference has, to ten digits. Meshing, a sum of 484 differences of phases, scatters in single
+    // precision by 6.2e-7 at most over 24 such starts.
     let plan = scattered.plan();
     let truth = reference(&plan);
     let [exponent, _] = truth.lyapunov.unwrap();
-    for (precision, scatter, meshing) in [(Precision::F32, 0.0089, 5e-7), (Precision::F64, 1e-9, 1e-10)] {
+    for (precision, scatter, meshing) in [(Precision::F32, 0.0089, 1e-6), (Precision::F64, 1e-9, 1e-10)] {
         let record = lane(&plan, precision);
         assert_eq!(classify(&record), Class::Periodic { period: 1 }, "{precision:?}: {record:?}");
         assert_eq!(record.impacts_per_period, 484.0, "{precision:?}: {record:?}");
