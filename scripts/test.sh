@@ -113,7 +113,9 @@ esac
 
 # Between runs either nothing is compiled, or what makes the second time fast would only take room.
 export CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-0}"
-# Mesa's software driver takes some five seconds to compile a lane's shader. Every process finds it here, and the next run.
+# Mesa's software driver takes some five seconds to compile a lane's shader, a third less where LLVM does not optimise it:
+# most tests run a shader for less time than that. Every process finds it here, and the next run.
+export GALLIVM_PERF="${GALLIVM_PERF:-nopt}"
 export MESA_SHADER_CACHE_DIR="${MESA_SHADER_CACHE_DIR:-${CARGO_TARGET_DIR:-$PWD/target}/shader-cache}"
 mkdir -p "$MESA_SHADER_CACHE_DIR"
 log="$(mktemp)"
