@@ -1,9 +1,6 @@
 // Chatter: ever slower impacts while the load presses. Short flights are followed by a
 // recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
 
-// A threshold below this, relative to `speed`, is none.
-const NO_THRESHOLD: Real = 1e-10;
-
 // Whether impacts that the load presses back have no end.
 fn is_endless() -> bool {
     return law.restitution < 1.0 && law.mesh_speed * h <= NO_THRESHOLD * speed;

@@ -85,9 +85,6 @@ struct Jump {
 // The gradient of the gap.
 const ALONG_GAP = array<Real, 4>(1.0, 0.0, 0.0, 0.0);
 
-// Approach speeds below this, relative to `speed` and with the load pulling away, count as near grazing.
-const GRAZING_SPEED: Real = 4e-5;
-
 // Free motion reaches a wall: the impact law, then meshing or not. The gap is on the wall.
 fn contact(side: u32, settling: bool) -> Jump {
     let sign = sign_of(side);

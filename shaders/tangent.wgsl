@@ -263,9 +263,6 @@ fn close(u: array<Real, 4>) -> array<Real, 4> {
     return array<Real, 4>(0.0, behind, x + crossing.lasts * v, v + (gained - kick * behind));
 }
 
-// Rates below this at an event, relative to `speed`, leave the linearisation without meaning.
-const NO_SPEED: Real = 1e-14;
-
 // Growth of the one vector since the last strobe, in octaves; it is given unit length.
 fn renormalise() -> Real {
     var u = tangent(0u);

@@ -49,7 +49,7 @@ use nalgebra::Matrix2;
 
 pub(crate) use expansion::{Expansion, REACH, TERMS, turned};
 pub use linear::LinearFlow;
-pub(crate) use linear::Step;
+pub(crate) use linear::{RADIUS, Step};
 pub(crate) use short_flight::SHORT;
 
 use crate::model::{Model, ModelError, NonImpacting, Oscillator, Side, State};

@@ -18,9 +18,9 @@ mod reading;
 mod recurrence;
 mod trace;
 
-pub use analysis::{CHAOS_ERRORS, analyse, analyse_flow, analyse_over, status_of};
+pub use analysis::{CHAOS_ERRORS, ESCAPE_GROWTH, analyse, analyse_flow, analyse_over, status_of};
 pub use budget::Budget;
-pub use cell::{Measured, measure};
+pub use cell::{Measured, NEUTRAL_ORDER, measure};
 pub use trace::trace;
 
 use crate::model::{Side, State};

@@ -25,9 +25,12 @@ mod start;
 mod step_verdict;
 mod tangent;
 
+pub use chatter::{CLOSING_ANGLE, NO_THRESHOLD};
 use clock::Clock;
+pub use contact::GRAZING_SPEED;
 pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, Happening, Observer, STEPS_PER_PERIOD_CAP, Stop, Work};
 use step_verdict::{Crossing, StepVerdict};
+pub use tangent::NO_SPEED;
 
 use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Step};
 use crate::model::{Law, Side, State};

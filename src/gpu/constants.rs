@@ -6,14 +6,11 @@ use nalgebra::{SMatrix, Vector2};
 use super::layout::{Domain, Flow};
 use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model;
+use rattlemap_dynamics::reference::CLOSING_ANGLE;
 
 /// Largest angle, in radians, that the fastest mode may turn in one step: Taylor series and
 /// certificate of the shaders are laid out for it.
 pub const STEP_ANGLE: f64 = 1.0;
-
-/// Angle, in radians of the fastest free rate, below which a series of impacts is closed: what its limit leaves
-/// out is of third order in it. The reference's, so that both count the same impacts before.
-const CLOSING_ANGLE: f64 = 1.6e-4;
 
 /// Terms of the matrix exponential over one step; rates times steps are below 1.
 const EXPONENTIAL_TERMS: u32 = 30;

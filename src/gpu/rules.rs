@@ -2,18 +2,11 @@
 //! written once, here; the shaders are compiled with them.
 
 use super::Precision;
-use rattlemap_dynamics::orbit::CHAOS_ERRORS;
+use rattlemap_dynamics::orbit::{CHAOS_ERRORS, ESCAPE_GROWTH, NEUTRAL_ORDER};
+use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
 /// Chaos is called early by this many blocks of growth at least: a standard error of fewer is none.
 pub(crate) const FEWEST_BLOCKS: u32 = 6;
-
-/// The power of time that chaos has to outgrow, since tangents of neutral motion grow, too: those of a free body, of a
-/// torus or of an undamped swing in proportion to time, at a double root to its square.
-pub(crate) const NEUTRAL_ORDER: f64 = 2.0;
-
-/// Growth of a tangent vector, as a natural logarithm, that no escape from an unstable cycle lasts through:
-/// beyond the ratio of the largest to the smallest distance.
-pub(crate) const ESCAPE_GROWTH: f64 = 40.0;
 
 /// Distances are kept in so many parts of an octave below the size of the motion: 4 means half.
 pub(crate) const OCTAVE: u32 = 4;
@@ -61,6 +54,7 @@ pub(super) fn declarations(precision: Precision) -> String {
          const CHAOS_ERRORS: Real = {CHAOS_ERRORS:?};\nconst ESCAPE_GROWTH: Real = {ESCAPE_GROWTH:?};\n\
          const OCTAVE: f32 = f32({OCTAVE}u);\nconst NEAR: u32 = {NEAR}u;\nconst RESOLVED: u32 = {resolved}u;\n\
          const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst MOST_FAILED_SEARCHES: u32 = {MOST_FAILED_SEARCHES}u;\n\
+         const GRAZING_SPEED: Real = {GRAZING_SPEED:?};\nconst NO_SPEED: Real = {NO_SPEED:?};\nconst NO_THRESHOLD: Real = {NO_THRESHOLD:?};\n\
          const WINDOW_SHARE: u32 = {WINDOW_SHARE}u;\nconst MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n"
     )
 }

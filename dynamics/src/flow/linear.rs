@@ -18,7 +18,7 @@ pub(crate) const ORDER: usize = 22;
 
 /// Largest `|G| h` at which the Taylor table is used. Larger costs digits by cancellation;
 /// smaller costs steps (0.8 to 1.6: a third fewer steps per period, 7 % fewer instructions).
-const RADIUS: f64 = 1.6;
+pub(crate) const RADIUS: f64 = 1.6;
 
 /// Largest `|G| h` from which [`LinearFlow::propagate`] doubles: time matters less there,
 /// and half the Taylor radius has the smallest error.

@@ -21,8 +21,9 @@ pub const CHAOS_ERRORS: f64 = 3.0;
 /// many forcing periods (or as many as were asked for, if that is more).
 const LONGEST_WINDOW: u32 = 32_768;
 
-/// Growth, as a logarithm, that takes an escape from rounding to the size of the motion.
-pub(super) const ESCAPE_GROWTH: f64 = 40.0;
+/// Growth of a tangent vector, as a natural logarithm, that no escape from an unstable cycle lasts through: beyond the
+/// ratio of the size of the motion to rounding.
+pub const ESCAPE_GROWTH: f64 = 40.0;
 
 /// Periods over which a fresh tangent vector turns to its direction.
 pub(super) const TANGENT_PERIODS: u32 = 50;

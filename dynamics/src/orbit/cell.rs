@@ -30,8 +30,9 @@ const CHECKS: u32 = 6;
 /// 4,000 over restitution and frequency was taken for a period that it then left.
 const SETTLED: f64 = 5e-4;
 
-/// Chaos has to outgrow this power of time.
-const NEUTRAL_ORDER: f64 = 2.0;
+/// The power of time that chaos has to outgrow, since tangents of neutral motion grow, too: those of a free body, of a
+/// torus or of an undamped swing in proportion to time, at a double root to its square.
+pub const NEUTRAL_ORDER: f64 = 2.0;
 
 /// Cycles, at least, over which an approach must have been seen.
 const APPROACH_CYCLES: usize = 4;

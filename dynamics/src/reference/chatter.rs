@@ -1,16 +1,19 @@
 //! Infinite chatter: the whole series of ever smaller impacts in one jump.
 
 use super::{EventKind, Observer, Trajectory};
-use crate::flow::{DomainKind, Gap, LinearFlow, Phasor};
+use crate::flow::{DomainKind, Gap, LinearFlow, Phasor, RADIUS};
 use crate::model::Side;
 
 /// A series is closed once its whole duration, in units of the fastest rate of free
 /// motion, is this short: what the closed form leaves out is of third order in it.
 const CLOSING_DURATION: f64 = 1e-4;
 
+/// The same as an angle, in radians of that rate.
+pub const CLOSING_ANGLE: f64 = CLOSING_DURATION * RADIUS;
+
 /// A threshold below this, relative to the scale of length and the rate of free motion, is
 /// none: the series is infinite for all that f64 can tell.
-const NO_THRESHOLD: f64 = 1e-10;
+pub const NO_THRESHOLD: f64 = 1e-10;
 
 /// Motion with the gap held closed: the wall takes up the relative acceleration.
 struct Sliding {

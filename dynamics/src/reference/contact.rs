@@ -7,7 +7,7 @@ use crate::model::Side;
 /// Approach speeds below this, relative to the scale of length and the rate of free motion
 /// and with the load pulling away, count as near grazing: the saltation matrix grows like
 /// its inverse.
-const GRAZING_SPEED: f64 = 4e-5;
+pub const GRAZING_SPEED: f64 = 4e-5;
 
 /// The gradient of the gap in gap coordinates.
 const ALONG_GAP: Gap = [1.0, 0.0, 0.0, 0.0];

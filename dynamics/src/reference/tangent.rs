@@ -5,7 +5,7 @@ use crate::flow::Gap;
 
 /// Speeds below this at an event, relative to the scale of length and the rate of free
 /// motion, leave the linearisation without meaning.
-const NO_SPEED: f64 = 1e-14;
+pub const NO_SPEED: f64 = 1e-14;
 
 /// Tangents larger than this or smaller than its inverse are rescaled.
 const LARGE: f64 = 1e100;
