@@ -19,8 +19,16 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     } else if motion.q[0] < walls[1] {
         begin_beyond(SIDE_LEFT);
     }
-    motions[lane] = Motion(motion, seen, array<Real, 16>(), FRESH);
-    tallies[lane] = Tally(tally, noted, array<u32, 16>(), array<u32, 16>(), array<u32, 7>());
+    // What is on the trail is told by `noted.passed`.
+    motions[lane].now = motion;
+    motions[lane].seen = seen;
+    motions[lane].tangents = array<Real, 16>();
+    motions[lane].vector = FRESH;
+    tallies[lane].now = tally;
+    tallies[lane].noted = noted;
+    tallies[lane].distances = array<u32, 16>();
+    tallies[lane].last_distances = array<u32, 16>();
+    tallies[lane].word = array<u32, 7>();
 }
 
 // A start beyond a wall is meshing.

@@ -130,7 +130,7 @@ fn judge_cycle() {
         return;
     }
     let is_found = is_stable && is_own() && is_on_cycle(to, is_last);
-    let is_cycle = is_found && is_approached(to);
+    let is_cycle = is_found && (is_held(to, is_last) || stays(to));
     if is_found && !is_cycle {
         noted.doubted += 1u;
         give_up();
@@ -194,6 +194,7 @@ fn search_on() {
     if is_unstable && noted.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
         motion.q[1] += Real(KICK * exp2(-f32(AT_REST) / OCTAVE)) * seen.rate_scale;
         motion.bound = 0.0;
+        noted.passed = 0u;
         // What grew there was no chaos.
         noted.blocks = 0u;
         noted.block_periods = 0u;
@@ -316,9 +317,18 @@ fn leaves(to: array<Real, 4>) -> bool {
 // Near, or as near as rounding lets it. What lies in another domain than the lane, as its derivative has
 // it, is no cycle that it comes to; and beside a graze only rest will do.
 fn is_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
-    let is_blurred = (noted.failed_searches >= MOST_FAILED_SEARCHES || is_last) && noted.settled != 0u && exp2(-f32(noted.apart) / OCTAVE) < min(noise(), ON_CYCLE);
     // Whether it goes on with the same events is seen where Newton's method leads it, if there is time.
     let is_confirmed = !is_last || settings.early_stop == 0u || noted.refinements > 0u || away() <= REFINED;
     let is_near = is_near_cycle() && keeps_domain(to) && tally.grazes == 0u && is_confirmed;
-    return is_near || ((is_at_rest() || is_blurred) && !leaves(to));
+    return is_near || moves_no_more(to, is_last);
+}
+
+// Whether the motion itself has come to rest on its cycle, or as near to it as rounding lets it.
+fn is_held(to: array<Real, 4>, is_last: bool) -> bool {
+    return noted.refinements == 0u && moves_no_more(to, is_last);
+}
+
+fn moves_no_more(to: array<Real, 4>, is_last: bool) -> bool {
+    let is_blurred = (noted.failed_searches >= MOST_FAILED_SEARCHES || is_last) && noted.settled != 0u && exp2(-f32(noted.apart) / OCTAVE) < min(noise(), ON_CYCLE);
+    return (is_at_rest() || is_blurred) && !leaves(to);
 }

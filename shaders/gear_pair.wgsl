@@ -155,6 +155,8 @@ fn onset_ends(side: u32) -> Jump {
 fn count_event(side: u32) {
     note_symbol(side);
     note_strobe();
+    // Meshing that ends before the wall is reached is another branch: modes tell.
+    tally.itinerary = mix_bits(tally.itinerary + 2u * tally.mode + side + 1u);
     tally.origin = side;
     tally.events += 1u;
     tally.events_in_period += 1u;

@@ -134,10 +134,6 @@ struct Seen {
     growth_squares: Real,
     // Strobe state that later ones are compared with; where the cycle is read, its start.
     anchor: array<Real, 4>,
-    // Where Newton's method set out from.
-    home: array<Real, 4>,
-    // The strobe one cycle before that.
-    before_home: array<Real, 4>,
     // Largest position and rate at strobes: the unit of distances.
     position_scale: Real,
     rate_scale: Real,
@@ -152,6 +148,8 @@ struct Motion {
     tangents: array<Real, 16>,
     // The one for the exponent while the matrix takes its place.
     vector: array<Real, 4>,
+    // The motion's last strobes (approach.wgsl).
+    trail: array<array<Real, 4>, TRAIL>,
 }
 
 // The counting.
@@ -195,6 +193,8 @@ struct TallyNow {
     recent: u32,
     // Events on the strobe phase.
     on_strobe: u32,
+    // The events of this period, hashed.
+    itinerary: u32,
 }
 
 // What strobes have noted of it.
@@ -210,13 +210,11 @@ struct Noted {
     blocks: u32,
     block_periods: u32,
     // Recurrence: when the anchor was taken, lags of this window, for how many windows the candidate
-    // has contracted, lags that the last window held, events in it, and events before the present one.
+    // has contracted, and lags that the last window held.
     anchor_period: u32,
     window: u32,
     streak: u32,
     known_lags: u32,
-    known_events: u32,
-    events_before: u32,
     // 1 if the candidate's limit is near.
     settled: u32,
     // In quarter octaves below 1: distance of the cycle from its mirror image; how far the
@@ -243,6 +241,9 @@ struct Noted {
     rejected_divisor: u32,
     // How far its cycle is from the lane by the derivative, in quarter octaves below 1.
     off: u32,
+    // Strobes of the motion so far, and for how many cycles it has had the events of the cycle that is read.
+    passed: u32,
+    shown: u32,
 }
 
 struct Tally {
@@ -251,6 +252,8 @@ struct Tally {
     // Distances per lag, of this window and the last: quarter octaves below 1, in bytes.
     distances: array<u32, 16>,
     last_distances: array<u32, 16>,
+    // The events of the trail's periods, hashed.
+    itineraries: array<u32, TRAIL>,
     // The word's symbols, ten to a number.
     word: array<u32, 7>,
 }

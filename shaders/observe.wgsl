@@ -8,10 +8,18 @@ fn begin_period() {
     tally.period += 1u;
     tally.passes_in_period = 0u;
     tally.events_in_period = 0u;
+    let itinerary = tally.itinerary;
+    tally.itinerary = 0u;
+    if EXPONENT && noted.refinements == 0u {
+        leave_trail(itinerary);
+    }
     if tally.stage == STAGE_READING {
         tally.to_read -= 1u;
         widen_scales(strobe_state());
         let read = tally.candidate - tally.to_read;
+        if EXPONENT {
+            compare_itineraries(itinerary, read);
+        }
         let apart = octaves(distance_between(strobe_state(), seen.anchor));
         if tally.to_read == 0u {
             noted.apart = apart;
@@ -63,8 +71,6 @@ fn end_non_impacting() {
 // Averages start here.
 fn begin_counting() {
     tally.impacts = 0u;
-    // So that what a window has counted stays right.
-    noted.events_before -= tally.events;
     tally.events = 0u;
     tally.grazes = 0u;
     tally.on_strobe = 0u;
@@ -92,6 +98,7 @@ fn begin_reading() {
     noted.mirror = 0u;
     noted.divisor = 0u;
     noted.divisor_apart = 0u;
+    noted.shown = TRAIL;
     seen.anchor = strobe_state();
     narrow_scales(seen.anchor);
     if EXPONENT {

@@ -37,7 +37,6 @@ fn recurs() -> bool {
     let is_fast = found > 0u && shrinks(found);
     let settled = judge_lag(found);
     noted.known_lags = noted.window;
-    noted.known_events = tally.events - noted.events_before;
     tallies[lane].last_distances = tallies[lane].distances;
     // The next anchor lies at the same place of the cycle: only there do distances compare. The
     // points of a cycle may be so close that a shorter lag seems to recur.
@@ -90,17 +89,20 @@ fn closest_of(lags: u32) -> u32 {
 // The distance of two strobes, relative to the motion. Where strobes catch it at its turning point, their
 // rates are all rounding.
 fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
-    let least = flows[cell.flow_index].domains[0].angle * seen.position_scale;
     let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(seen.position_scale, Real(1e-30));
-    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / max(max(seen.rate_scale, least), Real(1e-30));
+    let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / unit_of_rates();
     return max(p, r);
+}
+
+fn unit_of_rates() -> Real {
+    let least = flows[cell.flow_index].domains[0].angle * seen.position_scale;
+    return max(max(seen.rate_scale, least), Real(1e-30));
 }
 
 fn begin_window(q: array<Real, 4>, lags: u32) {
     seen.anchor = q;
     noted.anchor_period = tally.period;
     noted.window = min(lags, settings.max_period);
-    noted.events_before = tally.events;
     tallies[lane].distances = array<u32, 16>();
 }
 

@@ -5,8 +5,6 @@
 // there; false where that brings it no closer or is no part of the motion.
 fn refine(to: array<Real, 4>) -> bool {
     if noted.refinements == 0u {
-        seen.home = strobe_state();
-        seen.before_home = seen.anchor;
         noted.home_mode = tally.mode;
         noted.home_origin = tally.origin;
     }
@@ -15,7 +13,7 @@ fn refine(to: array<Real, 4>) -> bool {
     if stalls || is_over || tally.mode >= MODE_ONSET || tally.order > 0u {
         return false;
     }
-    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, seen.home) < Real(REACH)) {
+    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(noted.passed)) < Real(REACH)) {
         return false;
     }
     motion.q = to;
@@ -48,44 +46,6 @@ fn note_branch() {
 // be another motion's.
 fn is_own() -> bool {
     return branch() == noted.branch && (tally.grazes == 0u || noted.refinements == 0u);
-}
-
-// Departures from the linear map, as a share of the deviation, that are still small.
-const LINEAR: Real = 0.2;
-
-// Cycles ahead whose deviations must be no larger than the one seen: what is not normal in the matrix may grow before
-// it shrinks.
-const CYCLES_AHEAD: u32 = 64u;
-
-// Whether the motion approaches the cycle that Newton's method has led to: a cycle that is stable need not attract it.
-// The last window must have had the events of that cycle, the last cycle before must have moved the motion as its
-// monodromy matrix says, and those to come must not take it farther away.
-fn is_approached(to: array<Real, 4>) -> bool {
-    if noted.refinements == 0u {
-        return true;
-    }
-    if noted.known_events * tally.candidate != tally.events * noted.known_lags {
-        return false;
-    }
-    let before = difference(seen.before_home, to);
-    let present = difference(seen.home, to);
-    let size = size_of(before);
-    if noted.asked == 1u {
-        // One cycle of the multiple is several of this one.
-        return size_of(present) < size;
-    }
-    if size_of(difference(present, image_of(before))) > LINEAR * size + Real(noise()) {
-        return false;
-    }
-    var ahead = present;
-    for (var n = 0u; n < CYCLES_AHEAD; n++) {
-        iterations += 1u;
-        ahead = image_of(ahead);
-        if size_of(ahead) > size {
-            return false;
-        }
-    }
-    return true;
 }
 
 fn difference(a: array<Real, 4>, b: array<Real, 4>) -> array<Real, 4> {
@@ -125,7 +85,7 @@ fn give_up() {
     if noted.refinements == 0u {
         return;
     }
-    motion.q = seen.home;
+    motion.q = trail(noted.passed);
     tally.mode = noted.home_mode;
     tally.origin = noted.home_origin;
     // Newton's method does not set out from a wall.

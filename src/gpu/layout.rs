@@ -5,6 +5,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::rules::TRAIL;
+
 /// One linear domain in units of its own step; see the shader for the meaning of each field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -156,10 +158,6 @@ pub struct Motion {
     pub growth_squares: f64,
     /// Strobe state that later ones are compared with.
     pub anchor: [f64; 4],
-    /// Where Newton's method set out from.
-    pub home: [f64; 4],
-    /// The strobe one cycle before that.
-    pub before_home: [f64; 4],
     /// Largest position at strobes.
     pub position_scale: f64,
     /// Largest rate at strobes.
@@ -170,6 +168,8 @@ pub struct Motion {
     pub tangents: [f64; 16],
     /// The one for the exponent while the monodromy matrix takes their place.
     pub vector: [f64; 4],
+    /// The last strobes.
+    pub trail: [[f64; 4]; TRAIL],
 }
 
 /// The counting of a lane between dispatches.
@@ -226,6 +226,8 @@ pub struct Tally {
     pub recent: u32,
     /// Events on the strobe phase.
     pub on_strobe: u32,
+    /// The events of this period, hashed.
+    pub itinerary: u32,
     /// 1 once a cycle is being read or has been.
     pub has_read: u32,
     /// Period of the cycle that was read, if it is stable.
@@ -246,10 +248,6 @@ pub struct Tally {
     pub streak: u32,
     /// Lags that the last window held.
     pub known_lags: u32,
-    /// Events in it.
-    pub known_events: u32,
-    /// Events before the present window.
-    pub events_before: u32,
     /// 1 if the candidate's limit is near.
     pub settled: u32,
     /// Distance of the cycle from its mirror image, in quarter octaves below 1.
@@ -282,10 +280,16 @@ pub struct Tally {
     pub rejected_divisor: u32,
     /// How far its cycle is from the lane by the derivative, in quarter octaves below 1.
     pub off: u32,
+    /// Strobes of the motion so far.
+    pub passed: u32,
+    /// Cycles for which it has had the events of the cycle that is read.
+    pub shown: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.
     pub last_distances: [u32; 16],
+    /// The events of the trail's periods, hashed.
+    pub itineraries: [u32; TRAIL],
     /// Symbols of the cycle, ten to a number.
     pub word: [u32; 7],
 }

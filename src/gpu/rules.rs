@@ -2,7 +2,7 @@
 //! written once, here; the shaders are compiled with them.
 
 use super::Precision;
-use rattlemap_dynamics::orbit::{CHAOS_ERRORS, ESCAPE_GROWTH, NEUTRAL_ORDER};
+use rattlemap_dynamics::orbit::{CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, SHOWN_CYCLES};
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
 /// Chaos is called early by this many blocks of growth at least: a standard error of fewer is none.
@@ -23,6 +23,9 @@ pub(crate) const REFINEMENTS: u32 = 5;
 /// None of which is longer than this, relative to the motion: what contracts from farther off may still have a fold
 /// of the strobe map before it.
 pub(crate) const REACH: f64 = 3e-2;
+
+/// Strobes that a lane looks back at, to see whether it approaches a cycle.
+pub(crate) const TRAIL: usize = 32;
 
 /// Failed Newton searches after which a lane asks it no more.
 pub(crate) const MOST_FAILED_SEARCHES: u32 = 2;
@@ -55,6 +58,7 @@ pub(super) fn declarations(precision: Precision) -> String {
          const OCTAVE: f32 = f32({OCTAVE}u);\nconst NEAR: u32 = {NEAR}u;\nconst RESOLVED: u32 = {resolved}u;\n\
          const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst MOST_FAILED_SEARCHES: u32 = {MOST_FAILED_SEARCHES}u;\n\
          const GRAZING_SPEED: Real = {GRAZING_SPEED:?};\nconst NO_SPEED: Real = {NO_SPEED:?};\nconst NO_THRESHOLD: Real = {NO_THRESHOLD:?};\n\
+         const TRAIL: u32 = {TRAIL}u;\nconst LINEAR: Real = {LINEAR:?};\nconst SHOWN_CYCLES: u32 = {SHOWN_CYCLES}u;\n\
          const WINDOW_SHARE: u32 = {WINDOW_SHARE}u;\nconst MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n"
     )
 }

@@ -80,6 +80,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/word.wgsl"),
     include_str!("../../shaders/cycle.wgsl"),
     include_str!("../../shaders/refine.wgsl"),
+    include_str!("../../shaders/approach.wgsl"),
     include_str!("../../shaders/sweep.wgsl"),
     include_str!("../../shaders/compact.wgsl"),
     include_str!("../../shaders/begin.wgsl"),

@@ -158,13 +158,12 @@ fn what_a_lane_carries_lies_as_the_host_says() {
                 growth_sum,
                 growth_squares,
                 anchor,
-                home,
-                before_home,
                 position_scale,
                 rate_scale,
                 cycle_growth,
                 tangents,
-                vector
+                vector,
+                trail
             ]
         );
         same_layout!(
@@ -198,6 +197,7 @@ fn what_a_lane_carries_lies_as_the_host_says() {
                 hash_high,
                 recent,
                 on_strobe,
+                itinerary,
                 has_read,
                 cycle,
                 tries,
@@ -208,8 +208,6 @@ fn what_a_lane_carries_lies_as_the_host_says() {
                 window,
                 streak,
                 known_lags,
-                known_events,
-                events_before,
                 settled,
                 mirror,
                 apart,
@@ -226,8 +224,11 @@ fn what_a_lane_carries_lies_as_the_host_says() {
                 asked,
                 rejected_divisor,
                 off,
+                passed,
+                shown,
                 distances,
                 last_distances,
+                itineraries,
                 word
             ]
         );

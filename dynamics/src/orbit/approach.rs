@@ -17,13 +17,13 @@ use crate::stability::Cycle;
 
 /// Deviations from the linear map, as a share of the deviation, that are still small. At a tenth
 /// one cell of 40,000 over restitution and frequency was taken for a cycle that it then left.
-pub(super) const LINEAR: f64 = 0.03;
+pub const LINEAR: f64 = 0.03;
 
 /// The same where the motion is as near to the cycle as it may lie: not off by all of the deviation.
 pub(super) const BENT: f64 = 1.0;
 
 /// Cycles, at least, over which the motion must have shown the cycle's branch.
-pub(super) const SHOWN_CYCLES: usize = 4;
+pub const SHOWN_CYCLES: usize = 4;
 
 /// Cycles that are looked back at: a slow spiral turns once.
 pub(super) const HULL_CYCLES: usize = 64;

@@ -1,0 +1,106 @@
+// Does motion near a cycle end on it? The reference's rule (dynamics/src/orbit/approach.rs), over the last strobes.
+//
+// Only what the motion itself has shown of the strobe map counts: a stable cycle need not attract it. While its cycles
+// had the cycle's events and their deviations from it followed one another as the monodromy matrix says, a deviation
+// within the convex hull of the earlier ones stays in the part of the branch that was seen.
+
+// Departures from the linear map, as a share of the deviation, that are small; where the motion is as near as `BENT_WITHIN`,
+// it may be off by all of the deviation.
+const BENT_WITHIN: Real = 5e-4;
+// How far outside of the hull a deviation may lie, as a share of itself, or relative to the motion.
+const OUTSIDE: Real = 0.1;
+const HAIR: Real = 1e-4;
+// Steps towards the nearest point of a hull.
+const HULL_STEPS: u32 = 32u;
+
+// Notes a strobe of the motion, and the events of the period before it.
+fn leave_trail(itinerary: u32) {
+    noted.passed += 1u;
+    let place = noted.passed % TRAIL;
+    motions[lane].trail[place] = strobe_state();
+    tallies[lane].itineraries[place] = itinerary;
+}
+
+fn trail(strobe: u32) -> array<Real, 4> {
+    return motions[lane].trail[strobe % TRAIL];
+}
+
+// Cycles of the candidate's period, at most, that the trail holds.
+fn cycles_on_trail() -> u32 {
+    return (min(noted.passed, TRAIL) - 1u) / tally.candidate;
+}
+
+// One more period of the cycle has been read, the `read`-th: for how many of its last cycles has the motion had the
+// same events in it?
+fn compare_itineraries(itinerary: u32, read: u32) {
+    let is_own = noted.refinements == 0u;
+    // What is read along the motion is its last cycle.
+    let most = min(noted.shown, cycles_on_trail());
+    var cycles = select(0u, 1u, is_own);
+    while cycles < most {
+        iterations += 1u;
+        let back = (cycles + 1u) * tally.candidate;
+        let strobe = select(noted.passed - back + read, noted.passed - back + tally.candidate, is_own);
+        if tallies[lane].itineraries[strobe % TRAIL] != itinerary {
+            break;
+        }
+        cycles += 1u;
+    }
+    noted.shown = min(noted.shown, cycles);
+}
+
+// Whether the motion, which is at the end of its trail, stays by the cycle that has been read.
+fn stays(to: array<Real, 4>) -> bool {
+    let present = difference(trail(noted.passed), to);
+    let bend = select(LINEAR, Real(1.0), size_of(present) < BENT_WITHIN);
+    let blurred = Real(noise());
+    let most = min(noted.shown, cycles_on_trail());
+    var after = present;
+    var cycles = 0u;
+    while cycles < most {
+        iterations += 1u;
+        let before = difference(trail(noted.passed - (cycles + 1u) * tally.candidate), to);
+        if size_of(difference(after, image_of(before))) > bend * size_of(before) + blurred {
+            break;
+        }
+        after = before;
+        cycles += 1u;
+    }
+    return cycles >= min(SHOWN_CYCLES, (TRAIL - 1u) / tally.candidate) && is_in_hull(present, cycles, to);
+}
+
+// Whether a deviation lies within the convex hull of the origin and of those before it, or nearly so.
+//
+// E. G. Gilbert, SIAM J. Control 4 (1966) 61: from the nearest point so far to the corner that lies farthest beyond it;
+// how far that is bounds the distance from below.
+fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
+    let target_point = in_units(point);
+    let allowed = max(OUTSIDE * sqrt(dot(target_point, target_point)), HAIR);
+    var nearest = -target_point;
+    for (var n = 0u; n < HULL_STEPS; n++) {
+        let square = dot(nearest, nearest);
+        if square <= allowed * allowed {
+            return true;
+        }
+        var farthest = -target_point;
+        for (var back = 1u; back <= corners; back++) {
+            iterations += 1u;
+            let corner = in_units(difference(trail(noted.passed - back * tally.candidate), to)) - target_point;
+            farthest = select(farthest, corner, dot(corner, nearest) < dot(farthest, nearest));
+        }
+        let step = farthest - nearest;
+        let gain = -dot(nearest, step);
+        if dot(farthest, nearest) > allowed * sqrt(square) || gain <= ULP * square {
+            return false;
+        }
+        nearest += step * min(gain / dot(step, step), Real(1.0));
+    }
+    return false;
+}
+
+// A deviation in units of the motion.
+fn in_units(u: array<Real, 4>) -> vec4<Real> {
+    let rate = unit_of_rates();
+    let position = max(seen.position_scale, Real(1e-30));
+    return vec4<Real>(u[0] / position, u[1] / rate, u[2] / position, u[3] / rate);
+}
