@@ -49,6 +49,27 @@ fn compare_itineraries(itinerary: u32, read: u32) {
     noted.shown = min(noted.shown, cycles);
 }
 
+// Cycles of a period that the motion must have shown.
+fn cycles_to_show(period: u32) -> u32 {
+    return min(SHOWN_CYCLES, (TRAIL - 1u) / period);
+}
+
+// Whether the same events have followed one another for as long as a cycle must show, but for the one to be read.
+fn repeats_itself(period: u32) -> bool {
+    if !EXPONENT {
+        return true;
+    }
+    let compared = period * (max(cycles_to_show(period), 2u) - 2u);
+    for (var n = 0u; n < compared; n++) {
+        iterations += 1u;
+        let strobe = noted.passed - n;
+        if strobe < period + 1u || tallies[lane].itineraries[strobe % TRAIL] != tallies[lane].itineraries[(strobe - period) % TRAIL] {
+            return false;
+        }
+    }
+    return true;
+}
+
 // Whether the motion, which is at the end of its trail, stays by the cycle that has been read.
 fn stays(to: array<Real, 4>) -> bool {
     let present = difference(trail(noted.passed), to);
@@ -66,7 +87,7 @@ fn stays(to: array<Real, 4>) -> bool {
         after = before;
         cycles += 1u;
     }
-    return cycles >= min(SHOWN_CYCLES, (TRAIL - 1u) / tally.candidate) && is_in_hull(present, cycles, to);
+    return cycles >= cycles_to_show(tally.candidate) && is_in_hull(present, cycles, to);
 }
 
 // Whether a deviation lies within the convex hull of the origin and of those before it, or nearly so.

@@ -132,7 +132,8 @@ fn judge_cycle() {
     let is_found = is_stable && is_own() && is_on_cycle(to, is_last);
     let is_cycle = is_found && (is_held(to, is_last) || stays(to));
     if is_found && !is_cycle {
-        noted.doubted += 1u;
+        // Newton's method has led somewhere.
+        noted.failed_searches = 0u;
         give_up();
         if !is_last {
             check_again();

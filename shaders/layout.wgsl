@@ -232,11 +232,9 @@ struct Noted {
     // The divisor of its period after which it came nearest to its start, and how near.
     divisor: u32,
     divisor_apart: u32,
-    // Times that Newton's method led nowhere, and that the motion was not seen to approach the cycle that it led to;
-    // 1 while a divisor is read because its multiple might be it, and the divisor whose cycle then was found not to
-    // attract.
+    // Times that Newton's method led nowhere; 1 while a divisor is read because its multiple might be it, and the divisor
+    // whose cycle then was found not to attract.
     failed_searches: u32,
-    doubted: u32,
     asked: u32,
     rejected_divisor: u32,
     // How far its cycle is from the lane by the derivative, in quarter octaves below 1.

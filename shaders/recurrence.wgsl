@@ -169,10 +169,13 @@ fn has_settled(lag: u32) -> bool {
 
 // Whether Newton's method may show what the limit is.
 fn is_refinable(lag: u32) -> bool {
+    if !EXPONENT || settings.early_stop == 0u || noted.failed_searches >= MOST_FAILED_SEARCHES {
+        return false;
+    }
     let now = f32(distance_at(lag));
     let shrunk = now - f32(last_distance_at(lag));
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), SLOWEST, 1.0);
-    return EXPONENT && noted.failed_searches < MOST_FAILED_SEARCHES && settings.early_stop == 1u && now >= REFINABLE + 8.0 * f32(noted.doubted) - OCTAVE * log2(away);
+    return now >= REFINABLE - OCTAVE * log2(away) && repeats_itself(lag);
 }
 
 // Natural logarithm of a quarter octave.

@@ -272,8 +272,6 @@ pub struct Tally {
     pub divisor_apart: u32,
     /// Times that Newton's method led nowhere.
     pub failed_searches: u32,
-    /// Times that the motion was not seen to approach the cycle that Newton's method led to.
-    pub doubted: u32,
     /// 1 while a divisor is read because its multiple might be it.
     pub asked: u32,
     /// The divisor whose cycle then was found unstable.

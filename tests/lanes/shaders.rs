@@ -220,7 +220,6 @@ fn what_a_lane_carries_lies_as_the_host_says() {
                 divisor,
                 divisor_apart,
                 failed_searches,
-                doubted,
                 asked,
                 rejected_divisor,
                 off,
