@@ -97,6 +97,9 @@ fn stays(to: array<Real, 4>) -> bool {
 fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
     let target_point = in_units(point);
     let allowed = max(OUTSIDE * sqrt(dot(target_point, target_point)), HAIR);
+    if corners > 0u && distance_from_last(target_point, to) <= allowed {
+        return true;
+    }
     var nearest = -target_point;
     for (var n = 0u; n < HULL_STEPS; n++) {
         let square = dot(nearest, nearest);
@@ -117,6 +120,12 @@ fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
         nearest += step * min(gain / dot(step, step), Real(1.0));
     }
     return false;
+}
+
+// How far it is from the deviation before: slow motion hardly moves, and the steps of the search would be short.
+fn distance_from_last(point: vec4<Real>, to: array<Real, 4>) -> Real {
+    let off = in_units(difference(trail(noted.passed - tally.candidate), to)) - point;
+    return sqrt(dot(off, off));
 }
 
 // A deviation in units of the motion.

@@ -71,6 +71,10 @@ fn is_in_hull(point: &Vector4<f64>, corners: &[Vector4<f64>], metric: &Metric) -
     let seen: Vec<Vector4<f64>> = corners.iter().map(|corner| metric.scaled(corner) - target).collect();
     // E. G. Gilbert, SIAM J. Control 4 (1966) 61: from the nearest point so far to the corner that lies
     // farthest beyond it; how far that is bounds the distance from below.
+    // Slow motion hardly moves, and the steps below would be short.
+    if seen.first().is_some_and(|last| last.norm() <= allowed) {
+        return true;
+    }
     let mut nearest = -target;
     for _ in 0..HULL_STEPS {
         let square = nearest.norm_squared();
