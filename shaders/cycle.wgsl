@@ -1,7 +1,5 @@
 // The cycle that was read: is it stable, and has the lane come near it?
 
-// A lane has settled once it is this close to its cycle, relative to the motion.
-const ON_CYCLE: f32 = 1e-4;
 // A lane that rests on an unstable cycle is moved by so many times what counts as rest.
 const KICK: f32 = 8.0;
 

@@ -28,7 +28,5 @@ const AT_REST: u32 = 64u;
 const NEUTRAL: Real = 1e-3;
 // Newton's method has done enough this close to the cycle, relative to the motion.
 const REFINED: f32 = 1e-5;
-// Events this close to phase 0, in turns, lie on it.
-const ON_STROBE: Real = 1e-6;
 // Squarings of the monodromy matrix: more would let the smaller entries of a Jordan block underflow.
 const SQUARINGS: u32 = 20u;

@@ -29,7 +29,5 @@ const AT_REST: u32 = RESOLVED;
 const NEUTRAL: Real = 1e-7;
 // Newton's method has done enough this close to the cycle, relative to the motion.
 const REFINED: f32 = 1e-10;
-// Events this close to phase 0, in turns, lie on it.
-const ON_STROBE: Real = 1e-9;
 // Squarings of the monodromy matrix: the spectral radius to the last digits.
 const SQUARINGS: u32 = 40u;

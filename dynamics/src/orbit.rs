@@ -22,6 +22,7 @@ pub use analysis::{CHAOS_ERRORS, ESCAPE_GROWTH, analyse, analyse_flow, analyse_o
 pub use approach::{LINEAR, SHOWN_CYCLES};
 pub use budget::Budget;
 pub use cell::{Measured, NEUTRAL_ORDER, measure};
+pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;
 
 use crate::model::{Side, State};

@@ -2,7 +2,7 @@
 //! written once, here; the shaders are compiled with them.
 
 use super::Precision;
-use rattlemap_dynamics::orbit::{CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, SHOWN_CYCLES};
+use rattlemap_dynamics::orbit::{CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, ON_STROBE_TURNS, SHOWN_CYCLES};
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
 /// Chaos is called early by this many blocks of growth at least: a standard error of fewer is none.
@@ -33,6 +33,22 @@ pub(crate) const MOST_FAILED_SEARCHES: u32 = 2;
 /// A cycle this close to its mirror image, 2^-12 of the motion, is symmetric; states this close are the same.
 pub(crate) const MIRROR: f64 = 2.44e-4;
 
+/// A lane has settled once it is this close to its cycle, relative to the motion.
+pub(crate) const ON_CYCLE: f64 = 1e-4;
+
+/// [`NEAR`] as a distance.
+pub(crate) fn near() -> f64 {
+    (-f64::from(NEAR) / f64::from(OCTAVE)).exp2()
+}
+
+/// Events this close to phase 0, in turns, lie on the strobe.
+pub(crate) const fn on_strobe(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-6,
+        Precision::F64 => ON_STROBE_TURNS,
+    }
+}
+
 /// What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
 pub(crate) const fn noise(precision: Precision) -> f64 {
     match precision {
@@ -51,7 +67,7 @@ pub(crate) const fn resolved(precision: Precision) -> u32 {
 
 /// The rules as the shaders' constants.
 pub(super) fn declarations(precision: Precision) -> String {
-    let (resolved, noise) = (resolved(precision), noise(precision));
+    let (resolved, noise, on_strobe) = (resolved(precision), noise(precision), on_strobe(precision));
     format!(
         "const FEWEST_BLOCKS: u32 = {FEWEST_BLOCKS}u;\nconst NEUTRAL_ORDER: f32 = {NEUTRAL_ORDER:?};\n\
          const CHAOS_ERRORS: Real = {CHAOS_ERRORS:?};\nconst ESCAPE_GROWTH: Real = {ESCAPE_GROWTH:?};\n\
@@ -59,6 +75,7 @@ pub(super) fn declarations(precision: Precision) -> String {
          const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst MOST_FAILED_SEARCHES: u32 = {MOST_FAILED_SEARCHES}u;\n\
          const GRAZING_SPEED: Real = {GRAZING_SPEED:?};\nconst NO_SPEED: Real = {NO_SPEED:?};\nconst NO_THRESHOLD: Real = {NO_THRESHOLD:?};\n\
          const TRAIL: u32 = {TRAIL}u;\nconst LINEAR: Real = {LINEAR:?};\nconst SHOWN_CYCLES: u32 = {SHOWN_CYCLES}u;\n\
-         const WINDOW_SHARE: u32 = {WINDOW_SHARE}u;\nconst MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n"
+         const WINDOW_SHARE: u32 = {WINDOW_SHARE}u;\nconst MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n\
+         const ON_CYCLE: f32 = {ON_CYCLE:?};\nconst ON_STROBE: Real = {on_strobe:?};\n"
     )
 }

@@ -28,7 +28,7 @@ const MOST_OF_MESH_SPEED: f64 = 2e-3;
 /// Motions that show what the resolution makes of a cycle, and how much farther a lane may be off: it rounds at
 /// every step.
 const TURNS: u64 = 6;
-const FACTOR: f64 = 8.0;
+pub(super) const FACTOR: f64 = 8.0;
 
 /// A cycle that is approached slowly is followed for so many times the budget: to be seen near it is not to reach it.
 const FOLLOWED: u32 = 8;
@@ -42,6 +42,7 @@ pub(super) struct Cell<'a> {
     pub(super) start: State,
     budget: Budget,
     pub(super) bars: Bars,
+    pub(super) precision: Precision,
     resolution: f64,
     seed: u64,
 }
@@ -68,6 +69,7 @@ impl<'a> Cell<'a> {
             start: plan.start(id, subject.records),
             budget,
             bars: Bars::new(subject.precision, flow.period, &budget),
+            precision: subject.precision,
             resolution: resolution(subject.precision),
             seed: u64::from(id) << 32,
             flow,

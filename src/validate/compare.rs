@@ -238,8 +238,7 @@ impl Bars {
             list.push(compared(Field::Symmetric, flags[0] == flags[1], shown));
         }
         let logs = [record, judge].map(|side| side.lyapunov * period * self.forcing_period);
-        let is_none = logs.iter().all(|log| *log <= self.no_multiplier.ln());
-        let is_same = is_none || apart(logs[0], logs[1]) <= self.multiplier * period.max(5.0);
+        let is_same = self.is_same_multiplier(logs[0], logs[1], period);
         self.push(
             list,
             (Field::Exponent, valid::LYAPUNOV),
@@ -248,6 +247,12 @@ impl Bars {
             is_same,
         );
         self.push_averages(list, record, judge, [IMPACTS_BAR, self.mesh]);
+    }
+
+    /// Whether two logarithms of the largest multiplier of a cycle are the same.
+    pub(super) fn is_same_multiplier(&self, ours: f64, theirs: f64, period: f64) -> bool {
+        let is_none = [ours, theirs].iter().all(|log| *log <= self.no_multiplier.ln());
+        is_none || apart(ours, theirs) <= self.multiplier * period.max(5.0)
     }
 
     fn compare_averages(&self, record: &Record, judge: &Record, list: &mut Vec<Compared>) {

@@ -1,6 +1,7 @@
 //! Why a record differs from what its cell's start reaches.
 
 use super::Kind;
+use super::beside::on_its_cycle;
 use super::cell::Cell;
 use super::compare::Answer;
 use crate::record::classify::{classify, status};
@@ -50,6 +51,9 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes
     if is_too_short(cell, claim, truth, &agrees) {
         return Kind::Budget;
     }
+    if on_its_cycle(cell, claim).is_some_and(|claim| is_same_cycle(cell, &claim, truth)) {
+        return if status(claim) == Status::Slow { Kind::Budget } else { Kind::Border };
+    }
     // What a lane says because it stopped early is no rounding.
     let says = |lane: Option<&Record>| lane.is_some_and(|lane| agrees(&Answer::new(*lane, None)));
     let is_right = lanes.double.is_some_and(|double| cell.bars.agree(double, truth));
@@ -64,6 +68,15 @@ fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
         && claim.period.is_multiple_of(answer.record.period.max(1))
         && is_multiple(cell, claim, answer)
         && cell.closes_earlier(answer.record.strobe, claim.period)
+}
+
+/// Whether a record that would be the same on its cycle says what the reference says of it.
+fn is_same_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
+    // How far from its cycle a slow approach stands by the end is not what it says of the cycle.
+    let grades = [Status::Ok, Status::Slow];
+    let is_graded = grades.contains(&status(claim)) && grades.contains(&status(&truth.record));
+    let status = if is_graded { truth.record.status } else { claim.status };
+    cell.bars.agree(&Record { status, ..*claim }, truth)
 }
 
 /// Whether two cycles are the same but for status and how often one repeats the other.

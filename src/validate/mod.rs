@@ -9,6 +9,7 @@
 //! A map of the reference is judged by lanes in f64 as well, or where there are none by an adaptive ODE library
 //! with event location (`independent`): whoever reads the result is told by which ([`Judge`]).
 
+mod beside;
 mod cell;
 mod chaos;
 mod compare;

@@ -116,8 +116,17 @@ fn answers_do_not_depend_on_the_units_of_length_and_time() {
 #[test]
 fn a_stable_cycle_that_the_motion_leaves_is_not_its_cycle() {
     let settings = LaneSettings { undecided_periods: 1584, ..LaneSettings::default() };
-    for (e, omega, period, impacts) in [(0.8, 5.745098039215686, 2, 2.5), (0.3254901960784314, 3.2, 1, 16.0)]
-    {
+    let named = [
+        (0.8, 5.745098039215686, 2, 2.5),
+        (0.3254901960784314, 3.2, 1, 16.0),
+        // Across a threshold of meshing lies a cycle of period 1 that the motion nears for twenty periods.
+        (0.5949119373776908, 3.7984344422700587, 2, 8.5),
+        (0.5177257525083612, 3.6040133779264214, 3, 50.0 / 3.0),
+        (0.03522504892367906, 6.9628180039138945, 1, 3.0),
+        // The approach is slow, and so bent that Newton's method led nowhere until it was searched no more.
+        (0.5590551181102362, 5.417322834645669, 1, 2.0),
+    ];
+    for (e, omega, period, impacts) in named {
         let cells = [(0.0, 0.0), (1e-6, 0.0), (0.0, 1e-6), (1e-6, 1e-6)].map(|(d, w)| pair(e + d, omega + w));
         for precision in Precision::ALL {
             for record in run_from_rest(&mut open(precision), &cells, &settings) {
@@ -126,7 +135,8 @@ fn a_stable_cycle_that_the_motion_leaves_is_not_its_cycle() {
                     Class::Periodic { period },
                     "{precision:?}, {e} {omega}: {record:?}"
                 );
-                assert_eq!(record.impacts_per_period, impacts, "{precision:?}, {e} {omega}: {record:?}");
+                let off = (record.impacts_per_period - impacts).abs();
+                assert!(off < 1e-9, "{precision:?}, {e} {omega}: {record:?}");
             }
         }
     }

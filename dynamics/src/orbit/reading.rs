@@ -8,7 +8,7 @@ use crate::reference::{EventKind, Happening, Stop, Trajectory};
 use crate::word::Word;
 
 /// Events closer to phase 0 than this, in turns, count as lying on the strobe.
-const ON_STROBE_TURNS: f64 = 1e-9;
+pub const ON_STROBE_TURNS: f64 = 1e-9;
 
 /// Everything that happens over a number of forcing periods.
 #[derive(Clone, Debug)]
