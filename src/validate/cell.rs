@@ -1,5 +1,7 @@
 //! One cell, and what the reference can be asked about it.
 
+use nalgebra::{Matrix4, Vector4};
+
 use super::Subject;
 use super::compare::{Answer, Bars, farther};
 use crate::gpu::Precision;
@@ -12,6 +14,7 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, State};
 use rattlemap_dynamics::orbit::{Budget, Class, Status, measure};
 use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::stability::{UNIT, multipliers};
 
 /// What a precision resolves of a motion or a parameter, relative to its size: some roundings, since errors gather
 /// over the steps of a period.
@@ -180,13 +183,38 @@ impl<'a> Cell<'a> {
                 earlier = earlier.min(self.apart(&trajectory.state(), &state));
             }
         }
-        let turned = |k| {
-            let moved = self.moved(k)?;
-            Moved { start: state, ..moved }.shaken(period)
-        };
-        let ends = (0..TURNS).filter_map(turned);
+        let ends = self.turned::<0>(state, period, []).map(|end| end.state());
         let spread = ends.map(|end| self.apart(&end, &state)).fold(self.resolution, farther);
         spread.is_finite() && earlier <= FACTOR * spread
+    }
+
+    /// Logarithms of the largest multiplier of so many periods from a state, if every period rounds.
+    pub(super) fn multipliers_from(&self, state: State, period: u32) -> Vec<f64> {
+        let log_radius = |end: Trajectory<'_, 4>| {
+            let columns = end.tangents().map(Vector4::from);
+            let [re, im] = *multipliers(&Matrix4::from_columns(&columns))?.first()?;
+            Some(re.hypot(im).ln() + end.log_scale())
+        };
+        self.turned(state, period, UNIT).filter_map(log_radius).collect()
+    }
+
+    /// Where a few motions are after so many periods from a state, if every period rounds.
+    fn turned<const N: usize>(
+        &self,
+        state: State,
+        periods: u32,
+        tangents: [State; N],
+    ) -> impl Iterator<Item = Trajectory<'_, N>> {
+        (0..TURNS).filter_map(move |k| {
+            let mut random = Random::new(self.seed ^ k);
+            let begun = Trajectory::<0>::new(&self.flow, self.law, state);
+            let mut trajectory = begun.carrying(tangents);
+            for _ in 0..periods {
+                trajectory.advance_period(&mut ()).ok()?;
+                trajectory.shake(shares(&mut random, self.resolution));
+            }
+            Some(trajectory)
+        })
     }
 
     /// The distance of two states relative to the size of the motion, but not less than the walls' distance.
@@ -236,11 +264,15 @@ impl Moved {
         let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start);
         for _ in 0..periods {
             trajectory.advance_period(&mut ()).ok()?;
-            let shares = std::array::from_fn(|_| self.resolution * (2.0 * self.random.unit() - 1.0));
-            trajectory.shake(shares);
+            trajectory.shake(shares(&mut self.random, self.resolution));
         }
         Some(trajectory.state())
     }
+}
+
+/// By what a period rounds.
+fn shares(random: &mut Random, resolution: f64) -> [f64; 4] {
+    std::array::from_fn(|_| resolution * (2.0 * random.unit() - 1.0))
 }
 
 fn answer(flow: &Flow, law: Law, start: State, budget: &Budget) -> Answer {

@@ -1,7 +1,7 @@
 //! Why a record differs from what its cell's start reaches.
 
 use super::Kind;
-use super::beside::on_its_cycle;
+use super::beside::{meets_strobe, on_its_cycle};
 use super::cell::Cell;
 use super::compare::Answer;
 use crate::record::classify::{classify, status};
@@ -51,7 +51,7 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes
     if is_too_short(cell, claim, truth, &agrees) {
         return Kind::Budget;
     }
-    if on_its_cycle(cell, claim).is_some_and(|claim| is_same_cycle(cell, &claim, truth)) {
+    if is_same_beside(cell, claim, truth) {
         return if status(claim) == Status::Slow { Kind::Budget } else { Kind::Border };
     }
     // What a lane says because it stopped early is no rounding.
@@ -70,13 +70,14 @@ fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
         && cell.closes_earlier(answer.record.strobe, claim.period)
 }
 
-/// Whether a record that would be the same on its cycle says what the reference says of it.
-fn is_same_cycle(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
-    // How far from its cycle a slow approach stands by the end is not what it says of the cycle.
-    let grades = [Status::Ok, Status::Slow];
-    let is_graded = grades.contains(&status(claim)) && grades.contains(&status(&truth.record));
-    let status = if is_graded { truth.record.status } else { claim.status };
-    cell.bars.agree(&Record { status, ..*claim }, truth)
+/// Whether a record says the same of its cycle, but for what it was to be read on the cycle for.
+fn is_same_beside(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
+    let cycle = &truth.record;
+    let is_on_strobe = status(claim) == Status::StrobeOnEvent && meets_strobe(cell, cycle.strobe, cycle.period);
+    let status = if is_on_strobe { cycle.status } else { claim.status };
+    let claim = Record { status, ..*claim };
+    let agrees = |claim: &Record| cell.bars.agree(claim, truth);
+    agrees(&claim) || on_its_cycle(cell, &claim).is_some_and(|claim| agrees(&claim))
 }
 
 /// Whether two cycles are the same but for status and how often one repeats the other.
