@@ -2,7 +2,9 @@
 //! written once, here; the shaders are compiled with them.
 
 use super::Precision;
-use rattlemap_dynamics::orbit::{CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, ON_STROBE_TURNS, SHOWN_CYCLES};
+use rattlemap_dynamics::orbit::{
+    CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, ON_STROBE_TURNS, SHOWN_CYCLES,
+};
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
 /// Chaos is called early by this many blocks of growth at least: a standard error of fewer is none.

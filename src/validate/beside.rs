@@ -29,8 +29,11 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
     let is_there = cell.apart(&record.strobe, &cycle.state) <= FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
-    (is_there && may_be_read(cell, record.strobe, record.lyapunov * time, period))
-        .then(|| Record { lyapunov: cycle.exponent(cell.flow.period), status, ..*record })
+    (is_there && may_be_read(cell, record.strobe, record.lyapunov * time, period)).then(|| Record {
+        lyapunov: cycle.exponent(cell.flow.period),
+        status,
+        ..*record
+    })
 }
 
 /// Whether a multiplier, as a logarithm, may be read along the motion from a state: what the reference reads scatters

@@ -73,7 +73,8 @@ fn hides_period(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
 /// Whether a record says the same of its cycle, but for what it was to be read on the cycle for.
 fn is_same_beside(cell: &Cell<'_>, claim: &Record, truth: &Answer) -> bool {
     let cycle = &truth.record;
-    let is_on_strobe = status(claim) == Status::StrobeOnEvent && meets_strobe(cell, cycle.strobe, cycle.period);
+    let is_on_strobe =
+        status(claim) == Status::StrobeOnEvent && meets_strobe(cell, cycle.strobe, cycle.period);
     let status = if is_on_strobe { cycle.status } else { claim.status };
     let claim = Record { status, ..*claim };
     let agrees = |claim: &Record| cell.bars.agree(claim, truth);

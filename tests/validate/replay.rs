@@ -17,7 +17,11 @@ use rattlemap::output::{Identity, RECORDS, RecordFile};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::{Kind, Lanes, Sample, Stratum, Subject, Validation, replay, sample};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Class, Status};
+use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::stability::{StrobeMap, multipliers};
 use rattlemap_dynamics::word::Word;
 
 fn scene_text(columns: usize, rows: usize) -> String {
@@ -217,6 +221,42 @@ fn to_be_near_a_cycle_is_not_to_reach_it() {
     let subject = Subject { plan: &plan, records: &[record; 4], precision: Precision::F64, is_lane: true };
     let found = replay(&subject, &only(vec![0]), &Lanes::default(), &|_| {});
     assert_eq!(found.mismatches.len(), 1, "{:?}", found.agreement);
+}
+
+/// A slow approach over a bent strobe map: the multiplier is a tenth off the cycle's where the lane reads it.
+#[test]
+fn a_multiplier_is_compared_where_it_was_read() {
+    let (e, omega, period, run) = (0.7240704500978473, 2.0978473581213306, 4, 64);
+    let plan = planned([e, 1.0], [omega, 20.0], 2, &[]);
+    let pair = GearPair { omega, ..GearPair::paper(e) };
+    let flow = Flow::new(&pair.oscillator().unwrap());
+    let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), [0.0; 4]);
+    (0..run).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+    let strobe = trajectory.state();
+    let derivative = StrobeMap::Periods(period).apply(&trajectory, strobe).unwrap().derivative();
+    let [re, im] = multipliers(&derivative).unwrap()[0];
+    let record = Record {
+        period,
+        status: Status::Slow.code(),
+        lyapunov: re.hypot(im).ln() / (f64::from(period) * flow.period),
+        strobe,
+        periods_run: run,
+        valid: valid::PERIOD | valid::LYAPUNOV | valid::STROBE,
+        ..Record::default()
+    };
+    let kind_of = |record| {
+        let found = first(&plan, record, Precision::F32);
+        println!("{:?}", found.mismatches);
+        found.mismatches.first().map(|mismatch| mismatch.kind)
+    };
+    println!("{record:?}");
+    assert_eq!(kind_of(record), Some(Kind::Budget));
+    let doubled = Record { lyapunov: 2.0 * record.lyapunov, ..record };
+    assert_eq!(kind_of(doubled), Some(Kind::Unexplained), "the reference reads something else there");
+    let elsewhere = Record { strobe: strobe.map(|x| 1.3 * x), ..record };
+    assert_eq!(kind_of(elsewhere), Some(Kind::Unexplained), "no cycle is there");
+    let near = Record { status: Status::Ok.code(), strobe: strobe.map(|x| 1.01 * x), ..record };
+    assert_eq!(kind_of(near), Some(Kind::Unexplained), "it has not settled");
 }
 
 // ---- a whole map
