@@ -251,8 +251,8 @@ fn a_multiplier_is_compared_where_it_was_read() {
     };
     println!("{record:?}");
     assert_eq!(kind_of(record), Some(Kind::Budget));
-    let doubled = Record { lyapunov: 2.0 * record.lyapunov, ..record };
-    assert_eq!(kind_of(doubled), Some(Kind::Unexplained), "the reference reads something else there");
+    let steeper = Record { lyapunov: 4.0 * record.lyapunov, ..record };
+    assert_eq!(kind_of(steeper), Some(Kind::Unexplained), "the reference reads something else there");
     let elsewhere = Record { strobe: strobe.map(|x| 1.3 * x), ..record };
     assert_eq!(kind_of(elsewhere), Some(Kind::Unexplained), "no cycle is there");
     let near = Record { status: Status::Ok.code(), strobe: strobe.map(|x| 1.01 * x), ..record };
