@@ -12,6 +12,9 @@ use rattlemap_dynamics::reference::CLOSING_ANGLE;
 /// certificate of the shaders are laid out for it.
 pub const STEP_ANGLE: f64 = 1.0;
 
+/// Where a wall stands that there is not, in scales of length: shaders have no infinity, and square distances.
+const NOWHERE: f64 = 1e12;
+
 /// Terms of the matrix exponential over one step; rates times steps are below 1.
 const EXPONENTIAL_TERMS: u32 = 30;
 
@@ -60,6 +63,7 @@ impl Constants {
             (h * rate(oscillator, domain) / STEP_ANGLE).max(1.0).log2().ceil().exp2()
         };
         let [right, left] = oscillator.meshing;
+        let walls = walls(oscillator);
         let domain = |d: &model::Domain, wall: f64, substeps: f64| domain(oscillator, d, wall, h, substeps);
         let mut constants = Constants {
             flow: Zeroable::zeroed(),
@@ -71,10 +75,10 @@ impl Constants {
         constants.flow = Flow {
             domains: [
                 domain(&oscillator.free, 0.0, 1.0),
-                domain(&right, oscillator.walls[0], substeps(&right)),
-                domain(&left, oscillator.walls[1], substeps(&left)),
+                domain(&right, walls[0], substeps(&right)),
+                domain(&left, walls[1], substeps(&left)),
             ],
-            walls: oscillator.walls,
+            walls,
             kick: kick(oscillator),
             h,
             speed: speed(oscillator) * h,
@@ -131,9 +135,15 @@ fn rate(oscillator: &model::Oscillator, domain: &model::Domain) -> f64 {
     (0.5 * damping + frequency.max(0.5 * damping)).max(oscillator.omega)
 }
 
-/// What speeds are measured by: half the walls' distance times the rate of free motion.
+/// What speeds are measured by: the scale of length times the rate of free motion.
 pub(super) fn speed(oscillator: &model::Oscillator) -> f64 {
-    0.5 * (oscillator.walls[0] - oscillator.walls[1]) * free_rate(oscillator)
+    oscillator.length_scale() * free_rate(oscillator)
+}
+
+/// The walls, out of reach where there is none.
+fn walls(oscillator: &model::Oscillator) -> [f64; 2] {
+    let far = NOWHERE * oscillator.length_scale();
+    oscillator.walls.map(|wall| wall.clamp(-far, far))
 }
 
 /// The rate of free motion that thresholds are measured by; the reference's, so that both mean the same.

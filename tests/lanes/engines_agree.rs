@@ -5,8 +5,9 @@
 use crate::common::gpu::{open, run};
 use crate::common::table::{Row, rows};
 use crate::common::{REST, apart, flow_of, paper as pair};
-use rattlemap::gpu::{LaneSettings, Precision};
-use rattlemap_dynamics::model::{GearPair, State};
+use rattlemap::gpu::{Lane, LaneSettings, Precision};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
 use rattlemap_dynamics::reference::{EventKind, Happening, Observer, Trajectory};
 use rayon::prelude::*;
@@ -293,5 +294,45 @@ fn hostile_lanes_end_in_a_status() {
             assert_eq!(record.status, status.code(), "{precision:?}: {pair:?}");
             assert!(record.strobe.iter().all(|x| x.is_finite()), "{precision:?}: {pair:?}");
         }
+    }
+}
+
+/// The right wall alone, and a gap that the forcing drives into it.
+#[test]
+fn one_wall_is_enough() {
+    let pairs: Vec<GearPair> = [(0.2, 2.2), (0.5, 3.1), (0.3, 4.4), (0.6, 5.2), (0.0, 6.1), (0.4, 7.3)]
+        .map(|(e, omega)| pair(e, omega))
+        .to_vec();
+    let oscillators: Vec<Oscillator> = pairs
+        .iter()
+        .map(|pair| {
+            let pair = pair.oscillator().unwrap();
+            Oscillator { walls: [pair.walls[0], f64::NEG_INFINITY], ..pair }
+        })
+        .collect();
+    let laws: Vec<Law> = pairs.iter().map(GearPair::law).collect();
+    let lanes: Vec<Lane> = (0..pairs.len() as u32).map(|i| Lane { flow: i, law: i, start: REST }).collect();
+    let horizon = 40;
+    for precision in Precision::ALL {
+        let mut gpu = open(precision);
+        let settings = LaneSettings::only(horizon);
+        let records = pollster::block_on(gpu.run(&oscillators, &laws, &lanes, &settings)).unwrap();
+        let mut impacts = 0;
+        for ((oscillator, law), record) in oscillators.iter().zip(&laws).zip(records) {
+            let flow = Flow::new(oscillator);
+            let mut trajectory = Trajectory::<0>::new(&flow, *law, REST);
+            (0..horizon).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+            impacts += trajectory.work().impacts;
+            let off = apart(record.strobe, trajectory.state());
+            println!(
+                "{}: omega = {}, e = {}: {off:.1e}",
+                precision.name(),
+                oscillator.omega,
+                law.restitution
+            );
+            assert_eq!(record.status, Status::Ok.code());
+            assert!(off < bar([5.3e-6, 2.0e-14], precision), "{off:e}");
+        }
+        assert!(impacts > 100, "{impacts}");
     }
 }
