@@ -29,7 +29,11 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
     let is_there = cell.apart(&record.strobe, &cycle.state) <= FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
-    (is_there && may_be_read(cell, record.strobe, record.lyapunov * time, period)).then(|| Record {
+    // The cycle that was read ends at the strobe; where the multiplier is negative, it began on the other side.
+    let turns = cycle.multipliers.first().is_some_and(|[re, _]| *re < 0.0);
+    let before = |i: usize| if turns { 2.0 * cycle.state[i] - record.strobe[i] } else { record.strobe[i] };
+    let began = std::array::from_fn(before);
+    (is_there && may_be_read(cell, began, record.lyapunov * time, period)).then(|| Record {
         lyapunov: cycle.exponent(cell.flow.period),
         status,
         ..*record

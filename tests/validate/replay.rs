@@ -231,9 +231,10 @@ fn a_multiplier_is_compared_where_it_was_read() {
     let pair = GearPair { omega, ..GearPair::paper(e) };
     let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), [0.0; 4]);
-    (0..run).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+    (0..run - period).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+    let derivative = StrobeMap::Periods(period).apply(&trajectory, trajectory.state()).unwrap().derivative();
+    (0..period).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
     let strobe = trajectory.state();
-    let derivative = StrobeMap::Periods(period).apply(&trajectory, strobe).unwrap().derivative();
     let [re, im] = multipliers(&derivative).unwrap()[0];
     let record = Record {
         period,

@@ -374,7 +374,7 @@ impl Analysis<'_> {
         let mut trajectory = seed.at(cycle.state, []);
         let begun = trajectory.clone();
         let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
-        let closes = trajectory.meshing() == begun.meshing() || reading.on_strobe;
+        let closes = trajectory.is_in_domain_of(&begun) || reading.on_strobe;
         // The first flight has its symbol from where `seed` came from: right if the cycle comes from there, too.
         if !trajectory.stands_as(&begun) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;

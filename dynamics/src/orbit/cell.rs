@@ -259,11 +259,15 @@ impl<'a> Watch<'a> {
                 let Some(cycle) = self.analysis.smallest(newton, seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
                 if cycle.is_stable() && distance < NEAR {
+                    let at = self.strobes.len() - 1;
+                    let found = Found { cycle, seed: seed.clone(), at, distance, reading: OnceCell::new() };
+                    // A fixed point that lies in another domain than the motion now is no cycle.
+                    if !is_last && !self.reading(&found)?.closes {
+                        continue;
+                    }
                     // The next check will tell whether it is being approached.
                     self.approaches = true;
-                    let at = self.strobes.len() - 1;
-                    self.cycle =
-                        Some(Found { cycle, seed: seed.clone(), at, distance, reading: OnceCell::new() });
+                    self.cycle = Some(found);
                     let orbit = self.approached(&metric, near)?;
                     // One find is enough for now.
                     if orbit.is_some() || !is_last {

@@ -40,6 +40,17 @@ fn cycles_that_the_start_leaves_are_not_named() {
     }
 }
 
+/// The strobe lies 0.0002 after a start of meshing. While the motion comes to it from behind the wall, the strobe map has a
+/// fixed point in front of it that is no cycle.
+#[test]
+fn a_fixed_point_in_another_domain_is_no_cycle() {
+    let pair = paper(0.22504892367906065, 3.475538160469667);
+    for early_stop in [true, false] {
+        let measured = cell(&pair, &budget(early_stop, 400));
+        assert_eq!((measured.period, measured.symmetric), (Some(1), Some(true)), "early stop {early_stop}");
+    }
+}
+
 /// Where thresholds of meshing are dense, against brute force that goes on for longer.
 #[test]
 fn early_stops_name_what_brute_force_reaches() {

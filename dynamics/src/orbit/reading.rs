@@ -38,6 +38,7 @@ impl Reading {
         periods: u32,
     ) -> Result<Reading, Stop> {
         let (strobe, strobe_meshing) = (trajectory.state(), trajectory.meshing());
+        let begun = trajectory.clone();
         let start = trajectory.period();
         let (mesh_start, impacts_start) = (trajectory.meshing_time(), trajectory.work().impacts);
         trajectory.clear_near_grazing();
@@ -54,7 +55,7 @@ impl Reading {
             impacts_per_period: (trajectory.work().impacts - impacts_start) as f64 / span,
             mesh_fraction: (trajectory.meshing_time() - mesh_start) / (span * flow.period),
             itineraries: Recorder::list(flow, &met, start, periods),
-            closes: trajectory.meshing() == strobe_meshing,
+            closes: trajectory.is_in_domain_of(&begun),
             near_grazing: trajectory.near_grazing(),
             on_strobe: met.iter().any(|happening| {
                 let turns = happening.t / flow.period;

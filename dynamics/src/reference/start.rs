@@ -5,6 +5,9 @@ use super::{Mode, Trajectory, Work};
 use crate::flow::{DomainKind, Flow};
 use crate::model::{Law, Side, State};
 
+/// A gap this near to a wall, relative to its position or the scale of length, lies on it.
+const ON_WALL: f64 = 1e-9;
+
 impl<'f> Trajectory<'f, 0> {
     /// A trajectory that starts at phase 0 in the state `y`.
     ///
@@ -102,6 +105,16 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Whether it is in the same domain as another one, and comes from the same wall.
     pub(crate) fn stands_as(&self, other: &Trajectory<'_, N>) -> bool {
         (self.mode, self.origin, self.from_wall) == (other.mode, other.origin, other.from_wall)
+    }
+
+    /// Whether it is in the same domain as another one, contact onset and sustained contact told apart where the gap does
+    /// not lie on the wall between them.
+    pub(crate) fn is_in_domain_of(&self, other: &Trajectory<'_, N>) -> bool {
+        let is_between = |side: Side| {
+            let wall = self.flow.wall(side);
+            (self.q[0] - wall).abs() <= ON_WALL * wall.abs().max(self.flow.length)
+        };
+        self.mode == other.mode || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between)
     }
 
     /// A trajectory from the mirror image of the present state at phase 0, in the mirrored domain:
