@@ -85,8 +85,9 @@ struct Settings {
     iterations: u32,
     // Passes (scan steps and careful steps) allowed in one period.
     passes_per_period: u32,
-    // Events allowed in one period.
+    // Events allowed in one period, and in all.
     events_per_period: u32,
+    most_events: u32,
     // Invocations along the first dimension of a dispatch.
     row: u32,
     // Periods before averages are taken.
@@ -242,6 +243,8 @@ struct Noted {
     // Strobes of the motion so far, and for how many cycles it has had the events of the cycle that is read.
     passed: u32,
     shown: u32,
+    // Events of whole periods, whatever they were counted for.
+    all_events: u32,
 }
 
 struct Tally {

@@ -7,7 +7,12 @@ fn begin_period() {
     motion.phasor = array<Real, 2>(1.0, 0.0);
     tally.period += 1u;
     tally.passes_in_period = 0u;
+    noted.all_events += tally.events_in_period;
     tally.events_in_period = 0u;
+    if noted.all_events > settings.most_events {
+        tally.status = STATUS_CAP_EVENTS;
+        return;
+    }
     let itinerary = tally.itinerary;
     tally.itinerary = 0u;
     if EXPONENT && noted.refinements == 0u {

@@ -1,9 +1,9 @@
 //! Numerical stress: where computations of this kind go wrong, and whether these do.
 //!
-//! Seven parts, each with rows for a table and a verdict that can fail: long runs
+//! Eight parts, each with rows for a table and a verdict that can fail: long runs
 //! ([`long_runs`]), the laws of impact ([`impacts`]), the approach to grazing ([`grazing`]),
 //! chatter as restitution goes to one ([`chatter`]), stiff meshing ([`stiffness`]), coarse grids
-//! ([`grid`]) and random parameters ([`fuzz`]). Truth comes from closed forms where there are any,
+//! ([`grid`]), the work of single cells ([`work`]) and random parameters ([`fuzz`]). Truth comes from closed forms where there are any,
 //! else from the reference, and what an error may be from how far the reference itself moves
 //! when starts and parameters move within rounding.
 
@@ -20,13 +20,14 @@ pub mod output;
 mod perturbed;
 mod readout;
 pub mod stiffness;
+pub mod work;
 
 pub use cells::EngineName;
 pub use lanes::Lanes;
 
 use rattlemap::gpu::GpuError;
 
-/// One of the seven.
+/// One of the eight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// [`long_runs`].
@@ -41,19 +42,22 @@ pub enum Part {
     Stiffness,
     /// [`grid`].
     Grid,
+    /// [`work`].
+    Work,
     /// [`fuzz`].
     Fuzz,
 }
 
 impl Part {
     /// Every part, in the order in which they run.
-    pub const ALL: [Part; 7] = [
+    pub const ALL: [Part; 8] = [
         Part::LongRuns,
         Part::Impacts,
         Part::Grazing,
         Part::Chatter,
         Part::Stiffness,
         Part::Grid,
+        Part::Work,
         Part::Fuzz,
     ];
 
@@ -66,6 +70,7 @@ impl Part {
             Part::Chatter => "chatter",
             Part::Stiffness => "stiffness",
             Part::Grid => "grid",
+            Part::Work => "work",
             Part::Fuzz => "fuzz",
         }
     }
@@ -119,6 +124,8 @@ pub struct Report {
     pub stiffness: Option<Vec<stiffness::Row>>,
     /// Coarse grids.
     pub grid: Option<grid::Rows>,
+    /// Times of random cells.
+    pub work: Option<Vec<work::Row>>,
     /// Random parameters.
     pub fuzz: Option<fuzz::Rows>,
     /// One verdict per part that ran, in this order.
@@ -170,6 +177,7 @@ pub fn run(
             Part::Chatter => chatter::judge(report.chatter.insert(chatter::measure(size, lanes)?)),
             Part::Stiffness => stiffness::judge(report.stiffness.insert(stiffness::measure(size, lanes)?)),
             Part::Grid => grid::judge(report.grid.insert(grid::measure(size, seed, lanes, watch)?)),
+            Part::Work => work::judge(report.work.insert(work::measure_cells(size, seed, watch))),
             Part::Fuzz => fuzz::judge(report.fuzz.insert(fuzz::measure(size, seed, lanes, watch)?)),
         };
         watch.judged(&verdict);

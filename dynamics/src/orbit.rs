@@ -21,7 +21,7 @@ mod trace;
 pub use analysis::{CHAOS_ERRORS, ESCAPE_GROWTH, analyse, analyse_flow, analyse_over, status_of};
 pub use approach::{LINEAR, SHOWN_CYCLES};
 pub use budget::Budget;
-pub use cell::{Measured, NEUTRAL_ORDER, measure};
+pub use cell::{Measured, NEUTRAL_ORDER, measure, measure_until};
 pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;
 

@@ -15,6 +15,7 @@
 //!
 //! Every loop has a cap and every ending a name: see [`Stop`].
 
+mod allowance;
 mod chatter;
 mod clock;
 mod contact;
@@ -25,6 +26,7 @@ mod start;
 mod step_verdict;
 mod tangent;
 
+pub use allowance::Allowance;
 pub use chatter::{CLOSING_ANGLE, NO_THRESHOLD};
 use clock::Clock;
 pub use contact::GRAZING_SPEED;
@@ -99,6 +101,8 @@ pub struct Trajectory<'f, const N: usize = 0> {
     meshing_time: f64,
     near_grazing: bool,
     work: Work,
+    /// Of all that `work` counts.
+    allowance: Allowance<'f>,
 }
 
 impl<'f, const N: usize> Trajectory<'f, N> {
@@ -179,6 +183,21 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.work
     }
 
+    /// The same trajectory with so much work allowed from here on.
+    pub fn allowing(mut self, allowance: Allowance<'f>) -> Self {
+        self.allowance = Allowance {
+            steps: allowance.steps.saturating_add(self.work.steps),
+            events: allowance.events.saturating_add(self.work.events),
+            ..allowance
+        };
+        self
+    }
+
+    /// Work that it is still allowed.
+    pub(crate) fn allowance(&self) -> Allowance<'f> {
+        self.allowance.after(self.work)
+    }
+
     /// Integrates to the next phase 0.
     ///
     /// # Errors
@@ -199,6 +218,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn advance_to(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        if self.allowance.is_halted() {
+            return Err(Stop::TooStiff);
+        }
         self.goal = until;
         if let Some(side) = self.pending.take() {
             self.contact(side, observer);
@@ -215,7 +237,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     }
 
     fn check_events(&self) -> Result<(), Stop> {
-        if self.events_in_period > EVENTS_PER_PERIOD_CAP { Err(Stop::CapEvents) } else { Ok(()) }
+        let is_over =
+            self.events_in_period > EVENTS_PER_PERIOD_CAP || self.work.events > self.allowance.events;
+        if is_over { Err(Stop::CapEvents) } else { Ok(()) }
     }
 
     /// Rates whose powers leave the range of f64 leave nothing that bounds a step.
@@ -241,8 +265,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         loop {
             self.work.steps += 1;
             self.steps_in_period += 1;
-            if self.steps_in_period > STEPS_PER_PERIOD_CAP {
-                return Err(Stop::CapRoot);
+            if self.steps_in_period > STEPS_PER_PERIOD_CAP || self.work.steps > self.allowance.steps {
+                return Err(self.too_many_steps());
             }
             let made;
             let step = match linear.step(level) {
@@ -284,6 +308,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 }
             }
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn too_many_steps(&self) -> Stop {
+        if self.work.steps > self.allowance.steps { Stop::TooStiff } else { Stop::CapRoot }
     }
 
     /// Takes a longer step next time. Out of line, so that the next step need not wait for the

@@ -19,7 +19,7 @@ use nalgebra::linalg::Schur;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::model::State;
-use crate::reference::{Stop, Trajectory};
+use crate::reference::{Stop, Trajectory, Work};
 
 /// The unit vectors: tangents that become the columns of a derivative.
 pub const UNIT: [State; 4] =
@@ -68,15 +68,25 @@ impl StrobeMap {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub fn apply(self, seed: &Trajectory<'_>, y: State) -> Result<Image, Stop> {
+        self.apply_counting(seed, y, &mut Work::default())
+    }
+
+    /// The same, adding the work that it takes to `work`, also where it ends before.
+    pub(crate) fn apply_counting(
+        self,
+        seed: &Trajectory<'_>,
+        y: State,
+        work: &mut Work,
+    ) -> Result<Image, Stop> {
         let rate = seed.flow().rate;
         let mut image =
             Image { state: y, scaled: Matrix4::identity(), log_scale: 0.0, near_grazing: false, rate };
         match self {
             StrobeMap::Periods(p) => {
                 let mut trajectory = seed.at(y, UNIT);
-                for _ in 0..p {
-                    trajectory.advance_period(&mut ())?;
-                }
+                let ended = (0..p).try_for_each(|_| trajectory.advance_period(&mut ()));
+                *work += trajectory.work();
+                ended?;
                 image = read(&trajectory, 1.0);
             }
             StrobeMap::MirroredHalves(p) => {
@@ -86,7 +96,9 @@ impl StrobeMap {
                     if turn > 0 {
                         half = half.mirrored(UNIT);
                     }
-                    half.advance_to(0.5 * seed.flow().period, &mut ())?;
+                    let ended = half.advance_to(0.5 * seed.flow().period, &mut ());
+                    *work += half.work();
+                    ended?;
                     let step = read(&half, -1.0);
                     let (scaled, log_scale) =
                         unit_size(step.scaled * image.scaled, step.log_scale + image.log_scale);

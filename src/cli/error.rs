@@ -17,7 +17,17 @@ pub enum Failure {
     Usage(anyhow::Error),
     /// The run or its output failed: exit code 1.
     Run(anyhow::Error),
+    /// A signal ended the run: exit code 128 and its number, as shells count it.
+    Interrupted {
+        /// The signal's number.
+        signal: i32,
+        /// What is kept, and how to go on.
+        words: anyhow::Error,
+    },
 }
+
+/// What exit codes of processes that a signal ended begin with.
+pub(crate) const SIGNALLED: i32 = 128;
 
 impl Failure {
     /// Says on stderr what went wrong, causes included, and returns the exit code.
@@ -26,6 +36,7 @@ impl Failure {
         ExitCode::from(match self {
             Failure::Usage(_) => 2,
             Failure::Run(_) => 1,
+            Failure::Interrupted { signal, .. } => (SIGNALLED + signal) as u8,
         })
     }
 }
@@ -37,7 +48,7 @@ pub fn fail_if(failed: bool, message: &'static str) -> Result<(), Failure> {
 
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Failure::Usage(error) | Failure::Run(error)) = self;
+        let (Failure::Usage(error) | Failure::Run(error) | Failure::Interrupted { words: error, .. }) = self;
         // The alternate form is the whole chain of causes on one line.
         write!(f, "{error:#}")
     }

@@ -5,7 +5,6 @@ mod resume_command;
 mod summary;
 
 use std::error::Error;
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use crate::gpu::Precision;
@@ -17,8 +16,9 @@ use crate::map::schedule::Schedule;
 use crate::map::sweep::{self, SweepError};
 use crate::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError, unfinished};
 use crate::record::Record;
+use crate::record::classify::status;
 use anyhow::anyhow;
-use rattlemap_dynamics::orbit::Class;
+use rattlemap_dynamics::orbit::{Class, Status};
 
 use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
 use crate::cli::capacity;
@@ -188,13 +188,17 @@ fn integrate(
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
     let Work { plan, schedule, records } = work;
+    let mut warning = Warning::new(kept.file.count(), ask.run.quiet);
     let keep = |batch: &[(u32, Record)], known| {
         kept.keep(batch)?;
+        warning.heed(batch, unit(plan));
         progress.report(kept.file.count(), known);
-        Ok(if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        Ok(())
     };
     let swept = match interrupt.begin() {
-        true => pollster::block_on(sweep::run(plan, schedule, engine, records, keep)),
+        true => {
+            pollster::block_on(sweep::run(plan, schedule, engine, records, interrupt.raised(), keep))
+        }
         false => Ok(false),
     };
     let go_on = || {
@@ -204,9 +208,34 @@ fn integrate(
     };
     match swept {
         Ok(true) => Ok(()),
-        Ok(false) => Err(Failure::Run(anyhow!("interrupted; {}", go_on()))),
+        Ok(false) => Err(interrupt.failure(anyhow!("interrupted; {}", go_on()))),
         Err(error @ SweepError::Engine(_)) => Err(Failure::Run(anyhow!("{error}; {}", go_on()))),
         Err(error) => Err(Failure::Run(anyhow!("{error}; make room there; {}", go_on()))),
+    }
+}
+
+/// Says once that a map whose first cells all failed will go on like that.
+struct Warning {
+    is_due: bool,
+}
+
+impl Warning {
+    fn new(kept: usize, quiet: bool) -> Warning {
+        Warning { is_due: kept == 0 && !quiet }
+    }
+
+    fn heed(&mut self, batch: &[(u32, Record)], unit: &str) {
+        if !std::mem::take(&mut self.is_due) || !batch.iter().all(|(_, record)| status(record).is_failure()) {
+            return;
+        }
+        let count = |of: Status| batch.iter().filter(|(_, record)| status(record) == of).count();
+        let counts = Status::ALL.iter().filter(|of| count(**of) > 0);
+        let list: Vec<String> = counts.map(|&of| format!("{} {}", count(of), of.name())).collect();
+        say::note(format_args!(
+            "warning: all of the first {} {unit} failed ({}); the rest may well do so, too: Ctrl-C ends the run",
+            batch.len(),
+            list.join(", ")
+        ));
     }
 }
 

@@ -208,7 +208,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
     let policy = DispatchPolicy::of(info.device_type);
-    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: None, policy, watcher: None })
+    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: None, policy, watcher: None, halt: Arc::default() })
 }
 
 /// What in the environment narrows the adapters down, as far as `choice` heeds it, and what to do about it; none

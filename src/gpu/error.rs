@@ -43,6 +43,9 @@ pub enum GpuError {
         /// The driver's words.
         message: String,
     },
+    /// Somebody raised the flag that the device heeds.
+    #[error("stopped on demand; finished cells are kept")]
+    Halted,
     /// The device computes something else than what is known.
     #[error(
         "{adapter} fails the known answer of e = {e}, omega = {omega} by {error:.1e}: its driver cannot be trusted; \

@@ -115,6 +115,8 @@ pub struct Settings {
     pub passes_per_period: u32,
     /// Events allowed in one period.
     pub events_per_period: u32,
+    /// Events allowed in all.
+    pub most_events: u32,
     /// Invocations along the first dimension of a dispatch.
     pub row: u32,
     /// Periods before averages are taken.
@@ -282,6 +284,8 @@ pub struct Tally {
     pub passed: u32,
     /// Cycles for which it has had the events of the cycle that is read.
     pub shown: u32,
+    /// Events of whole periods, whatever they were counted for.
+    pub all_events: u32,
     /// Distances per lag, in bytes.
     pub distances: [u32; 16],
     /// The same of the last window.

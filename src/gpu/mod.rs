@@ -30,6 +30,8 @@ mod transfer;
 mod unroll;
 
 use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use constants::{Constants, STEP_ANGLE};
 pub use device::{
@@ -51,6 +53,9 @@ use rattlemap_dynamics::model::{Law, Oscillator, State};
 /// Largest meshing speed with which lanes follow chatter by short flights, relative to half the walls' distance times
 /// the rate of free motion: above it too few of them are left to pay for.
 const FOLLOWED_MESH_SPEED: f64 = 4e-4;
+
+/// Events of all lanes at most, so that their count does not overflow.
+const MOST_EVENTS: u32 = 1 << 31;
 
 /// Whether lanes of such a meshing speed follow chatter by short flights.
 pub fn follows_chatter(oscillator: &Oscillator, mesh_speed: f64) -> bool {
@@ -115,6 +120,8 @@ pub struct LaneSettings {
     pub passes_per_period: u32,
     /// Events per period beyond which a cell ends.
     pub events_per_period: u32,
+    /// Events in all beyond which a cell ends: looked at once a period, less than 2^32 by those of one.
+    pub most_events: u32,
 }
 
 impl Default for LaneSettings {
@@ -139,6 +146,7 @@ impl Default for LaneSettings {
             workgroup: WORKGROUP,
             passes_per_period: MOST_STEPS,
             events_per_period: 10_000,
+            most_events: MOST_EVENTS,
         }
     }
 }
@@ -170,6 +178,7 @@ pub struct Gpu {
     rewrite: Option<fn(String) -> String>,
     policy: DispatchPolicy,
     watcher: Option<stage::Watcher>,
+    halt: Arc<AtomicBool>,
 }
 
 impl Gpu {
@@ -208,6 +217,15 @@ impl Gpu {
     /// Tells `watcher` from here on how far lanes have come: for measurements.
     pub fn watch(&mut self, watcher: impl Fn(Stage) + Send + Sync + 'static) {
         self.watcher = Some(Box::new(watcher));
+    }
+
+    /// Looks at a flag from here on: while it is raised, [`Gpu::advance`] returns after the present round.
+    pub fn heed(&mut self, halt: &Arc<AtomicBool>) {
+        self.halt = Arc::clone(halt);
+    }
+
+    fn is_halted(&self) -> bool {
+        self.halt.load(Ordering::Relaxed)
     }
 
     fn tell(&self, stage: Stage) {
@@ -290,6 +308,9 @@ impl Gpu {
             if pool.under_way() == 0 {
                 return Ok(records);
             }
+            if self.is_halted() {
+                return Err(GpuError::Halted);
+            }
             let until = if begun < lanes.len() { pool.under_way() / 2 } else { 0 };
             for ended in self.advance(&mut pool, tables, until).await? {
                 records[ended.number() as usize] = ended.record(tables.constants());
@@ -345,7 +366,8 @@ impl Gpu {
         pool.begin(self, tables, lanes).await
     }
 
-    /// Integrates until no more than `until` lanes are left; returns those that have ended.
+    /// Integrates until no more than `until` lanes are left; returns those that have ended. Only where a flag is
+    /// raised it may be that none has.
     ///
     /// # Errors
     /// What the device refuses; the pool is of no use then.

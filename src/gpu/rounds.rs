@@ -103,6 +103,7 @@ impl Rounds<'_> {
             let all_left = left.iter().sum::<u32>();
             checked += 1;
             if all_left <= until
+                || gpu.is_halted()
                 || (until > 0 && checked >= gpu.policy.patience && all_left < self.active_lanes)
             {
                 break;

@@ -166,6 +166,7 @@ fn uniform(
         iterations: settings.iterations,
         passes_per_period: settings.passes_per_period,
         events_per_period: settings.events_per_period,
+        most_events: settings.most_events,
         row: slots.row * settings.workgroup,
         transient_periods,
         growth_from: if late_tangent { averaging.growth_from } else { 0 },

@@ -10,6 +10,9 @@ mod flows;
 #[cfg(feature = "gpu")]
 mod gpu;
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use thiserror::Error;
 
 pub use cpu::Cpu;
@@ -132,6 +135,16 @@ impl Engine<'_> {
         }
     }
 
+    /// Looks at a flag from here on: while it is raised, [`Engine::advance`] soon returns what has ended by then.
+    pub fn heed(&mut self, halt: &Arc<AtomicBool>) {
+        match self {
+            Engine::Cpu(cpu) => cpu.halt = Arc::clone(halt),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => gpu.heed(halt),
+            Engine::Fake(_) => {}
+        }
+    }
+
     /// Takes up cells; their records come from [`Engine::advance`].
     ///
     /// # Errors
@@ -147,7 +160,7 @@ impl Engine<'_> {
     }
 
     /// Computes until some of the cells under way have ended, best until no more than `until` are left: the records
-    /// of those that have, by id. None if no cell is under way.
+    /// of those that have, by id. None if no cell is under way, or a raised flag is heeded.
     ///
     /// # Errors
     /// [`EngineError`], after which nothing is under way.

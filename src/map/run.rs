@@ -1,6 +1,6 @@
 //! A whole map at once, for who needs neither files nor progress.
 
-use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use thiserror::Error;
 
@@ -104,8 +104,8 @@ pub fn run(scene: &Scene, on: Processor) -> Result<Map, MapError> {
     let mut schedule = Schedule::new(&plan);
     let mut records = vec![Record::default(); plan.run_count()];
     let mut engine = open(&plan, on)?;
-    let go_on = |_: &[(u32, Record)], _| Ok(ControlFlow::Continue(()));
-    pollster::block_on(sweep::run(&plan, &mut schedule, &mut engine, &mut records, go_on))?;
+    let (halt, keep) = (Arc::default(), |_: &[(u32, Record)], _| Ok(()));
+    pollster::block_on(sweep::run(&plan, &mut schedule, &mut engine, &mut records, &halt, keep))?;
     drop(engine);
     let refined = schedule.finish(&mut records);
     Ok(Map { plan, records, refined })

@@ -1,7 +1,8 @@
 //! The run of a map. Cells go to an engine as soon as the schedule asks for them; records are kept as they come.
 
 use std::error::Error;
-use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use web_time::Instant;
@@ -33,7 +34,7 @@ pub enum SweepError {
 
 /// Runs the cells that a schedule asks for, puts their records into `records` (by
 /// run) and hands them to `keep` about once a second, with the number of runs that are foreseen by
-/// now; `keep` says whether to go on. True if the map is finished.
+/// now. It ends before, and soon, once `halt` is raised. True if the map is finished.
 ///
 /// So many cells are under way that some end in about a second; records do not depend on it. If there are too many
 /// for the engine's memory it gets half as many.
@@ -45,8 +46,10 @@ pub async fn run(
     schedule: &mut Schedule,
     engine: &mut Engine<'_>,
     records: &mut [Record],
-    mut keep: impl FnMut(&[(u32, Record)], usize) -> Result<ControlFlow<()>, Box<dyn Error + Send + Sync>>,
+    halt: &Arc<AtomicBool>,
+    mut keep: impl FnMut(&[(u32, Record)], usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
+    engine.heed(halt);
     let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH };
     let mut under_way = 0;
     let (mut unkept, mut last_kept) = (Vec::new(), Instant::now());
@@ -65,6 +68,7 @@ pub async fn run(
                 engine.advance(under_way / 2).await
             }
         };
+        let is_halted = halt.load(Ordering::Relaxed);
         let is_over = match &ended {
             Err(_) => true,
             Ok(ended) => {
@@ -75,18 +79,18 @@ pub async fn run(
                     schedule.take(id, records);
                 }
                 unkept.extend_from_slice(ended);
-                schedule.is_finished()
+                schedule.is_finished() || is_halted
             }
         };
         if !unkept.is_empty() && (is_over || last_kept.elapsed() >= KEPT_AFTER) {
-            let stops = keep(&unkept, schedule.expected()).map_err(SweepError::Keep)?.is_break();
+            keep(&unkept, schedule.expected()).map_err(SweepError::Keep)?;
             unkept.clear();
             last_kept = Instant::now();
-            if stops && ended.is_ok() && !schedule.is_finished() {
-                return Ok(false);
-            }
         }
         ended?;
+        if is_halted && !schedule.is_finished() {
+            return Ok(false);
+        }
     }
     Ok(true)
 }

@@ -2,7 +2,7 @@
 //! work was cut up.
 
 use std::collections::BTreeSet;
-use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use rattlemap::map::engine::{Cpu, Engine, EngineError, Fake};
 use rattlemap::map::plan::{Cell, Plan};
@@ -161,9 +161,9 @@ fn sweep(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, 
     let keep = |batch: &[(u32, Record)], _| {
         assert!(batch.iter().all(|(id, record)| record.period == id + 1));
         kept.extend(batch.iter().map(|(id, _)| *id));
-        Ok(ControlFlow::Continue(()))
+        Ok(())
     };
-    let end = pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, keep));
+    let end = pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), keep));
     (end, kept)
 }
 
@@ -222,10 +222,10 @@ fn slow_cells_hold_up_nobody() {
             let mut records = vec![Record::default(); plan.cell_count()];
             let keep = |batch: &[(u32, Record)], _| {
                 kept.extend(batch.iter().map(|(id, _)| *id));
-                Ok(ControlFlow::Continue(()))
+                Ok(())
             };
             let engine = &mut Engine::Fake(fake);
-            let end = pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, keep));
+            let end = pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, &Arc::default(), keep));
             assert!(end.unwrap());
             let refined = schedule.finish(&mut records);
             (kept, records, refined)
@@ -258,9 +258,9 @@ fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_oft
     let plan = Plan::new(&scene(256, &sets));
     let mut measured = vec![Record::default(); plan.cell_count()];
     let engine = &mut Engine::Cpu(Cpu::new(&plan));
-    let go_on = |_: &[(u32, Record)], _| Ok(ControlFlow::Continue(()));
+    let (halt, keep) = (Arc::default(), |_: &[(u32, Record)], _| Ok(()));
     let mut schedule = Schedule::new(&plan);
-    assert!(pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, go_on)).unwrap());
+    assert!(pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, &halt, keep)).unwrap());
     let mut integrated = schedule.sequence().to_vec();
     integrated.sort_unstable();
     let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();

@@ -3,7 +3,7 @@
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
 use std::fs;
-use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::path::Path;
 
 use crate::common::pair_at;
@@ -56,9 +56,9 @@ fn swept(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
     let mut records = vec![Record::default(); plan.run_count()];
     let go_on = |_: &[(u32, Record)], expected| {
         assert_eq!(expected, plan.run_count());
-        Ok(ControlFlow::Continue(()))
+        Ok(())
     };
-    assert!(pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, go_on)).unwrap());
+    assert!(pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), go_on)).unwrap());
     records
 }
 

@@ -11,7 +11,7 @@ use rattlemap::output::{Folder, OutputError, WriteError};
 use rattlemap_dynamics::model::{GearPair, Model};
 
 /// All that a folder may hold: what an earlier run left goes before anything is written.
-const FILES: [&str; 14] = [
+const FILES: [&str; 15] = [
     MANIFEST,
     "long_runs.csv",
     "long_runs.png",
@@ -24,6 +24,7 @@ const FILES: [&str; 14] = [
     "grid_swings.csv",
     "grid_motions.csv",
     "grid.png",
+    "work.csv",
     "fuzz.csv",
     "fuzz_mismatches.csv",
 ];
@@ -102,6 +103,9 @@ pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> Result<Vec<&'
         file("grid_swings.csv", &|path| rows(path, &found.swings))?;
         file("grid_motions.csv", &|path| rows(path, &found.motions))?;
         file("grid.png", &|path| Ok(figures::grid(path, device, &found.swings)?))?;
+    }
+    if let Some(found) = &report.work {
+        file("work.csv", &|path| rows(path, found))?;
     }
     if let Some(found) = &report.fuzz {
         file("fuzz.csv", &|path| rows(path, &found.counts))?;

@@ -20,7 +20,7 @@ fn stress_judges_every_part_and_writes_its_folder() {
     };
     let said = run(&[]).success().stdout("").get_output().stderr.clone();
     let said = String::from_utf8(said).unwrap();
-    for part in ["long_runs", "impacts", "grazing", "chatter", "stiffness", "grid", "fuzz"] {
+    for part in ["long_runs", "impacts", "grazing", "chatter", "stiffness", "grid", "work", "fuzz"] {
         let line = said.lines().find(|line| line.starts_with(part));
         assert!(line.is_some_and(|line| line.contains("holds: ")), "{part}: {said}");
     }

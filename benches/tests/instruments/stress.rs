@@ -58,6 +58,14 @@ fn no_grid_is_too_coarse_to_see_an_event() {
     holds(&stress::grid::judge(&rows));
 }
 
+/// Two hundred cells are part of `stress_judges_every_part_and_writes_its_folder`, a hundred thousand of the full run.
+#[test]
+fn every_cell_ends_soon() {
+    let rows = stress::work::measure_cells(Size::Small, SEED, &());
+    rows.iter().for_each(|row| println!("{row:?}"));
+    holds(&stress::work::judge(&rows));
+}
+
 /// A thousand cells; the first 200 of them are part of `stress_judges_every_part_and_writes_its_folder`.
 #[test]
 #[ignore = "a minute; scripts/test.sh --all"]

@@ -7,7 +7,7 @@ use super::recurrence::{Candidate, Metric, candidates};
 use super::{Class, Orbit, Settings, Status};
 use crate::flow::Flow;
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
-use crate::reference::{Observer, Stop, Trajectory};
+use crate::reference::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap};
 use crate::word::Word;
 
@@ -40,8 +40,9 @@ const WITHIN_REACH: f64 = 0.3;
 /// Checks of an approach on the way; at each the trajectory must have come nearer.
 const APPROACH_CHECKS: u32 = 4;
 
-/// Steps that one cell may take before it ends as too stiff: about a minute.
-const STEPS_CAP: u64 = 1_000_000_000;
+/// Work that one motion may take: about a minute.
+const ALLOWANCE: Allowance<'static> =
+    Allowance { steps: 1_000_000_000, events: 200_000_000, ..Allowance::UNLIMITED };
 
 /// An undecided motion that has taken this many steps is not observed for longer.
 const EXTENSION_STEPS: u64 = 100_000_000;
@@ -134,9 +135,9 @@ pub(super) struct Analysis<'a> {
 impl Analysis<'_> {
     /// Counts in `periods_run` how long the motion is followed.
     fn run(&self, start: State, periods_run: &mut u64) -> Result<Orbit, Stop> {
-        let mut trajectory = Trajectory::new(self.flow, self.law, start);
+        let mut trajectory = Trajectory::new(self.flow, self.law, start).allowing(ALLOWANCE);
         for _ in 0..self.settings.transient_periods {
-            self.advance(&mut trajectory, &mut ())?;
+            trajectory.advance_period(&mut ())?;
             *periods_run += 1;
         }
         if let Some(orbit) = self.non_impacting(&trajectory)? {
@@ -190,18 +191,6 @@ impl Analysis<'_> {
         surely * window.strobes.len() as f64 * self.flow.period > ESCAPE_GROWTH
     }
 
-    /// One forcing period, within the cell's cap.
-    fn advance<const N: usize>(
-        &self,
-        trajectory: &mut Trajectory<'_, N>,
-        observer: &mut impl Observer,
-    ) -> Result<(), Stop> {
-        if trajectory.work().steps > STEPS_CAP {
-            return Err(Stop::TooStiff);
-        }
-        trajectory.advance_period(observer)
-    }
-
     /// Watches strobe states, the exponent and the averages for `length` periods.
     fn observe(
         &self,
@@ -212,7 +201,7 @@ impl Analysis<'_> {
         let mut carrier = trajectory.carrying([FRESH_TANGENT]);
         let mut exponent = Exponent::default();
         for _ in 0..TANGENT_PERIODS.min(length) {
-            self.advance(&mut carrier, &mut ())?;
+            carrier.advance_period(&mut ())?;
             *periods_run += 1;
             exponent.renormalise(&mut carrier);
         }
@@ -220,7 +209,7 @@ impl Analysis<'_> {
         let (mesh_start, impacts_start) = (carrier.meshing_time(), carrier.work().impacts);
         let mut strobes = vec![carrier.state()];
         for _ in 0..length {
-            self.advance(&mut carrier, &mut ())?;
+            carrier.advance_period(&mut ())?;
             *periods_run += 1;
             exponent.renormalise(&mut carrier);
             strobes.push(carrier.state());
@@ -319,7 +308,7 @@ impl Analysis<'_> {
         let mut last = before;
         for _ in 0..APPROACH_CHECKS {
             for _ in 0..cycle.period * (cycles / f64::from(APPROACH_CHECKS)).ceil() as u32 {
-                self.advance(&mut ahead, &mut ())?;
+                ahead.advance_period(&mut ())?;
             }
             let now = metric.distance(&ahead.state(), &cycle.state);
             if now >= last && now > ON_CYCLE {
@@ -355,7 +344,7 @@ impl Analysis<'_> {
             let mut is_alike = true;
             for itinerary in &shown {
                 let mut recorder = Recorder::new(self.flow);
-                self.advance(ahead, &mut recorder)?;
+                ahead.advance_period(&mut recorder)?;
                 is_alike &= recorder.itinerary == *itinerary;
             }
             strobes.push(ahead.state());

@@ -2,6 +2,7 @@
 
 use super::Settings;
 use super::analysis::TANGENT_PERIODS;
+use crate::reference::Allowance;
 
 /// An exponent that is shown accumulates from this period on, or from the end of a shorter
 /// transient.
@@ -25,6 +26,11 @@ const HASTY_CHAOS_FROM: u32 = 2;
 
 /// Periods, at least, over which an exponent is averaged before chaos is called early.
 const LEAST_AVERAGED: u32 = 32;
+
+/// Steps and events that a cell may take for each of the periods that it may take: a thousand times what gears take in
+/// one. Of 528 periods' worth, a core takes some tenths of a second.
+const STEPS_PER_PERIOD: u64 = 20_000;
+const EVENTS_PER_PERIOD: u64 = 2_000;
 
 /// How long one cell is integrated, and what for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +58,13 @@ impl Budget {
     pub fn longest(&self) -> u32 {
         let more = if self.early_stop { self.undecided_periods } else { 0 };
         self.periods().saturating_add(more)
+    }
+
+    /// Work that one cell may take, searches for cycles included.
+    pub fn allowance(&self) -> Allowance<'static> {
+        let longest = u64::from(self.longest());
+        let [steps, events] = [STEPS_PER_PERIOD, EVENTS_PER_PERIOD].map(|share| share * longest);
+        Allowance { steps, events, ..Allowance::UNLIMITED }
     }
 
     /// The period from which the exponent accumulates.

@@ -5,6 +5,7 @@
 //! strobe states that have passed, so that nothing is integrated ahead of the budget.
 
 use std::cell::{Cell, OnceCell};
+use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
 use super::analysis::{APPROACH, Analysis, ESCAPE_GROWTH, ON_CYCLE, status_of};
@@ -16,7 +17,7 @@ use super::recurrence::{Metric, NEAR, candidates, near_saddle};
 use super::{Budget, Orbit, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
-use crate::reference::{Stop, Trajectory};
+use crate::reference::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton};
 use crate::word::Word;
 
@@ -76,11 +77,35 @@ impl Measured {
 
 /// Integrates one cell from `start` at phase 0 within its budget.
 pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measured {
+    measure_within(flow, law, start, budget, budget.allowance())
+}
+
+/// [`measure`] until a flag is raised; none if it was by then.
+pub fn measure_until(
+    flow: &Flow,
+    law: Law,
+    start: State,
+    budget: &Budget,
+    halt: &AtomicBool,
+) -> Option<Measured> {
+    let allowance = budget.allowance().until(halt);
+    let measured = measure_within(flow, law, start, budget, allowance);
+    (!allowance.is_halted()).then_some(measured)
+}
+
+fn measure_within(
+    flow: &Flow,
+    law: Law,
+    start: State,
+    budget: &Budget,
+    allowance: Allowance<'_>,
+) -> Measured {
     let settings = &budget.settings;
     let analysis = Analysis { flow, law, settings, shown_periods: 0 };
     let mut watch = Watch {
         analysis: &analysis,
         budget,
+        allowance,
         strobes: vec![start],
         exponent: Exponent::default(),
         cycle: None,
@@ -107,6 +132,8 @@ struct Found<'a> {
 struct Watch<'a> {
     analysis: &'a Analysis<'a>,
     budget: &'a Budget,
+    /// What the motion and Newton's searches may take together.
+    allowance: Allowance<'a>,
     /// Strobe states from the start on; entry `n` after `n` periods.
     strobes: Vec<State>,
     exponent: Exponent,
@@ -130,7 +157,8 @@ impl<'a> Watch<'a> {
         let exponent_from = self.budget.exponent_from();
         let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
         let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { last };
-        let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start);
+        let mut bare =
+            Trajectory::new(self.analysis.flow, self.analysis.law, start).allowing(self.allowance);
         while bare.period() < u64::from(turning_from) {
             if let Some(measured) = self.period(&mut bare, &mut next_check, last)? {
                 return Ok(measured);
@@ -177,6 +205,9 @@ impl<'a> Watch<'a> {
             let strobe = if is_last { trajectory.state() } else { orbit.strobe };
             return Ok(Some(self.periodic(orbit, strobe)));
         }
+        let mut work = trajectory.work();
+        work += self.newton.work();
+        self.allowance.covers(work)?;
         Ok(match now {
             // Its search fails where a degree of freedom at rest would not decay.
             _ if now == last && self.is_non_impacting(trajectory) => Some(self.non_impacting()),

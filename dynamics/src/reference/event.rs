@@ -1,24 +1,26 @@
 //! What a trajectory reports: its events, why it ended, and the work it took.
 
+use std::ops::AddAssign;
+
 use crate::flow::Gap;
 use crate::model::Side;
 
 /// Events allowed in one forcing period.
 pub const EVENTS_PER_PERIOD_CAP: u64 = 1_000_000;
 
-/// Steps allowed in one forcing period, halved ones included.
-pub const STEPS_PER_PERIOD_CAP: u64 = 200_000_000;
+/// Steps allowed in one forcing period, halved ones included: some tenths of a second.
+pub const STEPS_PER_PERIOD_CAP: u64 = 20_000_000;
 
 /// Why a trajectory could not be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Stop {
-    /// More than [`EVENTS_PER_PERIOD_CAP`] events in one period.
-    #[error("more than {EVENTS_PER_PERIOD_CAP} events in one forcing period")]
+    /// More than [`EVENTS_PER_PERIOD_CAP`] events in one period, or than the [`Allowance`](super::Allowance) has.
+    #[error("more than {EVENTS_PER_PERIOD_CAP} events in one forcing period, or than one cell is allowed")]
     CapEvents,
     /// A root that does not converge, or more than [`STEPS_PER_PERIOD_CAP`] steps in one period.
     #[error("more than {STEPS_PER_PERIOD_CAP} steps in one forcing period, or a root that does not converge")]
     CapRoot,
-    /// More steps in all than the caller allows one cell.
+    /// More steps in all than the [`Allowance`](super::Allowance) has.
     #[error("too stiff: more steps than one cell is allowed")]
     TooStiff,
     /// The state is not finite any more.
@@ -87,4 +89,14 @@ pub struct Work {
     pub impacts: u64,
     /// Iterations on exact Taylor polynomials.
     pub root_iterations: u64,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Work) {
+        self.steps += other.steps;
+        self.halvings += other.halvings;
+        self.events += other.events;
+        self.impacts += other.impacts;
+        self.root_iterations += other.root_iterations;
+    }
 }

@@ -1,7 +1,7 @@
 //! Where a trajectory begins: free, in contact or meshing.
 
 use super::clock::Clock;
-use super::{Mode, Trajectory, Work};
+use super::{Allowance, Mode, Trajectory, Work};
 use crate::flow::{DomainKind, Flow};
 use crate::model::{Law, Side, State};
 
@@ -56,6 +56,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             meshing_time: 0.0,
             near_grazing: false,
             work: Work::default(),
+            allowance: Allowance::UNLIMITED,
         };
         trajectory.enter();
         trajectory
@@ -84,13 +85,15 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             meshing_time: self.meshing_time,
             near_grazing: self.near_grazing,
             work: self.work,
+            allowance: self.allowance,
         }
     }
 
     /// A trajectory from another state at phase 0, in the domain that this one is in.
     ///
     /// A state alone does not say whether a gap just short of a wall is free or in the contact onset
-    /// at the start of meshing; neighbours of a motion that is have to be told.
+    /// at the start of meshing; neighbours of a motion that is have to be told. It is allowed what is left of this
+    /// one's work.
     pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
         Trajectory {
             mode: self.mode,
@@ -98,6 +101,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             from_wall: None,
             short_flight: false,
             pending: None,
+            allowance: self.allowance(),
             ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
         }
     }

@@ -7,7 +7,7 @@ use super::unit_circle::lies_within_unit_circle;
 use super::{Cycle, Image, StrobeMap, balanced, multipliers};
 use crate::flow::Flow;
 use crate::model::{Model, State};
-use crate::reference::Trajectory;
+use crate::reference::{Trajectory, Work};
 
 /// How long Newton's method tries.
 #[derive(Clone, Copy, Debug)]
@@ -60,12 +60,18 @@ pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Newton {
     half_periods: u32,
+    work: Work,
 }
 
 impl Newton {
     /// Forcing periods integrated with four tangent vectors, rounded up.
     pub(crate) fn periods(&self) -> u32 {
         self.half_periods.div_ceil(2)
+    }
+
+    /// Work that they took.
+    pub(crate) fn work(&self) -> Work {
+        self.work
     }
 
     /// [`refine`].
@@ -87,10 +93,12 @@ impl Newton {
         if expands(&image)? { None } else { self.search(seed, map, image, HASTY, is_near) }
     }
 
-    /// A map's image, if the trajectory can be continued.
+    /// A map's image, if the trajectory can be continued, and within what all searches leave of its allowance.
     pub(crate) fn apply(&mut self, map: StrobeMap, seed: &Trajectory<'_>, y: State) -> Option<Image> {
+        let allowance = seed.allowance();
+        allowance.covers(self.work).ok()?;
         self.half_periods += map.half_periods();
-        map.apply(seed, y).ok()
+        map.apply_counting(&seed.clone().allowing(allowance.after(self.work)), y, &mut self.work).ok()
     }
 
     /// Newton's method from the state of `seed` with its `image`, as long as its steps aim at states

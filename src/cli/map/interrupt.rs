@@ -1,53 +1,81 @@
-//! Ctrl-C: the first one asks a run to end, the second one ends it.
+//! Ctrl-C and SIGTERM: the first one asks a run to end, the second one ends it.
 
 use std::process;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 
 use anyhow::Context;
+use signal_hook::consts::{SIGINT, SIGTERM};
 
-use crate::cli::error::Failure;
+use crate::cli::error::{Failure, SIGNALLED};
 use crate::cli::say;
 
-/// Exit code after a second Ctrl-C, as shells count it.
-const KILLED: i32 = 130;
-
-/// Whether there was a Ctrl-C.
+/// Whether a signal has come, and which.
 #[derive(Clone, Default)]
 pub(super) struct Interrupt {
     raised: Arc<AtomicBool>,
+    signal: Arc<AtomicI32>,
     /// Whether cells are under way by now.
     integrating: Arc<AtomicBool>,
 }
 
 impl Interrupt {
-    /// Listens from now on. A second Ctrl-C ends the process at once, which record files survive.
+    /// Listens from now on. A second signal ends the process at once, which record files survive.
+    #[cfg(unix)]
     pub(super) fn listen(quiet: bool) -> Result<Interrupt, Failure> {
         let interrupt = Interrupt::default();
-        let Interrupt { raised, integrating } = interrupt.clone();
-        ctrlc::set_handler(move || {
-            if raised.swap(true, Ordering::Relaxed) {
-                process::exit(KILLED);
-            }
-            let once = match integrating.load(Ordering::Relaxed) {
-                true => "some cells have ended",
-                false => "the engine is open",
-            };
-            if !quiet {
-                say::note(format_args!("stopping as soon as {once}; Ctrl-C again ends at once"));
-            }
-        })
-        .context("cannot listen for Ctrl-C")?;
+        let heard = interrupt.clone();
+        let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])
+            .context("cannot listen for signals")?;
+        std::thread::spawn(move || signals.forever().for_each(|signal| heard.hear(signal, quiet)));
         Ok(interrupt)
+    }
+
+    /// Listens from now on.
+    #[cfg(not(unix))]
+    pub(super) fn listen(_: bool) -> Result<Interrupt, Failure> {
+        let interrupt = Interrupt::default();
+        interrupt.signal.store(SIGINT, Ordering::Relaxed);
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register_conditional_shutdown(
+                signal,
+                SIGNALLED + signal,
+                Arc::clone(&interrupt.raised),
+            )
+            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&interrupt.raised)))
+            .context("cannot listen for signals")?;
+        }
+        Ok(interrupt)
+    }
+
+    #[cfg(unix)]
+    fn hear(&self, signal: i32, quiet: bool) {
+        self.signal.store(signal, Ordering::Relaxed);
+        if self.raised.swap(true, Ordering::Relaxed) {
+            process::exit(SIGNALLED + signal);
+        }
+        let once = match self.integrating.load(Ordering::Relaxed) {
+            true => "what has ended is kept",
+            false => "the engine is open",
+        };
+        if !quiet {
+            say::note(format_args!("stopping as soon as {once}; Ctrl-C again ends at once"));
+        }
     }
 
     /// Says that cells are under way; false if nobody wants them any more.
     pub(super) fn begin(&self) -> bool {
         self.integrating.store(true, Ordering::Relaxed);
-        !self.is_raised()
+        !self.raised.load(Ordering::Relaxed)
     }
 
-    pub(super) fn is_raised(&self) -> bool {
-        self.raised.load(Ordering::Relaxed)
+    /// The flag that is raised.
+    pub(super) fn raised(&self) -> &Arc<AtomicBool> {
+        &self.raised
+    }
+
+    /// A run that it ended, in words.
+    pub(super) fn failure(&self, words: anyhow::Error) -> Failure {
+        Failure::Interrupted { signal: self.signal.load(Ordering::Relaxed), words }
     }
 }

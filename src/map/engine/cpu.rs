@@ -1,5 +1,7 @@
 //! The reference as an engine: one cell per task on all processor cores.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use rayon::prelude::*;
@@ -9,7 +11,7 @@ use super::flows::Flows;
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::orbit::{Measured, measure};
+use rattlemap_dynamics::orbit::{Measured, measure_until};
 
 /// Cells that have ended wait no longer than this for others to begin.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -19,12 +21,14 @@ pub struct Cpu<'p> {
     plan: &'p Plan,
     flows: Flows<'p>,
     under_way: Vec<Cell>,
+    /// Raised by whoever wants no more cells.
+    pub(super) halt: Arc<AtomicBool>,
 }
 
 impl<'p> Cpu<'p> {
     /// An engine for the cells of a plan.
     pub fn new(plan: &'p Plan) -> Cpu<'p> {
-        Cpu { plan, flows: Flows::new(plan), under_way: Vec::new() }
+        Cpu { plan, flows: Flows::new(plan), under_way: Vec::new(), halt: Arc::default() }
     }
 
     pub(super) fn least_batch(&self) -> usize {
@@ -43,17 +47,21 @@ impl<'p> Cpu<'p> {
             .par_iter()
             .with_max_len(1)
             .enumerate()
-            .map(|(i, cell)| (i == 0 || clock.elapsed() < PATIENCE).then(|| (cell.id, self.cell(cell))))
+            .map(|(i, cell)| {
+                let record = (i == 0 || clock.elapsed() < PATIENCE).then(|| self.cell(cell))??;
+                Some((cell.id, record))
+            })
             .collect();
         let left = cells.iter().zip(&ended).filter(|(_, ended)| ended.is_none());
         self.under_way.extend(left.map(|(cell, _)| *cell));
         ended.into_iter().flatten().collect()
     }
 
-    fn cell(&self, cell: &Cell) -> Record {
-        let of = |flow: &Flow| measure(flow, self.plan.law(cell.law), cell.start, self.plan.budget());
-        let measured = self.flows.with(cell.flow, of);
-        record(&measured, self.plan.needs())
+    /// None if somebody wants no more cells.
+    fn cell(&self, cell: &Cell) -> Option<Record> {
+        let (law, budget) = (self.plan.law(cell.law), self.plan.budget());
+        let of = |flow: &Flow| measure_until(flow, law, cell.start, budget, &self.halt);
+        self.flows.with(cell.flow, of).map(|measured| record(&measured, self.plan.needs()))
     }
 }
 

@@ -1,6 +1,8 @@
 //! Lanes on a graphics device as an engine.
 
 use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
@@ -71,6 +73,10 @@ impl<'p> Gpu<'p> {
     /// The device, for another plan.
     pub fn into_device(self) -> gpu::Gpu {
         self.device
+    }
+
+    pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
+        self.device.heed(halt);
     }
 
     pub(super) fn precision(&self) -> &'static str {
@@ -153,6 +159,7 @@ impl<'p> Gpu<'p> {
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if cells.len() > 1 => {
                     self.most_waiting = cells.len() / 2;
                 }
+                Err(GpuError::Halted) => return Ok(Vec::new()),
                 Err(error) => return Err(error),
                 Ok(records) => {
                     self.waiting.truncate(left);
@@ -251,6 +258,7 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
         exponent_from: budget.exponent_from(),
         chaos_from: budget.chaos_from(),
         chaos_errors: budget.chaos_errors() as f32,
+        most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: match plan.steps_per_period() {
             Steps::Auto => None,
             Steps::PerPeriod(steps) => Some(steps),

@@ -1,0 +1,138 @@
+//! Work of single cells: does every cell of a map end soon, whatever its parameters?
+//!
+//! Parameters are drawn log-uniform over two decades to either side of the defaults, restitution evenly, starts up to ten
+//! thousand times the backlash and its frequency. Each cell takes what a map allows it: 528 periods, without early
+//! stops in one half of the cells. Time is that of a core, whatever else runs beside it.
+
+use cpu_time::ThreadTime;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::cells::flow_of;
+use super::{Part, Size, Verdict, Watch};
+use rattlemap::map::random::Random;
+use rattlemap_dynamics::model::GearPair;
+use rattlemap_dynamics::orbit::{Budget, Settings, Status, measure};
+
+/// A cell may take so many seconds of one core.
+const SECONDS: f64 = 1.0;
+
+/// Cells between two reports of progress.
+const BLOCK: usize = 256;
+
+/// The cells that share a status.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// How they ended.
+    pub status: &'static str,
+    /// How many.
+    pub cells: usize,
+    /// Seconds of one core: the median, that which one in a hundred and one in a thousand exceed, the worst.
+    pub median: f64,
+    /// See `median`.
+    pub p99: f64,
+    /// See `median`.
+    pub p999: f64,
+    /// See `median`.
+    pub worst: f64,
+}
+
+/// Measures every cell, on all cores.
+pub fn measure_cells(size: Size, seed: u64, watch: &dyn Watch) -> Vec<Row> {
+    let count = size.pick(200, 1_000, 100_000);
+    let numbers: Vec<u64> = (0..count as u64).collect();
+    let mut times: Vec<(Status, f64)> = Vec::with_capacity(count);
+    for block in numbers.chunks(BLOCK) {
+        times.par_extend(block.par_iter().with_max_len(1).map(|&n| time(seed, n)));
+        watch.progress("cells timed", times.len(), count);
+    }
+    let all = row("all", times.iter().map(|&(_, seconds)| seconds).collect());
+    let by_status = Status::ALL.iter().map(|&status| {
+        let of = |&(other, seconds): &(Status, f64)| (other == status).then_some(seconds);
+        row(status.name(), times.iter().filter_map(of).collect())
+    });
+    [all].into_iter().chain(by_status).filter(|row| row.cells > 0).collect()
+}
+
+fn row(status: &'static str, mut seconds: Vec<f64>) -> Row {
+    seconds.sort_by(f64::total_cmp);
+    let quantile = |share: f64| {
+        let place = (share * seconds.len() as f64) as usize;
+        seconds.get(place.min(seconds.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    };
+    Row {
+        status,
+        cells: seconds.len(),
+        median: quantile(0.5),
+        p99: quantile(0.99),
+        p999: quantile(0.999),
+        worst: quantile(1.0),
+    }
+}
+
+/// How the `n`th cell ends, and what it takes.
+fn time(seed: u64, n: u64) -> (Status, f64) {
+    let mut random = Random::new(seed ^ (n << 20));
+    let (pair, start) = cell(&mut random);
+    let budget = Budget {
+        settings: Settings::default(),
+        early_stop: n.is_multiple_of(2),
+        undecided_periods: 0,
+        exponent: true,
+        shows_exponent: true,
+    };
+    let clock = ThreadTime::now();
+    let flow = flow_of(&pair);
+    let status = measure(&flow, pair.law(), start, &budget).status;
+    (status, clock.elapsed().as_secs_f64())
+}
+
+fn cell(random: &mut Random) -> (GearPair, [f64; 4]) {
+    let paper = GearPair::paper(random.unit());
+    let mut about = |value: f64| value * 10f64.powf(4.0 * random.unit() - 2.0);
+    let pair = GearPair {
+        m1: about(paper.m1),
+        m2: about(paper.m2),
+        r1: about(paper.r1),
+        r2: about(paper.r2),
+        k1: about(paper.k1),
+        k2: about(paper.k2),
+        r: about(paper.r),
+        k: about(paper.k),
+        force: about(paper.force),
+        omega: about(paper.omega),
+        b: about(paper.b),
+        mesh_speed: about(paper.mesh_speed),
+        ..paper
+    };
+    // Undamped, elastic pairs keep what speed they start with.
+    let undamped = GearPair { r1: 0.0, r2: 0.0, r: 0.0, e: 1.0 - 1e-3 * random.unit(), ..pair };
+    let pair = if random.unit() < 0.1 { undamped } else { pair };
+    let size = 10f64.powf(4.0 * random.unit());
+    let rest = random.unit() < 0.5;
+    let start = std::array::from_fn(|_| if rest { 0.0 } else { size * (2.0 * random.unit() - 1.0) });
+    (pair, start)
+}
+
+/// No cell takes longer than a second of one core.
+pub fn judge(rows: &[Row]) -> Verdict {
+    let Some(all) = rows.first() else {
+        return Verdict { part: Part::Work.name(), holds: false, sentence: "no cell was timed".into() };
+    };
+    let statuses: Vec<String> =
+        rows[1..].iter().map(|row| format!("{} {}", row.cells, row.status)).collect();
+    Verdict {
+        part: Part::Work.name(),
+        holds: all.cells > 0 && all.worst <= SECONDS,
+        sentence: format!(
+            "{} random cells ({}): median {:.1} ms of a core, one in 100 above {:.0} ms, one in 1,000 above {:.0} ms, \
+             the slowest {:.0} ms",
+            all.cells,
+            statuses.join(", "),
+            1e3 * all.median,
+            1e3 * all.p99,
+            1e3 * all.p999,
+            1e3 * all.worst
+        ),
+    }
+}
