@@ -196,9 +196,7 @@ fn integrate(
         Ok(())
     };
     let swept = match interrupt.begin() {
-        true => {
-            pollster::block_on(sweep::run(plan, schedule, engine, records, interrupt.raised(), keep))
-        }
+        true => pollster::block_on(sweep::run(plan, schedule, engine, records, interrupt.raised(), keep)),
         false => Ok(false),
     };
     let go_on = || {

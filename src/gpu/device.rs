@@ -178,7 +178,7 @@ pub fn interface_rank(info: &wgpu::AdapterInfo) -> &'static str {
 }
 
 /// Slots that a pool has at most: below 1 GB on the device.
-const MOST_SLOTS: usize = 1 << 20;
+const MOST_SLOTS: usize = 1 << 19;
 
 /// Slots that an adapter's limits allow.
 pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
@@ -208,7 +208,18 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
     let policy = DispatchPolicy::of(info.device_type);
-    Ok(Gpu { device, queue, info, precision, pipelines, trouble, rewrite: None, policy, watcher: None, halt: Arc::default() })
+    Ok(Gpu {
+        device,
+        queue,
+        info,
+        precision,
+        pipelines,
+        trouble,
+        rewrite: None,
+        policy,
+        watcher: None,
+        halt: Arc::default(),
+    })
 }
 
 /// What in the environment narrows the adapters down, as far as `choice` heeds it, and what to do about it; none

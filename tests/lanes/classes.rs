@@ -8,7 +8,7 @@ use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
 use rattlemap_dynamics::model::GearPair;
-use rattlemap_dynamics::orbit::Class;
+use rattlemap_dynamics::orbit::{Class, Status};
 
 /// Seven points within a thousandth of the motion: shorter lags recur, and Newton's method leaves the motion's
 /// branch from there. Lanes that set out from the same point again, as if nothing had happened, did so for ever.
@@ -62,6 +62,18 @@ fn a_cycle_approached_from_either_side_in_turn_is_not_its_double() {
             let is_known = matches!(class, Class::Periodic { period: 3 } | Class::Chaotic | Class::Undecided);
             assert!(is_known, "{precision:?}: {record:?}");
         }
+    }
+}
+
+/// A cycle of period 15 whose points lie closer together than single precision tells apart.
+#[test]
+fn a_cycle_below_the_resolution_says_so() {
+    let cell = [pair(0.4637964774951076, 1.7749510763209393)];
+    let settings = LaneSettings { undecided_periods: 1584, ..LaneSettings::default() };
+    for (precision, status) in [(Precision::F32, Status::BelowResolution), (Precision::F64, Status::Ok)] {
+        let record = run_from_rest(&mut open(precision), &cell, &settings)[0];
+        assert_eq!(classify(&record), Class::Periodic { period: 15 }, "{precision:?}: {record:?}");
+        assert_eq!(record.status, status.code(), "{precision:?}: {record:?}");
     }
 }
 

@@ -10,3 +10,4 @@ mod early_stops;
 mod engines_agree;
 mod independence;
 mod shaders;
+mod work;

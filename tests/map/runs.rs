@@ -163,7 +163,8 @@ fn sweep(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, 
         kept.extend(batch.iter().map(|(id, _)| *id));
         Ok(())
     };
-    let end = pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), keep));
+    let end =
+        pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), keep));
     (end, kept)
 }
 
@@ -225,7 +226,14 @@ fn slow_cells_hold_up_nobody() {
                 Ok(())
             };
             let engine = &mut Engine::Fake(fake);
-            let end = pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut records, &Arc::default(), keep));
+            let end = pollster::block_on(sweep::run(
+                &plan,
+                &mut schedule,
+                engine,
+                &mut records,
+                &Arc::default(),
+                keep,
+            ));
             assert!(end.unwrap());
             let refined = schedule.finish(&mut records);
             (kept, records, refined)
@@ -260,7 +268,9 @@ fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_oft
     let engine = &mut Engine::Cpu(Cpu::new(&plan));
     let (halt, keep) = (Arc::default(), |_: &[(u32, Record)], _| Ok(()));
     let mut schedule = Schedule::new(&plan);
-    assert!(pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, &halt, keep)).unwrap());
+    assert!(
+        pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, &halt, keep)).unwrap()
+    );
     let mut integrated = schedule.sequence().to_vec();
     integrated.sort_unstable();
     let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();

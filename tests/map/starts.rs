@@ -3,8 +3,8 @@
 //! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
 
 use std::fs;
-use std::sync::Arc;
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::common::pair_at;
 use crate::common::{REST, apart, gpu};
@@ -58,7 +58,10 @@ fn swept(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
         assert_eq!(expected, plan.run_count());
         Ok(())
     };
-    assert!(pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), go_on)).unwrap());
+    assert!(
+        pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), go_on))
+            .unwrap()
+    );
     records
 }
 

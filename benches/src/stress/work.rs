@@ -119,8 +119,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
     let Some(all) = rows.first() else {
         return Verdict { part: Part::Work.name(), holds: false, sentence: "no cell was timed".into() };
     };
-    let statuses: Vec<String> =
-        rows[1..].iter().map(|row| format!("{} {}", row.cells, row.status)).collect();
+    let statuses: Vec<String> = rows[1..].iter().map(|row| format!("{} {}", row.cells, row.status)).collect();
     Verdict {
         part: Part::Work.name(),
         holds: all.cells > 0 && all.worst <= SECONDS,

@@ -157,8 +157,7 @@ impl<'a> Watch<'a> {
         let exponent_from = self.budget.exponent_from();
         let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
         let mut next_check = if self.budget.early_stop { FIRST_CHECK.min(budget) } else { last };
-        let mut bare =
-            Trajectory::new(self.analysis.flow, self.analysis.law, start).allowing(self.allowance);
+        let mut bare = Trajectory::new(self.analysis.flow, self.analysis.law, start).allowing(self.allowance);
         while bare.period() < u64::from(turning_from) {
             if let Some(measured) = self.period(&mut bare, &mut next_check, last)? {
                 return Ok(measured);

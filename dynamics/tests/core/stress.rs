@@ -1,9 +1,12 @@
 //! Corners of the parameter space: every cell ends, in finite states or in a named stop, and
 //! with a bounded amount of work.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
 use crate::common::{REST, apart, flow_of, negated, paper, sign, strobe, work_since};
 use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
+use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse, measure, measure_until};
 use rattlemap_dynamics::reference::{EVENTS_PER_PERIOD_CAP, Happening, Stop, Trajectory, Work};
 use rayon::prelude::*;
 
@@ -336,4 +339,53 @@ fn answers_do_not_depend_on_the_unit_of_length() {
             }
         }
     }
+}
+
+/// Undamped and nearly elastic, a pair keeps what speed it starts with: a hundred thousand impacts in every period.
+#[test]
+fn a_cell_may_take_so_much_and_no_more() {
+    let settings = Settings { transient_periods: 20, observed_periods: 12, max_period: 4 };
+    let budget =
+        Budget { settings, early_stop: true, undecided_periods: 0, exponent: true, shows_exponent: true };
+    let allowance = budget.allowance();
+    let undamped = GearPair { r1: 0.0, r2: 0.0, r: 0.0, ..paper(0.9999, 5.6) };
+    let flow = flow_of(&undamped);
+    let fast = [0.0, 2.8e5, 0.0, 0.0];
+    let measured = measure(&flow, undamped.law(), fast, &budget);
+    assert_eq!(measured.status, Status::CapEvents, "{measured:?}");
+    assert!(measured.periods_run < budget.periods(), "{measured:?}");
+    // By hand it takes as many events, and one.
+    let mut trajectory = Trajectory::<0>::new(&flow, undamped.law(), fast).allowing(allowance);
+    let ended = (0..budget.periods()).try_for_each(|_| trajectory.advance_period(&mut ()));
+    assert_eq!(ended, Err(Stop::CapEvents));
+    assert_eq!(trajectory.work().events, allowance.events + 1);
+    assert_eq!(trajectory.period(), u64::from(measured.periods_run));
+
+    // A light gear turns thousands of radians in a period of a slow force.
+    let light = GearPair { m1: 2e-6, ..paper(0.5, 0.004) };
+    let flow = flow_of(&light);
+    let measured = measure(&flow, light.law(), REST, &budget);
+    assert_eq!(measured.status, Status::TooStiff, "{measured:?}");
+    let mut trajectory = Trajectory::<0>::new(&flow, light.law(), REST).allowing(allowance);
+    let ended = (0..budget.periods()).try_for_each(|_| trajectory.advance_period(&mut ()));
+    assert_eq!((ended, trajectory.work().steps), (Err(Stop::TooStiff), allowance.steps + 1));
+}
+
+/// Whoever raises the flag waits for a period at most, and has no answer.
+#[test]
+fn a_cell_ends_when_it_is_told_to() {
+    let pair = paper(0.7, 5.6);
+    let flow = flow_of(&pair);
+    let settings = Settings { transient_periods: 2_000_000, ..Settings::default() };
+    let budget =
+        Budget { settings, early_stop: false, undecided_periods: 0, exponent: true, shows_exponent: true };
+    let halt = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let measured = scope.spawn(|| measure_until(&flow, pair.law(), REST, &budget, &halt));
+        std::thread::sleep(Duration::from_millis(50));
+        halt.store(true, Ordering::Relaxed);
+        let clock = Instant::now();
+        assert!(measured.join().unwrap().is_none());
+        assert!(clock.elapsed() < Duration::from_secs(1), "{:?}", clock.elapsed());
+    });
 }

@@ -25,8 +25,8 @@ impl Interrupt {
     pub(super) fn listen(quiet: bool) -> Result<Interrupt, Failure> {
         let interrupt = Interrupt::default();
         let heard = interrupt.clone();
-        let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])
-            .context("cannot listen for signals")?;
+        let mut signals =
+            signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
         std::thread::spawn(move || signals.forever().for_each(|signal| heard.hear(signal, quiet)));
         Ok(interrupt)
     }
