@@ -23,7 +23,7 @@ pub(super) async fn guarded<T>(
     }
     let Some(error) = refused else { return Ok(made) };
     // A lost device refuses everything; that it is lost it tells when it is polled.
-    let _ = gpu.device.poll(wgpu::PollType::Poll);
+    gpu.poll(wgpu::PollType::Poll)?;
     Err(gpu.failure(GpuError::Refused { what, message: error.to_string() }))
 }
 

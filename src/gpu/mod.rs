@@ -10,6 +10,7 @@
 //! carries it from event to event; see `shaders/`.
 
 mod averaging;
+mod caught;
 pub(crate) mod constants;
 mod device;
 mod dispatch_policy;
@@ -42,6 +43,8 @@ pub use shader::{Precision, Variant, WORKGROUP};
 pub use stage::Stage;
 pub use tables::Tables;
 pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
+
+use caught::{Dropped, caught};
 
 use crate::record::Record;
 use crate::record::limits::MOST_STEPS;
@@ -159,10 +162,20 @@ impl LaneSettings {
     }
 }
 
+impl Drop for Gpu {
+    /// A lost device is left to the driver: what still holds on to it would be the last to let go, and panic.
+    fn drop(&mut self) {
+        if self.trouble.message().is_some() {
+            std::mem::forget((self.device.clone(), (*self.queue).clone()));
+        }
+    }
+}
+
 /// A device that integrates lanes in one precision.
 pub struct Gpu {
     device: wgpu::Device,
-    queue: wgpu::Queue,
+    /// Dropped, it is waited for.
+    queue: Dropped<wgpu::Queue>,
     info: wgpu::AdapterInfo,
     precision: Precision,
     pipelines: HashMap<Variant, device::Pipelines>,
@@ -208,6 +221,15 @@ impl Gpu {
     /// Tells `watcher` from here on how far lanes have come: for measurements.
     pub fn watch(&mut self, watcher: impl Fn(Stage) + Send + Sync + 'static) {
         self.watcher = Some(Box::new(watcher));
+    }
+
+    /// What the device has to say: callbacks come while it is polled, native ones then alone.
+    fn poll(&self, poll: wgpu::PollType) -> Result<(), GpuError> {
+        let lost = |message: String| self.failure(GpuError::Lost { message });
+        // Of a device that is known to be lost nothing comes.
+        self.trouble.check()?;
+        caught(|| self.device.poll(poll)).map_err(lost)?.map_err(|error| lost(error.to_string()))?;
+        self.trouble.check()
     }
 
     fn tell(&self, stage: Stage) {

@@ -2,4 +2,6 @@
 
 mod bench;
 mod commands;
+#[cfg(unix)]
+mod faults;
 mod map;
