@@ -73,16 +73,16 @@ impl AdapterChoice {
 impl Trouble {
     fn watch(device: &wgpu::Device) -> Trouble {
         let first = Arc::new(Mutex::new(None));
-        let sink = || {
-            let first = Arc::clone(&first);
-            move |message: String| {
-                first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
-            }
-        };
+        let sink = || Trouble(Arc::clone(&first));
         let (refused, lost) = (sink(), sink());
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| refused(error.to_string())));
-        device.set_device_lost_callback(move |reason, message| lost(told(reason, &message)));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| refused.note(error.to_string())));
+        device.set_device_lost_callback(move |reason, message| lost.note(told(reason, &message)));
         Trouble(first)
+    }
+
+    /// Takes down what went wrong; what follows from it says less.
+    pub(super) fn note(&self, message: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
     }
 
     /// # Errors
@@ -291,18 +291,18 @@ pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipe
         label: Some("lane"),
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
-    let pipelines = Pipelines {
+    let pipelines = gpu.call(|| Pipelines {
         begin: pipeline(gpu, &module, BEGIN),
         sweep: pipeline(gpu, &module, SWEEP),
         compact: COMPACT.map(|entry_point| pipeline(gpu, &module, entry_point)),
         conclude: pipeline(gpu, &module, CONCLUDE),
-    };
+    });
     let mut refused = None;
     for scope in scopes.into_iter().rev() {
         refused = refused.or(scope.pop().await);
     }
     match refused {
-        None => Ok(pipelines),
+        None => pipelines,
         Some(error) => Err(gpu.failure(GpuError::Refused { what: "a shader", message: error.to_string() })),
     }
 }

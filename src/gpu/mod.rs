@@ -40,7 +40,7 @@ pub use error::GpuError;
 pub use pool::Pool;
 pub use reading::Ended;
 pub use shader::{Precision, Variant, WORKGROUP};
-pub use stage::Stage;
+pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
 pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
 
@@ -223,12 +223,19 @@ impl Gpu {
         self.watcher = Some(Box::new(watcher));
     }
 
+    /// Asks something of the device in a way that may panic where its driver fails; nothing is asked of a lost one.
+    fn call<T>(&self, call: impl FnOnce() -> T) -> Result<T, GpuError> {
+        self.trouble.check()?;
+        caught(call).map_err(|message| {
+            self.trouble.note(format!("its driver fails: {message}"));
+            self.failure(GpuError::Lost { message })
+        })
+    }
+
     /// What the device has to say: callbacks come while it is polled, native ones then alone.
     fn poll(&self, poll: wgpu::PollType) -> Result<(), GpuError> {
-        let lost = |message: String| self.failure(GpuError::Lost { message });
-        // Of a device that is known to be lost nothing comes.
-        self.trouble.check()?;
-        caught(|| self.device.poll(poll)).map_err(lost)?.map_err(|error| lost(error.to_string()))?;
+        let lost = |error: wgpu::PollError| self.failure(GpuError::Lost { message: error.to_string() });
+        self.call(|| self.device.poll(poll))?.map_err(lost)?;
         self.trouble.check()
     }
 

@@ -174,6 +174,7 @@ fn a_driver_that_fails_costs_no_cell_and_ends_no_run_in_a_panic() {
             ("vkCreateComputePipelines", 3, LOST),
             ("vkAllocateMemory", 1, NO_MEMORY),
             ("vkMapMemory", 1, NOT_MAPPED),
+            ("vkAllocateCommandBuffers", calls["vkAllocateCommandBuffers"] / 2, NO_HOST_MEMORY),
             ("vkQueueSubmit", 2, LOST),
             ("vkQueueSubmit", late("vkQueueSubmit"), LOST),
         ],
