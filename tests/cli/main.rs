@@ -5,3 +5,5 @@ mod commands;
 #[cfg(unix)]
 mod faults;
 mod map;
+#[cfg(target_os = "linux")]
+mod measure_gpu;
