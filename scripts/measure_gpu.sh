@@ -7,7 +7,8 @@
 # carried to a machine without Rust or a network. In steps, all of them unless some are named, what a reader of results
 # wants first before the rest; f32 before f64:
 #
-#     right       the lanes are right, cell by cell against the reference: 128 x 128 cells, 2,000 of them
+#     right       the lanes are right, cell by cell against the reference: 128 x 128 cells, 2,000 of them (32 x 32 or
+#                 8 x 8, a quarter of them, where there is no time for more)
 #     main        the main map as it is, 512 x 512 cells, all quantities and files
 #     classes     SIDE x SIDE cells (1024 unless given), decided: classes alone
 #     brute       the same cells by brute force: no early stops
@@ -33,7 +34,7 @@
 set -euo pipefail
 export LC_ALL=C
 
-[[ $# -ge 2 ]] || { sed -n '2,37p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+[[ $# -ge 2 ]] || { sed -n '2,/^set -/s/^# \{0,1\}//p' "$0"; exit 2; }
 binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
@@ -100,7 +101,7 @@ fi
 if [[ "$adapter" != gpu:* ]]; then
     echo "error: no hardware adapter; install its Vulkan driver, or name an adapter by WGPU_ADAPTER_NAME" >&2
     echo "libraries: $(ldconfig -p 2>/dev/null | grep -E 'libvulkan|libGLX_nvidia' | tr -s '[:space:]' ' ')" >&2
-    echo "drivers: $(ls /usr/share/vulkan/icd.d /etc/vulkan/icd.d 2>/dev/null | tr '\n' ' ')" >&2
+    echo "drivers: $(find /usr/share/vulkan/icd.d /etc/vulkan/icd.d -name '*.json' 2>/dev/null | tr '\n' ' ')" >&2
     exit 1
 fi
 WGPU_ADAPTER_NAME="$(sed -n '1s/^gpu: //p' <<<"$adapter")"
@@ -149,19 +150,28 @@ disk() {
 
 square() { sets+=(--set "axis.0.count=$1" --set "axis.1.count=$1"); }
 
+# As many cells as there is time for.
 right() {
-    local precision="$1" code=0 sets=()
-    local cells=$((side < 128 ? side : 128)) samples=2000
+    local precision="$1" cells
+    for cells in 128 32 8; do
+        ((cells <= side || cells == 8)) || continue
+        ! right_of "$precision" "$cells" || return 0
+    done
+    missing "right, $precision: there was not enough time"
+}
+
+# False if it was cut.
+right_of() {
+    local precision="$1" cells="$2" code=0 sets=() samples=2000
     ((cells * cells / 4 >= samples)) || samples=$(((cells * cells + 3) / 4))
     square "$cells"
     limited "$longest_run" "$binary" map "$scenes/e_omega.toml" --engine gpu --precision "$precision" \
         --out "$work/right" --force "${sets[@]}" 2>"$work/said" || code=$?
-    ((code)) || limited $((2 * longest_run)) "$binary" validate "$work/right" --samples "$samples" 2>"$work/said" || code=$?
+    ((code)) || limited "$longest_run" "$binary" validate "$work/right" --samples "$samples" 2>"$work/said" || code=$?
     case $code in
         0) ;;
-        1) failed "validate, $precision: $(tail -n 1 "$work/said")" ;;
-        124 | 125 | 137) missing "right, $precision: no time was left" && return ;;
-        *) failed "map or validate, $precision: exit code $code: $(tail -n 1 "$work/said")" ;;
+        124 | 125 | 137) return 1 ;;
+        *) failed "map or validate, $precision, $cells x $cells: $(tail -n 1 "$work/said")" ;;
     esac
     cp "$work/right/validation.json" "$out/validation_$precision.json" 2>/dev/null || true
     # Strata and rates, in words.
