@@ -6,7 +6,7 @@ pub mod statistics;
 use std::time::Instant;
 
 use crate::cli::bench::measure::check::check;
-use crate::cli::bench::measure::output::{Asked, shares_of_peak, write};
+use crate::cli::bench::measure::output::{Asked, device_share, shares_of_peak, write};
 use crate::cli::bench::measure::work::work;
 use crate::cli::bench::measure::{
     Answers, Bench, Engine, Extent, LEAST_RUNS, Point, QUICK_SIDES, RUNS, Run, SIDES, Series, peak,
@@ -174,8 +174,7 @@ fn summary(all: &[Series], asked: &Asked) -> String {
         let Some(point) = series.largest() else { continue };
         let known = |x: f64, text: String| if x.is_finite() { text } else { "-".to_owned() };
         let steps = point.spread(Run::step_rate).median;
-        let device =
-            point.spread(|run| run.times.device.map_or(f64::NAN, |d| d / run.times.integrate)).median;
+        let device = point.spread(device_share).median;
         let shares = shares_of_peak(series, point, peak);
         lines.push(format!(
             "{:<44} {:>10} {:>10} {:>9} {:>9} {:>8} {:>8}",

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::gpu::{self, AdapterChoice, AdapterReport, Precision};
+use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
 use crate::map::engine::{Cpu, Engine, EngineError, Gpu};
 use crate::map::plan::{Cell, Plan};
 use anyhow::anyhow;
@@ -58,8 +58,13 @@ fn open_gpu(plan: &Plan, precision: Precision) -> Result<Engine<'_>, Failure> {
 }
 
 fn open_device(precision: Precision) -> Result<gpu::Gpu, Failure> {
-    pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::from_environment()))
-        .map_err(|error| Failure::Usage(error.into()))
+    pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::from_environment())).map_err(|error| {
+        match error {
+            GpuError::NoAdapter { .. } => Failure::Usage(error.into()),
+            // What was asked for is there, and fails.
+            _ => Failure::Run(error.into()),
+        }
+    })
 }
 
 fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, Failure> {

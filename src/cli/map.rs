@@ -2,6 +2,7 @@
 
 mod interrupt;
 mod resume_command;
+mod stopped;
 mod summary;
 
 use std::error::Error;
@@ -27,7 +28,6 @@ use crate::cli::error::{Failure, fail_if};
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
 use interrupt::Interrupt;
-use resume_command::resume_command;
 use summary::summary;
 
 /// Asks, checks, computes, writes.
@@ -39,7 +39,8 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     plan.check()?;
     let interrupt = Interrupt::listen(ask.run.quiet)?;
     let folder = open_folder(ask)?;
-    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;
+    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))
+        .map_err(|failure| stopped::before_it_began(failure, ask, &folder, &plan))?;
     if !ask.run.quiet && !why.is_empty() {
         say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
     }
@@ -199,15 +200,13 @@ fn integrate(
         true => pollster::block_on(sweep::run(plan, schedule, engine, records, interrupt.raised(), keep)),
         false => Ok(false),
     };
-    let go_on = || {
-        let (done, total, unit) = (kept.file.count(), plan.run_count(), unit(plan));
-        let most = if plan.refine().is_some() { "at most " } else { "" };
-        format!("{done} of {most}{total} {unit} are kept; go on with: {}", resume_command(ask))
-    };
+    let go_on = || stopped::go_on(ask, plan, kept.file.count());
     match swept {
         Ok(true) => Ok(()),
         Ok(false) => Err(interrupt.failure(anyhow!("interrupted; {}", go_on()))),
-        Err(error @ SweepError::Engine(_)) => Err(Failure::Run(anyhow!("{error}; {}", go_on()))),
+        Err(error @ SweepError::Engine(_)) => {
+            Err(Failure::Run(anyhow!("{error}; {}{}", go_on(), stopped::on_the_processor(ask))))
+        }
         Err(error) => Err(Failure::Run(anyhow!("{error}; make room there; {}", go_on()))),
     }
 }

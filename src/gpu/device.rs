@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::caught::{Dropped, caught};
 use super::dispatch_policy::DispatchPolicy;
 use super::layout::{Motion, Tally};
 use super::{Gpu, GpuError, Precision};
@@ -72,21 +73,36 @@ impl AdapterChoice {
 impl Trouble {
     fn watch(device: &wgpu::Device) -> Trouble {
         let first = Arc::new(Mutex::new(None));
-        let sink = || {
-            let first = Arc::clone(&first);
-            move |message: String| {
-                first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
-            }
-        };
+        let sink = || Trouble(Arc::clone(&first));
         let (refused, lost) = (sink(), sink());
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| refused(error.to_string())));
-        device.set_device_lost_callback(move |reason, message| lost(format!("{reason:?}: {message}")));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| refused.note(error.to_string())));
+        device.set_device_lost_callback(move |reason, message| lost.note(told(reason, &message)));
         Trouble(first)
+    }
+
+    /// Takes down what went wrong; what follows from it says less.
+    pub(super) fn note(&self, message: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
+    }
+
+    /// # Errors
+    /// [`GpuError::Lost`] once something has gone wrong.
+    pub(super) fn check(&self) -> Result<(), GpuError> {
+        self.message().map_or(Ok(()), |message| Err(GpuError::Lost { message }))
     }
 
     /// The first thing that went wrong, if anything has.
     pub(super) fn message(&self) -> Option<String> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// Why a device was lost.
+fn told(reason: wgpu::DeviceLostReason, message: &str) -> String {
+    match (reason, message) {
+        (wgpu::DeviceLostReason::Unknown, "") => "its driver gives no reason".to_owned(),
+        (wgpu::DeviceLostReason::Unknown, message) => format!("its driver says: {message}"),
+        (wgpu::DeviceLostReason::Destroyed, _) => "it was destroyed".to_owned(),
     }
 }
 
@@ -115,13 +131,14 @@ pub async fn adapters() -> Vec<AdapterReport> {
         largest_binding: adapter.limits().max_storage_buffer_binding_size,
         most_lanes: most_slots(&adapter.limits()),
     };
-    all_adapters().await.iter().map(report).collect()
+    all_adapters().await.unwrap_or_default().iter().map(report).collect()
 }
 
-async fn all_adapters() -> Vec<wgpu::Adapter> {
-    let mut all = instance().enumerate_adapters(wgpu::Backends::all()).await;
+async fn all_adapters() -> Result<Vec<wgpu::Adapter>, GpuError> {
+    let list = caught(|| instance().enumerate_adapters(wgpu::Backends::all()));
+    let mut all = list.map_err(|message| GpuError::Refused { what: "to list its adapters", message })?.await;
     all.sort_by_key(|adapter| rank(&adapter.get_info()));
-    all
+    Ok(all)
 }
 
 /// An adapter in words: name, interface and driver, as manifests have it.
@@ -189,7 +206,7 @@ pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
 }
 
 pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
-    let all = all_adapters().await;
+    let all = all_adapters().await?;
     let fits = |adapter: &wgpu::Adapter| choice.allows(&adapter.get_info()) && has(adapter, precision);
     let Some(adapter) = all.iter().find(|adapter| fits(adapter)) else {
         return Err(no_adapter(precision, choice, &all));
@@ -201,13 +218,13 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         ..Default::default()
     };
     let info = adapter.get_info();
-    let (device, queue) = adapter
-        .request_device(&descriptor)
-        .await
-        .map_err(|source| GpuError::NoDevice { adapter: info.name.clone(), source })?;
+    let no_device = |reason: String| GpuError::NoDevice { adapter: info.name.clone(), reason };
+    let asked = caught(|| adapter.request_device(&descriptor))
+        .map_err(|why| no_device(format!("the driver fails while it is opened ({why})")))?;
+    let (device, queue) = asked.await.map_err(|error| no_device(error.to_string()))?;
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
-    let policy = DispatchPolicy::of(info.device_type);
+    let (queue, policy) = (Dropped::new(queue), DispatchPolicy::of(info.device_type));
     Ok(Gpu {
         device,
         queue,
@@ -285,18 +302,18 @@ pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipe
         label: Some("lane"),
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
-    let pipelines = Pipelines {
+    let pipelines = gpu.call(|| Pipelines {
         begin: pipeline(gpu, &module, BEGIN),
         sweep: pipeline(gpu, &module, SWEEP),
         compact: COMPACT.map(|entry_point| pipeline(gpu, &module, entry_point)),
         conclude: pipeline(gpu, &module, CONCLUDE),
-    };
+    });
     let mut refused = None;
     for scope in scopes.into_iter().rev() {
         refused = refused.or(scope.pop().await);
     }
     match refused {
-        None => Ok(pipelines),
+        None => pipelines,
         Some(error) => Err(gpu.failure(GpuError::Refused { what: "a shader", message: error.to_string() })),
     }
 }

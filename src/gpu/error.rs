@@ -14,12 +14,12 @@ pub enum GpuError {
         found: String,
     },
     /// The adapter gives no device.
-    #[error("the adapter {adapter} gives no device")]
+    #[error("the adapter {adapter} gives no device: {reason}")]
     NoDevice {
         /// Its name.
         adapter: String,
-        /// Why.
-        source: wgpu::RequestDeviceError,
+        /// The driver's words.
+        reason: String,
     },
     /// The device refused a shader, a buffer or a command.
     #[error("the device refused {what}: {message}")]
@@ -38,7 +38,7 @@ pub enum GpuError {
         count: usize,
     },
     /// The device was lost on the way.
-    #[error("the device was lost on the way: {message}; finished cells are kept")]
+    #[error("the device was lost on the way: {message}")]
     Lost {
         /// The driver's words.
         message: String,

@@ -15,15 +15,15 @@ pub(super) async fn guarded<T>(
     let out_of_memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     // What is made of a buffer that is not there is refused, which says no more.
     let refused = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let made = make();
+    let made = gpu.call(make);
     let (refused, out_of_memory) = (refused.pop(), out_of_memory.pop());
     let (refused, out_of_memory) = (refused.await, out_of_memory.await);
     if out_of_memory.is_some() {
         return Err(GpuError::OutOfMemory { what, count });
     }
-    let Some(error) = refused else { return Ok(made) };
+    let Some(error) = refused else { return made };
     // A lost device refuses everything; that it is lost it tells when it is polled.
-    let _ = gpu.device.poll(wgpu::PollType::Poll);
+    gpu.poll(wgpu::PollType::Poll)?;
     Err(gpu.failure(GpuError::Refused { what, message: error.to_string() }))
 }
 

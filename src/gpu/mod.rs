@@ -10,6 +10,7 @@
 //! carries it from event to event; see `shaders/`.
 
 mod averaging;
+mod caught;
 pub(crate) mod constants;
 mod device;
 mod dispatch_policy;
@@ -41,9 +42,11 @@ pub use error::GpuError;
 pub use pool::Pool;
 pub use reading::Ended;
 pub use shader::{Precision, Variant, WORKGROUP};
-pub use stage::Stage;
+pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
 pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
+
+use caught::{Dropped, caught};
 
 use crate::record::Record;
 use crate::record::limits::MOST_STEPS;
@@ -167,10 +170,20 @@ impl LaneSettings {
     }
 }
 
+impl Drop for Gpu {
+    /// A lost device is left to the driver: what still holds on to it would be the last to let go, and panic.
+    fn drop(&mut self) {
+        if self.trouble.message().is_some() {
+            std::mem::forget((self.device.clone(), (*self.queue).clone()));
+        }
+    }
+}
+
 /// A device that integrates lanes in one precision.
 pub struct Gpu {
     device: wgpu::Device,
-    queue: wgpu::Queue,
+    /// Dropped, it is waited for.
+    queue: Dropped<wgpu::Queue>,
     info: wgpu::AdapterInfo,
     precision: Precision,
     pipelines: HashMap<Variant, device::Pipelines>,
@@ -226,6 +239,22 @@ impl Gpu {
 
     fn is_halted(&self) -> bool {
         self.halt.load(Ordering::Relaxed)
+    }
+
+    /// Asks something of the device in a way that may panic where its driver fails; nothing is asked of a lost one.
+    fn call<T>(&self, call: impl FnOnce() -> T) -> Result<T, GpuError> {
+        self.trouble.check()?;
+        caught(call).map_err(|message| {
+            self.trouble.note(format!("its driver fails: {message}"));
+            self.failure(GpuError::Lost { message })
+        })
+    }
+
+    /// What the device has to say: callbacks come while it is polled, native ones then alone.
+    fn poll(&self, poll: wgpu::PollType) -> Result<(), GpuError> {
+        let lost = |error: wgpu::PollError| self.failure(GpuError::Lost { message: error.to_string() });
+        self.call(|| self.device.poll(poll))?.map_err(lost)?;
+        self.trouble.check()
     }
 
     fn tell(&self, stage: Stage) {

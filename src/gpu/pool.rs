@@ -102,18 +102,24 @@ impl Pool {
         }
         let Some(buffers) = &self.buffers else { return Ok(()) };
         let real = gpu.precision.bytes();
-        for at in stretches(slots.iter().rev().map(|&slot| slot as usize)) {
-            let (of_cells, of_starts) = (at.start * size_of::<Cell>(), at.start * 4 * real);
-            let starts = reals(&self.starts[at.clone()], gpu.precision);
-            gpu.queue.write_buffer(&buffers.cells, of_cells as u64, bytemuck::cast_slice(&self.cells[at]));
-            gpu.queue.write_buffer(&buffers.starts, of_starts as u64, &starts);
-        }
-        buffers.call(gpu, &self.active_list, self.active_list.len() - lanes.len(), &self.settings);
-        let first = &gpu.pipelines[&self.variants[0]];
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let bindings = bind(gpu, &first.begin, BEGIN, &buffers.bindings(tables));
-        dispatch(&mut encoder, &first.begin, &bindings, buffers.grid(lanes.len() as u32), None);
-        gpu.queue.submit([encoder.finish()]);
+        gpu.call(|| {
+            for at in stretches(slots.iter().rev().map(|&slot| slot as usize)) {
+                let (of_cells, of_starts) = (at.start * size_of::<Cell>(), at.start * 4 * real);
+                let starts = reals(&self.starts[at.clone()], gpu.precision);
+                gpu.queue.write_buffer(
+                    &buffers.cells,
+                    of_cells as u64,
+                    bytemuck::cast_slice(&self.cells[at]),
+                );
+                gpu.queue.write_buffer(&buffers.starts, of_starts as u64, &starts);
+            }
+            buffers.call(gpu, &self.active_list, self.active_list.len() - lanes.len(), &self.settings);
+            let first = &gpu.pipelines[&self.variants[0]];
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let bindings = bind(gpu, &first.begin, BEGIN, &buffers.bindings(tables));
+            dispatch(&mut encoder, &first.begin, &bindings, buffers.grid(lanes.len() as u32), None);
+            gpu.queue.submit([encoder.finish()]);
+        })?;
         gpu.tell(Stage::Uploaded);
         Ok(())
     }
@@ -139,9 +145,9 @@ impl Pool {
             most_iterations: self.settings.iterations,
         };
         let variants: Vec<&Pipelines> = self.variants.iter().map(|variant| &gpu.pipelines[variant]).collect();
-        buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings);
-        let device_seconds = rounds.run(&variants, until as u32, &mut self.iterations).await?;
-        gpu.tell(Stage::Integrated { device_seconds });
+        gpu.call(|| buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings))?;
+        let device = rounds.run(&variants, until as u32, &mut self.iterations).await?;
+        gpu.tell(Stage::Integrated { device });
         let last = variants[variants.len() - 1];
         let results = buffers.conclude(gpu, last, &bindings, self.active_list.len()).await?;
         if results.is_empty() && !gpu.is_halted() {
@@ -180,12 +186,14 @@ impl Pool {
             made => (ample, made?),
         };
         if let Some(old) = &self.buffers {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            for (from, to) in [(&old.motions, &made.motions), (&old.tallies, &made.tallies)] {
-                encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
-            }
-            gpu.queue.submit([encoder.finish()]);
-            gpu.queue.write_buffer(&made.cells, 0, bytemuck::cast_slice(&self.cells));
+            gpu.call(|| {
+                let mut encoder = gpu.device.create_command_encoder(&Default::default());
+                for (from, to) in [(&old.motions, &made.motions), (&old.tallies, &made.tallies)] {
+                    encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+                }
+                gpu.queue.submit([encoder.finish()]);
+                gpu.queue.write_buffer(&made.cells, 0, bytemuck::cast_slice(&self.cells));
+            })?;
         }
         self.buffers = Some(made);
         self.free.extend(had as u32..slots as u32);

@@ -8,7 +8,7 @@ use web_time::{Duration, Instant};
 
 use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
 use super::slots::{BEAT_AT, COUNT_AT};
-use super::stage::Clock;
+use super::stage::{Clock, DeviceTimes};
 use super::transfer::{read, readback};
 use super::{Gpu, GpuError};
 
@@ -21,8 +21,7 @@ const FEWEST_ITERATIONS_FOR: u32 = 1 << 14;
 /// Lanes of a workgroup that compacts.
 pub(super) const BLOCK: u32 = 256;
 
-/// Bytes of a check: lanes left for each of two variants, the device's count of its own work, two timestamps.
-const CHECK: u64 = 32;
+/// Bytes of a check: lanes left for each of two variants, the device's count of its own work; then timestamps.
 const BEAT: u64 = 8;
 const TIMES: u64 = 16;
 
@@ -57,6 +56,8 @@ struct Sent<'a> {
     /// Which variants it dispatched.
     ran: Vec<bool>,
     iterations: u32,
+    /// Bytes of its check.
+    bytes: u64,
 }
 
 impl Rounds<'_> {
@@ -68,35 +69,40 @@ impl Rounds<'_> {
         variants: &[&Pipelines],
         until: u32,
         iterations: &mut u32,
-    ) -> Result<Option<f64>, GpuError> {
+    ) -> Result<Option<DeviceTimes>, GpuError> {
         let gpu = self.gpu;
-        let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue));
-        let bound: Vec<Bound<'_>> = variants.iter().map(|pipelines| self.bound(pipelines)).collect();
-        let checks = [readback(gpu, "check", CHECK), readback(gpu, "check", CHECK)];
+        let dispatches = gpu.policy.dispatches * variants.len() as u32;
+        let (clock, bound, checks) = gpu.call(|| {
+            let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue, dispatches));
+            let bound: Vec<Bound<'_>> = variants.iter().map(|pipelines| self.bound(pipelines)).collect();
+            let checks = [(); 2].map(|()| readback(gpu, "check", TIMES + Clock::bytes(dispatches)));
+            (clock, bound, checks)
+        })?;
         // Lanes that a variant may have work for, those aside that come from the ones before.
         let mut left = vec![0; variants.len()];
         left[0] = self.active_lanes;
         let most = self.most_iterations.max(1);
         let fewest = fewest_iterations(self.active_lanes).min(most);
         *iterations = (*iterations).clamp(fewest, most);
-        let mut seconds = 0.0;
+        let (mut device, mut device_end) = (DeviceTimes::default(), None);
         let mut last_beat = 0;
         let mut before: Option<Sent<'_>> = None;
         let mut last_end = Instant::now();
         let mut checked = 0;
         for (slot, check) in (0..2).zip(&checks).cycle() {
-            let sent = self.send(&bound, &left, *iterations, (slot, check), clock.as_ref());
+            let sent = gpu.call(|| self.send(&bound, &left, *iterations, (slot, check), clock.as_ref()))?;
             let Some(sent) = before.replace(sent) else { continue };
             let take = |bytes: &[u8]| {
-                let took = clock.as_ref().map_or(0.0, |clock| clock.seconds(&bytes[TIMES as usize..]));
-                (bytemuck::pod_read_unaligned::<[u32; 3]>(&bytes[..12]), took)
+                if let Some(clock) = &clock {
+                    device = device.and(clock.times(&bytes[TIMES as usize..], &mut device_end));
+                }
+                bytemuck::pod_read_unaligned::<[u32; 3]>(&bytes[..12])
             };
-            let ([first, second, beat], took) = read(gpu, sent.check, CHECK, sent.submission, take).await?;
+            let [first, second, beat] = read(gpu, sent.check, sent.bytes, sent.submission, take).await?;
             if beat <= last_beat {
                 return Err(gpu.failure(GpuError::Lost { message: "it drops what it is given to do".into() }));
             }
             last_beat = beat;
-            seconds += took;
             for (left, (now, ran)) in left.iter_mut().zip([first, second].into_iter().zip(sent.ran)) {
                 *left = if ran { now } else { 0 };
             }
@@ -114,10 +120,10 @@ impl Rounds<'_> {
         }
         // The last round is in time, too; what comes next waits for it anyway.
         if let (Some(clock), Some(sent)) = (&clock, before) {
-            let take = |bytes: &[u8]| clock.seconds(&bytes[TIMES as usize..]);
-            seconds += read(gpu, sent.check, CHECK, sent.submission, take).await?;
+            let take = |bytes: &[u8]| clock.times(&bytes[TIMES as usize..], &mut device_end);
+            device = device.and(read(gpu, sent.check, sent.bytes, sent.submission, take).await?);
         }
-        Ok(clock.map(|_| seconds))
+        Ok(clock.map(|_| device))
     }
 
     fn bound<'a>(&self, pipelines: &'a Pipelines) -> Bound<'a> {
@@ -145,7 +151,7 @@ impl Rounds<'_> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         // Lanes may come from the variants before, so that a variant has work if one of them has.
         let first = left.iter().position(|&left| left > 0).unwrap_or(0);
-        let mut lanes = 0;
+        let (mut lanes, mut dispatches) = (0, 0);
         for (n, variant) in variants.iter().enumerate().skip(first) {
             lanes += left[n];
             for (nth, (pipeline, bindings)) in variant.compact.iter().enumerate() {
@@ -154,7 +160,9 @@ impl Rounds<'_> {
             }
             let (pipeline, bindings) = &variant.sweep;
             for _ in 0..gpu.policy.dispatches {
-                dispatch(&mut encoder, pipeline, bindings, (self.grid)(lanes), None);
+                let writes = clock.map(|clock| clock.dispatch_writes(slot, dispatches));
+                dispatch(&mut encoder, pipeline, bindings, (self.grid)(lanes), writes);
+                dispatches += 1;
             }
         }
         for (n, variant) in variants.iter().enumerate().skip(first) {
@@ -166,11 +174,14 @@ impl Rounds<'_> {
             encoder.copy_buffer_to_buffer(self.queue, COUNT_AT, check, 4 * n as u64, 4);
         }
         encoder.copy_buffer_to_buffer(self.queue, BEAT_AT, check, BEAT, 4);
+        let mut bytes = TIMES;
         if let Some(clock) = clock {
-            clock.copy(&mut encoder, slot, check, TIMES);
+            clock.copy(&mut encoder, (slot, dispatches), check, TIMES);
+            bytes += Clock::bytes(dispatches);
         }
         let submission = gpu.queue.submit([encoder.finish()]);
-        Sent { check, submission, ran: (0..variants.len()).map(|n| n >= first).collect(), iterations }
+        let ran = (0..variants.len()).map(|n| n >= first).collect();
+        Sent { check, submission, ran, iterations, bytes }
     }
 }
 

@@ -106,16 +106,18 @@ impl Slots {
         bindings: &[&wgpu::Buffer],
         active_lanes: usize,
     ) -> Result<Vec<(Reading, Finding)>, GpuError> {
-        gpu.queue.write_buffer(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        for (pass, (entry_point, pipeline)) in COMPACT.into_iter().zip(&pipelines.compact).enumerate() {
-            let compact = bind(gpu, pipeline, entry_point, bindings);
-            dispatch(&mut encoder, pipeline, &compact, compacting(pass, active_lanes as u32), None);
-        }
-        let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
-        dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(active_lanes as u32), None);
-        encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_readback, 0, COUNT_BYTES);
-        let submission = gpu.queue.submit([encoder.finish()]);
+        let submission = gpu.call(|| {
+            gpu.queue.write_buffer(&self.settings, ENDED, bytemuck::bytes_of(&1_u32));
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            for (pass, (entry_point, pipeline)) in COMPACT.into_iter().zip(&pipelines.compact).enumerate() {
+                let compact = bind(gpu, pipeline, entry_point, bindings);
+                dispatch(&mut encoder, pipeline, &compact, compacting(pass, active_lanes as u32), None);
+            }
+            let concluding = bind(gpu, &pipelines.conclude, CONCLUDE, bindings);
+            dispatch(&mut encoder, &pipelines.conclude, &concluding, self.grid(active_lanes as u32), None);
+            encoder.copy_buffer_to_buffer(&self.queue, COUNT_AT, &self.count_readback, 0, COUNT_BYTES);
+            gpu.queue.submit([encoder.finish()])
+        })?;
         let count = read(gpu, &self.count_readback, COUNT_BYTES, submission, |bytes| {
             bytemuck::pod_read_unaligned::<u32>(bytes) as usize
         })
@@ -127,10 +129,12 @@ impl Slots {
         let [readings, findings] = &self.readbacks;
         let numbers = (count * size_of::<Reading>() / size_of::<f64>() * gpu.precision.bytes()) as u64;
         let counts = (count * size_of::<Finding>()) as u64;
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
-        encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
-        let submission = gpu.queue.submit([encoder.finish()]);
+        let submission = gpu.call(|| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(&self.readings, 0, readings, 0, numbers);
+            encoder.copy_buffer_to_buffer(&self.findings, 0, findings, 0, counts);
+            gpu.queue.submit([encoder.finish()])
+        })?;
         let to_readings = |bytes: &[u8]| from_reals::<Reading>(bytes, gpu.precision);
         let readings = read(gpu, readings, numbers, submission.clone(), to_readings).await?;
         let to_findings = bytemuck::pod_collect_to_vec::<u8, Finding>;

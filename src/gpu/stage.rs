@@ -7,45 +7,79 @@ pub enum Stage {
     Uploaded,
     /// They have ended, or many of them.
     Integrated {
-        /// Seconds between the first and the last pass of every submission, by the device's own
-        /// clock; none if it has none.
-        device_seconds: Option<f64>,
+        /// By the device's own clock; none if it has none.
+        device: Option<DeviceTimes>,
     },
     /// The records of those are here.
     Read,
 }
 
+/// What lanes took by the device's own clock, in seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DeviceTimes {
+    /// Between the first and the last pass of every submission.
+    pub busy: f64,
+    /// The longest dispatch of these: some drivers reset a device whose work takes seconds.
+    pub longest_dispatch: f64,
+    /// Between one submission and the next.
+    pub idle: f64,
+    /// The longest of these gaps.
+    pub longest_gap: f64,
+}
+
+impl DeviceTimes {
+    /// Of both, one after the other.
+    pub fn and(self, other: DeviceTimes) -> DeviceTimes {
+        DeviceTimes {
+            busy: self.busy + other.busy,
+            longest_dispatch: self.longest_dispatch.max(other.longest_dispatch),
+            idle: self.idle + other.idle,
+            longest_gap: self.longest_gap.max(other.longest_gap),
+        }
+    }
+}
+
 /// Whoever is told.
 pub(super) type Watcher = Box<dyn Fn(Stage) + Send + Sync>;
 
-/// Bytes from one pair of timestamps to the next: as wgpu aligns them.
-const PAIR: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
+/// Bytes of a pair of timestamps: of a beginning and an end.
+const PAIR: u64 = 16;
 
-/// Timestamps about the passes of a submission; two submissions are under way at a time.
+/// Timestamps about the passes of a submission: a pair for all of them, then one for each dispatch of lanes. Two
+/// submissions are under way at a time.
 pub(super) struct Clock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     seconds_per_tick: f64,
+    /// Pairs of a submission at most.
+    pairs: u32,
 }
 
 impl Clock {
-    /// None if the device has no timestamps.
-    pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Option<Clock> {
+    /// Bytes that [`Clock::copy`] writes of a submission with so many dispatches, or fewer.
+    pub(super) fn bytes(dispatches: u32) -> u64 {
+        PAIR * u64::from(1 + dispatches)
+    }
+
+    /// For submissions of so many dispatches at most; none if the device has no timestamps.
+    pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, dispatches: u32) -> Option<Clock> {
         if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
         }
+        let pairs = 1 + dispatches;
         let queries = device.create_query_set(&wgpu::QuerySetDescriptor {
             label: Some("clock"),
             ty: wgpu::QueryType::Timestamp,
-            count: 4,
+            count: 2 * 2 * pairs,
         });
         let resolved = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("clock"),
-            size: 2 * PAIR,
+            size: 2 * stride(pairs),
             usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        Some(Clock { queries, resolved, seconds_per_tick: 1e-9 * f64::from(queue.get_timestamp_period()) })
+        let seconds_per_tick = 1e-9 * f64::from(queue.get_timestamp_period());
+        Some(Clock { queries, resolved, seconds_per_tick, pairs })
     }
 
     /// What a pass of submission `slot` (0 or 1) writes; only the first and the last do.
@@ -55,29 +89,60 @@ impl Clock {
         is_first: bool,
         is_last: bool,
     ) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        let at = self.first_query(slot);
         (is_first || is_last).then(|| wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
-            beginning_of_pass_write_index: is_first.then_some(2 * slot),
-            end_of_pass_write_index: is_last.then_some(2 * slot + 1),
+            beginning_of_pass_write_index: is_first.then_some(at),
+            end_of_pass_write_index: is_last.then_some(at + 1),
         })
     }
 
-    /// Copies the pair of submission `slot` to `readback`, from byte `at` on.
+    /// What the `nth` dispatch of lanes writes.
+    pub(super) fn dispatch_writes(&self, slot: u32, nth: u32) -> wgpu::ComputePassTimestampWrites<'_> {
+        let at = self.first_query(slot) + 2 * (1 + nth);
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(at),
+            end_of_pass_write_index: Some(at + 1),
+        }
+    }
+
+    /// Copies what submission `slot` with so many dispatches has written to `readback`, from byte `at` on.
     pub(super) fn copy(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        slot: u32,
+        (slot, dispatches): (u32, u32),
         readback: &wgpu::Buffer,
         at: u64,
     ) {
-        let from = PAIR * u64::from(slot);
-        encoder.resolve_query_set(&self.queries, 2 * slot..2 * slot + 2, &self.resolved, from);
-        encoder.copy_buffer_to_buffer(&self.resolved, from, readback, at, 16);
+        let (first, from) = (self.first_query(slot), stride(self.pairs) * u64::from(slot));
+        let written = first..first + 2 * (1 + dispatches);
+        encoder.resolve_query_set(&self.queries, written, &self.resolved, from);
+        encoder.copy_buffer_to_buffer(&self.resolved, from, readback, at, Clock::bytes(dispatches));
     }
 
-    /// Seconds between a pair, as it was copied.
-    pub(super) fn seconds(&self, pair: &[u8]) -> f64 {
-        let tick = |at: usize| bytemuck::pod_read_unaligned::<u64>(&pair[at..at + 8]);
-        tick(8).saturating_sub(tick(0)) as f64 * self.seconds_per_tick
+    /// What a submission took, as it was copied, after one that ended at `last_end`, which is the end of this one then.
+    pub(super) fn times(&self, copied: &[u8], last_end: &mut Option<u64>) -> DeviceTimes {
+        let tick = |at: usize| bytemuck::pod_read_unaligned::<u64>(&copied[at..at + 8]);
+        let seconds = |from: u64, to: u64| to.saturating_sub(from) as f64 * self.seconds_per_tick;
+        let pairs = (0..copied.len() / PAIR as usize).map(|n| n * PAIR as usize);
+        let dispatch = |at: usize| seconds(tick(at), tick(at + 8));
+        let (begin, end) = (tick(0), tick(8));
+        let gap = last_end.replace(end).map_or(0.0, |last_end| seconds(last_end, begin));
+        DeviceTimes {
+            busy: seconds(begin, end),
+            longest_dispatch: pairs.skip(1).map(dispatch).fold(0.0, f64::max),
+            idle: gap,
+            longest_gap: gap,
+        }
     }
+
+    fn first_query(&self, slot: u32) -> u32 {
+        2 * self.pairs * slot
+    }
+}
+
+/// Bytes from one submission's timestamps to the other's: as wgpu aligns them.
+fn stride(pairs: u32) -> u64 {
+    (PAIR * u64::from(pairs)).next_multiple_of(wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT)
 }

@@ -68,12 +68,7 @@ pub(super) async fn read<T>(
     let lost = |message: String| gpu.failure(GpuError::Lost { message });
     let (mapped, send) = Signal::new();
     buffer.map_async(wgpu::MapMode::Read, ..size, send);
-    // Native devices call back only while they are polled; a browser's do so by themselves.
-    let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
-    gpu.device.poll(wait).map_err(|error| lost(error.to_string()))?;
-    if let Some(message) = gpu.trouble.message() {
-        return Err(GpuError::Lost { message });
-    }
+    gpu.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })?;
     mapped.await.map_err(|error| lost(error.to_string()))?;
     let taken = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
     buffer.unmap();

@@ -50,6 +50,11 @@ fn engines_agree_and_say_where_their_time_goes() {
         assert!(row["cells_differing"].is_empty() || row["cells_differing"] == "0", "{row:?}");
         if !row["device_share"].is_empty() {
             assert!((0.01..1.01).contains(&number(row, "device_share")), "{row:?}");
+            let [busy, dispatch, idle, gap] =
+                ["device_s", "longest_dispatch_s", "idle_s", "longest_gap_s"].map(|name| number(row, name));
+            // Medians of few runs each: a dispatch is a part of what the device does, a gap of its idle time.
+            assert!(0.0 < dispatch && dispatch < 1.5 * busy, "{row:?}");
+            assert!(0.0 <= gap && gap <= 1.5 * idle + 1e-9, "{row:?}");
         }
     }
     let runs = rows(&out.join("runs.csv"));

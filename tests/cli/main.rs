@@ -2,4 +2,8 @@
 
 mod bench;
 mod commands;
+#[cfg(unix)]
+mod faults;
 mod map;
+#[cfg(target_os = "linux")]
+mod measure_gpu;

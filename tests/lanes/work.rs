@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::common::gpu::{fresh, open, run};
 use crate::common::{REST, paper};
 use rattlemap::gpu::{GpuError, Lane, LaneSettings, Precision};
-use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::Status;
 
 /// Events of all periods are counted, not those of one alone.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::gpu::DeviceTimes;
 use crate::output::{OutputError, WriteError};
 use serde::Serialize;
 
@@ -57,22 +58,30 @@ pub fn shares_of_peak(series: &Series, point: &Point, peak: Option<f64>) -> Opti
 }
 
 /// Share of the integration in which the device worked, by its own clock.
-fn device_share(run: &Run) -> f64 {
-    run.times.device.map_or(f64::NAN, |device| device / run.times.integrate)
+pub fn device_share(run: &Run) -> f64 {
+    device(run, |device| device.busy / run.times.integrate)
+}
+
+/// A number of the device's own clock, if it has one.
+fn device(run: &Run, of: impl Fn(DeviceTimes) -> f64) -> f64 {
+    run.times.device.map_or(f64::NAN, of)
 }
 
 /// A column of the tables: its name and its number.
 type Field = (&'static str, fn(&Run) -> f64);
 
 /// What is told of a run as it is and of a point by its median.
-const STAGE_FIELDS: [Field; 7] = [
+const STAGE_FIELDS: [Field; 10] = [
     ("prepare_s", |run| run.times.prepare),
     ("upload_s", |run| run.times.upload),
     ("integrate_s", |run| run.times.integrate),
     ("read_s", |run| run.times.read),
     ("write_s", |run| run.times.write),
-    ("device_s", |run| run.times.device.unwrap_or(f64::NAN)),
+    ("device_s", |run| device(run, |device| device.busy)),
     ("device_share", device_share),
+    ("longest_dispatch_s", |run| device(run, |device| device.longest_dispatch)),
+    ("idle_s", |run| device(run, |device| device.idle)),
+    ("longest_gap_s", |run| device(run, |device| device.longest_gap)),
 ];
 
 /// What is told of a point with its range, too.

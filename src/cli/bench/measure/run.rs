@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 
 use super::Engine;
 use crate::cli::bench::statistics::Spread;
-use crate::gpu::{self, AdapterChoice, Precision, Stage};
+use crate::gpu::{self, AdapterChoice, DeviceTimes, Precision, Stage};
 use crate::map::engine::{self, Cpu};
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
@@ -33,7 +33,7 @@ pub struct Times {
     /// Writing the table `cells.npy`.
     pub write: f64,
     /// Integration by the device's own clock, if it has one.
-    pub device: Option<f64>,
+    pub device: Option<DeviceTimes>,
 }
 
 impl Times {
@@ -282,10 +282,10 @@ impl Split {
     fn take(&mut self, stage: Stage) {
         match stage {
             Stage::Uploaded => self.lap(|times| &mut times.upload),
-            Stage::Integrated { device_seconds } => {
+            Stage::Integrated { device } => {
                 self.lap(|times| &mut times.integrate);
-                if let Some(seconds) = device_seconds {
-                    *self.times.device.get_or_insert(0.0) += seconds;
+                if let Some(device) = device {
+                    self.times.device = Some(self.times.device.unwrap_or_default().and(device));
                 }
             }
             Stage::Read => self.lap(|times| &mut times.read),

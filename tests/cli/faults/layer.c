@@ -1,0 +1,178 @@
+/*
+ * A Vulkan layer that lets calls fail, as drivers do when a card falls off the bus or resets.
+ *
+ *     RATTLEMAP_FAULT=CALL:N:RESULT   from the Nth call of CALL on it returns RESULT (a VkResult, below zero)
+ *     RATTLEMAP_CALLS=FILE            at the end "CALL COUNT" lines are written to FILE
+ *
+ * A device that has been lost once (-4) stays so: every call that may say so does from then on. The few types that a
+ * layer needs are declared here, so that no headers have to be installed. Calls are handed on with six words: the calling
+ * conventions of 64-bit systems pass them alike, whatever their types.
+ */
+#include <pthread.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef uint64_t word;
+typedef void (*function)(void);
+typedef function (*get_function)(void *handle, const char *name);
+typedef int32_t (*call)(void *handle, word, word, word, word, word);
+
+enum { DEVICE_LOST = -4, INITIALIZATION_FAILED = -3, INSTANCE_LINK = 47, DEVICE_LINK = 48 };
+
+/* VkLayerInstanceCreateInfo and VkLayerDeviceCreateInfo, of function VK_LAYER_LINK_INFO (0); any other create info. */
+struct info {
+    int32_t type;
+    const struct info *next;
+    int32_t function;
+    struct link *link;
+};
+
+/* VkLayerInstanceLink, VkLayerDeviceLink: the second function is the physical devices', or the device's. */
+struct link {
+    struct link *next;
+    get_function instance;
+    get_function other;
+};
+
+/* VkNegotiateLayerInterface */
+struct interface {
+    int32_t type;
+    void *next;
+    uint32_t version;
+    get_function instance, device, physical_device;
+};
+
+/* What comes next, of the instance and the device made last: those of one driver share their functions. */
+static get_function next_instance, next_device;
+static void *instance_made, *device_made;
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+
+/* Calls that may fail; the second says whether they tell of a lost device. */
+#define CALLS(X) \
+    X(QueueSubmit, 1) X(WaitForFences, 1) X(GetFenceStatus, 1) X(WaitSemaphores, 1) X(WaitSemaphoresKHR, 1) \
+    X(GetSemaphoreCounterValue, 1) X(GetSemaphoreCounterValueKHR, 1) X(QueueWaitIdle, 1) X(DeviceWaitIdle, 1) \
+    X(CreateComputePipelines, 0) X(CreateShaderModule, 0) X(CreatePipelineLayout, 0) X(CreateDescriptorSetLayout, 0) \
+    X(CreateDescriptorPool, 0) X(AllocateDescriptorSets, 0) X(CreateBuffer, 0) X(AllocateMemory, 0) X(MapMemory, 0) \
+    X(BindBufferMemory, 0) X(CreateCommandPool, 0) X(AllocateCommandBuffers, 0) X(BeginCommandBuffer, 0) \
+    X(EndCommandBuffer, 0) X(ResetCommandPool, 0) X(CreateFence, 0) X(ResetFences, 0) X(CreateSemaphore, 0) \
+    X(CreateQueryPool, 0)
+
+enum {
+#define NUMBER(name, tells) name,
+    CALLS(NUMBER) CreateDevice, CALL_COUNT
+};
+
+static const struct {
+    const char *name;
+    int tells;
+} calls[] = {
+#define ROW(name, tells) {"vk" #name, tells},
+    CALLS(ROW){"vkCreateDevice", 0},
+};
+
+static int counts[CALL_COUNT];
+static int is_lost;
+
+/* What a call returns in place of the driver's answer; 0 if it may go on. */
+static int32_t fault(int which) {
+    pthread_mutex_lock(&lock);
+    int count = ++counts[which];
+    int32_t result = is_lost && calls[which].tells ? DEVICE_LOST : 0;
+    const char *asked = getenv("RATTLEMAP_FAULT"), *colon = asked ? strchr(asked, ':') : NULL;
+    size_t length = colon ? (size_t)(colon - asked) : 0;
+    int from, code;
+    if (colon && strlen(calls[which].name) == length && !strncmp(asked, calls[which].name, length) &&
+        sscanf(colon, ":%d:%d", &from, &code) == 2 && count >= from) {
+        result = code;
+        is_lost |= code == DEVICE_LOST;
+    }
+    pthread_mutex_unlock(&lock);
+    return result;
+}
+
+/* The driver does not know that its device is lost: what is destroyed next must not be in use. */
+static void settle(void) {
+    if (device_made) ((call)next_device(device_made, "vkDeviceWaitIdle"))(device_made, 0, 0, 0, 0, 0);
+}
+
+#define WRAPPER(name, tells) \
+    static int32_t wrapped_##name(void *handle, word a, word b, word c, word d, word e) { \
+        int32_t result = fault(name); \
+        if (result == DEVICE_LOST) settle(); \
+        return result ? result : ((call)next_device(device_made, "vk" #name))(handle, a, b, c, d, e); \
+    }
+CALLS(WRAPPER)
+
+static const struct info *link_of(const struct info *info, int type) {
+    do info = info->next;
+    while (info && !(info->type == type && info->function == 0));
+    return info;
+}
+
+static int32_t create_instance(const struct info *create, const void *allocator, void **instance) {
+    struct info *link = (struct info *)link_of(create, INSTANCE_LINK);
+    if (!link) return INITIALIZATION_FAILED;
+    get_function next = link->link->instance;
+    link->link = link->link->next;
+    int32_t (*made)(const void *, const void *, void **) = (void *)next(NULL, "vkCreateInstance");
+    int32_t result = made(create, allocator, instance);
+    if (!result) next_instance = next, instance_made = *instance;
+    return result;
+}
+
+static int32_t create_device(void *physical, const struct info *create, const void *allocator, void **device) {
+    struct info *link = (struct info *)link_of(create, DEVICE_LINK);
+    if (!link) return INITIALIZATION_FAILED;
+    int32_t result = fault(CreateDevice);
+    if (result) return result;
+    get_function instance = link->link->instance, next = link->link->other;
+    link->link = link->link->next;
+    int32_t (*made)(void *, const void *, const void *, void **) = (void *)instance(instance_made, "vkCreateDevice");
+    result = made(physical, create, allocator, device);
+    if (!result) next_device = next, device_made = *device;
+    return result;
+}
+
+static function device_function(void *device, const char *name);
+static function instance_function(void *instance, const char *name);
+
+static function own(const char *name) {
+#define MATCH(call, tells) \
+    if (!strcmp(name, "vk" #call)) return (function)wrapped_##call;
+    CALLS(MATCH)
+    if (!strcmp(name, "vkCreateInstance")) return (function)create_instance;
+    if (!strcmp(name, "vkCreateDevice")) return (function)create_device;
+    if (!strcmp(name, "vkGetInstanceProcAddr")) return (function)instance_function;
+    if (!strcmp(name, "vkGetDeviceProcAddr")) return (function)device_function;
+    return NULL;
+}
+
+/* A function that the driver does not have is not there with this layer either. */
+static function device_function(void *device, const char *name) {
+    function next = next_device(device, name), mine = own(name);
+    return next && mine ? mine : next;
+}
+
+static function instance_function(void *instance, const char *name) {
+    function mine = own(name);
+    return mine || !instance ? mine : next_instance(instance, name);
+}
+
+__attribute__((visibility("default"))) int32_t vkNegotiateLoaderLayerInterfaceVersion(struct interface *interface) {
+    if (interface->version < 2) return INITIALIZATION_FAILED;
+    interface->version = 2;
+    interface->instance = instance_function;
+    interface->device = device_function;
+    interface->physical_device = NULL;
+    return 0;
+}
+
+__attribute__((destructor)) static void tell(void) {
+    const char *path = getenv("RATTLEMAP_CALLS");
+    FILE *file = path ? fopen(path, "w") : NULL;
+    if (!file) return;
+    for (int n = 0; n < CALL_COUNT; n++) fprintf(file, "%s %d\n", calls[n].name, counts[n]);
+    fclose(file);
+}
