@@ -18,6 +18,7 @@ use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::record::Record;
 use crate::record::classify::classify;
+use crate::record::distance::{apart, farther};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, State};
 use rattlemap_dynamics::orbit::Class;
@@ -145,7 +146,7 @@ impl Seen {
         };
         let position = largest(0, 2).max(flow.length);
         let velocity = largest(1, 3).max(flow.omega * position);
-        let apart = |i: usize| (a[i] - b[i]).abs();
-        (apart(0).max(apart(2)) / position).max(apart(1).max(apart(3)) / velocity)
+        let units = [position, velocity];
+        (0..4).map(|i| apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
     }
 }

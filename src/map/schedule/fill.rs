@@ -46,7 +46,9 @@ impl<'r> Filling<'r> {
         let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
         let nearest = usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5);
         let average = |field: fn(&Record) -> f64| {
-            self.corners.iter().zip(weights).map(|(corner, weight)| weight * field(corner)).sum::<f64>()
+            // What counts for nothing may be infinite: the exponent of a superstable cycle.
+            let beside = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
+            beside.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
         let filled = Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
         if !self.averages[nearest] {
