@@ -63,7 +63,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let device = lanes.device.as_deref();
     let files = write_validation(&folder, &cells, &made, device, &validation)?;
     let summary = summary(&validation, device);
-    progress.finish(&format!("{summary}{note}\n{}: {}", dir.display(), files.join(", ")));
+    progress.finish(&format!("{summary}{note}\n{}: {}", say::path(dir), files.join(", ")));
     verdict(dir, &plan, &validation)
 }
 
