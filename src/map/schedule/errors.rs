@@ -114,6 +114,8 @@ mod tests {
             Deviation { compared: 100, empty: 1, median: 6.25, p95: 11.875, worst: 12.5, off_by_one: 93 };
         assert_eq!(deviation, expected);
         assert_eq!(Deviation::new(std::iter::empty()), Deviation::default());
+        let lost = Deviation::new([(Some(1.0), Some(1.0)), (Some(f64::NAN), Some(1.0))].into_iter());
+        assert_eq!((lost.compared, lost.worst, lost.off_by_one), (2, f64::INFINITY, 1));
         let [low, high] = deviation.off_by_one_interval();
         assert!(low < deviation.off_by_one_rate() && deviation.off_by_one_rate() < high);
     }

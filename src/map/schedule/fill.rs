@@ -97,6 +97,15 @@ mod tests {
     }
 
     #[test]
+    fn a_superstable_corner_counts_where_it_has_weight() {
+        let block = Block { i: [0, 2], j: [0, 2] };
+        let corners = [-1.0, f64::NEG_INFINITY, -3.0, -4.0].map(corner);
+        let exponent = |at| Filling::new(&block, corners.each_ref()).record(at).lyapunov;
+        assert_eq!([exponent([0, 0]), exponent([0, 1]), exponent([1, 2])], [-1.0, -2.0, -3.5]);
+        assert_eq!([exponent([1, 0]), exponent([1, 1])], [f64::NEG_INFINITY; 2]);
+    }
+
+    #[test]
     fn what_one_corner_does_not_know_is_not_filled() {
         let block = Block { i: [0, 2], j: [0, 2] };
         let mut corners = [0.0; 4].map(corner);
