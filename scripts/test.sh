@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Everything that must hold before a change is taken: formatting, lints, docs, checks for WebAssembly, tests.
+# Everything that must hold before a change is taken: formatting, lints, docs, dependencies, checks for WebAssembly, tests.
 # Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, and Rust's wasm32 target.
 # With --all the tests run, too, that take minutes each. Ends with the time of each phase and the ten slowest tests.
 set -euo pipefail
@@ -99,6 +99,30 @@ slowest_tests() {
 # What tests could not do for want of a program: they say so past the harness, which keeps what passing tests print.
 skipped() { grep -o 'SKIPPED: .*' "$log" | sort | uniq -c || true; }
 
+# Licences, sources and advisories of all dependencies: deny.toml. What cannot be looked at is told here and at the end.
+unchecked=()
+skip() {
+    say "SKIPPED: $1"
+    unchecked+=("$1")
+}
+dependencies() {
+    if ! cargo deny --version >/dev/null 2>&1; then
+        skip "licences, sources and advisories of dependencies: no cargo-deny (cargo install cargo-deny --locked)"
+        return
+    fi
+    # It reads the crates of every platform.
+    if ! cargo fetch --locked --quiet; then
+        skip "licences and sources of dependencies: crates of other platforms are not here and cannot be fetched"
+        return
+    fi
+    cargo deny --offline check licenses bans sources
+    if cargo deny fetch db; then
+        cargo deny check --disable-fetch advisories
+    else
+        skip "advisories on dependencies: the database (github.com/rustsec/advisory-db) cannot be reached"
+    fi
+}
+
 # How many tests passed and how many wait for --all, over all binaries.
 totals() {
     awk '/^test result:/ { passed += $4; ignored += $8 }
@@ -126,6 +150,7 @@ require_vulkan
 phase "format" cargo fmt --all --check
 phase "lints" cargo clippy --workspace --all-targets -- -D warnings
 phase "docs, warnings denied" docs
+phase "dependencies" dependencies
 phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
 phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu --lib
 phase "compilation of tests" cargo test --workspace --tests --benches --no-run
@@ -137,5 +162,6 @@ printf '%s\n' "${phases[@]}"
 say "the ten slowest tests"
 slowest_tests
 skipped
+for what in "${unchecked[@]}"; do echo "SKIPPED: $what"; done
 say "tests: $(totals)"
 say "all passed"

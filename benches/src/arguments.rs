@@ -10,7 +10,7 @@ use rattlemap_bench::work_precision::measure::Method;
 ///
 /// Each writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version, bin_name = "rattlemap-bench", arg_required_else_help = true)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) instrument: Instrument,

@@ -5,13 +5,15 @@ mod commands;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use arguments::{Cli, Instrument};
 use commands::{stress, work_precision};
 
 fn main() -> ExitCode {
-    let done = match Cli::parse().instrument {
+    let cli = match rattlemap::cli::parsed::<Cli>() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
+    let done = match cli.instrument {
         Instrument::WorkPrecision(ask) => work_precision::run(&ask),
         Instrument::Stress(ask) => stress::run(&ask),
     };

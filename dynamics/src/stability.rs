@@ -11,7 +11,7 @@ mod exponent;
 mod newton;
 mod unit_circle;
 
-pub use exponent::{Exponent, FRESH_TANGENT, standard_error};
+pub use exponent::{Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
 pub use newton::{pitchfork, refine};
 

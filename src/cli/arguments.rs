@@ -1,7 +1,9 @@
 //! The command line: what can be asked, and its help.
 
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
+use crate::cli::say;
 use crate::gpu::Precision;
 use crate::validate::DEFAULT_SAMPLES;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -17,7 +19,7 @@ pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
 /// All quantities are dimensionless. Exit code 0: done; 1: the run or a validation failed; 2: bad usage or scene,
 /// and nothing was computed.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version, bin_name = "rattlemap", arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
     rattlemap map scenes/e_omega.toml                periods and chaos over restitution and frequency\n  \
     rattlemap orbit --set e=0.06                     the paper's motion with meshing on both sides\n  \
@@ -25,6 +27,23 @@ pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+/// What the process was asked for; else the exit code, once help, version or what is wrong has been told.
+///
+/// # Errors
+/// The exit code.
+pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
+    P::try_parse().map_err(|error| {
+        if error.use_stderr() {
+            // Plain: an argument that it quotes may hold escape sequences, and those must not pass for colours.
+            say::note(error.render().to_string().trim_end());
+        } else {
+            // A closed stdout has no reader.
+            let _ = error.print();
+        }
+        ExitCode::from(error.exit_code() as u8)
+    })
 }
 
 #[derive(Debug, Subcommand)]

@@ -7,7 +7,7 @@ use rattlemap_dynamics::orbit::Class;
 use super::arguments::Bifurcation;
 use super::error::{Failure, fail_if};
 use super::progress::Progress;
-use super::scene_file;
+use super::{say, scene_file};
 use crate::map::{bifurcation, scene};
 use crate::output::{self, Folder};
 
@@ -21,7 +21,7 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
     let report = |done| progress.report(done, cells.len());
     let columns = bifurcation::run(&cells, scene.start(), &scene.orbit_settings(), &report)?;
     let files = output::bifurcation::write(&folder, &scene, &ask.set, &columns, clock.elapsed())?;
-    progress.finish(&format!("{}: {}", folder.path().display(), files.join(", ")));
+    progress.finish(&format!("{}: {}", say::path(folder.path()), files.join(", ")));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
     fail_if(all_failed, "every column failed; the status column says why")
 }

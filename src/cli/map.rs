@@ -81,7 +81,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     progress.finish(&format!(
         "{}\n{}: {}",
         summary(&cells, &run, lane_steps, clock.elapsed().as_secs_f64()),
-        folder.path().display(),
+        say::path(folder.path()),
         files.join(", ")
     ));
     let all_failed = cells.classes().all(|class| class == Class::Failed);

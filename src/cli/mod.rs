@@ -17,10 +17,9 @@ mod validate;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use arguments::{Bench, Cli, Command};
 
+pub use arguments::parsed;
 pub use error::{Failure, fail_if};
 pub use processor::{cores, name as processor_name};
 pub use progress::Progress;
@@ -28,7 +27,11 @@ pub use say::note;
 
 /// Runs the command that the process was started with, and says how it ended.
 pub fn run() -> ExitCode {
-    let done = match Cli::parse().command {
+    let cli = match parsed::<Cli>() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
+    let done = match cli.command {
         Command::Map(ask) => map::run(&ask),
         Command::Orbit(ask) => orbit::run(&ask),
         Command::Bifurcation(ask) => bifurcation::run(&ask),

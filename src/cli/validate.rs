@@ -63,7 +63,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let device = lanes.device.as_deref();
     let files = write_validation(&folder, &cells, &made, device, &validation)?;
     let summary = summary(&validation, device);
-    progress.finish(&format!("{summary}{note}\n{}: {}", dir.display(), files.join(", ")));
+    progress.finish(&format!("{summary}{note}\n{}: {}", say::path(dir), files.join(", ")));
     verdict(dir, &plan, &validation)
 }
 
@@ -247,9 +247,15 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), Failu
         return Ok(());
     }
     let unexplained = validation.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
-    let mut named: Vec<String> = unexplained
-        .map(|mismatch| {
-            let [i, j] = plan.indices(mismatch.id);
+    let mut ids: Vec<u32> =
+        unexplained.map(|mismatch| mismatch.id).chain(validation.not_finite.clone()).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    let mut named: Vec<String> = ids
+        .into_iter()
+        .take(NAMED + 1)
+        .map(|id| {
+            let [i, j] = plan.indices(id);
             format!("({i}, {j})")
         })
         .collect();
@@ -261,4 +267,25 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), Failu
         faults.join("; "),
         dir.join("validation.json").display()
     )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::valid;
+
+    /// As of a map whose cells were all filled.
+    #[test]
+    fn a_validation_that_replayed_nothing_fails() {
+        let axis = |name: &str| format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1\ncount = 2\n");
+        let text = ["e", "omega"].map(axis).concat();
+        let plan = Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap());
+        let records = vec![Record { valid: valid::FILLED, ..Record::default() }; 4];
+        let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: true };
+        let sample = validate::sample(&plan, &records, 4, 1);
+        let validation = validate::replay(&subject, &sample, &Lanes::default(), &|_| {});
+        let failure = verdict(Path::new("o"), &plan, &validation).unwrap_err();
+        assert!(matches!(&failure, Failure::Run(_)), "{failure}");
+        assert!(failure.to_string().starts_with("none of 4 cells was replayed"), "{failure}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Known answers: every program that a device has compiled must give them before it is trusted.
 
 use super::{Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
+use crate::record::distance::{apart, farther, is_within};
 use rattlemap_dynamics::model::{GearPair, State};
 
 /// Forcing periods from rest to the answers.
@@ -48,8 +49,8 @@ pub(super) async fn check(
     for ended in pool.advance(gpu, &tables, 0).await? {
         let (e, omega, answer) = ANSWERS[ended.number() as usize];
         let record = ended.record(tables.constants());
-        let error = record.strobe.iter().zip(answer).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        if record.status != 0 || error.is_nan() || error > bar {
+        let error = record.strobe.iter().zip(answer).map(|(&a, b)| apart(a, b)).fold(0.0, farther);
+        if record.status != 0 || !is_within(error, bar) {
             let adapter = gpu.info.name.clone();
             return Err(GpuError::WrongAnswer { adapter, e, omega, error });
         }

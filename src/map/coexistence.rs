@@ -18,6 +18,7 @@ use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::record::Record;
 use crate::record::classify::classify;
+use crate::record::distance::{apart, farther};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, State};
 use rattlemap_dynamics::orbit::Class;
@@ -145,7 +146,30 @@ impl Seen {
         };
         let position = largest(0, 2).max(flow.length);
         let velocity = largest(1, 3).max(flow.omega * position);
-        let apart = |i: usize| (a[i] - b[i]).abs();
-        (apart(0).max(apart(2)) / position).max(apart(1).max(apart(3)) / velocity)
+        let units = [position, velocity];
+        (0..4).map(|i| apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::GearPair;
+
+    #[test]
+    fn a_state_that_is_no_number_lies_on_no_cycle() {
+        let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
+        let seen =
+            |point: State| Seen { period: 1, points: vec![point], last: point, is_non_impacting: false };
+        let state = [0.1, 0.2, -0.1, 0.3];
+        assert!(seen(state).passes(&flow, &state, 1));
+        for i in 0..4 {
+            for value in [f64::NAN, f64::INFINITY] {
+                let mut lost = state;
+                lost[i] = value;
+                assert!(!seen(state).passes(&flow, &lost, 1) && !seen(lost).passes(&flow, &state, 1));
+                assert!(!seen(lost).passes(&flow, &lost, 1), "{i}: {value}");
+            }
+        }
     }
 }

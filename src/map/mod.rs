@@ -3,6 +3,7 @@
 //! [`sweep`]). Over one axis it is a bifurcation diagram ([`bifurcation`]); several starts per cell
 //! count attractors ([`coexistence`]). [`run`] does all of it at once.
 
+pub mod printable;
 pub mod random;
 
 pub mod scene;

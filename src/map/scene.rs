@@ -100,7 +100,7 @@ impl Scene {
         let (command, axis_count) = purpose.needs();
         let axes = axis::read(&root, model, axis_count, command)?;
         let title = match root.get("title") {
-            Some(title) => title.text()?.to_owned(),
+            Some(title) => settings::read_title(&title)?,
             None => default_title(model, &axes),
         };
         let scene = Scene {

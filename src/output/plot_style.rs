@@ -6,6 +6,7 @@
 //! as one polygon, which leaves holes wherever a trajectory crosses itself.
 
 pub mod axes;
+mod fitting;
 pub mod labels;
 pub mod legend;
 mod raster;
@@ -227,24 +228,6 @@ impl Canvas<'_> {
         };
         let style = font.color(&color).pos(Pos::new(h_pos, VPos::Top));
         self.area.draw_text(text, &style, at)
-    }
-
-    /// Width of a text.
-    pub fn text_width(&self, text: &str, size: f64) -> Result<f64, DrawError> {
-        let scale = f64::from(FINE);
-        let font = FontDesc::new(FontFamily::Name(FONT), size * scale, FontStyle::Normal);
-        let (width, _) = self.area.estimate_text_size(text, &font.into())?;
-        Ok(f64::from(width) / scale)
-    }
-
-    /// The beginning of a text that is not wider than `room`, with an ellipsis if that is not all.
-    pub fn fitted(&self, text: &str, size: f64, room: f64) -> Result<String, DrawError> {
-        let mut text = text.to_owned();
-        while text.chars().count() > 2 && self.text_width(&text, size)? > room {
-            text.truncate(text.char_indices().nth_back(1).map_or(0, |(i, _)| i));
-            text.push('\u{2026}');
-        }
-        Ok(text)
     }
 
     /// Draws an event marker, with a thin white rim that sets it off from the line.

@@ -3,6 +3,9 @@
 //! The page's own code is in `report/`. Its data are JSON; arrays over the cells are little
 //! endian numbers, compressed with gzip (browsers unpack that themselves) and written in
 //! base64.
+//!
+//! The page runs its own script and style and nothing else, which its policy says: what gets into a page from a scene or a
+//! manifest is text, and would stay text if it were written as a script.
 
 use std::fs;
 use std::io::Write;
@@ -15,6 +18,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer, Words};
@@ -121,15 +125,21 @@ pub(super) fn write(
         refinement: cells.refinement().map(RefinementObject::from),
         validation,
     };
+    let [style, script] = [STYLE, SCRIPT].map(inline);
+    let policy = policy(&style, &script);
     // `<` could end the script that holds the data.
     let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
     let title = scene.title().replace('&', "&amp;").replace('<', "&lt;");
     // One pass: data must not be searched for marks.
     let mut page = String::with_capacity(PAGE.len() + STYLE.len() + SCRIPT.len() + json.len());
     let mut rest = PAGE;
-    for (mark, text) in
-        [("@TITLE@", title.as_str()), ("@STYLE@", STYLE), ("@DATA@", &json), ("@SCRIPT@", SCRIPT)]
-    {
+    for (mark, text) in [
+        ("@POLICY@", policy.as_str()),
+        ("@TITLE@", &title),
+        ("@STYLE@", &style),
+        ("@DATA@", &json),
+        ("@SCRIPT@", &script),
+    ] {
         let Some((before, after)) = rest.split_once(mark) else { unreachable!("the page has {mark}") };
         page.push_str(before);
         page.push_str(text);
@@ -137,6 +147,18 @@ pub(super) fn write(
     }
     page.push_str(rest);
     Ok(fs::write(path, page)?)
+}
+
+/// An inline part as it stands between its tags. Browsers hash what they have parsed, in which lines end in line feeds.
+fn inline(source: &str) -> String {
+    format!("\n{}\n", source.replace("\r\n", "\n").trim_end())
+}
+
+/// What a browser may load and run: these two inline parts, by their hashes.
+fn policy(style: &str, script: &str) -> String {
+    let [style, script] =
+        [style, script].map(|part| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part))));
+    format!("default-src 'none'; script-src {script}; style-src {style}; base-uri 'none'; form-action 'none'")
 }
 
 /// Starts that a cell's record does not tell, in full: the command that replays it needs them.

@@ -44,6 +44,8 @@ pub(super) struct ValidationObject {
     computed_again: usize,
     chaos: Vec<ChaosObject>,
     states: Option<StatesObject>,
+    /// Runs of the whole map whose record holds a number that is not finite.
+    not_finite: Vec<u32>,
     mismatches: Vec<MismatchObject>,
 }
 
@@ -155,6 +157,7 @@ impl ValidationObject {
             computed_again: validation.again[1],
             chaos: validation.chaos.iter().map(ChaosObject::from).collect(),
             states: validation.states.as_ref().map(StatesObject::from),
+            not_finite: validation.not_finite.clone(),
             mismatches: validation.mismatches.iter().map(|mismatch| mismatched(cells, mismatch)).collect(),
         }
     }

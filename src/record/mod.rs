@@ -1,6 +1,7 @@
 //! What one lane measured: the only thing that travels from an engine to the host's tables.
 
 pub mod classify;
+pub mod distance;
 pub mod limits;
 mod spelling;
 

@@ -5,9 +5,9 @@
 //! reference reads the same there, and it belongs to the cycle that lies there.
 
 use super::cell::{Cell, FACTOR};
-use super::compare::apart;
 use crate::gpu::rules;
 use crate::record::classify::{classify, status};
+use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Class, Status};
@@ -43,12 +43,18 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
 /// Whether a multiplier, as a logarithm, may be read along the motion from a state: what the reference reads scatters
 /// where every period rounds, and the record's reading is one of them.
 fn may_be_read(cell: &Cell<'_>, state: State, said: f64, period: u32) -> bool {
-    let read = cell.multipliers_from(state, period);
+    let mut read = cell.multipliers_from(state, period);
+    // A multiplier that vanishes is one that is as good as zero.
+    let none = cell.bars.none();
+    read.iter_mut().filter(|log| **log == f64::NEG_INFINITY).for_each(|log| *log = none);
+    if read.is_empty() || !read.iter().all(|log| log.is_finite()) {
+        return false;
+    }
     let least = read.iter().copied().fold(f64::INFINITY, f64::min);
     let most = read.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     // As far again: a few readings do not show all of their range.
     let nearest = said.clamp(least - (most - least), most + (most - least));
-    !read.is_empty() && cell.bars.is_same_multiplier(said, nearest, f64::from(period))
+    cell.bars.is_same_multiplier(said, nearest, f64::from(period))
 }
 
 /// Whether an event of a cycle lies on phase 0, as far as the engine can tell.

@@ -3,13 +3,15 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::Subject;
-use super::compare::{Answer, Bars, farther};
+use super::compare::{Answer, Bars};
+use super::finite::not_finite;
 use crate::gpu::Precision;
 use crate::map::engine::measured_record;
 use crate::map::plan::Needs;
 use crate::map::random::Random;
 use crate::record::Record;
 use crate::record::classify::{classify, status};
+use crate::record::distance::{self, farther};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, State};
 use rattlemap_dynamics::orbit::{Budget, Class, Status, measure};
@@ -87,6 +89,11 @@ impl<'a> Cell<'a> {
         let periods = budget.periods().saturating_mul(times);
         budget.settings.transient_periods = periods.saturating_sub(observed);
         budget
+    }
+
+    /// Whether a record holds the numbers that it claims to hold.
+    pub(super) fn is_finite(&self, record: &Record) -> bool {
+        not_finite(record, &self.budget).is_none()
     }
 
     /// Forcing periods that the plan allows one run.
@@ -220,7 +227,7 @@ impl<'a> Cell<'a> {
     /// The distance of two states relative to the size of the motion, but not less than the walls' distance.
     pub(super) fn apart(&self, a: &State, b: &State) -> f64 {
         let [position, velocity] = self.units(a);
-        let by = |i: usize| super::compare::apart(a[i], b[i]) / [position, velocity][i % 2];
+        let by = |i: usize| distance::apart(a[i], b[i]) / [position, velocity][i % 2];
         (0..4).map(by).fold(0.0, farther)
     }
 

@@ -2,8 +2,10 @@
 
 use serde::Serialize;
 
+use super::finite::not_finite;
 use crate::gpu::Precision;
 use crate::record::classify::{classify, status};
+use crate::record::distance::{apart, is_within};
 use crate::record::{Record, Spelling, valid};
 use rattlemap_dynamics::orbit::{Budget, Class, Status};
 use rattlemap_dynamics::word::Word;
@@ -29,13 +31,15 @@ pub enum Field {
     Status,
     /// Forcing periods integrated: no more than the plan allows.
     Periods,
+    /// Every number that the record claims to hold: it is finite.
+    Finite,
     /// The whole record: the same lane on the same device gives it again, to the bit.
     Again,
 }
 
 impl Field {
     /// Every field, in the order in which they are told.
-    pub const ALL: [Field; 10] = [
+    pub const ALL: [Field; 11] = [
         Field::Class,
         Field::Period,
         Field::Word,
@@ -45,6 +49,7 @@ impl Field {
         Field::Mesh,
         Field::Status,
         Field::Periods,
+        Field::Finite,
         Field::Again,
     ];
 
@@ -60,6 +65,7 @@ impl Field {
             Field::Mesh => "mesh_fraction",
             Field::Status => "status",
             Field::Periods => "periods_run",
+            Field::Finite => "finite",
             Field::Again => "again",
         }
     }
@@ -140,9 +146,7 @@ pub(super) struct Bars {
     no_multiplier: f64,
     mesh: f64,
     forcing_period: f64,
-    /// Periods that one run of the plan takes, and may take where it is undecided by then.
-    periods: u32,
-    longest: u32,
+    budget: Budget,
 }
 
 /// Growth or decay, as a logarithm, that takes rounding to the size of the motion or back: what has had less of it by
@@ -160,23 +164,24 @@ const CHAOS_BARS: [f64; 3] = [0.1, 0.5, 0.25];
 
 impl Bars {
     pub(super) fn new(precision: Precision, forcing_period: f64, budget: &Budget) -> Bars {
-        let (periods, longest) = (budget.periods(), budget.longest());
         let (multiplier, no_multiplier, mesh) = match precision {
             Precision::F32 => (4e-3, 1e-2, 2e-5),
             Precision::F64 => (1e-3, 1e-5, 1e-6),
         };
-        Bars { multiplier, no_multiplier, mesh, forcing_period, periods, longest }
+        Bars { multiplier, no_multiplier, mesh, forcing_period, budget: *budget }
     }
 
     /// Compares a record with what its judge says, field by field as far as both have them.
     pub(super) fn compare(&self, record: &Record, answer: &Answer) -> Vec<Compared> {
         let judge = &answer.record;
         let [ours, theirs] = [record, judge].map(classify);
+        let longest = self.budget.longest();
         let mut list = vec![
             compared(Field::Class, ours.index() == theirs.index(), || texts(ours.name(), theirs.name())),
-            compared(Field::Periods, record.periods_run <= self.longest, || {
-                (Value::Count(record.periods_run), Value::Count(self.longest))
+            compared(Field::Periods, record.periods_run <= longest, || {
+                (Value::Count(record.periods_run), Value::Count(longest))
             }),
+            self.finite(record),
         ];
         if ours.index() == theirs.index() {
             let statuses = [record, judge].map(status);
@@ -217,7 +222,17 @@ impl Bars {
     /// Whether the motion of a record settles or separates, within the budget, by enough to be told from neutral.
     pub(super) fn is_told(&self, judge: &Record) -> bool {
         let has = judge.valid & valid::LYAPUNOV != 0;
-        has && judge.lyapunov.abs() * self.forcing_period * f64::from(self.periods) >= TELLING
+        has && judge.lyapunov.abs() * self.forcing_period * f64::from(self.budget.periods()) >= TELLING
+    }
+
+    /// That every number of a record is finite.
+    pub(super) fn finite(&self, record: &Record) -> Compared {
+        let found = not_finite(record, &self.budget);
+        let shown = || {
+            let (name, value) = found.unwrap_or_default();
+            (Value::Text(format!("{name} = {value}")), Value::Text("a finite number".into()))
+        };
+        compared(Field::Finite, found.is_none(), shown)
     }
 
     /// Whether a record says the same in every field.
@@ -251,8 +266,13 @@ impl Bars {
 
     /// Whether two logarithms of the largest multiplier of a cycle are the same.
     pub(super) fn is_same_multiplier(&self, ours: f64, theirs: f64, period: f64) -> bool {
-        let is_none = [ours, theirs].iter().all(|log| *log <= self.no_multiplier.ln());
-        is_none || apart(ours, theirs) <= self.multiplier * period.max(5.0)
+        let is_none = [ours, theirs].iter().all(|log| *log <= self.none());
+        is_none || is_within(apart(ours, theirs), self.multiplier * period.max(5.0))
+    }
+
+    /// The logarithm of a multiplier that is as good as zero.
+    pub(super) fn none(&self) -> f64 {
+        self.no_multiplier.ln()
     }
 
     fn compare_averages(&self, record: &Record, judge: &Record, list: &mut Vec<Compared>) {
@@ -260,7 +280,7 @@ impl Bars {
         // Only the judge's error counts: what a record says of itself widens no bar.
         let own = if judge.lyapunov_error.is_finite() { judge.lyapunov_error } else { 0.0 };
         let bar = ERRORS * std::f64::consts::SQRT_2 * own + CHAOS_BARS[0] / self.forcing_period;
-        let is_same = apart(exponents[0], exponents[1]) <= bar;
+        let is_same = is_within(apart(exponents[0], exponents[1]), bar);
         let both = record.valid & judge.valid;
         self.push(list, (Field::Exponent, valid::LYAPUNOV), exponents, both, is_same);
         let impacts = CHAOS_BARS[1] * judge.impacts_per_period + 1.0;
@@ -274,7 +294,7 @@ impl Bars {
             ((Field::Mesh, valid::MESH), [record, judge].map(|side| side.mesh_fraction)),
         ];
         for ((field, values), bar) in of.into_iter().zip(bars) {
-            self.push(list, field, values, both, apart(values[0], values[1]) <= bar);
+            self.push(list, field, values, both, is_within(apart(values[0], values[1]), bar));
         }
     }
 
@@ -291,24 +311,6 @@ impl Bars {
             list.push(compared(field, is_same, || (Value::Number(record), Value::Number(judge))));
         }
     }
-}
-
-/// The distance of two numbers; two equal infinities are the same number, and what is not finite otherwise is
-/// infinitely far from anything.
-pub(super) fn apart(a: f64, b: f64) -> f64 {
-    let distance = (a - b).abs();
-    if a == b {
-        0.0
-    } else if distance.is_nan() {
-        f64::INFINITY
-    } else {
-        distance
-    }
-}
-
-/// The larger distance; `f64::max` would drop what is not a number.
-pub(super) fn farther(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 
 pub(super) fn compared(field: Field, same: bool, shown: impl FnOnce() -> (Value, Value)) -> Compared {

@@ -28,7 +28,8 @@ pub(super) struct Lanes<'a> {
 /// The kind of a mismatch. `claim` is what differs from `truth`, the reference's answer: the map's record, or what
 /// judges a map of the reference itself.
 pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes<'_>) -> Kind {
-    if claim.periods_run > cell.longest() {
+    // Such numbers are no engine's answer: there is nothing to explain.
+    if claim.periods_run > cell.longest() || !cell.is_finite(claim) {
         return Kind::Unexplained;
     }
     // Caps and resolution are the lanes' own; the reference cannot tell whether they were met.

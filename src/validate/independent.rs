@@ -12,6 +12,7 @@ use nalgebra::Matrix4;
 
 use crate::map::plan::Plan;
 use crate::record::classify::CHAOS_ERRORS;
+use crate::record::distance::{self, farther};
 use crate::record::{Record, valid};
 use dop853::Solver;
 use flight::{Ended, Flight};
@@ -118,7 +119,7 @@ fn follow(oscillator: &Oscillator, law: Law, start: State, budget: &Budget) -> O
     let position = largest(0).max(0.5 * (oscillator.walls[0] - oscillator.walls[1]));
     let units = [position, largest(1).max(oscillator.omega * position)];
     let apart = |a: &[f64; 4], b: &[f64; 4]| {
-        (0..4).map(|i| (a[i] - b[i]).abs() / units[i % 2]).fold(0.0, super::compare::farther)
+        (0..4).map(|i| distance::apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
     };
     let recurs = |lag: usize, within: f64| {
         (lag..window.len()).rev().take(lag).all(|n| apart(&window[n], &window[n - lag]) < within)

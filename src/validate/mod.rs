@@ -14,6 +14,7 @@ mod cell;
 mod chaos;
 mod compare;
 mod explain;
+mod finite;
 #[cfg(feature = "independent")]
 pub mod independent;
 mod lanes;
@@ -175,6 +176,8 @@ pub struct Validation {
     pub states: Option<StateCheck>,
     /// Every cell that differs, by id.
     pub mismatches: Vec<Mismatch>,
+    /// Runs of the whole map, replayed or not, whose record claims a number and holds none.
+    pub not_finite: Vec<u32>,
 }
 
 impl Validation {
@@ -193,6 +196,10 @@ impl Validation {
         let mut faults = Vec::new();
         if self.replayed == 0 {
             faults.push(format!("none of {} {} was replayed", self.runs, self.counted()));
+        }
+        if !self.not_finite.is_empty() {
+            let (count, runs, counted) = (self.not_finite.len(), self.runs, self.counted());
+            faults.push(format!("{count} of {runs} {counted} hold numbers that are not finite"));
         }
         for stratum in &self.strata {
             let rate = stratum.rate(Kind::Unexplained);
@@ -268,7 +275,15 @@ pub fn replay(
         chaos: chaos::tests(&chaos),
         states: has_states.then(|| states::check(subject, lanes.states())),
         mismatches,
+        not_finite: not_finite(subject),
     }
+}
+
+/// Runs whose record claims a number and holds none.
+fn not_finite(subject: &Subject<'_>) -> Vec<u32> {
+    let budget = subject.plan.budget();
+    let is_wrong = |record: &Record| finite::not_finite(record, budget).is_some();
+    (0..).zip(subject.records).filter(|(_, record)| is_wrong(record)).map(|(id, _)| id).collect()
 }
 
 /// Where a record differs from another of the same cell, without asking why.

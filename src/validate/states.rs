@@ -7,8 +7,8 @@
 
 use super::Subject;
 use super::cell::{Cell, resolution};
-use super::compare::farther;
 use super::rate::Rate;
+use crate::record::distance::farther;
 use rattlemap_dynamics::model::State;
 use rayon::prelude::*;
 

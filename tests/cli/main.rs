@@ -7,3 +7,4 @@ mod faults;
 mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;
+mod text;

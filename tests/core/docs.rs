@@ -70,3 +70,29 @@ fn anchors_are_as_readers_of_markdown_make_them() {
     );
     assert_eq!(links("[a](b) c\n```\n[d](e)\n```\n[f](g#h)"), ["b", "g#h"]);
 }
+
+/// Fonts are under licences of their own, which go where the program goes.
+#[test]
+fn every_font_in_the_program_has_its_notice() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let notice = fs::read_to_string(root.join("NOTICE")).unwrap();
+    let mut used = Vec::new();
+    for folder in ["src", "benches/src"] {
+        for source in super::layers::sources(&root.join(folder)) {
+            let text = fs::read_to_string(&source).unwrap();
+            let names = text.split("epaint_default_fonts::").skip(1);
+            used.extend(names.map(|rest| {
+                rest.split(|c: char| !c.is_ascii_uppercase() && c != '_').next().unwrap().to_owned()
+            }));
+        }
+    }
+    assert_eq!(used, ["UBUNTU_LIGHT"], "a font without its notice");
+    for part in [
+        "Ubuntu-Light.ttf",
+        "Copyright 2011 Canonical Ltd.",
+        "UBUNTU FONT LICENCE Version 1.0",
+        "PERMISSION & CONDITIONS",
+    ] {
+        assert!(notice.contains(part), "{part}");
+    }
+}

@@ -13,6 +13,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::read::GzDecoder;
 use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 const COLUMNS: usize = 24;
@@ -119,6 +120,12 @@ fn visit(browser: &str, page: &Path) -> Value {
     serde_json::from_slice(&STANDARD.decode(said).unwrap()).unwrap()
 }
 
+fn skipped() {
+    // Past the harness, which keeps what tests that pass print.
+    let mut stderr = io::stderr();
+    writeln!(stderr, "SKIPPED: no Chromium to open the report with").unwrap();
+}
+
 /// A map and its report.
 struct Report {
     folder: TempDir,
@@ -172,16 +179,29 @@ impl Report {
     /// What the page says in a browser, with some more of it read; none without a browser.
     fn visited(&self, also: &str) -> Option<Value> {
         let Some(browser) = chromium() else {
-            // Past the harness, which keeps what tests that pass print.
-            let mut stderr = io::stderr();
-            writeln!(stderr, "SKIPPED: no Chromium to open the report with").unwrap();
+            skipped();
             return None;
         };
         let visited = self.file("visited.html");
         let visit_and_read = VISIT.replacen("const result", &format!("{also} const result"), 1);
-        fs::write(&visited, self.page().replace("</body>", &visit_and_read)).unwrap();
+        let page = self.page().replace("</body>", &visit_and_read);
+        // The policy lets no foreign script run: this one is told to it, beside the page's own.
+        let own = between(&visit_and_read, "<script>", "</script>");
+        let page = page.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
+        fs::write(&visited, page).unwrap();
         Some(visit(browser, &visited))
     }
+}
+
+/// What stands between two marks, the first of each.
+fn between<'t>(text: &'t str, from: &str, to: &str) -> &'t str {
+    let (_, rest) = text.split_once(from).unwrap_or_else(|| panic!("no {from}"));
+    rest.split_once(to).unwrap_or_else(|| panic!("no {to}")).0
+}
+
+/// A part as a policy names it.
+fn hashed(part: &str) -> String {
+    format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part)))
 }
 
 /// The command that replays a cell.
@@ -209,6 +229,78 @@ fn the_report_is_one_page_that_stands_alone() {
     let layers: Vec<&Value> = data["layers"].as_array().unwrap().iter().map(|layer| &layer["name"]).collect();
     assert_eq!(layers.len(), LAYERS.len(), "{layers:?}");
     assert_eq!(data["validation"], Value::Null);
+}
+
+/// The policy lets the two inline parts run and nothing else, and nothing in the page needs more: handlers and styles in
+/// attributes have no hash.
+#[test]
+fn the_policy_allows_the_pages_own_parts_alone() {
+    let page = Report::validated().page();
+    let policy = between(&page, "<meta http-equiv=\"Content-Security-Policy\" content=\"", "\">");
+    let style = hashed(between(&page, "<style>", "</style>"));
+    let script = hashed(between(&page, "<script>", "</script>"));
+    let expected = format!(
+        "default-src 'none'; script-src {script}; style-src {style}; base-uri 'none'; form-action 'none'"
+    );
+    assert_eq!(policy, expected);
+    let at = |part: &str| page.find(part).unwrap();
+    assert!(at("Content-Security-Policy") < at("<title>") && at("<title>") < at("<style>"), "too late");
+    assert_eq!((page.matches("<script").count(), page.matches("<style").count()), (2, 1));
+    let data = between(&page, "<script id=\"map\" type=\"application/json\">", "</script>");
+    let script = between(&page, "<script>", "</script>");
+    let markup = page.replace(data, "").replace(script, "");
+    let handles = |tag: &&str| {
+        let name = |attribute: &str| attribute.split('=').next().unwrap().to_ascii_lowercase();
+        tag.split_whitespace().skip(1).map(name).any(|name| name == "style" || name.starts_with("on"))
+    };
+    let tags: Vec<&str> = markup.split('<').skip(1).filter_map(|rest| rest.split('>').next()).collect();
+    assert!(tags.len() > 40, "{}", tags.len());
+    assert_eq!(tags.into_iter().find(handles), None);
+    // What the script makes has none either.
+    for made in [
+        "setAttribute(\"style\"",
+        "setAttribute(\"on",
+        "innerHTML",
+        "insertAdjacentHTML",
+        "document.write",
+        "eval(",
+    ] {
+        assert!(!script.contains(made), "{made}");
+    }
+}
+
+/// In a browser, of scripts that got into the page all the same: neither runs, and the browser says so.
+#[test]
+fn a_browser_refuses_foreign_scripts() {
+    let report = Report::new();
+    let Some(browser) = chromium() else { return skipped() };
+    let foreign = report.file("foreign.html");
+    let intruders = "<script>document.title = \"run\"</script>\
+                     <img src=\"data:image/gif,x\" onerror='document.title = \"run\"'></body>";
+    let opened = |page: String| {
+        fs::write(&foreign, page).unwrap();
+        let url = format!("file://{}", foreign.display());
+        let run = Command::new(browser)
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0"])
+            .args(["--virtual-time-budget=5000", "--dump-dom", &url])
+            .output()
+            .unwrap();
+        let [dom, log] = [run.stdout, run.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+        let title = between(&dom, "<title>", "</title>").to_owned();
+        let refused = log.lines().filter(|line| line.contains("Content Security Policy")).count();
+        assert!(
+            dom.contains("aria-checked=\"true\""),
+            "the page's own script did not run: {dom:.2000} {log}"
+        );
+        (title, refused)
+    };
+    let page = report.page();
+    let (title, refused) = opened(page.clone());
+    assert!(title != "run" && refused == 0, "{title}: {refused} of the page's own parts were refused");
+    let (title, refused) = opened(page.replace("</body>", intruders));
+    assert!(title != "run" && refused >= 2, "{title}, {refused} refused");
+    let without = page.replacen("http-equiv=\"Content-Security-Policy\"", "name=\"none\"", 1);
+    assert_eq!(opened(without.replace("</body>", intruders)).0, "run", "they would run without it");
 }
 
 #[test]

@@ -8,5 +8,6 @@ mod short_cells;
 
 mod classes_agree;
 mod independent;
+mod not_finite;
 mod replay;
 mod short_lanes;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use rattlemap::gpu::Precision;
+use rattlemap::record::distance::{self, farther};
 use rattlemap_dynamics::flow::Flow;
 pub(super) use rattlemap_dynamics::model::REST;
 use rattlemap_dynamics::model::{GearPair, Model, State};
@@ -75,8 +76,7 @@ pub(super) fn after(pair: &GearPair, start: State, periods: u32) -> Result<State
 
 /// Largest difference of two states; infinite if one is not finite.
 pub(super) fn apart(a: &State, b: &State) -> f64 {
-    let largest = |m: f64, d: f64| if d.is_nan() { f64::INFINITY } else { m.max(d) };
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, largest)
+    a.iter().zip(b).map(|(&a, &b)| distance::apart(a, b)).fold(0.0, farther)
 }
 
 /// Roundings by which starts and parameters are moved to see what rounding may do.
@@ -105,7 +105,7 @@ pub(super) fn sensitivity_to(amount: f64, pair: &GearPair, start: State, periods
     };
     let ends = (0..8).map(moved_start).chain((0..2 * GearPair::PARAMETERS.len()).filter_map(moved_pair));
     let size = end.iter().fold(pair.b, |m, x| m.max(x.abs()));
-    ends.map(|moved| moved.map_or(f64::INFINITY, |moved| apart(&moved, &end))).fold(amount * size, f64::max)
+    ends.map(|moved| moved.map_or(f64::INFINITY, |moved| apart(&moved, &end))).fold(amount * size, farther)
 }
 
 /// What rounding may make of an error after so many steps: the reference is moved by four

@@ -141,7 +141,9 @@ pub fn judge(rows: &[Row]) -> Verdict {
         EngineName::LanesF32 | EngineName::LanesF64 => u64::from(LaneSettings::default().events_per_period),
     };
     let good = |row: &&Row| match (row.status, row.error) {
-        ("ok", Some(error)) => row.bar.is_none_or(|bar| bar > UNFORESEEN || error <= bar),
+        ("ok", Some(error)) => {
+            error.is_finite() && row.bar.is_none_or(|bar| bar > UNFORESEEN || error <= bar)
+        }
         // The truth itself has no end below its cap, but this series was closed.
         ("ok", None) => row.mesh_speed < TINY,
         ("cap_events", _) => row.impacts > cap(row.engine),

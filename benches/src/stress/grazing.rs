@@ -22,6 +22,7 @@ use super::{Part, Size, Verdict, readout};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::map::random::Random;
 use rattlemap::record::Record;
+use rattlemap::record::distance::farther;
 use rattlemap_dynamics::model::{GearPair, Side};
 use rattlemap_dynamics::reference::{Happening, Trajectory};
 
@@ -127,7 +128,7 @@ fn tabulate(engine: EngineName, distances: &[f64], starts: &[Start], speeds: &[O
             distance,
             cells,
             contacts: errors.len(),
-            speed_error: errors.iter().copied().fold(0.0, f64::max),
+            speed_error: errors.iter().copied().fold(0.0, farther),
             law: law(distance, ROUNDINGS * engine.unit_roundoff()),
         }
     };
@@ -145,7 +146,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
         .sum();
     let made_up: usize =
         rows.iter().filter(|row| resolved(row) && row.distance < 0.0).map(|row| row.contacts).sum();
-    let worst = rows.iter().map(|row| row.speed_error / row.law).fold(0.0, f64::max);
+    let worst = rows.iter().map(|row| row.speed_error / row.law).fold(0.0, farther);
     let holds = missed == 0 && made_up == 0 && worst <= 1.0;
     let cells: usize = rows.iter().map(|row| row.cells).sum();
     Verdict {

@@ -19,6 +19,7 @@ use super::perturbed::{Perturbed, perturbed};
 use super::{Part, Size, Verdict, Watch, readout};
 use rattlemap::gpu::{Constants, GpuError, LaneSettings};
 use rattlemap::map::random::Random;
+use rattlemap::record::distance::is_within;
 use rattlemap::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::Status;
@@ -253,7 +254,7 @@ pub fn judge(rows: &Rows) -> Verdict {
     let good = |row: &&Motion| {
         row.status == "ok"
             && (row.impacts_least..=row.impacts_most).contains(&row.impacts)
-            && row.error <= row.bar
+            && is_within(row.error, row.bar)
             && row.steps >= row.steps_asked
     };
     let bad = rows.motions.iter().filter(|row| !good(row)).count();

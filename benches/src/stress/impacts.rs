@@ -17,6 +17,7 @@ use super::readout::{self, Contact};
 use super::{Part, Size, Verdict};
 use rattlemap::gpu::{GpuError, LaneSettings};
 use rattlemap::map::random::Random;
+use rattlemap::record::distance::farther;
 use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{GearPair, State};
 use rattlemap_dynamics::reference::{Happening, Observer, Trajectory};
@@ -72,10 +73,8 @@ impl Worst<'_> {
             (momentum(after) - momentum(before)).abs() / (momentum(moduli(before)) + momentum(moduli(after)));
         let energy_error =
             (energy(before) - energy(after) - law).abs() / (energy(moduli(before)) + energy(moduli(after)));
-        // `f64::max` would swallow a NaN.
-        let worse = |worst: f64, error: f64| if error / unit <= worst { worst } else { error / unit };
-        self.row.momentum_error = worse(self.row.momentum_error, momentum_error);
-        self.row.energy_error = worse(self.row.energy_error, energy_error);
+        self.row.momentum_error = farther(self.row.momentum_error, momentum_error / unit);
+        self.row.energy_error = farther(self.row.energy_error, energy_error / unit);
         self.row.contacts += 1;
     }
 }
@@ -159,7 +158,7 @@ pub fn judge(rows: &[Row]) -> Verdict {
     let told = EngineName::ALL.into_iter().filter_map(|engine| {
         let of_engine = || rows.iter().filter(move |row| row.engine == engine);
         of_engine().next()?;
-        let worst = |of: fn(&Row) -> f64| of_engine().map(of).fold(0.0, f64::max);
+        let worst = |of: fn(&Row) -> f64| of_engine().map(of).fold(0.0, farther);
         let contacts: u64 = of_engine().map(|row| row.contacts).sum();
         let (momentum, energy) = (worst(|row| row.momentum_error), worst(|row| row.energy_error));
         Some(format!("{} {momentum:.1} and {energy:.1} at {contacts} contacts", engine.name()))

@@ -12,6 +12,7 @@ use super::cells::{EngineName, after, apart, flow_of, paper};
 use super::lanes::{Lanes, Start};
 use super::{Part, Size, Verdict, Watch};
 use rattlemap::gpu::{GpuError, LaneSettings};
+use rattlemap::record::distance::{farther, is_within};
 use rattlemap_dynamics::model::{GearPair, State};
 use rattlemap_dynamics::orbit::Status;
 use rattlemap_dynamics::reference::Trajectory;
@@ -88,7 +89,7 @@ pub fn measure(size: Size, lanes: &mut Lanes, watch: &dyn Watch) -> Result<Vec<R
                     Some(Status::Ok) => apart(&records[k].strobe, &truth[k]),
                     _ => f64::INFINITY,
                 });
-                rows.push(row(cell, precision.into(), horizon, error.fold(0.0, f64::max)));
+                rows.push(row(cell, precision.into(), horizon, error.fold(0.0, farther)));
             }
         }
         done += horizon as usize;
@@ -165,12 +166,12 @@ pub fn judge(rows: &[Row]) -> Verdict {
             let mut times: Vec<u32> = of_cell().map(|row| row.periods).collect();
             times.sort_unstable();
             let early = times.get(1).copied().unwrap_or(longest);
-            let first = of_cell().filter(|row| row.periods <= early).map(|row| row.error).fold(0.0, f64::max);
+            let first = of_cell().filter(|row| row.periods <= early).map(|row| row.error).fold(0.0, farther);
             let bar = GROWTH * first + ROUNDINGS * engine.unit_roundoff() * last.size;
-            holds &= of_cell().all(|row| row.error <= bar);
+            holds &= of_cell().all(|row| is_within(row.error, bar));
         }
         let at = |periods: u32| {
-            of_engine.iter().filter(|row| row.periods == periods).map(|row| row.error).fold(0.0, f64::max)
+            of_engine.iter().filter(|row| row.periods == periods).map(|row| row.error).fold(0.0, farther)
         };
         told.push(format!("{} {:.1e} after {longest} periods", engine.name(), at(longest)));
     }

@@ -14,6 +14,7 @@ use super::cells::{EngineName, REST, UNFORESEEN, after, apart, bar, flow_of, pap
 use super::lanes::{Lanes, Start};
 use super::{Part, Size, Verdict};
 use rattlemap::gpu::{Constants, GpuError, LaneSettings};
+use rattlemap::record::distance::{farther, is_within};
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Status, status_of};
 use rattlemap_dynamics::reference::Trajectory;
@@ -131,7 +132,7 @@ fn on_reference((pair, start): &Start) -> (Status, f64) {
 pub fn judge(rows: &[Row]) -> Verdict {
     let foreseen = |row: &Row| row.conditioning < UNFORESEEN;
     let rounding = |row: &Row| bar(row.conditioning, row.steps_per_period * f64::from(PERIODS));
-    let within = |distance: Option<f64>, bar: f64| distance.is_none_or(|distance| distance <= bar);
+    let within = |distance: Option<f64>, bar: f64| distance.is_none_or(|distance| is_within(distance, bar));
     let good = |row: &&Row| {
         row.status == "ok"
             && (!foreseen(row)
@@ -143,11 +144,11 @@ pub fn judge(rows: &[Row]) -> Verdict {
     let (soft, stiff) = (ks().fold(f64::INFINITY, f64::min), ks().fold(0.0, f64::max));
     let largest = |engine: EngineName, of: fn(&Row) -> Option<f64>| {
         let here = rows.iter().filter(|row| row.engine == engine && foreseen(row));
-        here.filter_map(of).fold(0.0, f64::max)
+        here.filter_map(of).fold(0.0, farther)
     };
     let at = |k: f64, of: fn(&Row) -> f64| {
         let here = rows.iter().filter(|row| row.engine == EngineName::Reference && row.k == k);
-        here.map(of).fold(0.0, f64::max)
+        here.map(of).fold(0.0, farther)
     };
     let [f32s, f64s] = [EngineName::LanesF32, EngineName::LanesF64];
     Verdict {

@@ -1,6 +1,7 @@
 //! What a method ends with, and how far off that is.
 
 use super::EVENTS;
+use rattlemap::record::distance::{apart, farther};
 use rattlemap_dynamics::model::State;
 
 /// The end of a lane.
@@ -30,26 +31,16 @@ impl Outcome {
 
     /// How far it is from `truth`, with forcing period `period`.
     pub fn error(&self, truth: &Outcome, period: f64) -> Error {
-        let differences = self.state.iter().zip(&truth.state).map(|(a, b)| (a - b).abs());
-        let state = differences.fold(0.0, worse);
+        let differences = self.state.iter().zip(&truth.state).map(|(&a, &b)| apart(a, b));
+        let state = differences.fold(0.0, farther);
         let times = self.events.iter().zip(&truth.events).filter(|(_, truth)| !truth.is_nan());
         // An event at phase 0 may be counted to either period.
-        let apart = |(a, b): (&f64, &f64)| {
-            let d = (a - b).abs();
-            d.min((period - d).abs())
+        let either = |(&a, &b): (&f64, &f64)| {
+            let d = apart(a, b);
+            d.min(apart(period, d))
         };
-        let event = times.map(apart).reduce(worse).map(finite_or_lost);
-        Error { state: finite_or_lost(state), event }
+        Error { state, event: times.map(either).reduce(farther) }
     }
-}
-
-/// The larger number, NaN counting as largest.
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
-}
-
-fn finite_or_lost(error: f64) -> f64 {
-    if error.is_nan() { f64::INFINITY } else { error }
 }
 
 /// Median and largest of some errors, none of which is NaN; zero if there are none.

@@ -12,6 +12,7 @@ use super::points::{self, Point};
 use rattlemap::output::manifest::{Head, MANIFEST};
 use rattlemap::output::parameters::Parameters;
 use rattlemap::output::{Folder, OutputError, WriteError};
+use rattlemap::record::distance::farther;
 use rattlemap_dynamics::model::State;
 
 const TABLE: &str = "work_precision.csv";
@@ -162,7 +163,7 @@ fn cell(variants: &[Subject]) -> CellObject {
         omega: first.pair.omega,
         force: first.pair.force,
         beyond: first.beyond,
-        amplification: variants.iter().map(|subject| subject.amplification).fold(0.0, f64::max),
+        amplification: variants.iter().map(|subject| subject.amplification).fold(0.0, farther),
         variants: variants.len(),
     }
 }
@@ -186,7 +187,7 @@ fn write_cells(path: &Path, subjects: &[Subject], curves: &[Curve]) -> Result<()
         for variants in subjects.chunk_by(|a, b| a.cell == b.cell) {
             let (first, own) = (&variants[0], errors.by_ref().take(variants.len()));
             let largest = own.fold((0.0f64, None::<f64>), |(state, event), error| {
-                (state.max(error.state), event.into_iter().chain(error.event).reduce(f64::max))
+                (farther(state, error.state), event.into_iter().chain(error.event).reduce(farther))
             });
             writer.serialize(CellRow {
                 method: &point.method,

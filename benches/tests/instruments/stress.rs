@@ -75,3 +75,50 @@ fn random_parameters_end_as_on_the_reference() {
     rows.mismatches.iter().for_each(|row| println!("{row:?}"));
     holds(&stress::fuzz::judge(&rows));
 }
+
+/// An error that is no number is never small, and an infinite one not allowed by an infinite one before it.
+#[test]
+fn what_is_not_finite_fails_every_verdict() {
+    use rattlemap_bench::stress::{EngineName, chatter, grazing, impacts, long_runs, stiffness};
+    for error in [f64::NAN, f64::INFINITY] {
+        let engine = EngineName::LanesF64;
+        let run = |periods| long_runs::Row { e: 0.5, omega: 5.6, engine, periods, error, size: 1.0 };
+        assert!(!long_runs::judge(&[10, 30, 100].map(run)).holds, "long runs: {error}");
+        let graze =
+            grazing::Row { engine, distance: 0.03, cells: 1, contacts: 1, speed_error: error, law: 1e-9 };
+        assert!(
+            !grazing::judge(&[grazing::Row { speed_error: 0.0, ..graze }, graze]).holds,
+            "grazing: {error}"
+        );
+        let impact = impacts::Row {
+            engine,
+            e: 0.5,
+            m1: 1.0,
+            m2: 1.0,
+            contacts: 1,
+            momentum_error: error,
+            energy_error: 0.0,
+        };
+        assert!(!impacts::judge(&[impact]).holds, "impacts: {error}");
+        let (status, bar) = ("ok", Some(1e-9));
+        let series =
+            chatter::Row { e: 0.5, mesh_speed: 0.01, engine, status, impacts: 3, error: Some(0.0), bar };
+        assert!(chatter::judge(&[series; 3]).holds);
+        // Where rounding may do anything, too.
+        let lost = chatter::Row { error: Some(error), bar: Some(f64::INFINITY), ..series };
+        assert!(!chatter::judge(&[series, series, lost]).holds, "chatter: {error}");
+        let stiff = stiffness::Row {
+            k: 1e3,
+            e: 0.5,
+            omega: 5.6,
+            engine,
+            status,
+            error: Some(error),
+            spread: Some(0.0),
+            conditioning: 1e-9,
+            scatter: f64::INFINITY,
+            steps_per_period: 100.0,
+        };
+        assert!(!stiffness::judge(&[stiff]).holds, "stiffness: {error}");
+    }
+}

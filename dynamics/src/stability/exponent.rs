@@ -6,6 +6,9 @@ use crate::reference::Trajectory;
 /// Blocks whose means give the standard error.
 const BLOCKS: usize = 16;
 
+/// Periods below which an average has no standard error: it is infinite.
+pub const LEAST_FOR_ERROR: u32 = BLOCKS as u32;
+
 /// A fresh tangent vector: no direction that a gear pair keeps to itself. All entries alike would
 /// be a common translation, which without supports never meets a wall.
 pub const FRESH_TANGENT: State = [0.64, -0.36, 0.28, 0.61];

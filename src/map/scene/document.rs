@@ -10,7 +10,7 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Place, Problem, SceneError};
+use super::error::{Place, Problem, SHOWN, SceneError};
 
 /// The fields of a table by name.
 pub(super) type Table = BTreeMap<String, Node>;
@@ -43,11 +43,10 @@ pub(super) enum Value {
 
 /// Reads TOML text; `file` is the name that messages give it.
 pub(super) fn read(text: &str, file: &str) -> Result<Node, SceneError> {
-    let source = Source { text, file: file.into() };
+    let source = Source::new(text, file);
     let table = DeTable::parse(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
-        let (line, _) = source.line_and_column(at);
-        let line = shorten(text.lines().nth(line - 1).unwrap_or_default());
+        let line = shorten(source.line_of(at));
         source.error(at, Problem::Syntax { message: error.message().replace('\n', ", "), line })
     })?;
     Ok(Node {
@@ -62,7 +61,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<Node, SceneError> {
 /// second layer of quotes.
 pub(super) fn read_argument(value: &str, argument: &Arc<str>) -> Node {
     let parsed = match DeValue::parse(value) {
-        Ok(parsed) => Source { text: value, file: "".into() }.value(parsed.into_inner()),
+        Ok(parsed) => Source::new(value, "").value(parsed.into_inner()),
         Err(_) => value.parse().map_or_else(|_| Value::Text(value.to_owned()), Value::Float),
     };
     let place = Place::Set { argument: argument.clone() };
@@ -99,9 +98,43 @@ impl Node {
 struct Source<'a> {
     text: &'a str,
     file: Arc<str>,
+    /// Where lines begin, in bytes.
+    line_starts: Vec<usize>,
+    /// Characters before every [`STRIDE`]th byte: a text has as many places as values, and lines may be long.
+    characters: Vec<usize>,
 }
 
-impl Source<'_> {
+/// Bytes between those that characters are counted up to.
+const STRIDE: usize = 64;
+
+impl<'a> Source<'a> {
+    /// A text, which is gone through once.
+    fn new(text: &'a str, file: &str) -> Source<'a> {
+        let newlines = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let line_starts = std::iter::once(0).chain(newlines.map(|(at, _)| at + 1)).collect();
+        let mut characters = vec![0];
+        for chunk in text.as_bytes().chunks(STRIDE) {
+            characters.push(characters[characters.len() - 1] + begun(chunk));
+        }
+        Source { text, file: file.into(), line_starts, characters }
+    }
+
+    /// Characters that begin before a byte.
+    fn characters_before(&self, offset: usize) -> usize {
+        let chunk = offset / STRIDE;
+        self.characters[chunk] + begun(&self.text.as_bytes()[chunk * STRIDE..offset])
+    }
+
+    /// The number of the line, from 0, that a byte is in.
+    fn line(&self, offset: usize) -> usize {
+        self.line_starts.partition_point(|&start| start <= offset) - 1
+    }
+
+    /// The line that a byte is in.
+    fn line_of(&self, offset: usize) -> &'a str {
+        let from = self.line_starts[self.line(offset.min(self.text.len()))];
+        self.text[from..].lines().next().unwrap_or_default()
+    }
     fn table(&self, table: DeTable<'_>) -> Table {
         let entry = |(key, value): (Spanned<_>, Spanned<DeValue<'_>>)| {
             let name_place = self.place(key.span().start);
@@ -150,18 +183,31 @@ impl Source<'_> {
     }
 
     fn line_and_column(&self, offset: usize) -> (usize, usize) {
-        let before = self.text.get(..offset).unwrap_or(self.text);
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+        let offset = offset.min(self.text.len());
+        let line = self.line(offset);
+        let column = self.characters_before(offset) - self.characters_before(self.line_starts[line]);
+        (line + 1, column + 1)
     }
 }
 
-/// One line of at most 60 characters.
-fn shorten(text: &str) -> String {
-    let words: Vec<&str> = text.split_whitespace().collect();
-    let line = words.join(" ");
-    match line.char_indices().nth(60) {
-        Some((end, _)) => format!("{}...", &line[..end]),
-        None => line,
+/// Characters of UTF-8 that begin in some bytes.
+fn begun(bytes: &[u8]) -> usize {
+    bytes.iter().filter(|&&byte| byte & 0xc0 != 0x80).count()
+}
+
+/// One line of at most [`SHOWN`] characters; no more of the text is looked at.
+pub(super) fn shorten(text: &str) -> String {
+    let mut line = String::new();
+    let mut left = SHOWN;
+    for word in text.split_whitespace() {
+        let space = if line.is_empty() { "" } else { " " };
+        for c in space.chars().chain(word.chars()) {
+            if left == 0 {
+                return line + "...";
+            }
+            left -= 1;
+            line.push(c);
+        }
     }
+    line
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use super::document::shorten;
+use crate::map::printable;
 use rattlemap_dynamics::model::ModelError;
 use thiserror::Error;
 
@@ -32,20 +34,23 @@ pub enum Place {
     Builder,
 }
 
+/// Characters of a name or a value that a message shows.
+pub(super) const SHOWN: usize = 60;
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Place::Text { file, line, column } => write!(f, "{file}:{line}:{column}"),
-            Place::Set { argument } => write!(f, "--set {argument}"),
+            Place::Set { argument } => write!(f, "--set {}", shorten(argument)),
             Place::File { file } => write!(f, "{file}"),
             Place::Builder => write!(f, "scene"),
         }
     }
 }
 
-/// A scene that cannot be run; its text is one line that says how to mend it.
+/// A scene that cannot be run; its text is one line that says how to mend it, fit for a terminal.
 #[derive(Clone, Debug, Error, PartialEq)]
-#[error("{place}: {problem}")]
+#[error("{}", printable::line(&format!("{place}: {problem}")))]
 pub struct SceneError {
     /// Where it stands.
     pub place: Place,
@@ -143,14 +148,17 @@ pub enum Problem {
 
 /// The sentence for an unknown name: the nearest known one, if any is near, and all of them.
 pub(super) fn suggest(name: &str, known: &[&str]) -> String {
-    let distance =
-        |candidate: &str| strsim::damerau_levenshtein(&candidate.to_lowercase(), &name.to_lowercase());
     let all = known.join(", ");
     let length = name.chars().count();
     // One slip per three letters; a name that is all slips resembles nothing.
-    let near = |slips: usize| slips <= (length / 3).max(1) && slips < length;
-    match known.iter().min_by_key(|candidate| distance(candidate)) {
-        Some(nearest) if near(distance(nearest)) => {
+    let most = (length / 3).max(1).min(length.saturating_sub(1));
+    // As many as lengths differ by, at least: a name of a million letters is compared with nothing.
+    let may_be_near = |candidate: &&&str| candidate.chars().count().abs_diff(length) <= most;
+    let slips =
+        |candidate: &str| strsim::damerau_levenshtein(&candidate.to_lowercase(), &name.to_lowercase());
+    let candidates = known.iter().filter(may_be_near).map(|candidate| (slips(candidate), candidate));
+    match candidates.min_by_key(|(slips, _)| *slips) {
+        Some((slips, nearest)) if slips <= most => {
             format!("did you mean `{nearest}`? valid names: {all}")
         }
         _ => format!("valid names: {all}"),

@@ -3,8 +3,11 @@
 use std::sync::Arc;
 
 use super::TOP_LEVEL;
-use super::document::{Node, Table, Value, read_argument};
+use super::document::{Node, Table, Value, read_argument, shorten};
 use super::error::{Place, Problem, SceneError};
+
+/// Names in a path: more than any setting has, and few enough to go down by recursion.
+const DEEPEST: usize = 8;
 
 /// Writes the value of one `NAME=VALUE` argument into the tree.
 ///
@@ -26,9 +29,12 @@ pub(super) fn apply(document: &mut Node, argument: &str) -> Result<(), SceneErro
     }
     let node = read_argument(value, &argument);
     let unknown = |remedy| {
-        let (field, value) = (path.join("."), node.shown.clone());
+        let (field, value) = (shorten(&path.join(".")), node.shown.clone());
         fail(Problem::UnknownField { field, value, remedy })
     };
+    if path.len() > DEEPEST {
+        return Err(unknown("no setting lies as deep; the deepest are such as axis.0.count".to_owned()));
+    }
     insert(document, &path, &node).map_err(unknown)
 }
 
@@ -53,10 +59,11 @@ fn insert(parent: &mut Node, path: &[&str], leaf: &Node) -> Result<(), String> {
             match name.parse().ok().and_then(|i: usize| items.get_mut(i)) {
                 Some(item) => insert(item, rest, leaf),
                 None => Err(format!(
-                    "`{name}` must be a number below {count}: the list has that many entries, counted from 0"
+                    "`{}` must be a number below {count}: the list has that many entries, counted from 0",
+                    shorten(name)
                 )),
             }
         }
-        _ => Err(format!("`{}` has no fields; drop `.{name}`", parent.shown)),
+        _ => Err(format!("`{}` has no fields; drop `.{}`", parent.shown, shorten(name))),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::document::{Node, Table, Value};
+use super::document::{Node, Table, Value, shorten};
 use super::error::{Place, Problem, SceneError, suggest};
 use rattlemap_dynamics::model::ModelError;
 
@@ -20,17 +20,20 @@ impl<'a> Section<'a> {
             return Err(Field { path: path.to_owned(), node }.wrong_type(&format!("a table, [{path}]")));
         };
         let section = Section { path: path.to_owned(), place: node.name_place.clone(), table: Some(table) };
-        match table.iter().find(|(name, _)| !known.contains(&name.as_str())) {
-            Some((name, node)) => Err(SceneError {
-                place: node.name_place.clone(),
-                problem: Problem::UnknownField {
-                    field: section.path_of(name),
-                    value: node.shown.clone(),
-                    remedy: suggest(name, known),
-                },
-            }),
-            None => Ok(section),
-        }
+        let mut unknown = table.iter().filter(|(name, _)| !known.contains(&name.as_str()));
+        let Some((name, node)) = unknown.next() else { return Ok(section) };
+        // One is shown; a list of thousands would help nobody.
+        let remedy = match unknown.count() {
+            0 => suggest(name, known),
+            1 => format!("{}; 1 more field beside it is unknown", suggest(name, known)),
+            more => format!("{}; {more} more fields beside it are unknown", suggest(name, known)),
+        };
+        let problem = Problem::UnknownField {
+            field: section.path_of(&shorten(name)),
+            value: node.shown.clone(),
+            remedy,
+        };
+        Err(SceneError { place: node.name_place.clone(), problem })
     }
 
     /// Opens the table `name` inside this one; if it is absent every field has its default.

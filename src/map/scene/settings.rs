@@ -3,12 +3,15 @@
 use super::Purpose;
 use super::document::Value;
 use super::error::SceneError;
-use super::section::Section;
+use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 use rattlemap_dynamics::orbit;
 
 /// The most forcing periods that one field may ask for.
 const MAX_PERIODS: u32 = 1_000_000_000;
+
+/// Characters of a title: figures have one line for it.
+const LONGEST_TITLE: usize = 200;
 
 /// How fine the lanes' time grid is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,6 +186,16 @@ impl Format {
 
 fn name<T: PartialEq>(names: &[(&'static str, T)], thing: T) -> &'static str {
     names.iter().find(|(_, named)| *named == thing).map_or("", |&(name, _)| name)
+}
+
+/// The heading of figures and reports.
+pub(super) fn read_title(field: &Field<'_>) -> Result<String, SceneError> {
+    let title = field.text()?;
+    match title.chars().count() {
+        0..=LONGEST_TITLE => Ok(title.to_owned()),
+        count => Err(field
+            .out_of_range(&format!("at most {LONGEST_TITLE} characters long; it has {count}, shorten it"))),
+    }
 }
 
 pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneError> {

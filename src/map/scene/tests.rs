@@ -3,6 +3,7 @@
 mod built;
 mod ranges;
 mod sets;
+mod texts;
 
 use super::*;
 

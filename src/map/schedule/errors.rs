@@ -1,6 +1,7 @@
 //! How far what is filled is from what integration shows.
 
 use crate::map::plan::Needs;
+use crate::record::distance::apart;
 use crate::record::{Record, valid};
 
 /// Impacts are counted: what is off by less than this has the same count.
@@ -43,7 +44,8 @@ impl Errors {
     pub(super) fn new(pairs: &[(Record, &Record)], needs: &Needs) -> Errors {
         let deviation = |bit, field: fn(&Record) -> f64| {
             let value = |record: &Record| {
-                Some(field(record)).filter(|value| record.valid & bit != 0 && value.is_finite())
+                // The exponent of a superstable cycle is no quantity that others are near to.
+                Some(field(record)).filter(|&value| record.valid & bit != 0 && value != f64::NEG_INFINITY)
             };
             let values = pairs.iter().map(|(filled, own)| (value(filled), value(own)));
             Deviation::new(values)
@@ -62,7 +64,7 @@ impl Deviation {
         let (mut differences, mut empty) = (Vec::new(), 0);
         for pair in pairs {
             match pair {
-                (Some(filled), Some(own)) => differences.push((filled - own).abs()),
+                (Some(filled), Some(own)) => differences.push(apart(filled, own)),
                 (None, Some(_)) => empty += 1,
                 (_, None) => {}
             }
@@ -112,6 +114,8 @@ mod tests {
             Deviation { compared: 100, empty: 1, median: 6.25, p95: 11.875, worst: 12.5, off_by_one: 93 };
         assert_eq!(deviation, expected);
         assert_eq!(Deviation::new(std::iter::empty()), Deviation::default());
+        let lost = Deviation::new([(Some(1.0), Some(1.0)), (Some(f64::NAN), Some(1.0))].into_iter());
+        assert_eq!((lost.compared, lost.worst, lost.off_by_one), (2, f64::INFINITY, 1));
         let [low, high] = deviation.off_by_one_interval();
         assert!(low < deviation.off_by_one_rate() && deviation.off_by_one_rate() < high);
     }

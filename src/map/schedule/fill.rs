@@ -46,7 +46,9 @@ impl<'r> Filling<'r> {
         let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
         let nearest = usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5);
         let average = |field: fn(&Record) -> f64| {
-            self.corners.iter().zip(weights).map(|(corner, weight)| weight * field(corner)).sum::<f64>()
+            // What counts for nothing may be infinite: the exponent of a superstable cycle.
+            let beside = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
+            beside.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
         let filled = Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
         if !self.averages[nearest] {
@@ -92,6 +94,15 @@ mod tests {
             assert_eq!((record.period, record.periods_run), (2, 0));
             assert_eq!(record.valid, valid::PERIOD | valid::LYAPUNOV | valid::FILLED);
         }
+    }
+
+    #[test]
+    fn a_superstable_corner_counts_where_it_has_weight() {
+        let block = Block { i: [0, 2], j: [0, 2] };
+        let corners = [-1.0, f64::NEG_INFINITY, -3.0, -4.0].map(corner);
+        let exponent = |at| Filling::new(&block, corners.each_ref()).record(at).lyapunov;
+        assert_eq!([exponent([0, 0]), exponent([0, 1]), exponent([1, 2])], [-1.0, -2.0, -3.5]);
+        assert_eq!([exponent([1, 0]), exponent([1, 1])], [f64::NEG_INFINITY; 2]);
     }
 
     #[test]

@@ -429,7 +429,7 @@ function table(caption, heads, lines, numbers = []) {
 const STRATA = { uniform: "drawn from all that were integrated", border: "drawn at borders of classes", status: "drawn by status" };
 const FIELDS = { class: "class", period: "period", word: "word, up to mirror image", symmetric: "symmetry",
   lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing", status: "status",
-  periods_run: "periods integrated", again: "the same record again" };
+  periods_run: "periods integrated", finite: "numbers are finite", again: "the same record again" };
 const JUDGES = { reference: "the event-driven reference, without early stops",
   lanes_f64: "lanes in f64 and by the reference without early stops",
   dop853: "DOP853, an adaptive ODE library, with event location, and by the reference without early stops" };

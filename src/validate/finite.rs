@@ -1,0 +1,69 @@
+//! Whether a record holds the numbers that it claims to hold.
+
+use crate::record::{Record, valid};
+use rattlemap_dynamics::orbit::Budget;
+use rattlemap_dynamics::stability::LEAST_FOR_ERROR;
+
+/// The first field of a record that claims a number and holds none, by its name in files, with what it holds instead.
+///
+/// Two infinities are answers: the exponent of a superstable cycle, and the error of an exponent that was averaged over
+/// too few periods to have one.
+pub(super) fn not_finite(record: &Record, budget: &Budget) -> Option<(&'static str, f64)> {
+    let is_cycle = record.period > 0;
+    let averaged = record.periods_run.saturating_sub(budget.exponent_from());
+    let has_no_error = !is_cycle && averaged < LEAST_FOR_ERROR;
+    let fields: [(u32, &'static str, f64, Option<f64>); 8] = [
+        (valid::LYAPUNOV, "lyapunov", record.lyapunov, is_cycle.then_some(f64::NEG_INFINITY)),
+        (valid::LYAPUNOV, "lyapunov_error", record.lyapunov_error, has_no_error.then_some(f64::INFINITY)),
+        (valid::IMPACTS, "impacts_per_period", record.impacts_per_period, None),
+        (valid::MESH, "mesh_fraction", record.mesh_fraction, None),
+        (valid::STROBE, "x1", record.strobe[0], None),
+        (valid::STROBE, "v1", record.strobe[1], None),
+        (valid::STROBE, "x2", record.strobe[2], None),
+        (valid::STROBE, "v2", record.strobe[3], None),
+    ];
+    let is_wrong = |&(bit, _, value, answer): &(u32, &str, f64, Option<f64>)| {
+        record.valid & bit != 0 && !value.is_finite() && answer != Some(value)
+    };
+    fields.into_iter().find(is_wrong).map(|(_, name, value, _)| (name, value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::orbit::Settings;
+
+    const BUDGET: Budget = Budget {
+        settings: Settings { transient_periods: 4, observed_periods: 40, max_period: 2 },
+        early_stop: false,
+        undecided_periods: 0,
+        exponent: true,
+        shows_exponent: true,
+    };
+
+    #[test]
+    fn claims_alone_are_looked_at_and_two_infinities_are_answers() {
+        let all = valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH | valid::STROBE;
+        let right = Record { periods_run: 44, valid: all, ..Record::default() };
+        let named = |record: Record| not_finite(&record, &BUDGET).map(|(name, _)| name);
+        assert_eq!(named(right), None);
+        let superstable = Record { period: 2, lyapunov: f64::NEG_INFINITY, ..right };
+        assert_eq!(named(superstable), None);
+        assert_eq!(named(Record { period: 0, ..superstable }), Some("lyapunov"));
+        assert_eq!(named(Record { lyapunov: f64::INFINITY, ..superstable }), Some("lyapunov"));
+        let unsure = Record { lyapunov_error: f64::INFINITY, periods_run: 19, ..right };
+        assert_eq!(named(unsure), None);
+        for wrong in [
+            Record { periods_run: 20, ..unsure },
+            Record { period: 1, ..unsure },
+            Record { lyapunov_error: f64::NAN, ..unsure },
+        ] {
+            assert_eq!(named(wrong), Some("lyapunov_error"));
+        }
+        let unclaimed = Record { strobe: [f64::NAN; 4], ..right };
+        assert_eq!(
+            (named(unclaimed), named(Record { valid: valid::PERIOD, ..unclaimed })),
+            (Some("x1"), None)
+        );
+    }
+}
