@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::map::scene::Scene;
 use crate::map::size::Size;
-use crate::output::RECORDS;
+use crate::output::map;
 use anyhow::anyhow;
 
 use crate::cli::arguments::EngineChoice;
@@ -20,9 +20,13 @@ struct Free {
 /// Refuses a map that does not fit memory or disk, with figures. What the system does not
 /// tell is taken to be enough.
 pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(), Failure> {
-    let kept = out.join(RECORDS).metadata().map_or(0, |data| data.len());
-    let disk = free_disk(out).map(|free| free.saturating_add(kept));
+    let disk = free_disk(out).map(|free| free.saturating_add(replaced(out)));
     judge(scene, engine, &Free { memory: free_memory(), disk })
+}
+
+/// Bytes of a folder's files that a map takes the place of.
+fn replaced(out: &Path) -> u64 {
+    map::names().filter_map(|name| out.join(name).symlink_metadata().ok()).map(|data| data.len()).sum()
 }
 
 fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
@@ -106,5 +110,26 @@ mod tests {
             assert!(text.contains("or ask for --engine cpu"), "{text}");
         }
         assert!(judge(&scene, EngineChoice::Gpu, &Free { memory: None, disk: None }).is_ok());
+    }
+
+    /// Tables and figures take more room than records, and what they replace makes room.
+    #[test]
+    fn room_is_counted_for_all_that_is_written_and_replaced() {
+        let disk = |files: &str| {
+            let sets = [format!("outputs.files={files}")];
+            Size::of(&Scene::parse(SLOW, "s", &sets, Purpose::Map).unwrap()).disk
+        };
+        let [records, all] = [disk("[\"png\"]"), disk("[\"csv\",\"npy\",\"png\",\"html\"]")];
+        assert!(all > 3 * records, "{all} {records}");
+        let scene = Scene::parse(SLOW, "s", &[], Purpose::Map).unwrap();
+        let with = |disk| judge(&scene, EngineChoice::Cpu, &Free { memory: None, disk: Some(disk) });
+        assert!(with(Size::of(&scene).disk).is_ok());
+        let text = with(records).unwrap_err().to_string();
+        assert!(text.contains("of disk, and") && text.contains("--out"), "{text}");
+        let out = tempfile::tempdir().unwrap();
+        for name in ["records.bin", "cells.csv", "report.html", "notes.txt"] {
+            std::fs::write(out.path().join(name), [0; 1000]).unwrap();
+        }
+        assert_eq!(replaced(out.path()), 3000);
     }
 }

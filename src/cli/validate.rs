@@ -18,7 +18,7 @@ use serde::Deserialize;
 
 use crate::cli::arguments::Validate;
 use crate::cli::error::Failure;
-use crate::cli::map::unit;
+use crate::cli::map::{order, unit};
 use crate::cli::progress::Progress;
 use crate::cli::say;
 
@@ -127,11 +127,12 @@ fn read_records(
     let identity = Identity::new(&manifest.engine, &manifest.precision, &manifest.device, scene.identity());
     let mut schedule = Schedule::new(plan);
     let mut records = vec![Record::default(); plan.run_count()];
+    let order = order(&schedule);
     let take = |batch: &[(u32, Record)]| sweep::replay(&mut schedule, &mut records, batch);
     let again = "make the map again with `rattlemap map SCENE --force`";
     let go_on = "`rattlemap map SCENE --resume` keeps them and computes the others";
     let Extent { count, damage, .. } =
-        RecordFile::read(&path, &identity, take).map_err(|error| match error {
+        RecordFile::read(&path, &identity, order, take).map_err(|error| match error {
             RecordFileError::OtherRun { path, differences } => {
                 anyhow!(
                     "{} does not belong to the {MANIFEST} beside it: {differences}; {again}",

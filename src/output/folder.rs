@@ -65,6 +65,13 @@ impl Folder {
         }
     }
 
+    /// Whether a folder has anything in it but what a run leaves that was killed before it kept anything.
+    pub fn holds_results(path: &Path) -> bool {
+        let is_leftover =
+            |entry: &fs::DirEntry| LEFTOVERS.into_iter().any(|leftover| entry.file_name() == leftover);
+        fs::read_dir(path).is_ok_and(|entries| entries.flatten().any(|entry| !is_leftover(&entry)))
+    }
+
     /// Where it is, as the user named it.
     pub fn path(&self) -> &Path {
         &self.path
@@ -81,7 +88,11 @@ impl Folder {
         write: impl FnOnce(&Path) -> Result<(), WriteError>,
     ) -> Result<(), OutputError> {
         let target = self.path.join(name);
-        let partial = self.path.join(format!("partial-{name}"));
+        let partial = partial(&target);
+        let links = refuse_link(&target).and_then(|()| refuse_link(&partial));
+        if let Err(reason) = links {
+            return Err(OutputError::Write { path: target, reason: reason.into() });
+        }
         let written = write(&partial).and_then(|()| Ok(fs::rename(&partial, &target)?));
         if written.is_err() {
             // Best effort: the error that matters is the one already at hand.
@@ -116,9 +127,32 @@ impl Folder {
     }
 }
 
+const PROBE: &str = ".rattlemap-probe";
+
+/// What a run that was killed at once may leave in a folder: nothing of value.
+const LEFTOVERS: [&str; 3] = [PROBE, "partial-records.bin", "partial-unfinished.json"];
+
 enum Contents {
     Nothing,
     Something,
+}
+
+/// The name under which a file is written before it is whole.
+pub(super) fn partial(path: &Path) -> PathBuf {
+    path.with_file_name(format!("partial-{}", path.file_name().unwrap_or_default().to_string_lossy()))
+}
+
+/// Refuses to write a file through a symbolic link, to wherever that may point.
+pub(super) fn refuse_link(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(data) if data.is_symlink() => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            Err(io::Error::other(format!(
+                "{name} is a symbolic link, and no file is written through one; remove it"
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn prepare(path: &Path) -> io::Result<Contents> {
@@ -130,7 +164,7 @@ fn prepare(path: &Path) -> io::Result<Contents> {
 }
 
 fn probe(path: &Path) -> io::Result<()> {
-    let probe = path.join(".rattlemap-probe");
+    let probe = path.join(PROBE);
     fs::write(&probe, b"")?;
     fs::remove_file(&probe)
 }

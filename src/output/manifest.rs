@@ -16,7 +16,7 @@ pub struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
-    /// Of the program; `unknown` where it was built outside of its repository.
+    /// Of the program; `unknown` where it was built outside of its repository, or not for release.
     commit: &'static str,
 }
 

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::validation_json::ValidationObject;
 use super::{
-    Cells, Folder, OutputError, WriteError, cells_csv, cells_npy, layers, map_figure, map_manifest, report,
-    unfinished,
+    Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, layers, map_figure, map_manifest,
+    report, unfinished,
 };
 use crate::map::scene::Format;
 use crate::validate::Validation;
@@ -34,6 +34,11 @@ const ALL: [&str; 11] = [
     HTML,
     VALIDATION,
 ];
+
+/// Every file that a map may write, records included.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ALL.into_iter().chain([RECORDS])
+}
 
 /// Removes what an earlier run left, but for its records: files must not stand beside a
 /// manifest that does not know them.

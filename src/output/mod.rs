@@ -31,5 +31,5 @@ mod validation_json;
 pub use cells::Cells;
 pub use error::{DrawError, FigureError, OutputError, WriteError};
 pub use folder::{Folder, FolderError};
-pub use record_file::{Damage, Extent, Identity, RECORDS, RecordFile, RecordFileError};
+pub use record_file::{Damage, Extent, Identity, Order, RECORDS, RecordFile, RecordFileError};
 pub use stdout::print;

@@ -13,7 +13,7 @@ use rattlemap::gpu::Precision;
 use rattlemap::map::engine::{self, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
-use rattlemap::output::{Identity, RECORDS, RecordFile};
+use rattlemap::output::{Identity, Order, RECORDS, RecordFile};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::{Kind, Lanes, Sample, Stratum, Subject, Validation, replay, sample};
@@ -486,7 +486,7 @@ fn planted_records_fail_the_validation_by_name() {
     let identity = Identity::new("cpu", "f64", "event-driven reference", scene.identity());
     let path = out.join(RECORDS);
     let mut records = vec![Record::default(); plan.cell_count()];
-    let count = RecordFile::read(&path, &identity, |batch| {
+    let count = RecordFile::read(&path, &identity, Order::Any, |batch| {
         batch.iter().for_each(|&(id, record)| records[id as usize] = record);
         true
     });
@@ -552,7 +552,7 @@ fn lanes_of_another_device_are_named() {
         records.extend_from_slice(batch);
         true
     };
-    RecordFile::read(&out.join(RECORDS), &identity(device), take).unwrap();
+    RecordFile::read(&out.join(RECORDS), &identity(device), Order::Any, take).unwrap();
     RecordFile::create(&out.join(RECORDS), &identity("Faraway card")).unwrap().append(&records).unwrap();
     fs::write(out.join("manifest.json"), manifest.replace(device, "Faraway card")).unwrap();
     let text = validated();
@@ -598,10 +598,13 @@ fn what_is_no_finished_map_is_refused() {
     let records = fs::read(out.join(RECORDS)).unwrap();
     fs::write(out.join(RECORDS), &records[..records.len() - 1]).unwrap();
     refused(&["o"], &["of 576 cells"]);
+    // The length of the first copy of its header, and behind it the second.
     let mut bad = records.clone();
+    let head = 16 + u32::from_le_bytes(bad[8..12].try_into().unwrap()) as usize;
     bad[20] ^= 0x10;
+    bad[head + 20] ^= 0x10;
     fs::write(out.join(RECORDS), bad).unwrap();
-    refused(&["o"], &["is damaged at byte 16", "--force"]);
+    refused(&["o"], &["neither copy of its header matches its checksum", "--force"]);
     fs::remove_file(out.join(RECORDS)).unwrap();
     refused(&["o"], &["there is no records.bin"]);
 }

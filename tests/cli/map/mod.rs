@@ -5,6 +5,7 @@ mod engines;
 mod interrupts;
 mod records;
 mod streams;
+mod torture;
 
 use std::fs;
 use std::path::Path;
