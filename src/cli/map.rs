@@ -94,7 +94,9 @@ fn open_folder(ask: &Map) -> Result<Folder, Failure> {
     if ask.resume && !out.join(RECORDS).is_file() && Folder::holds_results(&out) {
         return Err(RecordFileError::NothingToResume { folder: out }.into());
     }
-    Ok(Folder::open(&out, ask.run.force || ask.resume)?)
+    let folder = Folder::open(&out, ask.run.force || ask.resume)?;
+    folder.refuse_links(output::map::names())?;
+    Ok(folder)
 }
 
 /// The engine that was asked for; where that is left open, an interrupted run goes on with

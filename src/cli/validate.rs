@@ -10,7 +10,7 @@ use crate::map::scene::{Purpose, Scene};
 use crate::map::schedule::{Refined, Schedule};
 use crate::map::sweep;
 use crate::output::map::{MANIFEST, Made, write_validation};
-use crate::output::{Cells, Extent, Folder, Identity, RECORDS, RecordFile, RecordFileError};
+use crate::output::{self, Cells, Extent, Folder, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::record::Record;
 use crate::validate::{self, HORIZON, Judge, Kind, Lanes, Sample, StratumResult, Subject, Validation};
 use anyhow::{Context, anyhow};
@@ -37,12 +37,20 @@ struct Manifest {
 /// Reads, replays, writes.
 pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let dir = &ask.folder;
+    if !dir.is_dir() {
+        return Err(Failure::Usage(anyhow!(
+            "{}: there is no such folder; name the folder of a finished map",
+            dir.display()
+        )));
+    }
+    // From here on: what is read must not be another map's by the time that something is written.
+    let folder = Folder::open(dir, true)?;
+    folder.refuse_links(output::map::names())?;
     let manifest = read_manifest(dir).map_err(Failure::Usage)?;
     let name = dir.join(MANIFEST).display().to_string();
     let scene = Scene::parse(&manifest.scene, &name, &manifest.set, Purpose::Map)?;
     let plan = Plan::new(&scene);
     let (records, refined) = read_records(dir, &manifest, &scene, &plan).map_err(Failure::Usage)?;
-    let folder = Folder::open(dir, true)?;
     let subject = Subject {
         plan: &plan,
         records: &records,
@@ -68,9 +76,6 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
 }
 
 fn read_manifest(dir: &Path) -> anyhow::Result<Manifest> {
-    if !dir.is_dir() {
-        return Err(anyhow!("{}: there is no such folder; name the folder of a finished map", dir.display()));
-    }
     let path = dir.join(MANIFEST);
     if !path.is_file() {
         let advice = if dir.join(RECORDS).is_file() {

@@ -11,6 +11,9 @@ use crate::map::scene::{Format, Scene};
 const CSV: &str = "bifurcation.csv";
 const PNG: &str = "bifurcation.png";
 
+/// Every file that a bifurcation diagram may write.
+pub const NAMES: [&str; 3] = [MANIFEST, CSV, PNG];
+
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one
 /// is complete. Returns the files' names.
 ///
@@ -24,7 +27,7 @@ pub fn write(
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     // Files of an earlier run must not stand beside a manifest that does not know them.
-    folder.remove(&[MANIFEST, CSV, PNG])?;
+    folder.remove(&NAMES)?;
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();

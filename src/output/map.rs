@@ -4,6 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::unfinished::UNFINISHED;
 use super::validation_json::ValidationObject;
 use super::{
     Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, layers, map_figure, map_manifest,
@@ -37,7 +38,7 @@ const ALL: [&str; 11] = [
 
 /// Every file that a map may write, records included.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    ALL.into_iter().chain([RECORDS])
+    ALL.into_iter().chain([RECORDS, UNFINISHED])
 }
 
 /// Removes what an earlier run left, but for its records: files must not stand beside a

@@ -21,6 +21,11 @@ fn samples_per_period(oscillator: &Oscillator) -> usize {
 
 const JSON: &str = "orbit.json";
 
+/// Every file that an orbit may write.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    [JSON].into_iter().chain(orbit_figures::NAMES)
+}
+
 /// Prints the orbit to stdout, as JSON or as a summary for the eye.
 ///
 /// # Errors
@@ -45,6 +50,8 @@ pub fn write(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<usize,
     }
     let samples = samples_per_period(&model.oscillator()?);
     let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
-    let figures = orbit_figures::write(folder.path(), model, orbit, &trace)?;
-    Ok(1 + figures.len())
+    orbit_figures::write_each(model, orbit, &trace, |name, save| {
+        folder.replace(name, |path| Ok(save(path)?))
+    })?;
+    Ok(1 + orbit_figures::NAMES.len())
 }

@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod engines;
+mod folders;
 mod interrupts;
 mod records;
 mod streams;
