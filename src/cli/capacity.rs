@@ -24,13 +24,36 @@ pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(
     judge(scene, engine, &Free { memory: free_memory(), disk })
 }
 
+/// Refuses a finished map that this machine cannot read, before anything is allocated for it, or whose files it has
+/// no room to replace one by one.
+pub(crate) fn check_finished(scene: &Scene, engine: EngineChoice, dir: &Path) -> Result<(), Failure> {
+    let free = Free { memory: free_memory(), disk: free_disk(dir) };
+    let size = Size::of(scene);
+    judge_size(
+        scene,
+        engine,
+        &free,
+        Size { disk: size.largest_output, ..size },
+        "use a machine that has as much",
+    )
+}
+
 /// Bytes of a folder's files that a map takes the place of.
 fn replaced(out: &Path) -> u64 {
     map::names().filter_map(|name| out.join(name).symlink_metadata().ok()).map(|data| data.len()).sum()
 }
 
 fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
-    let size = Size::of(scene);
+    judge_size(scene, engine, free, Size::of(scene), "lower axis.0.count or axis.1.count")
+}
+
+fn judge_size(
+    scene: &Scene,
+    engine: EngineChoice,
+    free: &Free,
+    size: Size,
+    remedy: &str,
+) -> Result<(), Failure> {
     let threads = processor::cores() as u64;
     let (cpu, gpu) = (size.on_cpu(threads), size.on_gpu());
     let memory = match engine {
@@ -44,7 +67,7 @@ fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure
     let map = format!("a map of {} = {} cells{starts}", counts.join(" x "), size.cells);
     let refuse = |what: &str, needed: u64, available: u64| {
         Err(Failure::Usage(anyhow!(
-            "{map} needs about {} of {what}, and {} are free; lower axis.0.count or axis.1.count{}",
+            "{map} needs about {} of {what}, and {} are free; {remedy}{}",
             bytes(needed),
             bytes(available),
             match what {
@@ -56,7 +79,7 @@ fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure
     };
     if !size.is_countable() {
         return Err(Failure::Usage(anyhow!(
-            "{map} is too large: at most {} runs can be numbered; lower axis.0.count or axis.1.count",
+            "{map} is too large: at most {} runs can be numbered; {remedy}",
             u32::MAX
         )));
     }

@@ -27,6 +27,7 @@ use crate::cli::error::{Failure, fail_if};
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
 use interrupt::Interrupt;
+pub(crate) use resume_command::quoted;
 use resume_command::resume_command;
 use summary::summary;
 
@@ -39,7 +40,9 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     plan.check()?;
     let interrupt = Interrupt::listen(ask.run.quiet)?;
     let folder = open_folder(ask)?;
+    let clock = Instant::now();
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))?;
+    let opening = clock.elapsed();
     if !ask.run.quiet && !why.is_empty() {
         say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
     }
@@ -70,6 +73,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         precision,
         device: &device,
         processor: &processor::described(),
+        opening,
         elapsed,
         elapsed_before,
         resumed_cells,

@@ -1,10 +1,10 @@
 //! The folder of a bifurcation diagram: table, figure and manifest.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure};
+use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, inventory};
 use crate::map::bifurcation::Column;
 use crate::map::scene::{Format, Scene};
 
@@ -26,6 +26,7 @@ pub fn write(
     columns: &[Column],
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
+    let clock = Instant::now();
     // Files of an earlier run must not stand beside a manifest that does not know them.
     folder.remove(&NAMES)?;
     let parameter = scene.axes()[0].parameter();
@@ -43,7 +44,9 @@ pub fn write(
         folder.replace(PNG, |path| Ok(bifurcation_figure::write(path, &title, &label, columns)?))?;
         files.push(PNG);
     }
+    let listed = inventory::entries(folder, &files)?;
+    let times = [elapsed, clock.elapsed()];
+    folder.write_json(MANIFEST, &Manifest::new(scene, sets, columns, times, &listed))?;
     files.push(MANIFEST);
-    folder.write_json(MANIFEST, &Manifest::new(scene, sets, columns, elapsed, &files))?;
     Ok(files)
 }

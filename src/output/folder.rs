@@ -11,7 +11,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::{OutputError, WriteError};
-use lock::{LOCK, Lock};
+pub(super) use lock::LOCK;
+use lock::Lock;
 
 /// Why a folder cannot be used.
 #[derive(Debug, Error)]
@@ -147,9 +148,9 @@ impl Folder {
     ///
     /// # Errors
     /// [`OutputError::Replace`] if one exists and cannot be removed.
-    pub fn remove(&self, names: &[&str]) -> Result<(), OutputError> {
+    pub fn remove<N: AsRef<str>>(&self, names: &[N]) -> Result<(), OutputError> {
         for name in names {
-            let path = self.path.join(name);
+            let path = self.path.join(name.as_ref());
             match fs::remove_file(&path) {
                 Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
                     return Err(OutputError::Replace { path, reason });
@@ -164,9 +165,12 @@ impl Folder {
 /// What a run that was killed at once may leave in a folder: nothing of value. Earlier versions left a probe.
 const LEFTOVERS: [&str; 4] = [LOCK, ".rattlemap-probe", "partial-records.bin", "partial-unfinished.json"];
 
+/// What the name begins with under which a file is written before it is whole.
+pub(super) const PARTIAL: &str = "partial-";
+
 /// The name under which a file is written before it is whole.
 pub(super) fn partial(path: &Path) -> PathBuf {
-    path.with_file_name(format!("partial-{}", path.file_name().unwrap_or_default().to_string_lossy()))
+    path.with_file_name(format!("{PARTIAL}{}", path.file_name().unwrap_or_default().to_string_lossy()))
 }
 
 /// Refuses to write a file through a symbolic link, to wherever that may point.

@@ -9,6 +9,7 @@ mod cells_csv;
 mod cells_npy;
 mod error;
 pub mod folder;
+pub mod inventory;
 mod layers;
 pub mod manifest;
 pub mod map;

@@ -23,7 +23,7 @@ pub(super) fn resume_command(ask: &Map) -> String {
 
 /// A word as a POSIX shell takes it: plain where it means itself, else in apostrophes, within
 /// which only the apostrophe means anything.
-fn quoted(word: &str) -> String {
+pub(crate) fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         return word.to_owned();

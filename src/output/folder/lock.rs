@@ -10,7 +10,7 @@ use same_file::Handle;
 use super::refuse_link;
 
 /// Its name. It is there while a folder is written, and after a kill; then nobody holds it.
-pub(super) const LOCK: &str = ".rattlemap.lock";
+pub(in crate::output) const LOCK: &str = ".rattlemap.lock";
 
 /// How often a lock is tried for whose file goes away under it.
 const TRIES: usize = 100;

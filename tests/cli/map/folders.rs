@@ -60,7 +60,9 @@ fn files_are_not_written_through_symbolic_links() {
         }
         assert_eq!(fs::read_to_string(&outside).unwrap(), "precious", "{name}");
         fs::remove_file(&link).unwrap();
-        before.map(|before| fs::write(link, before).unwrap());
+        if let Some(before) = before {
+            fs::write(link, before).unwrap();
+        }
     };
     linked("manifest.json", &WRITERS[..2]);
     linked("records.bin", &WRITERS[..3]);
