@@ -81,6 +81,13 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
     let manifest = Manifest::read(dir)?;
     let lost: Vec<&str> =
         findings.iter().filter(|finding| finding.is_lost()).map(|finding| finding.name.as_str()).collect();
+    if lost.contains(&MANIFEST) {
+        return Err(Failure::Run(anyhow!(
+            "{}: {MANIFEST} is damaged, and cannot be believed; `{}` makes it and every file anew",
+            dir.display(),
+            manifest.resume_command(dir)
+        )));
+    }
     if lost.contains(&RECORDS) {
         return Err(Failure::Run(anyhow!(
             "{}: {RECORDS} is damaged or missing, and nothing can be made of it; `{}` keeps what is good of it, \

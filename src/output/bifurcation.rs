@@ -46,7 +46,7 @@ pub fn write(
     }
     let listed = inventory::entries(folder, &files)?;
     let times = [elapsed, clock.elapsed()];
-    folder.write_json(MANIFEST, &Manifest::new(scene, sets, columns, times, &listed))?;
+    inventory::write_manifest(folder, &Manifest::new(scene, sets, columns, times, &listed))?;
     files.push(MANIFEST);
     Ok(files)
 }

@@ -13,6 +13,9 @@ use super::folder::{Folder, LOCK};
 use super::manifest::MANIFEST;
 use super::{OutputError, WriteError};
 
+/// The field of a manifest that has its own hash.
+const SEAL: &str = "manifest_sha256";
+
 /// A file as a manifest lists it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileEntry {
@@ -78,15 +81,14 @@ pub fn entry(folder: &Path, name: &str) -> io::Result<FileEntry> {
             }
         }
     }
-    let sha256 = hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok(FileEntry { name: name.to_owned(), bytes, sha256 })
+    Ok(FileEntry { name: name.to_owned(), bytes, sha256: hex(hasher.finalize()) })
 }
 
 /// The entries of these files, in their order.
-pub(super) fn entries<N: AsRef<str> + Sync>(
-    folder: &Folder,
-    names: &[N],
-) -> Result<Vec<FileEntry>, OutputError> {
+///
+/// # Errors
+/// If one cannot be read.
+pub fn entries<N: AsRef<str> + Sync>(folder: &Folder, names: &[N]) -> Result<Vec<FileEntry>, OutputError> {
     let of = |name: &N| {
         let name = name.as_ref();
         entry(folder.path(), name).map_err(|reason| OutputError::Write {
@@ -97,11 +99,14 @@ pub(super) fn entries<N: AsRef<str> + Sync>(
     names.par_iter().map(of).collect()
 }
 
-/// Compares a folder's files with the list in its manifest: what is wrong, listed files first.
+/// Compares a folder's files with the list in its manifest: what is wrong, the manifest and listed files first.
 ///
 /// # Errors
 /// If the folder cannot be read.
 pub fn check(folder: &Path, listed: &[FileEntry]) -> io::Result<Vec<Finding>> {
+    let manifest = fs::read_to_string(folder.join(MANIFEST))?;
+    let damaged = || Fault::Damaged("its contents are not what they were".to_owned());
+    let of_manifest = (!is_sealed(&manifest)).then(|| (MANIFEST.to_owned(), damaged()));
     let faults = listed.par_iter().map(|entry| fault(folder, entry)).collect::<Vec<_>>();
     let of_listed = listed.iter().zip(faults).filter_map(|(entry, fault)| Some((entry.name.clone(), fault?)));
     let mut unknown = Vec::new();
@@ -114,7 +119,12 @@ pub fn check(folder: &Path, listed: &[FileEntry]) -> io::Result<Vec<Finding>> {
         }
     }
     unknown.sort_by(|(a, _), (b, _)| a.cmp(b));
-    Ok(of_listed.chain(unknown).map(|(name, fault)| Finding { name, fault }).collect())
+    Ok(of_manifest
+        .into_iter()
+        .chain(of_listed)
+        .chain(unknown)
+        .map(|(name, fault)| Finding { name, fault })
+        .collect())
 }
 
 /// What is wrong with a listed file, if anything is.
@@ -158,6 +168,44 @@ pub(super) fn update(folder: &Folder, names: &[&str], timing: (&str, f64)) -> Re
     }
     manifest["files"] = serde_json::to_value(listed)?;
     let (phase, seconds) = timing;
+    if !manifest["timings"].is_object() {
+        manifest["timings"] = serde_json::json!({});
+    }
     manifest["timings"][phase] = seconds.into();
-    folder.write_json(MANIFEST, &manifest)
+    // One that was damaged stays so.
+    if is_sealed(&text) { write_manifest(folder, &manifest) } else { folder.write_json(MANIFEST, &manifest) }
+}
+
+/// Writes a manifest, sealed.
+///
+/// # Errors
+/// As [`Folder::replace`].
+pub fn write_manifest(folder: &Folder, manifest: &impl Serialize) -> Result<(), OutputError> {
+    let text = sealed(serde_json::to_value(manifest)?)?;
+    folder.replace(MANIFEST, |path| Ok(fs::write(path, text)?))
+}
+
+/// The text of a manifest with its own hash in it: that of the same text with an empty one.
+///
+/// # Errors
+/// If it is no JSON object.
+pub fn sealed(mut manifest: Value) -> serde_json::Result<String> {
+    manifest[SEAL] = "".into();
+    let hash = hex(Sha256::digest(pretty(&manifest)?));
+    manifest[SEAL] = hash.into();
+    pretty(&manifest)
+}
+
+/// Whether a manifest's text is as it was written.
+pub fn is_sealed(text: &str) -> bool {
+    let manifest = serde_json::from_str::<Value>(text);
+    manifest.is_ok_and(|manifest| manifest.is_object() && sealed(manifest).is_ok_and(|sealed| sealed == text))
+}
+
+fn pretty(manifest: &Value) -> serde_json::Result<String> {
+    Ok(serde_json::to_string_pretty(manifest)? + "\n")
+}
+
+fn hex(hash: impl AsRef<[u8]>) -> String {
+    hash.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -68,7 +68,7 @@ pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<St
     let has_records = folder.path().join(RECORDS).is_file();
     let listed: Vec<&str> = files.iter().map(String::as_str).chain(has_records.then_some(RECORDS)).collect();
     let listed = inventory::entries(folder, &listed)?;
-    folder.write_json(MANIFEST, &map_manifest::map(cells, run, clock.elapsed(), &listed))?;
+    inventory::write_manifest(folder, &map_manifest::map(cells, run, clock.elapsed(), &listed))?;
     files.push(MANIFEST.to_owned());
     unfinished::clear(folder)?;
     Ok(files)

@@ -103,6 +103,6 @@ pub fn write(folder: &Folder, model: &dyn Model, orbit: &Orbit, asked: &Asked) -
         },
         files: &listed,
     };
-    folder.write_json(MANIFEST, &manifest)?;
+    inventory::write_manifest(folder, &manifest)?;
     Ok(files.len() + 1)
 }

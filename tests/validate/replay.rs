@@ -563,7 +563,7 @@ fn lanes_of_another_device_are_named() {
     let listed =
         ["records.bin", "report.html", "validation.json"].map(|name| inventory::entry(&out, name).unwrap());
     files.extend(listed.map(|entry| serde_json::to_value(entry).unwrap()));
-    fs::write(out.join("manifest.json"), faraway.to_string()).unwrap();
+    fs::write(out.join("manifest.json"), inventory::sealed(faraway).unwrap()).unwrap();
     let text = validated();
     assert!(
         text.contains(&format!("lanes ran again on {device}, not on the map's own device: no")),

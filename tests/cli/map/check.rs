@@ -1,6 +1,6 @@
 //! `rattlemap check`: what was damaged is named, and made anew where records allow.
 
-use rattlemap::output::{Identity, Order, RecordFile};
+use rattlemap::output::{Identity, Order, RecordFile, inventory};
 use rattlemap::record::{Record, valid};
 
 use super::*;
@@ -167,12 +167,24 @@ fn manifests_that_cannot_be_believed_are_refused() {
     check(&folder, &["out/s"]).code(1).stderr(says(&["manifest.json is damaged"]));
     with("\"format\": 2", "\"format\": 1");
     check(&folder, &["out/s"]).code(2).stderr(says(&["of format 1", "reads format 2", "--force"]));
+    // A figure that nobody looks at.
+    with("\"cells\": 12", "\"cells\": 13");
+    for repair in [&[][..], &["--repair"]] {
+        let run = check(&folder, &[&["out/s"], repair].concat()).code(1);
+        run.stderr(says(&["manifest.json is damaged: its contents are not what they were"]));
+    }
+    let sealed = || {
+        let manifest = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+        fs::write(&path, inventory::sealed(manifest).unwrap()).unwrap();
+    };
     with("\"name\": \"cells.csv\"", "\"name\": \"../../s.toml\"");
+    sealed();
     check(&folder, &["out/s"]).code(1).stderr(says(&["../../s.toml is damaged: this is no name of a file"]));
     // A map that no machine holds is refused before its memory is asked for.
     with("axis.0.count=4", "axis.0.count=60000");
     let count = fs::read_to_string(&path).unwrap().replace("axis.1.count=3", "axis.1.count=60000");
     fs::write(&path, count).unwrap();
+    sealed();
     for arguments in [&["validate", "out/s"][..], &["check", "out/s", "--repair"]] {
         fs::remove_file(folder.path().join("out/s/map.png")).ok();
         let run = command(&folder, arguments).assert().code(2);
