@@ -57,6 +57,7 @@ pub(crate) enum Command {
     /// a name) and WGPU_BACKEND (vulkan, metal, dx12) in the environment narrow the adapters down.
     Devices,
     Validate(Validate),
+    Check(Check),
     /// Measurements: how fast are maps on this machine's engines?
     ///
     /// Writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
@@ -311,6 +312,28 @@ pub(crate) struct Validate {
     /// Decides which cells: the same seed, the same sample
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(crate) seed: u64,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Whether the files of a folder are what they were
+///
+/// Compares every file with the size and the hash (SHA-256) in manifest.json, and names what is damaged, missing or
+/// unknown: then the exit code is 1. Nothing is written unless --repair is given: it makes tables, figures and report of a
+/// map anew from records.bin. No scene file is needed.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    rattlemap check out/e_omega --repair")]
+pub(crate) struct Check {
+    /// The folder of a finished map, diagram or orbit
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+
+    /// Make damaged and missing files of a map anew from its records
+    #[arg(long)]
+    pub(crate) repair: bool,
 
     /// Say nothing unless something is wrong
     #[arg(long)]

@@ -15,6 +15,7 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
     let ask = &ask.run;
     let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
     let folder = Folder::open(&ask.out(), ask.force)?;
+    folder.refuse_links(output::bifurcation::NAMES)?;
     let cells = scene.line();
     let progress = Progress::new(cells.len(), 0, "columns", ask.quiet);
     let clock = Instant::now();

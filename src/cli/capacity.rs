@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::map::scene::Scene;
 use crate::map::size::Size;
-use crate::output::RECORDS;
+use crate::output::map;
 use anyhow::anyhow;
 
 use crate::cli::arguments::EngineChoice;
@@ -20,13 +20,40 @@ struct Free {
 /// Refuses a map that does not fit memory or disk, with figures. What the system does not
 /// tell is taken to be enough.
 pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(), Failure> {
-    let kept = out.join(RECORDS).metadata().map_or(0, |data| data.len());
-    let disk = free_disk(out).map(|free| free.saturating_add(kept));
+    let disk = free_disk(out).map(|free| free.saturating_add(replaced(out)));
     judge(scene, engine, &Free { memory: free_memory(), disk })
 }
 
-fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
+/// Refuses a finished map that this machine cannot read, before anything is allocated for it, or whose files it has
+/// no room to replace one by one.
+pub(crate) fn check_finished(scene: &Scene, engine: EngineChoice, dir: &Path) -> Result<(), Failure> {
+    let free = Free { memory: free_memory(), disk: free_disk(dir) };
     let size = Size::of(scene);
+    judge_size(
+        scene,
+        engine,
+        &free,
+        Size { disk: size.largest_output, ..size },
+        "use a machine that has as much",
+    )
+}
+
+/// Bytes of a folder's files that a map takes the place of.
+fn replaced(out: &Path) -> u64 {
+    map::names().filter_map(|name| out.join(name).symlink_metadata().ok()).map(|data| data.len()).sum()
+}
+
+fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
+    judge_size(scene, engine, free, Size::of(scene), "lower axis.0.count or axis.1.count")
+}
+
+fn judge_size(
+    scene: &Scene,
+    engine: EngineChoice,
+    free: &Free,
+    size: Size,
+    remedy: &str,
+) -> Result<(), Failure> {
     let threads = processor::cores() as u64;
     let (cpu, gpu) = (size.on_cpu(threads), size.on_gpu());
     let memory = match engine {
@@ -40,7 +67,7 @@ fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure
     let map = format!("a map of {} = {} cells{starts}", counts.join(" x "), size.cells);
     let refuse = |what: &str, needed: u64, available: u64| {
         Err(Failure::Usage(anyhow!(
-            "{map} needs about {} of {what}, and {} are free; lower axis.0.count or axis.1.count{}",
+            "{map} needs about {} of {what}, and {} are free; {remedy}{}",
             bytes(needed),
             bytes(available),
             match what {
@@ -52,7 +79,7 @@ fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure
     };
     if !size.is_countable() {
         return Err(Failure::Usage(anyhow!(
-            "{map} is too large: at most {} runs can be numbered; lower axis.0.count or axis.1.count",
+            "{map} is too large: at most {} runs can be numbered; {remedy}",
             u32::MAX
         )));
     }
@@ -106,5 +133,26 @@ mod tests {
             assert!(text.contains("or ask for --engine cpu"), "{text}");
         }
         assert!(judge(&scene, EngineChoice::Gpu, &Free { memory: None, disk: None }).is_ok());
+    }
+
+    /// Tables and figures take more room than records, and what they replace makes room.
+    #[test]
+    fn room_is_counted_for_all_that_is_written_and_replaced() {
+        let disk = |files: &str| {
+            let sets = [format!("outputs.files={files}")];
+            Size::of(&Scene::parse(SLOW, "s", &sets, Purpose::Map).unwrap()).disk
+        };
+        let [records, all] = [disk("[\"png\"]"), disk("[\"csv\",\"npy\",\"png\",\"html\"]")];
+        assert!(all > 3 * records, "{all} {records}");
+        let scene = Scene::parse(SLOW, "s", &[], Purpose::Map).unwrap();
+        let with = |disk| judge(&scene, EngineChoice::Cpu, &Free { memory: None, disk: Some(disk) });
+        assert!(with(Size::of(&scene).disk).is_ok());
+        let text = with(records).unwrap_err().to_string();
+        assert!(text.contains("of disk, and") && text.contains("--out"), "{text}");
+        let out = tempfile::tempdir().unwrap();
+        for name in ["records.bin", "cells.csv", "report.html", "notes.txt"] {
+            std::fs::write(out.path().join(name), [0; 1000]).unwrap();
+        }
+        assert_eq!(replaced(out.path()), 3000);
     }
 }

@@ -15,7 +15,7 @@ use crate::map::plan::Plan;
 use crate::map::scene::{Purpose, Scene, Steps};
 use crate::map::schedule::Schedule;
 use crate::map::sweep::{self, SweepError};
-use crate::output::{self, Cells, Folder, Identity, RECORDS, RecordFile, RecordFileError, unfinished};
+use crate::output::{self, Cells, Folder, Identity, Order, RECORDS, RecordFile, RecordFileError, unfinished};
 use crate::record::Record;
 use crate::record::classify::status;
 use anyhow::anyhow;
@@ -28,6 +28,7 @@ use crate::cli::error::{Failure, fail_if};
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
 use interrupt::Interrupt;
+pub(crate) use resume_command::quoted;
 use summary::summary;
 
 /// Asks, checks, computes, writes.
@@ -39,8 +40,10 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     plan.check()?;
     let interrupt = Interrupt::listen(ask.run.quiet)?;
     let folder = open_folder(ask)?;
+    let clock = Instant::now();
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))
         .map_err(|failure| stopped::before_it_began(failure, ask, &folder, &plan))?;
+    let opening = clock.elapsed();
     if !ask.run.quiet && !why.is_empty() {
         say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
     }
@@ -71,6 +74,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         precision,
         device: &device,
         processor: &processor::described(),
+        opening,
         elapsed,
         elapsed_before,
         resumed_cells,
@@ -91,11 +95,13 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
 /// A new folder, an earlier run's with `--force`, an interrupted one's with `--resume`.
 fn open_folder(ask: &Map) -> Result<Folder, Failure> {
     let out = ask.run.out();
-    let is_new = out.read_dir().map_or(true, |mut entries| entries.next().is_none());
-    if ask.resume && !is_new && !out.join(RECORDS).is_file() {
+    // A run that ended before it kept anything has left nothing else.
+    if ask.resume && !out.join(RECORDS).is_file() && Folder::holds_results(&out) {
         return Err(RecordFileError::NothingToResume { folder: out }.into());
     }
-    Ok(Folder::open(&out, ask.run.force || ask.resume)?)
+    let folder = Folder::open(&out, ask.run.force || ask.resume)?;
+    folder.refuse_links(output::map::names())?;
+    Ok(folder)
 }
 
 /// The engine that was asked for; where that is left open, an interrupted run goes on with
@@ -106,13 +112,15 @@ fn engine_of(ask: &Map, folder: &Folder) -> EngineOptions {
         return asked;
     }
     match Identity::read(&folder.path().join(RECORDS)) {
-        Ok(identity) if identity.engine() == "cpu" => EngineOptions { engine: EngineChoice::Cpu, ..asked },
-        Ok(identity) => {
+        Ok(Some(identity)) if identity.engine() == "cpu" => {
+            EngineOptions { engine: EngineChoice::Cpu, ..asked }
+        }
+        Ok(Some(identity)) => {
             let precision = Precision::ALL.into_iter().find(|p| p.name() == identity.precision());
             EngineOptions { engine: EngineChoice::Gpu, precision }
         }
         // What is wrong with the file is said when it is resumed.
-        Err(_) => asked,
+        Ok(None) | Err(_) => asked,
     }
 }
 
@@ -128,15 +136,24 @@ fn open_records<'f>(
     let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
     let (file, elapsed_before) = if ask.resume && path.is_file() {
         let Work { schedule, records, .. } = work;
-        let file = RecordFile::resume(&path, &identity, |batch| sweep::replay(schedule, records, batch))?;
+        let order = order(schedule);
+        let file =
+            RecordFile::resume(&path, &identity, order, |batch| sweep::replay(schedule, records, batch))?;
         if let Some(damage) = file.damage() {
             let (path, count, unit) = (path.display(), file.count(), unit(work.plan));
             say::note(format_args!(
-                "warning: {path}: {damage} and are dropped; {count} {unit} are kept, the others computed again"
+                "warning: {path}: {damage}; what is damaged is dropped: {count} {unit} are kept, the others computed \
+                 again"
             ));
+        }
+        if file.count() == 0 && file.damage().is_none() {
+            say_anew(ask, folder);
         }
         (file, unfinished::elapsed(folder))
     } else {
+        if ask.resume {
+            say_anew(ask, folder);
+        }
         (RecordFile::create(&path, &identity)?, Duration::ZERO)
     };
     // The manifest, which may have that time, too, goes next.
@@ -147,6 +164,20 @@ fn open_records<'f>(
     }
     output::map::clear(folder)?;
     Ok(Kept { file, folder, elapsed_before, clock: Instant::now() })
+}
+
+fn say_anew(ask: &Map, folder: &Folder) {
+    if !ask.run.quiet {
+        say::note(format_args!(
+            "{}: nothing was kept there yet; the map is begun anew",
+            folder.path().display()
+        ));
+    }
+}
+
+/// In which order a schedule takes up records again.
+pub(crate) fn order(schedule: &Schedule) -> Order {
+    if schedule.takes_any_order() { Order::Any } else { Order::AsKept }
 }
 
 /// What outlives a run that is interrupted.

@@ -4,9 +4,11 @@ mod arguments;
 pub mod bench;
 mod bifurcation;
 mod capacity;
+mod check;
 mod devices;
 mod engine_choice;
 mod error;
+mod finished_map;
 mod map;
 mod orbit;
 mod processor;
@@ -37,6 +39,7 @@ pub fn run() -> ExitCode {
         Command::Bifurcation(ask) => bifurcation::run(&ask),
         Command::Devices => devices::run(),
         Command::Validate(ask) => validate::run(&ask),
+        Command::Check(ask) => check::run(&ask),
         Command::Bench(Bench::Engines(ask)) => bench::run(&ask),
     };
     done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)

@@ -1,48 +1,37 @@
 //! `rattlemap validate`: a finished map's folder in, its validation beside it.
 
-use std::fs;
 use std::path::Path;
+use std::time::Instant;
 
 use crate::gpu::{self, AdapterChoice, Gpu, Precision};
 use crate::map::coexistence;
 use crate::map::plan::Plan;
-use crate::map::scene::{Purpose, Scene};
-use crate::map::schedule::{Refined, Schedule};
-use crate::map::sweep;
+use crate::output::inventory::Finding;
 use crate::output::map::{MANIFEST, Made, write_validation};
-use crate::output::{Cells, Extent, Folder, Identity, RECORDS, RecordFile, RecordFileError};
-use crate::record::Record;
+use crate::output::{self, Cells, Folder};
 use crate::validate::{self, HORIZON, Judge, Kind, Lanes, Sample, StratumResult, Subject, Validation};
 use anyhow::{Context, anyhow};
-use serde::Deserialize;
 
 use crate::cli::arguments::Validate;
 use crate::cli::error::Failure;
-use crate::cli::map::unit;
+use crate::cli::finished_map::{self, Manifest};
 use crate::cli::progress::Progress;
 use crate::cli::say;
 
-/// What a manifest has to say.
-#[derive(Deserialize)]
-struct Manifest {
-    command: String,
-    crate_version: String,
-    engine: String,
-    precision: String,
-    device: String,
-    scene: String,
-    set: Vec<String>,
-}
-
 /// Reads, replays, writes.
 pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
+    let clock = Instant::now();
     let dir = &ask.folder;
-    let manifest = read_manifest(dir).map_err(Failure::Usage)?;
-    let name = dir.join(MANIFEST).display().to_string();
-    let scene = Scene::parse(&manifest.scene, &name, &manifest.set, Purpose::Map)?;
-    let plan = Plan::new(&scene);
-    let (records, refined) = read_records(dir, &manifest, &scene, &plan).map_err(Failure::Usage)?;
+    finished_map::require_folder(dir)?;
+    // From here on: what is read must not be another map's by the time that something is written.
     let folder = Folder::open(dir, true)?;
+    folder.refuse_links(output::map::names())?;
+    let manifest = Manifest::read(dir)?;
+    let findings = finished_map::check_files(dir, &manifest.files)?;
+    let finished = manifest.scene(dir)?;
+    let plan = finished.plan()?;
+    let (records, refined) = finished.records(&plan)?;
+    let scene = &finished.scene;
     let subject = Subject {
         plan: &plan,
         records: &records,
@@ -58,47 +47,24 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let progress = Progress::new(count, 0, "cells replayed", ask.quiet);
     let validation = validate::replay(&subject, &sample, &lanes, &|done| progress.report(done, count));
     let attractors = coexistence::attractors(&plan, &records);
-    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
+    let cells = Cells::new(scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let device = lanes.device.as_deref();
-    let files = write_validation(&folder, &cells, &made, device, &validation)?;
+    let files = write_validation(&folder, &cells, &made, device, &validation, clock.elapsed())?;
     let summary = summary(&validation, device);
     progress.finish(&format!("{summary}{note}\n{}: {}", say::path(dir), files.join(", ")));
-    verdict(dir, &plan, &validation)
-}
-
-fn read_manifest(dir: &Path) -> anyhow::Result<Manifest> {
-    if !dir.is_dir() {
-        return Err(anyhow!("{}: there is no such folder; name the folder of a finished map", dir.display()));
+    verdict(dir, &plan, &validation)?;
+    // What was rewritten is good again.
+    let left: Vec<&Finding> =
+        findings.iter().filter(|finding| !files.contains(&finding.name.as_str())).collect();
+    match left.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::Run(anyhow!(
+            "{}; `{}` makes anew what can be made of the records",
+            finished_map::told(dir, &left),
+            finished_map::repair_command(dir)
+        ))),
     }
-    let path = dir.join(MANIFEST);
-    if !path.is_file() {
-        let advice = if dir.join(RECORDS).is_file() {
-            "the run is unfinished: go on with `rattlemap map SCENE --resume`"
-        } else {
-            "it is not the folder of a map: `rattlemap map SCENE` makes one"
-        };
-        return Err(anyhow!("{}: there is no {MANIFEST}; {advice}", dir.display()));
-    }
-    let foreign = || format!("{}: this is not the manifest of a map", path.display());
-    let text = fs::read_to_string(&path).with_context(foreign)?;
-    let manifest: serde_json::Value = serde_json::from_str(&text).with_context(foreign)?;
-    if manifest["command"] != "map" {
-        let made = manifest["command"].as_str().unwrap_or("something else");
-        return Err(anyhow!("{}: this is not the manifest of a map, but of `{made}`", path.display()));
-    }
-    let manifest: Manifest = serde_json::from_value(manifest).with_context(foreign)?;
-    let own = env!("CARGO_PKG_VERSION");
-    if manifest.crate_version != own {
-        return Err(anyhow!(
-            "{}: the map was made by rattlemap {}, this is {own}; validate it with that version, or make it \
-             again with `rattlemap {} --force`",
-            path.display(),
-            manifest.crate_version,
-            manifest.command
-        ));
-    }
-    Ok(manifest)
 }
 
 fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
@@ -107,57 +73,6 @@ fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
         ("gpu", "f32") => Ok(Precision::F32),
         (engine, precision) => Err(anyhow!("{MANIFEST}: no engine `{engine}` computes in `{precision}`")),
     }
-}
-
-/// One record per run, and what became of an adaptive map.
-fn read_records(
-    dir: &Path,
-    manifest: &Manifest,
-    scene: &Scene,
-    plan: &Plan,
-) -> anyhow::Result<(Vec<Record>, Option<Refined>)> {
-    let path = dir.join(RECORDS);
-    if !path.is_file() {
-        return Err(anyhow!(
-            "{}: there is no {RECORDS}; tables alone cannot be replayed: make the map again with \
-             `rattlemap map SCENE --force`",
-            dir.display()
-        ));
-    }
-    let identity = Identity::new(&manifest.engine, &manifest.precision, &manifest.device, scene.identity());
-    let mut schedule = Schedule::new(plan);
-    let mut records = vec![Record::default(); plan.run_count()];
-    let take = |batch: &[(u32, Record)]| sweep::replay(&mut schedule, &mut records, batch);
-    let again = "make the map again with `rattlemap map SCENE --force`";
-    let go_on = "`rattlemap map SCENE --resume` keeps them and computes the others";
-    let Extent { count, damage, .. } =
-        RecordFile::read(&path, &identity, take).map_err(|error| match error {
-            RecordFileError::OtherRun { path, differences } => {
-                anyhow!(
-                    "{} does not belong to the {MANIFEST} beside it: {differences}; {again}",
-                    path.display()
-                )
-            }
-            RecordFileError::Damaged { path, at, what } => {
-                anyhow!("{} is damaged at byte {at}: {what}; {again}", path.display())
-            }
-            other => other.into(),
-        })?;
-    if !schedule.is_finished() {
-        let (cells, unit) = (schedule.expected(), unit(plan));
-        let damage = damage.map_or(String::new(), |damage| format!("{damage}: "));
-        return Err(anyhow!("{}: {damage}{count} of {cells} {unit} are there; {go_on}", path.display()));
-    }
-    // Nothing is missing: it stands behind the last cell.
-    if let Some(damage) = damage {
-        say::note(format_args!(
-            "warning: {}: {damage}; all {count} {} are there",
-            path.display(),
-            unit(plan)
-        ));
-    }
-    let refined = schedule.finish(&mut records);
-    Ok((records, refined))
 }
 
 /// Runs the sample's lanes again, on the device that made the map or else on the best adapter there is; and in f64
@@ -272,7 +187,8 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), Failu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::valid;
+    use crate::map::scene::{Purpose, Scene};
+    use crate::record::{Record, valid};
 
     /// As of a map whose cells were all filled.
     #[test]

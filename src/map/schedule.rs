@@ -136,6 +136,11 @@ impl Schedule {
         self.states.get(id as usize) == Some(&State::Asked)
     }
 
+    /// Whether records may be taken up in any order: no cell depends on another.
+    pub fn takes_any_order(&self) -> bool {
+        matches!(self.rule, Rule::Whole)
+    }
+
     /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included.
     pub fn take(&mut self, id: u32, records: &[Record]) {
         self.states[id as usize] = State::Come;

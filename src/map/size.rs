@@ -2,7 +2,7 @@
 
 use crate::gpu;
 use crate::map::plan::keeps_flows;
-use crate::map::scene::{Axis, Format, Scene, Steps};
+use crate::map::scene::{Axis, Format, Quantity, Scene, Steps};
 use crate::record::Record;
 
 /// Bytes per cell in memory beside its record: its place in the order, and what the outputs
@@ -18,10 +18,17 @@ const FLOW: u64 = 100_000;
 /// Flows that are sampled to estimate the constants of all.
 const FLOWS_LOOKED_AT: usize = 256;
 
+/// Bytes per run on disk of what a record always has, and of what is asked for, where it does not compress: chaos.
+const RECORD: u64 = 44;
+const NUMBER: u64 = 8;
+const WORD: u64 = 16;
+
 /// Bytes per cell on disk of each output.
 const CSV: u64 = 190;
 const NPY: u64 = 132;
 const HTML: u64 = 24;
+/// Of one figure.
+const PNG: u64 = 4;
 /// Starts of cells that follow their neighbours, in the report.
 const HTML_START: u64 = 44;
 
@@ -40,8 +47,10 @@ pub struct Size {
     pub flows: u64,
     /// Bytes of memory for the constants that lanes read, while they are handed to the device.
     pub lane_tables: u64,
-    /// Bytes on disk, about.
+    /// Bytes on disk of records and outputs, about.
     pub disk: u64,
+    /// Bytes on disk of the largest output, about: when it is replaced there are two of it.
+    pub largest_output: u64,
 }
 
 impl Size {
@@ -54,8 +63,10 @@ impl Size {
             Format::Npy => NPY,
             Format::Html if scene.start().follows() => HTML + HTML_START,
             Format::Html => HTML,
-            Format::Png => 1,
+            // One of each quantity, one of attractors.
+            Format::Png => PNG * (scene.outputs().quantities.len() as u64 + 1),
         };
+        let per_files = || scene.outputs().files.iter().map(per_file);
         let settings = scene.orbit_settings();
         let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
         let one_cell = periods * PER_PERIOD;
@@ -66,8 +77,10 @@ impl Size {
             memory_per_thread: one_cell,
             flows: if keeps_flows(flow_count(scene), runs) { flow_count(scene) * FLOW } else { 0 },
             lane_tables: lane_tables(scene, runs),
-            disk: runs.saturating_mul(record)
-                + cells * scene.outputs().files.iter().map(per_file).sum::<u64>(),
+            disk: runs
+                .saturating_mul(record_on_disk(scene))
+                .saturating_add(cells.saturating_mul(per_files().sum())),
+            largest_output: cells.saturating_mul(per_files().max().unwrap_or(0)),
         }
     }
 
@@ -85,6 +98,16 @@ impl Size {
     pub fn is_countable(&self) -> bool {
         self.runs <= u64::from(u32::MAX)
     }
+}
+
+fn record_on_disk(scene: &Scene) -> u64 {
+    let quantity = |quantity: &Quantity| match quantity {
+        Quantity::Word => WORD,
+        Quantity::Lyapunov | Quantity::Impacts | Quantity::Mesh => NUMBER,
+        Quantity::Class | Quantity::Symmetric => 1,
+    };
+    // The class needs an exponent, too, with its error.
+    RECORD + 2 * NUMBER + scene.outputs().quantities.iter().map(quantity).sum::<u64>()
 }
 
 /// Distinct flows: one per value of the axes that are no contact law's.

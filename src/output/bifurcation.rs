@@ -1,15 +1,18 @@
 //! The folder of a bifurcation diagram: table, figure and manifest.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure};
+use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, inventory};
 use crate::map::bifurcation::Column;
 use crate::map::scene::{Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
 const PNG: &str = "bifurcation.png";
+
+/// Every file that a bifurcation diagram may write.
+pub const NAMES: [&str; 3] = [MANIFEST, CSV, PNG];
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one
 /// is complete. Returns the files' names.
@@ -23,8 +26,9 @@ pub fn write(
     columns: &[Column],
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
+    let clock = Instant::now();
     // Files of an earlier run must not stand beside a manifest that does not know them.
-    folder.remove(&[MANIFEST, CSV, PNG])?;
+    folder.remove(&NAMES)?;
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();
@@ -40,7 +44,9 @@ pub fn write(
         folder.replace(PNG, |path| Ok(bifurcation_figure::write(path, &title, &label, columns)?))?;
         files.push(PNG);
     }
+    let listed = inventory::entries(folder, &files)?;
+    let times = [elapsed, clock.elapsed()];
+    inventory::write_manifest(folder, &Manifest::new(scene, sets, columns, times, &listed))?;
     files.push(MANIFEST);
-    folder.write_json(MANIFEST, &Manifest::new(scene, sets, columns, elapsed, &files))?;
     Ok(files)
 }

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::manifest::{AxisObject, Head, StartObject, start};
+use super::inventory::FileEntry;
+use super::manifest::{AxisObject, Head, StartObject, TimingsObject, start};
 use super::names;
 use super::parameters::Parameters;
 use crate::map::bifurcation::Column;
@@ -27,7 +28,8 @@ pub(super) struct Manifest<'a> {
     integration: IntegrationObject,
     classes: BTreeMap<&'static str, usize>,
     elapsed_seconds: f64,
-    files: &'a [&'static str],
+    timings: TimingsObject,
+    files: &'a [FileEntry],
 }
 
 #[derive(Serialize)]
@@ -42,8 +44,8 @@ impl<'a> Manifest<'a> {
         scene: &'a Scene,
         sets: &'a [String],
         columns: &[Column],
-        elapsed: Duration,
-        files: &'a [&'static str],
+        [elapsed, writing]: [Duration; 2],
+        files: &'a [FileEntry],
     ) -> Manifest<'a> {
         let axis = &scene.axes()[0];
         let settings = scene.orbit_settings();
@@ -64,6 +66,7 @@ impl<'a> Manifest<'a> {
             },
             classes: names::CLASSES.into_iter().zip(classes).collect(),
             elapsed_seconds: elapsed.as_secs_f64(),
+            timings: TimingsObject { integrate: elapsed.as_secs_f64(), write: writing.as_secs_f64() },
             files,
         }
     }

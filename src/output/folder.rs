@@ -1,5 +1,7 @@
-//! The output folder: proved writable before anything is computed, and guarded against
-//! overwriting an earlier run by accident.
+//! The output folder: proved writable before anything is computed, written by one command at a time, and guarded
+//! against overwriting an earlier run by accident.
+
+mod lock;
 
 use std::fs;
 use std::io;
@@ -9,6 +11,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::{OutputError, WriteError};
+pub(super) use lock::LOCK;
+use lock::Lock;
 
 /// Why a folder cannot be used.
 #[derive(Debug, Error)]
@@ -29,6 +33,20 @@ pub enum FolderError {
         /// The folder asked for.
         path: PathBuf,
     },
+    /// Another command has the folder.
+    #[error("{}: another run is writing to this folder; wait for it, or choose another one with --out", .path.display())]
+    InUse {
+        /// The folder asked for.
+        path: PathBuf,
+    },
+    /// A file that is to be written is a symbolic link.
+    #[error("{}: {reason}", .path.display())]
+    Link {
+        /// The folder asked for.
+        path: PathBuf,
+        /// Which file.
+        reason: io::Error,
+    },
     /// The folder cannot be made, read or written.
     #[error("--out {}: cannot write there ({reason}); choose another folder with --out", .path.display())]
     NotWritable {
@@ -39,30 +57,54 @@ pub enum FolderError {
     },
 }
 
-/// A folder that exists and can be written.
+/// A folder that exists and can be written, by nobody else while this lives.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
+    _lock: Lock,
 }
 
 impl Folder {
-    /// Makes the folder if need be and writes a probe file into it.
+    /// Makes the folder if need be and takes its lock.
     ///
     /// # Errors
-    /// [`FolderError`] if it cannot be written, or has something in it and `force` is not set.
+    /// [`FolderError`] if it cannot be written, another command has it, or it has something in it and `force` is not
+    /// set.
     pub fn open(path: &Path, force: bool) -> Result<Folder, FolderError> {
         let path = path.to_owned();
         if path.exists() && !path.is_dir() {
             return Err(FolderError::NotAFolder { path });
         }
-        match prepare(&path) {
+        // The lock's file shows that others can be written, too.
+        match fs::create_dir_all(&path).and_then(|()| Lock::take(&path)) {
             Err(reason) => Err(FolderError::NotWritable { path, reason }),
-            Ok(Contents::Something) if !force => Err(FolderError::NotEmpty { path }),
-            Ok(_) => match probe(&path) {
+            Ok(None) => Err(FolderError::InUse { path }),
+            Ok(Some(lock)) => match is_empty(&path) {
                 Err(reason) => Err(FolderError::NotWritable { path, reason }),
-                Ok(()) => Ok(Folder { path }),
+                Ok(false) if !force => Err(FolderError::NotEmpty { path }),
+                Ok(_) => Ok(Folder { path, _lock: lock }),
             },
         }
+    }
+
+    /// Looks whether one of the files `names` is a symbolic link, before there is something to write to it.
+    ///
+    /// # Errors
+    /// [`FolderError::Link`] for the first one.
+    pub fn refuse_links<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
+        let check = |name| {
+            let path = self.path.join(name);
+            refuse_link(&path).and_then(|()| refuse_link(&partial(&path)))
+        };
+        let checked = names.into_iter().try_for_each(check);
+        checked.map_err(|reason| FolderError::Link { path: self.path.clone(), reason })
+    }
+
+    /// Whether a folder has anything in it but what a run leaves that was killed before it kept anything.
+    pub fn holds_results(path: &Path) -> bool {
+        let is_leftover =
+            |entry: &fs::DirEntry| LEFTOVERS.into_iter().any(|leftover| entry.file_name() == leftover);
+        fs::read_dir(path).is_ok_and(|entries| entries.flatten().any(|entry| !is_leftover(&entry)))
     }
 
     /// Where it is, as the user named it.
@@ -81,7 +123,11 @@ impl Folder {
         write: impl FnOnce(&Path) -> Result<(), WriteError>,
     ) -> Result<(), OutputError> {
         let target = self.path.join(name);
-        let partial = self.path.join(format!("partial-{name}"));
+        let partial = partial(&target);
+        let links = refuse_link(&target).and_then(|()| refuse_link(&partial));
+        if let Err(reason) = links {
+            return Err(OutputError::Write { path: target, reason: reason.into() });
+        }
         let written = write(&partial).and_then(|()| Ok(fs::rename(&partial, &target)?));
         if written.is_err() {
             // Best effort: the error that matters is the one already at hand.
@@ -102,9 +148,9 @@ impl Folder {
     ///
     /// # Errors
     /// [`OutputError::Replace`] if one exists and cannot be removed.
-    pub fn remove(&self, names: &[&str]) -> Result<(), OutputError> {
+    pub fn remove<N: AsRef<str>>(&self, names: &[N]) -> Result<(), OutputError> {
         for name in names {
-            let path = self.path.join(name);
+            let path = self.path.join(name.as_ref());
             match fs::remove_file(&path) {
                 Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
                     return Err(OutputError::Replace { path, reason });
@@ -116,23 +162,38 @@ impl Folder {
     }
 }
 
-enum Contents {
-    Nothing,
-    Something,
+/// What a run that was killed at once may leave in a folder: nothing of value. Earlier versions left a probe.
+const LEFTOVERS: [&str; 4] = [LOCK, ".rattlemap-probe", "partial-records.bin", "partial-unfinished.json"];
+
+/// What the name begins with under which a file is written before it is whole.
+pub(super) const PARTIAL: &str = "partial-";
+
+/// The name under which a file is written before it is whole.
+pub(super) fn partial(path: &Path) -> PathBuf {
+    path.with_file_name(format!("{PARTIAL}{}", path.file_name().unwrap_or_default().to_string_lossy()))
 }
 
-fn prepare(path: &Path) -> io::Result<Contents> {
-    fs::create_dir_all(path)?;
-    match fs::read_dir(path)?.next() {
-        None => Ok(Contents::Nothing),
-        Some(entry) => entry.map(|_| Contents::Something),
+/// Refuses to write a file through a symbolic link, to wherever that may point.
+pub(super) fn refuse_link(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(data) if data.is_symlink() => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            Err(io::Error::other(format!(
+                "{name} is a symbolic link, and no file is written through one; remove it"
+            )))
+        }
+        _ => Ok(()),
     }
 }
 
-fn probe(path: &Path) -> io::Result<()> {
-    let probe = path.join(".rattlemap-probe");
-    fs::write(&probe, b"")?;
-    fs::remove_file(&probe)
+/// Whether a folder has nothing in it but its lock.
+fn is_empty(path: &Path) -> io::Result<bool> {
+    for entry in fs::read_dir(path)? {
+        if entry?.file_name() != LOCK {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 #[cfg(test)]
@@ -144,8 +205,9 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("a/b");
         let folder = Folder::open(&path, false).unwrap();
-        assert_eq!(fs::read_dir(&path).unwrap().count(), 0, "the probe is gone");
         folder.replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap();
+        drop(folder);
+        assert_eq!(fs::read_dir(&path).unwrap().count(), 1, "the lock is gone");
         assert!(matches!(Folder::open(&path, false), Err(FolderError::NotEmpty { .. })));
         Folder::open(&path, true).unwrap().remove(&["x.txt", "absent.txt"]).unwrap();
         Folder::open(&path, false).unwrap();
@@ -160,6 +222,64 @@ mod tests {
         assert!(matches!(Folder::open(&file.join("below"), true), Err(FolderError::NotWritable { .. })));
     }
 
+    /// However many try at the same time, while locks come and go.
+    #[test]
+    fn a_folder_has_one_writer_at_a_time() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = Folder::open(root.path(), false).unwrap();
+        assert!(matches!(Folder::open(root.path(), true), Err(FolderError::InUse { .. })));
+        drop(folder);
+        let inside = std::sync::atomic::AtomicUsize::new(0);
+        let opened: usize = std::thread::scope(|scope| {
+            let work = || {
+                let held = || {
+                    Folder::open(root.path(), true).ok().map(|_held| {
+                        let others = inside.fetch_add(1, std::sync::atomic::Ordering::SeqCst);
+                        std::thread::yield_now();
+                        inside.fetch_sub(1, std::sync::atomic::Ordering::SeqCst);
+                        assert_eq!(others, 0, "two writers");
+                    })
+                };
+                (0..500).filter_map(|_| held()).count()
+            };
+            let threads: Vec<_> = (0..4).map(|_| scope.spawn(work)).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).sum()
+        });
+        assert!(opened > 100, "{opened} of 2000");
+        // What a killed process leaves is no lock.
+        fs::write(root.path().join(LOCK), "").unwrap();
+        Folder::open(root.path(), false).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_through_a_symbolic_link() {
+        let root = tempfile::tempdir().unwrap();
+        let [inside, outside] = ["inside", "outside"].map(|name| root.path().join(name));
+        fs::write(&outside, "precious").unwrap();
+        fs::create_dir(&inside).unwrap();
+        for name in ["x.txt", "partial-x.txt", LOCK] {
+            let link = inside.join(name);
+            std::os::unix::fs::symlink(&outside, &link).unwrap();
+            let failed = match Folder::open(&inside, true) {
+                Ok(folder) => {
+                    let named = folder.refuse_links(["x.txt"]).unwrap_err().to_string();
+                    assert!(named.contains(&format!("{name} is a symbolic link")), "{named}");
+                    folder.replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap_err().to_string()
+                }
+                Err(error) => error.to_string(),
+            };
+            assert!(failed.contains(&format!("{name} is a symbolic link")), "{failed}");
+            assert!(link.is_symlink() && fs::read_to_string(&outside).unwrap() == "precious", "{name}");
+            fs::remove_file(link).unwrap();
+        }
+        // The folder itself may be one.
+        let link = root.path().join("link");
+        std::os::unix::fs::symlink(&inside, &link).unwrap();
+        Folder::open(&link, false).unwrap().replace("x.txt", |at| Ok(fs::write(at, "one")?)).unwrap();
+        assert_eq!(fs::read_to_string(inside.join("x.txt")).unwrap(), "one");
+    }
+
     #[test]
     fn failed_writes_leave_what_was_there() {
         let root = tempfile::tempdir().unwrap();
@@ -171,6 +291,7 @@ mod tests {
         });
         assert!(failed.unwrap_err().to_string().contains("x.txt: disk full"));
         assert_eq!(fs::read_to_string(root.path().join("x.txt")).unwrap(), "one");
+        drop(folder);
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
     }
 }

@@ -8,7 +8,8 @@ use crate::map::scene::{Axis, Scene, Start};
 pub const MANIFEST: &str = "manifest.json";
 
 /// Raised whenever a field changes its meaning.
-const FORMAT: u32 = 1;
+/// 2: `files` are objects of name, size and hash.
+pub const FORMAT: u32 = 2;
 
 /// What a run's JSON begins with: what it is, and which program wrote it.
 #[derive(Serialize)]
@@ -16,7 +17,7 @@ pub struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
-    /// Of the program; `unknown` where it was built outside of its repository.
+    /// Of the program; `unknown` where it was built outside of its repository, or not for release.
     commit: &'static str,
 }
 
@@ -70,4 +71,11 @@ pub(super) fn start(scene: &Scene) -> StartObject {
     };
     let (count, seed) = scene.draw().map(|draw| (draw.count, draw.seed)).unzip();
     StartObject { policy, state, count, seed }
+}
+
+/// Seconds by phase.
+#[derive(Serialize)]
+pub(super) struct TimingsObject {
+    pub(super) integrate: f64,
+    pub(super) write: f64,
 }

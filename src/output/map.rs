@@ -1,13 +1,18 @@
 //! The folder of a map: tables, figures, report and manifest.
 
+use std::fs;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
+use serde_json::Value;
 
+use super::folder::PARTIAL;
+use super::unfinished::UNFINISHED;
 use super::validation_json::ValidationObject;
 use super::{
-    Cells, Folder, OutputError, WriteError, cells_csv, cells_npy, layers, map_figure, map_manifest, report,
-    unfinished,
+    Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, inventory, layers, map_figure,
+    map_manifest, report, unfinished,
 };
 use crate::map::scene::Format;
 use crate::validate::Validation;
@@ -18,7 +23,8 @@ pub use super::map_manifest::{Made, Run};
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const HTML: &str = "report.html";
-const VALIDATION: &str = "validation.json";
+/// What a validation found.
+pub const VALIDATION: &str = "validation.json";
 
 /// Every file that a map may have beside its records.
 const ALL: [&str; 11] = [
@@ -35,13 +41,19 @@ const ALL: [&str; 11] = [
     VALIDATION,
 ];
 
+/// Every file that a map may write, records included.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ALL.into_iter().chain([RECORDS, UNFINISHED])
+}
+
 /// Removes what an earlier run left, but for its records: files must not stand beside a
 /// manifest that does not know them.
 ///
 /// # Errors
 /// If a file cannot be removed.
 pub fn clear(folder: &Folder) -> Result<(), OutputError> {
-    folder.remove(&ALL)
+    folder.remove(&ALL)?;
+    folder.remove(&ALL.map(|name| format!("{PARTIAL}{name}")))
 }
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one is
@@ -50,20 +62,21 @@ pub fn clear(folder: &Folder) -> Result<(), OutputError> {
 /// # Errors
 /// If a file cannot be written.
 pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<String>, OutputError> {
+    let clock = Instant::now();
     clear(folder)?;
-    // Side by side, for each of them has parts that one core must do alone.
-    let (tables, pictures) = rayon::join(|| write_tables(folder, cells), || write_pictures(folder, cells));
-    let mut files = tables?;
-    files.extend(pictures?);
+    let mut files = write_files(folder, cells, None, &|_| true)?;
+    let has_records = folder.path().join(RECORDS).is_file();
+    let listed: Vec<&str> = files.iter().map(String::as_str).chain(has_records.then_some(RECORDS)).collect();
+    let listed = inventory::entries(folder, &listed)?;
+    inventory::write_manifest(folder, &map_manifest::map(cells, run, clock.elapsed(), &listed))?;
     files.push(MANIFEST.to_owned());
-    folder.write_json(MANIFEST, &map_manifest::map(cells, run, &files))?;
     unfinished::clear(folder)?;
     Ok(files)
 }
 
 /// Writes `validation.json` and, where the map has a report, the report again with a section
-/// on it. `again` is the device that ran the sample's lanes again, if one did. Returns the files'
-/// names.
+/// on it; then the manifest that lists them. `again` is the device that ran the sample's lanes again, if one did,
+/// `elapsed` how long the validation took. Returns the files' names.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -73,51 +86,105 @@ pub fn write_validation(
     made: &Made<'_>,
     again: Option<&str>,
     validation: &Validation,
+    elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
-    let object = ValidationObject::new(cells, made, again, validation);
+    let object = serde_json::to_value(ValidationObject::new(cells, made, again, validation))?;
     folder.write_json(VALIDATION, &object)?;
-    if !folder.path().join(HTML).is_file() {
-        return Ok(vec![VALIDATION]);
+    let mut files = vec![VALIDATION];
+    if folder.path().join(HTML).is_file() {
+        write_files(folder, cells, Some(&object), &|name| name == HTML)?;
+        files.push(HTML);
     }
-    let words = layers::read_words(cells);
-    let layers = layers::of(cells, words.as_ref());
-    folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref(), Some(&object)))?;
-    Ok(vec![VALIDATION, HTML])
+    inventory::update(folder, &files, ("validate", elapsed.as_secs_f64()))?;
+    Ok(files)
 }
 
-fn write_tables(folder: &Folder, cells: &Cells<'_>) -> Result<Vec<String>, OutputError> {
-    let wants = |format| cells.scene().outputs().files.contains(&format);
-    let write_if = |wanted: bool, name: &str, write: fn(&Path, &Cells<'_>) -> Result<(), WriteError>| {
-        if wanted {
+/// Writes those of the files `lost` anew that are made of records alone, then the manifest that lists them. The report
+/// gets its section on the validation where `has_validation` says that this is good. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn repair(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    lost: &[&str],
+    has_validation: bool,
+) -> Result<Vec<String>, OutputError> {
+    let clock = Instant::now();
+    let path = folder.path().join(VALIDATION);
+    let read = || {
+        let text = fs::read_to_string(&path);
+        text.map_err(|reason| OutputError::Write { path: path.clone(), reason: reason.into() })
+    };
+    let validation: Option<Value> = if has_validation { Some(serde_json::from_str(&read()?)?) } else { None };
+    let files = write_files(folder, cells, validation.as_ref(), &|name| lost.contains(&name))?;
+    if !files.is_empty() {
+        let names: Vec<&str> = files.iter().map(String::as_str).collect();
+        inventory::update(folder, &names, ("repair", clock.elapsed().as_secs_f64()))?;
+    }
+    Ok(files)
+}
+
+/// Whether a name is wanted.
+type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
+
+/// Writes the files that the scene asks for, as far as they are wanted.
+fn write_files(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    validation: Option<&Value>,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    // Side by side, for each of them has parts that one core must do alone.
+    let (tables, pictures) = rayon::join(
+        || write_tables(folder, cells, wanted),
+        || write_pictures(folder, cells, validation, wanted),
+    );
+    let mut files = tables?;
+    files.extend(pictures?);
+    Ok(files)
+}
+
+fn write_tables(folder: &Folder, cells: &Cells<'_>, wanted: Wanted<'_>) -> Result<Vec<String>, OutputError> {
+    let write_if = |format, name: &str, write: fn(&Path, &Cells<'_>) -> Result<(), WriteError>| {
+        if cells.scene().outputs().files.contains(&format) && wanted(name) {
             folder.replace(name, |path| write(path, cells)).map(|()| Some(name.to_owned()))
         } else {
             Ok(None)
         }
     };
     let (csv, npy) = rayon::join(
-        || write_if(wants(Format::Csv), CSV, cells_csv::write),
-        || write_if(wants(Format::Npy), NPY, cells_npy::write),
+        || write_if(Format::Csv, CSV, cells_csv::write),
+        || write_if(Format::Npy, NPY, cells_npy::write),
     );
     Ok([csv?, npy?].into_iter().flatten().collect())
 }
 
-fn write_pictures(folder: &Folder, cells: &Cells<'_>) -> Result<Vec<String>, OutputError> {
-    let wants = |format| cells.scene().outputs().files.contains(&format);
+fn write_pictures(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    validation: Option<&Value>,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    let asks = |format| cells.scene().outputs().files.contains(&format);
     let mut files = Vec::new();
-    if !wants(Format::Png) && !wants(Format::Html) {
+    let wants_page = asks(Format::Html) && wanted(HTML);
+    let wants_figures = asks(Format::Png) && ALL.iter().any(|name| name.ends_with(".png") && wanted(name));
+    if !wants_page && !wants_figures {
         return Ok(files);
     }
     let words = layers::read_words(cells);
     let layers = layers::of(cells, words.as_ref());
-    if wants(Format::Png) {
-        let names: Vec<String> = layers.iter().map(|layer| format!("{}.png", layer.name)).collect();
-        layers.par_iter().zip(&names).try_for_each(|(layer, name)| {
+    if wants_figures {
+        let named = layers.iter().map(|layer| (layer, format!("{}.png", layer.name)));
+        let named: Vec<_> = named.filter(|(_, name)| wanted(name)).collect();
+        named.par_iter().try_for_each(|(layer, name)| {
             folder.replace(name, |path| Ok(map_figure::write(path, cells, layer)?))
         })?;
-        files.extend(names);
+        files.extend(named.into_iter().map(|(_, name)| name));
     }
-    if wants(Format::Html) {
-        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref(), None))?;
+    if wants_page {
+        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref(), validation))?;
         files.push(HTML.to_owned());
     }
     Ok(files)

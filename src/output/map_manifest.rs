@@ -7,9 +7,11 @@ use serde::Serialize;
 
 use super::cells::{Cells, SOURCES};
 use super::cells_npy::ABSENT;
+use super::inventory::FileEntry;
 use super::manifest::{AxisObject, Head, StartObject, start};
 use super::names;
 use super::parameters::Parameters;
+use super::record_file::Identity;
 use crate::map::plan::count_classes;
 use crate::map::scene::{Scene, Steps};
 use crate::map::schedule::{Audit, Deviation, Refined};
@@ -39,6 +41,8 @@ pub struct Run<'a> {
     pub device: &'a str,
     /// The host's processor, in words.
     pub processor: &'a str,
+    /// Time until the engine was ready.
+    pub opening: Duration,
     /// Time spent integrating in this run.
     pub elapsed: Duration,
     /// And in those that it went on from.
@@ -61,6 +65,9 @@ pub(super) struct Manifest<'a> {
     device: &'a str,
     /// Of the host.
     processor: &'a str,
+    /// A hash of the sources that decide what records hold, and what they were compiled for.
+    sources: &'static str,
+    target: &'static str,
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
@@ -81,7 +88,16 @@ pub(super) struct Manifest<'a> {
     elapsed_seconds: f64,
     resumed_cells: usize,
     refinement: Option<RefinementObject>,
-    files: &'a [String],
+    timings: TimingsObject,
+    files: &'a [FileEntry],
+}
+
+/// Seconds by phase; `integrate` of all runs that the map took, the others of the last. Validation adds its own.
+#[derive(Serialize)]
+struct TimingsObject {
+    open: f64,
+    integrate: f64,
+    write: f64,
 }
 
 #[derive(Serialize)]
@@ -198,7 +214,12 @@ struct Codes {
 }
 
 /// The manifest of a map that `run` has made.
-pub(super) fn map<'a>(cells: &Cells<'a>, run: &Run<'a>, files: &'a [String]) -> Manifest<'a> {
+pub(super) fn map<'a>(
+    cells: &Cells<'a>,
+    run: &Run<'a>,
+    writing: Duration,
+    files: &'a [FileEntry],
+) -> Manifest<'a> {
     let scene = cells.scene();
     Manifest {
         head: Head::of("map"),
@@ -206,6 +227,8 @@ pub(super) fn map<'a>(cells: &Cells<'a>, run: &Run<'a>, files: &'a [String]) -> 
         precision: run.precision,
         device: run.device,
         processor: run.processor,
+        sources: Identity::own_sources(),
+        target: Identity::own_target(),
         title: scene.title(),
         scene: scene.text(),
         set: run.sets,
@@ -223,6 +246,11 @@ pub(super) fn map<'a>(cells: &Cells<'a>, run: &Run<'a>, files: &'a [String]) -> 
         elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,
         refinement: run.refined.as_ref().map(RefinementObject::from),
+        timings: TimingsObject {
+            open: run.opening.as_secs_f64(),
+            integrate: (run.elapsed_before + run.elapsed).as_secs_f64(),
+            write: writing.as_secs_f64(),
+        },
         files,
     }
 }

@@ -1,12 +1,18 @@
 //! One orbit on the terminal and in its folder: `orbit.json` and figures.
 
 use std::fs;
+use std::time::{Duration, Instant};
 
+use serde::Serialize;
+
+use super::inventory::{self, FileEntry};
+use super::manifest::{Head, MANIFEST, TimingsObject};
 use super::orbit_json::to_json;
 use super::orbit_summary::summary;
+use super::parameters::Parameters;
 use super::{Folder, OutputError, orbit_figures};
-use rattlemap_dynamics::model::{Model, Oscillator};
-use rattlemap_dynamics::orbit::{Class, Orbit, trace};
+use rattlemap_dynamics::model::{Model, Oscillator, State};
+use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
 /// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
 /// in meshing where that is more.
@@ -21,6 +27,37 @@ fn samples_per_period(oscillator: &Oscillator) -> usize {
 
 const JSON: &str = "orbit.json";
 
+/// What makes the folder again, and what is in it.
+#[derive(Serialize)]
+struct Manifest<'a> {
+    #[serde(flatten)]
+    head: Head,
+    engine: &'static str,
+    parameters: Parameters,
+    start: Vec<f64>,
+    transient_periods: u32,
+    observed_periods: u32,
+    max_period: u32,
+    timings: TimingsObject,
+    files: &'a [FileEntry],
+}
+
+/// How an orbit was asked for, and how long that took.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    /// The state at phase 0 to start from.
+    pub start: State,
+    /// How long to integrate.
+    pub settings: Settings,
+    /// How long it took.
+    pub elapsed: Duration,
+}
+
+/// Every file that an orbit may write.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    [MANIFEST, JSON].into_iter().chain(orbit_figures::NAMES)
+}
+
 /// Prints the orbit to stdout, as JSON or as a summary for the eye.
 ///
 /// # Errors
@@ -30,21 +67,42 @@ pub fn print(model: &dyn Model, orbit: &Orbit, json: bool) -> Result<(), OutputE
     super::print(&text)
 }
 
-/// Writes the orbit and, unless it failed, its figures. Returns the number of files.
+/// Writes the orbit and, unless it failed, its figures; the manifest last. Returns the number of files.
 ///
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
-pub fn write(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<usize, OutputError> {
+pub fn write(folder: &Folder, model: &dyn Model, orbit: &Orbit, asked: &Asked) -> Result<usize, OutputError> {
+    let clock = Instant::now();
     // Figures of an earlier orbit must not stand beside this one.
-    folder.remove(&[JSON])?;
+    folder.remove(&[MANIFEST, JSON])?;
     folder.remove(&orbit_figures::NAMES)?;
     let json = to_json(model, orbit)?;
     folder.replace(JSON, |path| Ok(fs::write(path, json + "\n")?))?;
-    if orbit.class == Class::Failed {
-        return Ok(1);
+    let mut files = vec![JSON];
+    if orbit.class != Class::Failed {
+        let samples = samples_per_period(&model.oscillator()?);
+        let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
+        orbit_figures::write_each(model, orbit, &trace, |name, save| {
+            folder.replace(name, |path| Ok(save(path)?))
+        })?;
+        files.extend(orbit_figures::NAMES);
     }
-    let samples = samples_per_period(&model.oscillator()?);
-    let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
-    let figures = orbit_figures::write(folder.path(), model, orbit, &trace)?;
-    Ok(1 + figures.len())
+    let listed = inventory::entries(folder, &files)?;
+    let Settings { transient_periods, observed_periods, max_period } = asked.settings;
+    let manifest = Manifest {
+        head: Head::of("orbit"),
+        engine: "reference f64",
+        parameters: Parameters::of(model),
+        start: asked.start[..model.state_names().len()].to_vec(),
+        transient_periods,
+        observed_periods,
+        max_period,
+        timings: TimingsObject {
+            integrate: asked.elapsed.as_secs_f64(),
+            write: clock.elapsed().as_secs_f64(),
+        },
+        files: &listed,
+    };
+    inventory::write_manifest(folder, &manifest)?;
+    Ok(files.len() + 1)
 }

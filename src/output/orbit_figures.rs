@@ -13,7 +13,7 @@ use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{
     Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MESHING, Marker, Rect, SMALL, Shape, save_figure, wall_color,
 };
-use super::{DrawError, OutputError};
+use super::{DrawError, FigureError, OutputError};
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{EventKind, Orbit, Sample};
 
@@ -46,6 +46,17 @@ pub fn write(
     orbit: &Orbit,
     trace: &[Sample],
 ) -> Result<Vec<PathBuf>, OutputError> {
+    write_each(model, orbit, trace, |name, save| Ok(save(&dir.join(name))?))?;
+    Ok(NAMES.map(|name| dir.join(name)).to_vec())
+}
+
+/// Draws the figures; `place` gets the name of each and what saves it at a path.
+pub(super) fn write_each(
+    model: &dyn Model,
+    orbit: &Orbit,
+    trace: &[Sample],
+    mut place: impl FnMut(&'static str, &dyn Fn(&Path) -> Result<(), FigureError>) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
     let scene = Scene {
         names: model.state_names().into_iter().map(subscripted).collect(),
         bodies: model.bodies(),
@@ -54,11 +65,10 @@ pub fn write(
         title: heading::parameters(model),
         subtitle: heading::character(orbit),
     };
-    let [phase_plane, time_history, gap] = NAMES.map(|name| dir.join(name));
-    save_figure(&phase_plane, (WIDTH, 980), |canvas| scene.draw_phase_planes(canvas))?;
-    save_figure(&time_history, (WIDTH, 1150), |canvas| scene.draw_time_history(canvas))?;
-    save_figure(&gap, (WIDTH, 1050), |canvas| scene.draw_gap(canvas))?;
-    Ok(vec![phase_plane, time_history, gap])
+    let [phase_plane, time_history, gap] = NAMES;
+    place(phase_plane, &|path| save_figure(path, (WIDTH, 980), |canvas| scene.draw_phase_planes(canvas)))?;
+    place(time_history, &|path| save_figure(path, (WIDTH, 1150), |canvas| scene.draw_time_history(canvas)))?;
+    place(gap, &|path| save_figure(path, (WIDTH, 1050), |canvas| scene.draw_gap(canvas)))
 }
 
 /// One orbit on its way onto paper.

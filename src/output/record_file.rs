@@ -1,37 +1,40 @@
 //! `records.bin`: what a killed run leaves and the next one goes on from.
 //!
-//! A header identifies the run. Batches follow, appended as cells end, each with its checksum. All numbers are little-endian:
+//! A header says whose records these are, twice. Batches follow, appended as cells end. All numbers are little-endian:
 //!
 //! ```text
-//! magic "RTLMAP\0\x02"   length u32   crc32 u32   identity (JSON)
-//! then per batch: cells before it u64   cells u32   crc32 u32 (over all else)   ids u32 each   records
+//! twice: magic "RTLMAP2\0"   length u32   crc32 u32 (over all else)   format, columns, identity (JSON)
+//! then per batch: mark "\x93RTLBAT\n"   number u32   cells u32   columns u32 (a bit each)   bytes u32
+//!                 crc32 u32 (of what follows the head)   crc32 u32 (of the head)   columns, compressed
 //! ```
 //!
-//! A run that is killed while it writes leaves a torn last batch. A disk may do worse, anywhere.
-//! Batches are good up to the first one that is not; what follows is cut off and computed again.
+//! The header is there whole or not at all: it is written under another name. A run that is killed while it writes leaves
+//! a torn last batch. A disk may do worse, anywhere: a damaged batch is lost, and its cells are computed again. So is
+//! what follows it where cells depend on those before them.
 
+mod batch;
+mod columns;
+mod header;
+mod identity;
 mod reader;
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use fs4::fs_std::FileExt;
-use serde::{Deserialize, Serialize};
+use rayon::prelude::*;
 use thiserror::Error;
 
-pub use reader::{Damage, Extent};
+pub use identity::Identity;
+pub use reader::{Damage, Extent, Order};
 
-use crate::record::{RECORD_VERSION, Record};
+use super::folder::{partial, refuse_link};
+use crate::record::Record;
 use reader::Reader;
 
 /// Its name in a map's folder.
 pub const RECORDS: &str = "records.bin";
-
-const MAGIC: [u8; 8] = *b"RTLMAP\0\x02";
-const BATCH_HEAD: usize = 16;
-const RECORD: usize = size_of::<Record>();
-const ID: usize = size_of::<u32>();
 
 const _: () = assert!(cfg!(target_endian = "little"), "records are written as they lie in memory");
 
@@ -62,9 +65,13 @@ pub enum RecordFileError {
         /// What is wrong there.
         what: &'static str,
     },
-    /// Another run is writing it.
-    #[error("{}: another run is writing to this folder; wait for it, or choose another one with --out", .path.display())]
-    InUse {
+    /// An earlier version wrote it.
+    #[error(
+        "{} is of format 1, without columns and compression, which this version does not read; make the map anew \
+         with --force, or go on with the version that began it",
+        .path.display()
+    )]
+    OldFormat {
         /// The file.
         path: PathBuf,
     },
@@ -78,118 +85,60 @@ pub enum RecordFileError {
     },
 }
 
-/// Whose records a file holds: they may be continued by the same alone.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Identity {
-    record_version: u32,
-    crate_version: String,
-    engine: String,
-    precision: String,
-    device: String,
-    scene: Vec<(String, String)>,
-}
-
-impl Identity {
-    /// The identity of a run of this version of the crate.
-    pub fn new(engine: &str, precision: &str, device: &str, scene: Vec<(String, String)>) -> Identity {
-        Identity {
-            record_version: RECORD_VERSION,
-            crate_version: env!("CARGO_PKG_VERSION").to_owned(),
-            engine: engine.to_owned(),
-            precision: precision.to_owned(),
-            device: device.to_owned(),
-            scene,
-        }
-    }
-
-    /// The identity of the run whose records a file holds.
-    ///
-    /// # Errors
-    /// [`RecordFileError`] if it cannot be read.
-    pub fn read(path: &Path) -> Result<Identity, RecordFileError> {
-        let file =
-            File::open(path).map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?;
-        Reader::new(&file, path)?.identity()
-    }
-
-    /// The engine's name.
-    pub fn engine(&self) -> &str {
-        &self.engine
-    }
-
-    /// Its precision.
-    pub fn precision(&self) -> &str {
-        &self.precision
-    }
-
-    fn named(&self) -> Vec<(&str, String)> {
-        let own = [
-            ("record version", self.record_version.to_string()),
-            ("rattlemap", self.crate_version.clone()),
-            ("engine", self.engine.clone()),
-            ("precision", self.precision.clone()),
-            ("device", self.device.clone()),
-        ];
-        own.into_iter().chain(self.scene.iter().map(|(name, value)| (name.as_str(), value.clone()))).collect()
-    }
-
-    /// What differs from the identity that is `asked` for, in words; empty if nothing.
-    fn differences(&self, asked: &Identity) -> String {
-        let (mine, theirs) = (self.named(), asked.named());
-        let value = |list: &[(&str, String)], name: &str| {
-            list.iter().find(|(n, _)| *n == name).map_or("absent".to_owned(), |(_, value)| value.clone())
-        };
-        let mut names: Vec<&str> = mine.iter().map(|(name, _)| *name).collect();
-        names.extend(theirs.iter().map(|(name, _)| *name).filter(|name| value(&mine, name) == "absent"));
-        let differing = names.into_iter().filter(|name| value(&mine, name) != value(&theirs, name));
-        let sentence = |name| format!("`{name}` was {}, now {}", value(&mine, name), value(&theirs, name));
-        differing.map(sentence).collect::<Vec<_>>().join(", ")
-    }
-}
-
-/// A record file being written.
+/// A record file being written. Whoever writes it holds its [`Folder`](super::Folder), so that nobody else does.
 #[derive(Debug)]
 pub struct RecordFile {
     file: File,
     path: PathBuf,
     count: usize,
+    next_number: u32,
     damage: Option<Damage>,
 }
 
 impl RecordFile {
-    /// Starts a file anew.
+    /// Starts a file anew, in the place of one that may be there.
     ///
     /// # Errors
-    /// [`RecordFileError`] if it cannot be written, or another run is writing it.
+    /// [`RecordFileError::Io`] if it cannot be written.
     pub fn create(path: &Path, identity: &Identity) -> Result<RecordFile, RecordFileError> {
-        let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
-        // Not truncated on opening: it may be another run's.
-        let options = OpenOptions::new().create(true).truncate(false).write(true).clone();
-        let mut file = lock(options.open(path).map_err(io)?, path)?;
-        let identity = serde_json::to_vec(identity).map_err(|error| io(error.into()))?;
-        let mut head = MAGIC.to_vec();
-        head.extend((identity.len() as u32).to_le_bytes());
-        head.extend(crc32fast::hash(&identity).to_le_bytes());
-        head.extend(identity);
-        file.set_len(0).and_then(|()| file.write_all(&head)).and_then(|()| file.sync_all()).map_err(io)?;
-        Ok(RecordFile { file, path: path.to_owned(), count: 0, damage: None })
+        let begun =
+            header::bytes(identity).map_err(io::Error::from).and_then(|header| begin(path, &header, None));
+        let file = begun.map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?;
+        Ok(RecordFile { file, path: path.to_owned(), count: 0, next_number: 0, damage: None })
     }
 
     /// Opens the file of an interrupted run; `take` gets every batch that is good, ids with their
-    /// records, and says whether the run asks for them. What follows the first damage is cut off.
+    /// records, and says whether the run asks for them. What is damaged is taken out of the file. One in
+    /// which nothing was kept yet is started anew.
     ///
     /// # Errors
-    /// [`RecordFileError`] if the file is another run's, has no readable header, is in use or unreadable.
+    /// [`RecordFileError`] if the file is another run's, has no readable header or cannot be read or written.
     pub fn resume(
         path: &Path,
         identity: &Identity,
+        order: Order,
         take: impl FnMut(&[(u32, Record)]) -> bool,
     ) -> Result<RecordFile, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
-        let mut file = lock(OpenOptions::new().read(true).write(true).open(path).map_err(io)?, path)?;
-        let Extent { count, end, damage } = Reader::open(&file, path, identity)?.batches(take)?;
-        file.set_len(end).and_then(|()| file.seek(SeekFrom::End(0))).map_err(io)?;
-        Ok(RecordFile { file, path: path.to_owned(), count, damage })
+        refuse_link(path).map_err(io)?;
+        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(io)?;
+        let Some(reader) = Reader::of(&file, path, identity)? else {
+            return RecordFile::create(path, identity);
+        };
+        let Extent { count, damage, good, next_number } = reader.batches(order, take)?;
+        let (begin_of_batches, is_whole) = (reader.begin, reader.is_whole);
+        let mended = match &good[..] {
+            [] if is_whole => file.set_len(begin_of_batches).map(|()| None),
+            [one] if is_whole && one.start == begin_of_batches => file.set_len(one.end).map(|()| None),
+            _ => header::bytes(identity)
+                .map_err(io::Error::from)
+                .and_then(|header| begin(path, &header, Some((&file, &good))).map(Some)),
+        };
+        if let Some(mended) = mended.map_err(io)? {
+            file = mended;
+        }
+        file.seek(SeekFrom::End(0)).map_err(io)?;
+        Ok(RecordFile { file, path: path.to_owned(), count, next_number, damage })
     }
 
     /// Reads a file and leaves it alone; `take` is as for [`RecordFile::resume`].
@@ -199,11 +148,11 @@ impl RecordFile {
     pub fn read(
         path: &Path,
         identity: &Identity,
+        order: Order,
         take: impl FnMut(&[(u32, Record)]) -> bool,
     ) -> Result<Extent, RecordFileError> {
-        let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
-        let file = File::open(path).map_err(io)?;
-        Reader::open(&file, path, identity)?.batches(take)
+        let file = open(path)?;
+        Reader::of(&file, path, identity)?.map_or(Ok(Extent::default()), |reader| reader.batches(order, take))
     }
 
     /// Records that the file holds.
@@ -211,42 +160,59 @@ impl RecordFile {
         self.count
     }
 
-    /// What was cut off when the file was opened, if anything was.
+    /// What was no good when the file was opened, if anything was.
     pub fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()
     }
 
-    /// Appends the next batch, ids with their records, and sees it onto the disk.
+    /// Appends records with their ids and sees them onto the disk.
     ///
     /// # Errors
     /// [`RecordFileError::Io`], for instance on a full disk.
-    pub fn append(&mut self, batch: &[(u32, Record)]) -> Result<(), RecordFileError> {
-        let ids: Vec<u8> = batch.iter().flat_map(|(id, _)| id.to_le_bytes()).collect();
-        let records: Vec<Record> = batch.iter().map(|(_, record)| *record).collect();
-        let bytes = [&ids, bytemuck::cast_slice(&records)].concat();
-        let (before, cells) = ((self.count as u64).to_le_bytes(), (batch.len() as u32).to_le_bytes());
-        let sum = checksum(&before, &cells, &bytes).to_le_bytes();
-        let head = [&before[..], &cells, &sum].concat();
-        self.file
-            .write_all(&head)
-            .and_then(|()| self.file.write_all(&bytes))
+    pub fn append(&mut self, records: &[(u32, Record)]) -> Result<(), RecordFileError> {
+        let batches: Vec<&[(u32, Record)]> = records.chunks(batch::MOST_CELLS).collect();
+        let numbered = (self.next_number..).zip(&batches).collect::<Vec<_>>().into_par_iter();
+        let encoded: io::Result<Vec<Vec<u8>>> =
+            numbered.map(|(number, cells)| batch::encode(number, cells)).collect();
+        encoded
+            .and_then(|encoded| encoded.iter().try_for_each(|batch| self.file.write_all(batch)))
             .and_then(|()| self.file.sync_data())
             .map_err(|reason| RecordFileError::Io { path: self.path.clone(), reason })?;
-        self.count += batch.len();
+        self.next_number += batches.len() as u32;
+        self.count += records.len();
         Ok(())
     }
 }
 
-fn lock(file: File, path: &Path) -> Result<File, RecordFileError> {
-    match FileExt::try_lock_exclusive(&file) {
-        Ok(false) => Err(RecordFileError::InUse { path: path.to_owned() }),
-        // Some network disks have no locks; that is no reason not to run there.
-        Ok(true) | Err(_) => Ok(file),
-    }
+fn open(path: &Path) -> Result<File, RecordFileError> {
+    File::open(path).map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })
 }
 
-fn checksum(before: &[u8], cells: &[u8], body: &[u8]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    [before, cells, body].into_iter().for_each(|part| hasher.update(part));
-    hasher.finalize()
+/// A file with a header and, of another file, these bytes. It has its name once all is on the disk.
+fn begin(path: &Path, header: &[u8], of: Option<(&File, &[Range<u64>])>) -> io::Result<File> {
+    refuse_link(path)?;
+    let partial = partial(path);
+    refuse_link(&partial)?;
+    match fs::remove_file(&partial) {
+        Err(reason) if reason.kind() != io::ErrorKind::NotFound => return Err(reason),
+        _ => {}
+    }
+    let mut file = OpenOptions::new().read(true).write(true).create_new(true).open(&partial)?;
+    let write = |file: &mut File| {
+        file.write_all(header)?;
+        if let Some((mut from, ranges)) = of {
+            for range in ranges {
+                from.seek(SeekFrom::Start(range.start))?;
+                io::copy(&mut from.take(range.end - range.start), file)?;
+            }
+        }
+        file.sync_all()?;
+        fs::rename(&partial, path)
+    };
+    if let Err(reason) = write(&mut file) {
+        // Best effort: the error that matters is the one already at hand.
+        let _ = fs::remove_file(&partial);
+        return Err(reason);
+    }
+    Ok(file)
 }

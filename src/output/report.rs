@@ -24,7 +24,6 @@ use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
-use super::validation_json::ValidationObject;
 use super::{WriteError, names, replay};
 use crate::map::scene::Quantity;
 use rattlemap_dynamics::orbit::Status;
@@ -51,7 +50,7 @@ struct Data<'a> {
     words: Vec<String>,
     /// What became of an adaptive map.
     refinement: Option<RefinementObject>,
-    validation: Option<&'a ValidationObject>,
+    validation: Option<&'a serde_json::Value>,
 }
 
 #[derive(Serialize)]
@@ -107,7 +106,7 @@ pub(super) fn write(
     cells: &Cells<'_>,
     layers: &[Layer],
     words: Option<&Words>,
-    validation: Option<&ValidationObject>,
+    validation: Option<&serde_json::Value>,
 ) -> Result<(), WriteError> {
     let scene = cells.scene();
     let data = Data {

@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use super::manifest::MANIFEST;
 use super::{Folder, OutputError};
 
-const UNFINISHED: &str = "unfinished.json";
+/// Its name.
+pub(super) const UNFINISHED: &str = "unfinished.json";
 const ELAPSED: &str = "elapsed_seconds";
 
 /// How long earlier runs in this folder integrated, all together, finished or not; nothing where they do not say.

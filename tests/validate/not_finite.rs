@@ -8,7 +8,7 @@ use assert_cmd::Command;
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
-use rattlemap::output::{Identity, RECORDS, RecordFile};
+use rattlemap::output::{Identity, Order, RECORDS, RecordFile};
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::{Lanes, Subject, replay};
 
@@ -123,7 +123,7 @@ fn a_map_of_states_that_are_not_numbers_fails() {
         records.extend_from_slice(batch);
         true
     };
-    RecordFile::read(&path, &identity, take).unwrap();
+    RecordFile::read(&path, &identity, Order::Any, take).unwrap();
     records.iter_mut().for_each(|(_, record)| record.strobe = [f64::NAN; 4]);
     RecordFile::create(&path, &identity).unwrap().append(&records).unwrap();
     let failed = run(&["validate", "o", "--samples", "4", "--quiet"]).code(1).stdout("");

@@ -13,7 +13,7 @@ use rattlemap::gpu::Precision;
 use rattlemap::map::engine::{self, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
-use rattlemap::output::{Identity, RECORDS, RecordFile};
+use rattlemap::output::{Identity, Order, RECORDS, RecordFile, inventory};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::{Kind, Lanes, Sample, Stratum, Subject, Validation, replay, sample};
@@ -487,7 +487,7 @@ fn planted_records_fail_the_validation_by_name() {
     let identity = Identity::new("cpu", "f64", "event-driven reference", scene.identity());
     let path = out.join(RECORDS);
     let mut records = vec![Record::default(); plan.cell_count()];
-    let count = RecordFile::read(&path, &identity, |batch| {
+    let count = RecordFile::read(&path, &identity, Order::Any, |batch| {
         batch.iter().for_each(|&(id, record)| records[id as usize] = record);
         true
     });
@@ -553,9 +553,18 @@ fn lanes_of_another_device_are_named() {
         records.extend_from_slice(batch);
         true
     };
-    RecordFile::read(&out.join(RECORDS), &identity(device), take).unwrap();
+    RecordFile::read(&out.join(RECORDS), &identity(device), Order::Any, take).unwrap();
     RecordFile::create(&out.join(RECORDS), &identity("Faraway card")).unwrap().append(&records).unwrap();
-    fs::write(out.join("manifest.json"), manifest.replace(device, "Faraway card")).unwrap();
+    let mut faraway: serde_json::Value =
+        serde_json::from_str(&manifest.replace(device, "Faraway card")).unwrap();
+    let files = faraway["files"].as_array_mut().unwrap();
+    files.retain(|file| {
+        !["records.bin", "report.html", "validation.json"].contains(&file["name"].as_str().unwrap())
+    });
+    let listed =
+        ["records.bin", "report.html", "validation.json"].map(|name| inventory::entry(&out, name).unwrap());
+    files.extend(listed.map(|entry| serde_json::to_value(entry).unwrap()));
+    fs::write(out.join("manifest.json"), inventory::sealed(faraway).unwrap()).unwrap();
     let text = validated();
     assert!(
         text.contains(&format!("lanes ran again on {device}, not on the map's own device: no")),
@@ -570,10 +579,11 @@ fn lanes_of_another_device_are_named() {
 #[test]
 fn what_is_no_finished_map_is_refused() {
     let (folder, out) = finished();
-    let refused = |arguments: &[&str], parts: &[&str]| {
-        let run = rattlemap(folder.path(), &[&["validate"], arguments].concat()).code(2).stdout("");
+    let ends = |code: i32, arguments: &[&str], parts: &[&str]| {
+        let run = rattlemap(folder.path(), &[&["validate"], arguments].concat()).code(code).stdout("");
         parts.iter().for_each(|part| assert!(said(&run).contains(part), "{part}: {}", said(&run)));
     };
+    let refused = |arguments: &[&str], parts: &[&str]| ends(2, arguments, parts);
     refused(&["nowhere"], &["nowhere: there is no such folder"]);
     refused(&["."], &["there is no manifest.json", "not the folder of a map"]);
     refused(&["o", "--samples", "0"], &["--samples"]);
@@ -598,11 +608,14 @@ fn what_is_no_finished_map_is_refused() {
     fs::write(out.join("manifest.json"), &manifest).unwrap();
     let records = fs::read(out.join(RECORDS)).unwrap();
     fs::write(out.join(RECORDS), &records[..records.len() - 1]).unwrap();
-    refused(&["o"], &["of 576 cells"]);
+    ends(1, &["o"], &["records.bin is damaged: it has", "of 576 cells", "--resume"]);
+    // The length of the first copy of its header, and behind it the second.
     let mut bad = records.clone();
+    let head = 16 + u32::from_le_bytes(bad[8..12].try_into().unwrap()) as usize;
     bad[20] ^= 0x10;
+    bad[head + 20] ^= 0x10;
     fs::write(out.join(RECORDS), bad).unwrap();
-    refused(&["o"], &["is damaged at byte 16", "--force"]);
+    ends(1, &["o"], &["neither copy of its header matches its checksum", "--force"]);
     fs::remove_file(out.join(RECORDS)).unwrap();
     refused(&["o"], &["there is no records.bin"]);
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::{Report, Verdict, figures, fuzz};
+use rattlemap::output::inventory::{self, FileEntry};
 use rattlemap::output::manifest::{Head, MANIFEST};
 use rattlemap::output::{Folder, OutputError, WriteError};
 use rattlemap_dynamics::model::{GearPair, Model};
@@ -52,7 +53,7 @@ struct Manifest<'a> {
     threads: usize,
     elapsed_seconds: f64,
     verdicts: Vec<VerdictObject<'a>>,
-    files: &'a [&'static str],
+    files: &'a [FileEntry],
 }
 
 #[derive(Serialize)]
@@ -111,6 +112,7 @@ pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> Result<Vec<&'
         file("fuzz.csv", &|path| rows(path, &found.counts))?;
         file("fuzz_mismatches.csv", &|path| mismatches(path, &found.mismatches))?;
     }
+    let listed = inventory::entries(folder, &files)?;
     files.push(MANIFEST);
     let manifest = Manifest {
         head: Head::of("stress"),
@@ -120,9 +122,9 @@ pub fn write(folder: &Folder, report: &Report, made: &Made<'_>) -> Result<Vec<&'
         threads: rayon::current_num_threads(),
         elapsed_seconds: made.elapsed.as_secs_f64(),
         verdicts: report.verdicts.iter().map(VerdictObject::from).collect(),
-        files: &files,
+        files: &listed,
     };
-    folder.write_json(MANIFEST, &manifest)?;
+    inventory::write_manifest(folder, &manifest)?;
     Ok(files)
 }
 

@@ -9,6 +9,7 @@ use super::cells::Subject;
 use super::figure::{self, Shown};
 use super::measure::Curve;
 use super::points::{self, Point};
+use rattlemap::output::inventory::{self, FileEntry};
 use rattlemap::output::manifest::{Head, MANIFEST};
 use rattlemap::output::parameters::Parameters;
 use rattlemap::output::{Folder, OutputError, WriteError};
@@ -19,7 +20,7 @@ const TABLE: &str = "work_precision.csv";
 const CELLS_TABLE: &str = "work_precision_cells.csv";
 const CELLS: &str = "cells.json";
 
-/// Every file that a run may write.
+/// Every file that a run may write, the manifest last.
 pub const FILES: [&str; 7] = [
     TABLE,
     CELLS_TABLE,
@@ -83,7 +84,7 @@ struct Manifest<'a> {
     run: &'a Run<'a>,
     periods: u32,
     cells: Vec<CellObject>,
-    files: [&'static str; 7],
+    files: Vec<FileEntry>,
 }
 
 /// A cell, by its first variant; amplification is the largest over the variants.
@@ -150,9 +151,9 @@ pub fn write(
         run,
         periods: PERIODS,
         cells: subjects.chunk_by(|a, b| a.cell == b.cell).map(cell).collect(),
-        files: FILES,
+        files: inventory::entries(folder, &FILES[..FILES.len() - 1])?,
     };
-    folder.write_json(MANIFEST, &manifest)
+    inventory::write_manifest(folder, &manifest)
 }
 
 fn cell(variants: &[Subject]) -> CellObject {

@@ -29,7 +29,7 @@ fn stress_judges_every_part_and_writes_its_folder() {
     let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
     assert_eq!(manifest["command"], "stress");
     for file in manifest["files"].as_array().unwrap() {
-        let size = out.join(file.as_str().unwrap()).metadata().unwrap().len();
+        let size = out.join(file["name"].as_str().unwrap()).metadata().unwrap().len();
         assert!(size > 0, "{file} is empty");
     }
 
@@ -86,7 +86,7 @@ fn work_precision_measures_every_method() {
     let manifest = json("manifest.json");
     assert_eq!(manifest["quick"], true);
     for file in manifest["files"].as_array().unwrap() {
-        assert!(fs::metadata(out.join(file.as_str().unwrap())).unwrap().len() > 100, "{file}");
+        assert!(fs::metadata(out.join(file["name"].as_str().unwrap())).unwrap().len() > 100, "{file}");
     }
     let cells = json("cells.json");
     assert_eq!(cells.as_array().unwrap().len(), 5 * 8);

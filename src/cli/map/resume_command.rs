@@ -36,7 +36,7 @@ fn command(ask: &Map, engine: EngineOptions, last: &str) -> String {
 
 /// A word as a POSIX shell takes it: plain where it means itself, else in apostrophes, within
 /// which only the apostrophe means anything; by `printf` where a terminal would not show it as it is.
-fn quoted(word: &str) -> String {
+pub(crate) fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         return word.to_owned();

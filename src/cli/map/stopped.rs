@@ -7,7 +7,7 @@ use super::unit;
 use crate::cli::arguments::{EngineChoice, Map};
 use crate::cli::error::Failure;
 use crate::map::plan::Plan;
-use crate::output::{Folder, Identity, RECORDS, RecordFile};
+use crate::output::{Folder, Identity, Order, RECORDS, RecordFile};
 
 /// How many are kept, and the command that computes the others.
 pub(super) fn go_on(ask: &Map, plan: &Plan, done: usize) -> String {
@@ -31,8 +31,8 @@ pub(super) fn before_it_began(failure: Failure, ask: &Map, folder: &Folder, plan
     let Failure::Run(error) = failure else { return failure };
     let kept = || {
         let path = folder.path().join(RECORDS);
-        let identity = Identity::read(&path).ok()?;
-        Some(RecordFile::read(&path, &identity, |_| true).ok()?.count)
+        let identity = Identity::read(&path).ok()??;
+        Some(RecordFile::read(&path, &identity, Order::Any, |_| true).ok()?.count)
     };
     let rest = if ask.run.force {
         format!("nothing in {} was touched; try again with: {}", folder.path().display(), same_command(ask))

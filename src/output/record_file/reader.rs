@@ -1,168 +1,225 @@
-//! Reading `records.bin`, as far as it is good.
+//! Reading `records.bin`, past what is no good.
 
 use std::fmt;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::Path;
 
-use super::{BATCH_HEAD, ID, Identity, MAGIC, RECORD, RecordFileError, checksum};
-use crate::record::Record;
+use super::batch::{self, HEAD, Head};
+use super::header::{self, Found};
+use super::{Identity, RecordFileError};
+use crate::record::{Record, valid};
 
-/// Where a file stops being good, and how much of it comes after.
+/// Bytes of damage that are searched for the next batch at a time.
+const WINDOW: usize = 1 << 16;
+
+/// In which order records may be taken up again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// In any: one that is lost costs itself alone.
+    Any,
+    /// As they were kept: what follows depends on what was before.
+    AsKept,
+}
+
+/// What is no good in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
     /// Offset of the first byte that is lost.
     pub at: u64,
-    /// Bytes from there to the end.
+    /// Bytes that are, all together.
     pub bytes: u64,
-    /// What is wrong.
+    /// In how many places.
+    pub places: usize,
+    /// What is wrong in the first.
     pub what: &'static str,
 }
 
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} bytes from byte {} on are no good ({})", self.bytes, self.at, self.what)
+        let Damage { at, bytes, places, what } = self;
+        match places {
+            0 => write!(f, "{what}"),
+            1 => write!(f, "{bytes} bytes from byte {at} on are no good ({what})"),
+            _ => write!(f, "{bytes} bytes in {places} places, from byte {at} on, are no good ({what})"),
+        }
     }
 }
 
 /// What a file holds.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Extent {
     /// Good records.
     pub count: usize,
-    /// Bytes of them and the header.
-    pub(super) end: u64,
-    /// What comes after them, if anything does.
+    /// What is no good, if anything is.
     pub damage: Option<Damage>,
+    /// Where good batches are; those side by side are one.
+    pub(super) good: Vec<Range<u64>>,
+    /// The number of the next batch.
+    pub(super) next_number: u32,
 }
 
-/// A batch, or why there is none.
-enum Next {
-    Batch(Vec<(u32, Record)>),
-    Damaged(&'static str),
-    End,
+impl Extent {
+    fn lose(&mut self, lost: Range<u64>, what: &'static str) {
+        let first = Damage { at: lost.start, bytes: 0, places: 0, what };
+        let damage = self.damage.get_or_insert(first.clone());
+        if damage.places == 0 {
+            *damage = first;
+        }
+        damage.bytes += lost.end - lost.start;
+        damage.places += 1;
+    }
+
+    fn keep(&mut self, good: Range<u64>) {
+        match self.good.last_mut() {
+            Some(last) if last.end == good.start => last.end = good.end,
+            _ => self.good.push(good),
+        }
+    }
 }
 
-/// A record file, read from the front.
+/// A record file whose header has been read.
 pub(super) struct Reader<'a> {
-    input: BufReader<&'a File>,
+    file: &'a File,
     path: &'a Path,
-    at: u64,
     length: u64,
+    /// Whose records follow.
+    pub(super) identity: Identity,
+    /// Where batches begin.
+    pub(super) begin: u64,
+    /// Whether both copies of the header are good.
+    pub(super) is_whole: bool,
 }
 
 impl<'a> Reader<'a> {
-    /// At the beginning of a file.
-    pub(super) fn new(file: &'a File, path: &'a Path) -> Result<Reader<'a>, RecordFileError> {
-        let length =
-            file.metadata().map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?.len();
-        Ok(Reader { input: BufReader::new(file), path, at: 0, length })
+    /// Reads a file's header; none where nothing was kept yet.
+    pub(super) fn open(file: &'a File, path: &'a Path) -> Result<Option<Reader<'a>>, RecordFileError> {
+        let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
+        let length = file.metadata().map_err(io)?.len();
+        let mut first = Vec::new();
+        read_at(file, 0).map_err(io)?.take(header::SEARCHED as u64).read_to_end(&mut first).map_err(io)?;
+        match header::find(&first, length == first.len() as u64) {
+            Found::Header { identity, end: begin, is_whole } => {
+                Ok(Some(Reader { file, path, length, identity, begin, is_whole }))
+            }
+            Found::Nothing => Ok(None),
+            Found::OldFormat => Err(RecordFileError::OldFormat { path: path.to_owned() }),
+            Found::Damaged(what) => Err(RecordFileError::Damaged { path: path.to_owned(), at: 0, what }),
+        }
     }
 
     /// At the first batch of a file, which must be the run's that `identity` names.
-    pub(super) fn open(
+    pub(super) fn of(
         file: &'a File,
         path: &'a Path,
         identity: &Identity,
-    ) -> Result<Reader<'a>, RecordFileError> {
-        let mut reader = Reader::new(file, path)?;
-        let differences = reader.identity()?.differences(identity);
-        if !differences.is_empty() {
-            return Err(RecordFileError::OtherRun { path: path.to_owned(), differences });
+    ) -> Result<Option<Reader<'a>>, RecordFileError> {
+        let Some(reader) = Reader::open(file, path)? else { return Ok(None) };
+        let differences = reader.identity.differences(identity);
+        match differences.is_empty() {
+            true => Ok(Some(reader)),
+            false => Err(RecordFileError::OtherRun { path: path.to_owned(), differences }),
         }
-        Ok(reader)
     }
 
-    fn take(&mut self, buffer: &mut [u8]) -> Result<(), RecordFileError> {
-        let path = self.path;
-        self.input
-            .read_exact(buffer)
-            .map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })?;
-        self.at += buffer.len() as u64;
-        Ok(())
-    }
-
-    fn left(&self) -> u64 {
-        self.length - self.at
-    }
-
-    fn damaged(&self, at: u64, what: &'static str) -> RecordFileError {
-        RecordFileError::Damaged { path: self.path.to_owned(), at, what }
-    }
-
-    /// Whose records follow.
-    pub(super) fn identity(&mut self) -> Result<Identity, RecordFileError> {
-        let mut head = [0; 16];
-        if self.left() < 16 {
-            return Err(self.damaged(0, "its header is incomplete"));
-        }
-        self.take(&mut head)?;
-        if head[..8] != MAGIC {
-            return Err(self.damaged(0, "it is no record file of this version"));
-        }
-        let length = u32_at(&head, 8);
-        if self.left() < u64::from(length) {
-            return Err(self.damaged(16, "its header is incomplete"));
-        }
-        let mut identity = vec![0; length as usize];
-        self.take(&mut identity)?;
-        if crc32fast::hash(&identity) != u32_at(&head, 12) {
-            return Err(self.damaged(16, "its header does not match the checksum"));
-        }
-        serde_json::from_slice(&identity).map_err(|_| self.damaged(16, "its header cannot be read"))
-    }
-
-    /// Reads batches up to the first damage; `take` is as for [`RecordFile::resume`](super::RecordFile::resume).
+    /// Reads every good batch; `take` is as for [`RecordFile::resume`](super::RecordFile::resume).
     pub(super) fn batches(
-        &mut self,
+        &self,
+        order: Order,
         mut take: impl FnMut(&[(u32, Record)]) -> bool,
     ) -> Result<Extent, RecordFileError> {
-        let mut count = 0;
-        loop {
-            let at = self.at;
-            match self.next(count)? {
-                Next::End => return Ok(Extent { count, end: at, damage: None }),
-                Next::Damaged(what) => {
-                    let damage = Some(Damage { at, bytes: self.length - at, what });
-                    return Ok(Extent { count, end: at, damage });
+        let io = |reason| RecordFileError::Io { path: self.path.to_owned(), reason };
+        let foreign = |at, what| RecordFileError::Damaged { path: self.path.to_owned(), at, what };
+        let mut extent = Extent::default();
+        if !self.is_whole {
+            extent.damage = Some(Damage {
+                at: 0,
+                bytes: 0,
+                places: 0,
+                what: "one of the two copies of its header is damaged",
+            });
+        }
+        let mut at = self.begin;
+        while at < self.length {
+            match self.batch_at(at, extent.next_number).map_err(io)? {
+                Err(what) => {
+                    let next = match order {
+                        Order::Any => self.next_after(at).map_err(io)?,
+                        Order::AsKept => self.length,
+                    };
+                    extent.lose(at..next, what);
+                    at = next;
                 }
-                Next::Batch(batch) if take(&batch) => count += batch.len(),
-                // No damage: these are cells of another order of work, and nothing may be cut off.
-                Next::Batch(_) => return Err(self.damaged(at, "a batch of cells that nobody asked for")),
+                Ok((head, batch)) => {
+                    // What follows is no damage: these are of another order of work, and nothing may be cut off.
+                    if batch.iter().any(|(_, record)| record.valid & valid::FILLED != 0) {
+                        return Err(foreign(
+                            at,
+                            "a record that was filled, where only integrated ones are kept",
+                        ));
+                    }
+                    if !take(&batch) {
+                        return Err(foreign(at, "a batch of cells that nobody asked for"));
+                    }
+                    let end = at + (HEAD as u64) + u64::from(head.bytes);
+                    extent.count += batch.len();
+                    extent.next_number = head.number.saturating_add(1);
+                    extent.keep(at..end);
+                    at = end;
+                }
             }
         }
+        Ok(extent)
     }
 
-    /// The next batch, before which there must be `done` records.
-    fn next(&mut self, done: usize) -> Result<Next, RecordFileError> {
-        if self.left() == 0 {
-            return Ok(Next::End);
+    /// The batch that begins there, with a number of at least `least`, or what is wrong with it.
+    #[expect(clippy::type_complexity, reason = "read once")]
+    fn batch_at(&self, at: u64, least: u32) -> io::Result<Result<(Head, Vec<(u32, Record)>), &'static str>> {
+        const CUT: &str = "a batch is cut short";
+        let mut head = [0; HEAD];
+        let left = self.length - at;
+        if left < HEAD as u64 {
+            return Ok(Err(CUT));
         }
-        let mut head = [0; BATCH_HEAD];
-        if self.left() < BATCH_HEAD as u64 {
-            return Ok(Next::Damaged("a batch is cut short"));
+        let mut input = read_at(self.file, at)?;
+        input.read_exact(&mut head)?;
+        let Some(head) = Head::read(&head) else { return Ok(Err("the head of a batch is damaged")) };
+        if left - (HEAD as u64) < u64::from(head.bytes) {
+            return Ok(Err(CUT));
         }
-        self.take(&mut head)?;
-        let cells = u32_at(&head, 8);
-        let bytes = u64::from(cells) * (ID + RECORD) as u64;
-        if bytes > self.left() {
-            // Or its length is wrong: there is no telling.
-            return Ok(Next::Damaged("a batch is cut short"));
+        let mut body = vec![0; head.bytes as usize];
+        input.read_exact(&mut body)?;
+        if head.number < least {
+            return Ok(Err("a batch is out of place"));
         }
-        let mut body = vec![0; bytes as usize];
-        self.take(&mut body)?;
-        if checksum(&head[..8], &head[8..12], &body) != u32_at(&head, 12) {
-            return Ok(Next::Damaged("a batch does not match its checksum"));
+        Ok(head.decode(&body).map(|batch| (head, batch)).ok_or("a batch does not match its checksum"))
+    }
+
+    /// Where the next good head of a batch behind `at` is, or the end.
+    fn next_after(&self, at: u64) -> io::Result<u64> {
+        let mut from = at + 1;
+        let mut window = vec![0; WINDOW + HEAD];
+        while from + (HEAD as u64) <= self.length {
+            let here = window.len().min((self.length - from) as usize);
+            read_at(self.file, from)?.read_exact(&mut window[..here])?;
+            let mut searched = 0;
+            while let Some(place) = batch::find(&window[searched..here]) {
+                searched += place;
+                let head = window[searched..here].first_chunk::<HEAD>();
+                if head.is_some_and(|head| Head::read(head).is_some()) {
+                    return Ok(from + searched as u64);
+                }
+                searched += 1;
+            }
+            // A head that begins within the last bytes is seen again.
+            from += (here - (HEAD - 1)) as u64;
         }
-        if head[..8] != (done as u64).to_le_bytes() {
-            return Ok(Next::Damaged("a batch is out of place"));
-        }
-        let (ids, records) = body.split_at(cells as usize * ID);
-        let ids = ids.chunks_exact(ID).map(|id| u32_at(id, 0));
-        Ok(Next::Batch(ids.zip(bytemuck::pod_collect_to_vec::<u8, Record>(records)).collect()))
+        Ok(self.length)
     }
 }
 
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+fn read_at(mut file: &File, at: u64) -> io::Result<&File> {
+    file.seek(SeekFrom::Start(at))?;
+    Ok(file)
 }

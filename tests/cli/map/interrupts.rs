@@ -60,7 +60,7 @@ fn killed_runs_are_resumed_to_the_same_bytes() {
 }
 
 /// A number that no two runs share.
-fn moment() -> u64 {
+pub(super) fn moment() -> u64 {
     u64::from(std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().subsec_micros())
 }
 

@@ -1,10 +1,13 @@
 //! `rattlemap map` as scripts see it: files of the contract, refusals, resumption.
 
 mod adaptive;
+mod check;
 mod engines;
+mod folders;
 mod interrupts;
 mod records;
 mod streams;
+mod torture;
 
 use std::fs;
 use std::path::Path;
@@ -196,9 +199,14 @@ fn check_manifest(out: &Path, rows: &[Vec<String>]) {
         let count = rows.iter().filter(|row| row[4] == class).count();
         assert_eq!(manifest["classes"][class], count);
     }
-    let mut files: Vec<String> = serde_json::from_value(manifest["files"].clone()).unwrap();
-    files.push("records.bin".to_owned());
-    files.sort();
+    assert_eq!(manifest["format"], 2);
+    for phase in ["open", "integrate", "write"] {
+        assert!(manifest["timings"][phase].as_f64().unwrap() >= 0.0, "{phase}");
+    }
+    let files = manifest["files"].as_array().unwrap();
+    let mut files: Vec<&str> = files.iter().map(|file| file["name"].as_str().unwrap()).collect();
+    files.push("manifest.json");
+    files.sort_unstable();
     assert_eq!(files, names(out));
 }
 

@@ -1,6 +1,6 @@
 //! `records.bin`: torn, damaged and foreign ones, and what is kept of them.
 
-use rattlemap::output::{Identity, RecordFile};
+use rattlemap::output::{Extent, Identity, Order, RecordFile};
 use rattlemap::record::Record;
 
 use super::*;
@@ -10,17 +10,35 @@ pub(super) fn bytes(out: &Path) -> Vec<Vec<u8>> {
     SAME.iter().map(|name| fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))).collect()
 }
 
-/// Cuts the one batch of a short run's record file into five, as a longer run would have left them.
-fn cut_into_batches(path: &Path) {
-    let identity = Identity::read(path).unwrap();
+/// All that a file holds, in the order in which it was kept.
+fn kept(path: &Path) -> (Vec<(u32, Record)>, Extent) {
+    let identity = Identity::read(path).unwrap().unwrap();
     let mut all = Vec::new();
     let take = |batch: &[(u32, Record)]| {
         all.extend_from_slice(batch);
         true
     };
-    RecordFile::read(path, &identity, take).unwrap();
+    let extent = RecordFile::read(path, &identity, Order::Any, take).unwrap();
+    (all, extent)
+}
+
+/// Cuts the one batch of a short run's record file into five, as a longer run would have left them.
+fn cut_into_batches(path: &Path) {
+    let identity = Identity::read(path).unwrap().unwrap();
+    let (all, _) = kept(path);
     let mut file = RecordFile::create(path, &identity).unwrap();
     all.chunks(all.len().div_ceil(5)).for_each(|batch| file.append(batch).unwrap());
+}
+
+/// Where batches begin, and where the last one ends.
+fn ends(records: &[u8]) -> Vec<usize> {
+    let u32_at = |at: usize| u32::from_le_bytes(records[at..at + 4].try_into().unwrap()) as usize;
+    let mut ends = vec![2 * (16 + u32_at(8))];
+    while ends.last().is_some_and(|&end| end < records.len()) {
+        let at = ends[ends.len() - 1];
+        ends.push(at + 32 + u32_at(at + 20));
+    }
+    ends
 }
 
 #[test]
@@ -33,7 +51,7 @@ fn torn_files_are_resumed_to_the_same_bytes() {
     let cut = folder.path().join("cut");
     fs::create_dir(&cut).unwrap();
     // From inside the last batch back to the header's end.
-    let head = 16 + u32::from_le_bytes(records[8..12].try_into().unwrap()) as usize;
+    let head = ends(&records)[0];
     for length in [records.len() - 1, records.len() / 2, head + 100, head + 3, head] {
         fs::write(cut.join("records.bin"), &records[..length]).unwrap();
         map(&folder, &["--quiet", "--out", "cut", "--resume"]).success();
@@ -66,24 +84,23 @@ fn records_of_another_run_are_refused() {
     }
     let other_version = String::from_utf8_lossy(&before).contains(env!("CARGO_PKG_VERSION"));
     assert!(other_version && fs::read(&records).unwrap() == before, "the records were touched");
+    // Nor are those of a program of other deciding sources, or for another processor.
+    let own = Identity::read(&records).unwrap().unwrap();
+    for (identity, part) in [
+        (own.clone().built_from("0123", Identity::own_target()), "`sources` was 0123, now "),
+        (own.built_from(Identity::own_sources(), "z80"), "`target` was z80, now "),
+    ] {
+        RecordFile::create(&records, &identity).unwrap();
+        map(&folder, &[&few[..], &["--resume"]].concat()).code(2).stderr(says(&[part, "--force"]));
+    }
+    fs::write(&records, before).unwrap();
     // Title and kinds of file may change.
     map(&folder, &[&few[..], &["--set", "title=Other", "--resume"]].concat()).success();
 }
 
-/// Where batches begin, and where the last one ends.
-fn ends(records: &[u8]) -> Vec<usize> {
-    let u32_at = |at: usize| u32::from_le_bytes(records[at..at + 4].try_into().unwrap()) as usize;
-    let mut ends = vec![16 + u32_at(8)];
-    while ends.last().is_some_and(|&end| end < records.len()) {
-        let at = ends[ends.len() - 1];
-        ends.push(at + 16 + u32_at(at + 8) * (4 + 160));
-    }
-    ends
-}
-
-/// Damage behind good batches, or among them, costs what follows it and nothing else.
+/// A damaged batch costs its own cells, and a torn end what was not kept yet.
 #[test]
-fn good_records_before_damage_are_kept() {
+fn good_batches_beside_damage_are_kept() {
     let folder = folder();
     map(&folder, &["--quiet", "--out", "whole"]).success();
     let whole = folder.path().join("whole");
@@ -101,24 +118,47 @@ fn good_records_before_damage_are_kept() {
     let cut = folder.path().join("cut");
     fs::create_dir(&cut).unwrap();
     let cases = [
-        (with_tail(3, &[0; 1000]), 3, "1000 bytes from"),
-        (with_tail(3, &noise), 3, "1000 bytes from"),
-        (with_tail(5, &[0; 7]), 5, "7 bytes from"),
-        (with_tail(2, &records[ends[2]..ends[3] - 1]), 2, "a batch is cut short"),
-        (with_tail(2, &records[ends[1]..]), 2, "a batch is out of place"),
-        (flipped(ends[0] + 200), 0, "a batch does not match its checksum"),
-        (flipped(ends[3]), 3, "a batch does not match its checksum"),
-        (flipped(ends[4] + 11), 4, "a batch is cut short"),
+        (with_tail(3, &[0; 1000]), 3, 3, "1000 bytes from"),
+        (with_tail(3, &noise), 3, 3, "1000 bytes from"),
+        (with_tail(5, &[0; 7]), 5, 5, "7 bytes from"),
+        (with_tail(2, &records[ends[2]..ends[3] - 1]), 2, 2, "a batch is cut short"),
+        (with_tail(2, &records[ends[1]..]), 2, 5, "a batch is out of place"),
+        (flipped(ends[0] + 200), 0, 4, "a batch does not match its checksum"),
+        (flipped(ends[3]), 3, 4, "the head of a batch is damaged"),
+        (flipped(ends[4] + 11), 4, 4, "the head of a batch is damaged"),
     ];
-    for (bad, batches, part) in cases {
+    for (bad, first, batches, part) in cases {
         fs::write(cut.join("records.bin"), bad).unwrap();
-        let (at, kept) =
-            (format!("from byte {} on", ends[batches]), format!("{} cells are kept", 64 * batches));
+        let (at, left) =
+            (format!("from byte {} on", ends[first]), format!("{} cells are kept", 64 * batches));
         let run = map(&folder, &["--out", "cut", "--resume"]).success();
-        run.stderr(says(&["warning: cut/records.bin", part, &at, &kept]));
+        run.stderr(says(&["warning: cut/records.bin", part, &at, &left]));
         assert!(bytes(&cut) == expected, "{part}, {batches} batches");
-        assert!(fs::read(cut.join("records.bin")).unwrap()[..ends[batches]] == records[..ends[batches]]);
+        let (cells, extent) = kept(&cut.join("records.bin"));
+        assert_eq!((cells.len(), extent.damage), (320, None), "{part}");
     }
+}
+
+/// Where rows follow each other nothing behind damage can be taken up.
+#[test]
+fn what_depends_on_lost_records_is_computed_again() {
+    let folder = folder();
+    let up = ["--set", "start.policy=up", "--set", "axis.1.count=5"];
+    map(&folder, &[&up[..], &["--quiet", "--out", "whole"]].concat()).success();
+    let path = folder.path().join("whole/records.bin");
+    cut_into_batches(&path);
+    let (expected, mut records) = (bytes(&folder.path().join("whole")), fs::read(&path).unwrap());
+    let (ends, (cells, _)) = (ends(&records), kept(&path));
+    records[ends[2] + 50] ^= 1;
+    fs::write(&path, records).unwrap();
+    let run = map(&folder, &[&up[..], &["--out", "whole", "--resume"]].concat()).success();
+    run.stderr(says(&["a batch does not match its checksum", "40 cells are kept"]));
+    assert!(bytes(&folder.path().join("whole")) == expected);
+    let sorted = |mut cells: Vec<(u32, Record)>| {
+        cells.sort_by_key(|&(id, _)| id);
+        cells
+    };
+    assert!(sorted(kept(&path).0) == sorted(cells));
 }
 
 #[test]
@@ -134,39 +174,81 @@ fn a_finished_map_with_a_damaged_record_says_how_to_mend_it() {
         let arguments = [&["validate", "out/s", "--samples", "8"], quiet].concat();
         command(&folder, &arguments).assert()
     };
-    validate(&[]).code(2).stderr(says(&["a batch does not match its checksum", "--resume"]));
+    validate(&[]).code(1).stderr(says(&["a batch does not match its checksum", "--resume"]));
     map(&folder, &["--resume", "--quiet"]).success();
     validate(&["--quiet"]).success().stderr("");
     // What stands behind the last cell is no reason to refuse.
     fs::write(&path, [&good[..], &[0; 100]].concat()).unwrap();
-    validate(&["--quiet"]).success().stderr(says(&[
+    validate(&["--quiet"]).code(1).stderr(says(&[
         "warning",
         "100 bytes from byte",
         "all 320 cells are there",
+        "records.bin is damaged: it has",
     ]));
 }
 
 #[test]
-fn records_without_a_readable_header_are_refused() {
+fn a_header_is_there_twice_and_once_is_enough() {
     let folder = folder();
-    map(&folder, &["--quiet"]).success();
+    let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3"];
+    let resume = || map(&folder, &[&few[..], &["--resume"]].concat());
+    map(&folder, &[&few[..], &["--quiet"]].concat()).success();
     let path = folder.path().join("out/s/records.bin");
     let good = fs::read(&path).unwrap();
-    let head = 16 + u32::from_le_bytes(good[8..12].try_into().unwrap()) as usize;
-    for (at, part) in [
-        (0, "damaged at byte 0: it is no record file of this version"),
-        (20, "damaged at byte 16: its header does not match the checksum"),
-    ] {
+    let head = ends(&good)[0];
+    let flipped = |places: &[usize]| {
         let mut bad = good.clone();
-        bad[at] ^= 0x10;
-        fs::write(&path, bad).unwrap();
-        let run = map(&folder, &["--resume"]).code(2).stdout("");
-        run.stderr(says(&["records.bin is damaged", part, "start anew with --force"]));
+        places.iter().for_each(|&at| bad[at] ^= 0x10);
+        bad
+    };
+    for at in [3, 9, 40, head / 2 + 3, head / 2 + 9, head - 1] {
+        fs::write(&path, flipped(&[at])).unwrap();
+        resume()
+            .success()
+            .stderr(says(&["one of the two copies of its header is damaged", "12 cells are kept"]));
+        assert!(fs::read(&path).unwrap() == good, "byte {at} was not mended");
     }
-    fs::write(&path, &good[..10]).unwrap();
-    map(&folder, &["--resume"]).code(2).stderr(says(&["its header is incomplete"]));
-    map(&folder, &["--quiet", "--force"]).success();
-    assert!(fs::read(&path).unwrap()[..head] == good[..head]);
+    for (bad, part) in [
+        (flipped(&[40, head - 1]), "neither copy of its header matches its checksum"),
+        (b"something else".to_vec(), "it is no record file of this version"),
+    ] {
+        fs::write(&path, &bad).unwrap();
+        resume().code(2).stdout("").stderr(says(&[
+            "records.bin is damaged",
+            part,
+            "start anew with --force",
+        ]));
+        assert!(fs::read(&path).unwrap() == bad, "the file was touched");
+    }
+    fs::write(&path, [&b"RTLMAP\0\x02"[..], &good[8..head / 2]].concat()).unwrap();
+    resume().code(2).stderr(says(&["format 1", "this version does not read", "--force"]));
+    map(&folder, &[&few[..], &["--quiet", "--force"]].concat()).success();
+    assert!(fs::read(&path).unwrap() == good);
+}
+
+/// A run that was killed before it kept anything is no reason to refuse.
+#[test]
+fn nothing_kept_is_begun_anew() {
+    let folder = folder();
+    let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3"];
+    map(&folder, &[&few[..], &["--quiet"]].concat()).success();
+    let out = folder.path().join("out/s");
+    let (expected, good) = (bytes(&out), fs::read(out.join("records.bin")).unwrap());
+    let begun = |name: &str, contents: &[u8]| {
+        fs::remove_dir_all(&out).unwrap();
+        fs::create_dir(&out).unwrap();
+        fs::write(out.join(name), contents).unwrap();
+        let run = map(&folder, &[&few[..], &["--resume"]].concat()).success();
+        run.stderr(says(&["out/s: nothing was kept there yet; the map is begun anew"]));
+        assert!(bytes(&out) == expected, "{name}, {} bytes", contents.len());
+    };
+    let half = ends(&good)[0] / 2;
+    for length in [0, 1, 10, half - 1] {
+        begun("records.bin", &good[..length]);
+    }
+    begun("records.bin", &[0; 4096]);
+    begun("partial-records.bin", &good[..20]);
+    begun(".rattlemap-probe", b"");
 }
 
 /// The time that a map took is that of all its runs.

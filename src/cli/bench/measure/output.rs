@@ -11,6 +11,7 @@ use super::check::Check;
 use super::{Point, Run, SCENE, Series, figure};
 use crate::cli::bench::statistics::Spread;
 use crate::output::Folder;
+use crate::output::inventory::{self, FileEntry};
 use crate::output::manifest::{Head, MANIFEST};
 use crate::validate::Kind;
 use rattlemap_dynamics::orbit::Class;
@@ -45,9 +46,10 @@ pub fn write(folder: &Folder, series: &[Series], asked: &Asked) -> Result<Vec<&'
     folder.replace(RUNS, |path| write_runs(path, series))?;
     folder.replace(FIGURE, |path| Ok(figure::write_rates(path, series, &asked.processor)?))?;
     folder.replace(STAGES, |path| Ok(figure::write_stages(path, series)?))?;
-    let files = vec![TABLE, RUNS, FIGURE, STAGES, MANIFEST];
-    folder.write_json(MANIFEST, &manifest(series, asked, &files))?;
-    Ok(files)
+    let files = [TABLE, RUNS, FIGURE, STAGES];
+    let listed = inventory::entries(folder, &files)?;
+    inventory::write_manifest(folder, &manifest(series, asked, &listed))?;
+    Ok([&files[..], &[MANIFEST]].concat())
 }
 
 /// Shares of the peak that a point's counted operations come to, at least and at most.
@@ -170,7 +172,7 @@ struct Manifest<'a> {
     processor: &'a str,
     cores: usize,
     series: Vec<SeriesObject<'a>>,
-    files: &'a [&'static str],
+    files: &'a [FileEntry],
 }
 
 #[derive(Serialize)]
@@ -230,7 +232,7 @@ impl From<&Check> for CheckObject {
     }
 }
 
-fn manifest<'a>(all: &'a [Series], asked: &'a Asked, files: &'a [&'static str]) -> Manifest<'a> {
+fn manifest<'a>(all: &'a [Series], asked: &'a Asked, files: &'a [FileEntry]) -> Manifest<'a> {
     let object = |(series, &peak): (&'a Series, &Option<f64>)| SeriesObject {
         engine: series.engine.name(),
         precision: series.engine.precision(),

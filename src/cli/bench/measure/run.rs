@@ -209,6 +209,7 @@ impl<'a> Bench<'a> {
             device: self.engine.device(),
             processor: "",
             elapsed: Duration::from_secs_f64(run.times.running()),
+            opening: Duration::ZERO,
             elapsed_before: Duration::ZERO,
             resumed_cells: 0,
             lane_grid: None,

@@ -1,0 +1,115 @@
+//! `rattlemap check`: are a folder's files what its manifest says; and what can be made of records, made anew.
+
+use std::path::Path;
+
+use crate::map::coexistence;
+use crate::output::inventory::{FileEntry, Finding};
+use crate::output::manifest::MANIFEST;
+use crate::output::map::{VALIDATION, repair};
+use crate::output::{self, Cells, Folder, RECORDS};
+use anyhow::{Context, anyhow};
+use serde_json::Value;
+
+use crate::cli::arguments::Check;
+use crate::cli::error::Failure;
+use crate::cli::finished_map::{self, Manifest, check_files, told};
+use crate::cli::say;
+
+/// The command whose folders can be mended.
+const MAP: &str = "map";
+
+/// Looks, names, and with `--repair` mends.
+pub(crate) fn run(ask: &Check) -> Result<(), Failure> {
+    let dir = &ask.folder;
+    finished_map::require_folder(dir)?;
+    let folder = ask.repair.then(|| Folder::open(dir, true)).transpose()?;
+    let (command, listed) = listed(dir)?;
+    let findings = check_files(dir, &listed)?;
+    if findings.is_empty() {
+        if !ask.quiet {
+            let count = listed.len();
+            say::note(format_args!("{}: all {count} files are as {MANIFEST} says", dir.display()));
+        }
+        return Ok(());
+    }
+    let mended = match &folder {
+        Some(folder) if findings.iter().any(Finding::is_lost) => mend(ask, folder, &command, &findings)?,
+        _ => Vec::new(),
+    };
+    let left: Vec<&Finding> = findings.iter().filter(|finding| !mended.contains(&finding.name)).collect();
+    if left.is_empty() {
+        return Ok(());
+    }
+    let lost = |name: &str| left.iter().any(|finding| finding.is_lost() && finding.name == name);
+    let remedy = if lost(VALIDATION) {
+        format!("; `rattlemap validate` makes {VALIDATION} and its section of the report anew")
+    } else if !ask.repair && command == MAP && left.iter().any(|finding| finding.is_lost()) {
+        format!("; `{}` makes anew what can be made of the records", finished_map::repair_command(dir))
+    } else {
+        String::new()
+    };
+    Err(Failure::Run(anyhow!("{}{remedy}", told(dir, &left))))
+}
+
+/// The command that made a folder, and the files that its manifest lists.
+fn listed(dir: &Path) -> Result<(String, Vec<FileEntry>), Failure> {
+    if !dir.join(MANIFEST).is_file() {
+        return finished_map::read_json(dir).map(|_| Default::default()).map_err(Failure::Usage);
+    }
+    let damaged = || {
+        format!("{} is damaged; the command that made the folder makes it anew", dir.join(MANIFEST).display())
+    };
+    let manifest: Value = finished_map::read_json(dir).with_context(damaged).map_err(Failure::Run)?;
+    finished_map::require_format(dir, &manifest).map_err(Failure::Usage)?;
+    let command = manifest["command"].as_str().unwrap_or_default().to_owned();
+    let files = serde_json::from_value(manifest["files"].clone());
+    let files = files.with_context(|| format!("{} lists no hashes of files", dir.join(MANIFEST).display()));
+    Ok((command, files.map_err(Failure::Usage)?))
+}
+
+/// Makes anew what can be made of a map's records; the names of what was.
+fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Result<Vec<String>, Failure> {
+    let dir = &ask.folder;
+    if command != MAP {
+        return Err(Failure::Run(anyhow!(
+            "{}: only the files of a map can be made from its records; run `rattlemap {}` again with --force",
+            told(dir, &findings.iter().collect::<Vec<_>>()),
+            command.escape_debug()
+        )));
+    }
+    folder.refuse_links(output::map::names())?;
+    let manifest = Manifest::read(dir)?;
+    let lost: Vec<&str> =
+        findings.iter().filter(|finding| finding.is_lost()).map(|finding| finding.name.as_str()).collect();
+    if lost.contains(&MANIFEST) {
+        return Err(Failure::Run(anyhow!(
+            "{}: {MANIFEST} is damaged, and cannot be believed; `{}` makes it and every file anew",
+            dir.display(),
+            manifest.resume_command(dir)
+        )));
+    }
+    if lost.contains(&RECORDS) {
+        return Err(Failure::Run(anyhow!(
+            "{}: {RECORDS} is damaged or missing, and nothing can be made of it; `{}` keeps what is good of it, \
+             computes the rest and makes every file anew",
+            dir.display(),
+            manifest.resume_command(dir)
+        )));
+    }
+    let finished = manifest.scene(dir)?;
+    let plan = finished.plan()?;
+    let (records, refined) = finished.records(&plan)?;
+    let attractors = coexistence::attractors(&plan, &records);
+    let cells = Cells::new(&finished.scene, &plan, &records)
+        .counting(attractors.as_deref())
+        .refined(refined.as_ref());
+    let has_validation =
+        manifest.files.iter().any(|file| file.name == VALIDATION) && !lost.contains(&VALIDATION);
+    let made = repair(folder, &cells, &lost, has_validation)?;
+    if !ask.quiet {
+        for name in &made {
+            say::note(format_args!("{}: {name} is made anew", dir.display()));
+        }
+    }
+    Ok(made)
+}

@@ -1,0 +1,211 @@
+//! The folder of a finished map, read: its manifest, its scene, its records, and whether its files are what they were.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::map::plan::Plan;
+use crate::map::scene::{Purpose, Scene};
+use crate::map::schedule::{Refined, Schedule};
+use crate::map::sweep;
+use crate::output::inventory::{self, FileEntry, Finding};
+use crate::output::manifest::{FORMAT, MANIFEST};
+use crate::output::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
+use crate::record::Record;
+use anyhow::{Context, anyhow};
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::cli::arguments::EngineChoice;
+use crate::cli::capacity;
+use crate::cli::error::Failure;
+use crate::cli::map::{order, quoted, unit};
+use crate::cli::say;
+
+/// What a map's manifest has to say.
+#[derive(Deserialize)]
+pub(crate) struct Manifest {
+    pub(crate) engine: String,
+    pub(crate) precision: String,
+    pub(crate) device: String,
+    sources: String,
+    target: String,
+    scene: String,
+    set: Vec<String>,
+    pub(crate) files: Vec<FileEntry>,
+}
+
+/// Refuses what is no folder.
+pub(crate) fn require_folder(dir: &Path) -> Result<(), Failure> {
+    match dir.is_dir() {
+        true => Ok(()),
+        false => Err(Failure::Usage(anyhow!(
+            "{}: there is no such folder; name the folder of a finished map",
+            dir.display()
+        ))),
+    }
+}
+
+/// The manifest of any command, of this version's format.
+pub(crate) fn read_json(dir: &Path) -> anyhow::Result<Value> {
+    let path = dir.join(MANIFEST);
+    if !path.is_file() {
+        let advice = if dir.join(RECORDS).is_file() {
+            "the run is unfinished: go on with `rattlemap map SCENE --resume`"
+        } else {
+            "it is not the folder of a map: `rattlemap map SCENE` makes one"
+        };
+        return Err(anyhow!("{}: there is no {MANIFEST}; {advice}", dir.display()));
+    }
+    let foreign = || format!("{}: this is not the manifest of a map", path.display());
+    let text = fs::read_to_string(&path).with_context(foreign)?;
+    serde_json::from_str(&text).with_context(foreign)
+}
+
+/// Refuses the manifest of an earlier version.
+pub(crate) fn require_format(dir: &Path, manifest: &Value) -> anyhow::Result<()> {
+    match manifest["format"].as_u64() {
+        Some(format) if format == u64::from(FORMAT) => Ok(()),
+        format => Err(anyhow!(
+            "{}: the folder is of format {}, and this version reads format {FORMAT}; make it again with --force",
+            dir.join(MANIFEST).display(),
+            format.map_or("unknown".to_owned(), |format| format.to_string())
+        )),
+    }
+}
+
+impl Manifest {
+    /// Reads the manifest of a map that this version made.
+    pub(crate) fn read(dir: &Path) -> Result<Manifest, Failure> {
+        Manifest::of(dir).map_err(Failure::Usage)
+    }
+
+    fn of(dir: &Path) -> anyhow::Result<Manifest> {
+        let path = dir.join(MANIFEST);
+        let manifest = read_json(dir)?;
+        if manifest["command"] != "map" {
+            let made = manifest["command"].as_str().unwrap_or("something else").escape_debug();
+            return Err(anyhow!("{}: this is not the manifest of a map, but of `{made}`", path.display()));
+        }
+        let (version, own) = (manifest["crate_version"].as_str().unwrap_or("?"), env!("CARGO_PKG_VERSION"));
+        if version != own {
+            return Err(anyhow!(
+                "{}: the map was made by rattlemap {}, this is {own}; use that version, or make it again with \
+                 `rattlemap map --force`",
+                path.display(),
+                version.escape_debug()
+            ));
+        }
+        require_format(dir, &manifest)?;
+        serde_json::from_value(manifest)
+            .with_context(|| format!("{}: this is not the manifest of a map", path.display()))
+    }
+
+    /// The scene, if its map fits this machine.
+    pub(crate) fn scene(&self, dir: &Path) -> Result<FinishedMap<'_>, Failure> {
+        let name = dir.join(MANIFEST).display().to_string();
+        let scene = Scene::parse(&self.scene, &name, &self.set, Purpose::Map)?;
+        let engine = if self.engine == "gpu" { EngineChoice::Gpu } else { EngineChoice::Cpu };
+        capacity::check_finished(&scene, engine, dir)?;
+        Ok(FinishedMap { manifest: self, dir: dir.to_owned(), scene })
+    }
+
+    /// The command that makes all files anew from what is good of the records.
+    pub(crate) fn resume_command(&self, dir: &Path) -> String {
+        let sets: String = self.set.iter().map(|set| format!(" --set {}", quoted(set))).collect();
+        let out = quoted(&dir.display().to_string());
+        format!("rattlemap map SCENE --out {out}{sets} --resume")
+    }
+}
+
+/// A map as its folder tells it.
+pub(crate) struct FinishedMap<'m> {
+    manifest: &'m Manifest,
+    dir: PathBuf,
+    pub(crate) scene: Scene,
+}
+
+impl FinishedMap<'_> {
+    /// Its cells, each with a motion.
+    pub(crate) fn plan(&self) -> Result<Plan, Failure> {
+        let plan = Plan::new(&self.scene);
+        plan.check()?;
+        Ok(plan)
+    }
+
+    /// One record per run, and what became of an adaptive map.
+    pub(crate) fn records(&self, plan: &Plan) -> Result<(Vec<Record>, Option<Refined>), Failure> {
+        let (dir, path) = (self.dir.display(), self.dir.join(RECORDS));
+        if !path.is_file() {
+            return Err(Failure::Usage(anyhow!(
+                "{dir}: there is no {RECORDS}; tables alone cannot be replayed: make the map again with \
+                 `rattlemap map SCENE --force`"
+            )));
+        }
+        let Manifest { engine, precision, device, sources, target, .. } = self.manifest;
+        let identity =
+            Identity::new(engine, precision, device, self.scene.identity()).built_from(sources, target);
+        let mut schedule = Schedule::new(plan);
+        let mut records = vec![Record::default(); plan.run_count()];
+        let order = order(&schedule);
+        let take = |batch: &[(u32, Record)]| sweep::replay(&mut schedule, &mut records, batch);
+        let read = RecordFile::read(&path, &identity, order, take).map_err(unreadable)?;
+        let Extent { count, damage, .. } = read;
+        let unit = unit(plan);
+        if !schedule.is_finished() {
+            let cells = schedule.expected();
+            let go_on =
+                format!("`{}` keeps them and computes the others", self.manifest.resume_command(&self.dir));
+            let told = damage.as_ref().map_or(String::new(), |damage| format!("{damage}: "));
+            let error = anyhow!("{}: {told}{count} of {cells} {unit} are there; {go_on}", path.display());
+            return Err(if damage.is_some() { Failure::Run(error) } else { Failure::Usage(error) });
+        }
+        // Nothing is missing: it stands behind the last cell.
+        if let Some(damage) = damage {
+            say::note(format_args!("warning: {}: {damage}; all {count} {unit} are there", path.display()));
+        }
+        let refined = schedule.finish(&mut records);
+        Ok((records, refined))
+    }
+}
+
+fn unreadable(error: RecordFileError) -> Failure {
+    const AGAIN: &str = "make the map again with `rattlemap map SCENE --force`";
+    match error {
+        RecordFileError::OtherRun { path, differences } => Failure::Usage(anyhow!(
+            "{} does not belong to the {MANIFEST} beside it: {differences}; {AGAIN}",
+            path.display()
+        )),
+        RecordFileError::Damaged { path, at, what } => {
+            Failure::Run(anyhow!("{} is damaged at byte {at}: {what}; {AGAIN}", path.display()))
+        }
+        other => Failure::Usage(other.into()),
+    }
+}
+
+/// Compares a folder's files with their list, and says what is wrong with each.
+pub(crate) fn check_files(dir: &Path, listed: &[FileEntry]) -> Result<Vec<Finding>, Failure> {
+    let findings = inventory::check(dir, listed);
+    let findings =
+        findings.with_context(|| format!("cannot read {}", dir.display())).map_err(Failure::Run)?;
+    for finding in &findings {
+        say::note(format_args!("{}: {finding}", dir.display()));
+    }
+    Ok(findings)
+}
+
+/// Findings that stay, by kind.
+pub(crate) fn told(dir: &Path, left: &[&Finding]) -> String {
+    let (lost, unknown): (Vec<&Finding>, Vec<&Finding>) = left.iter().partition(|finding| finding.is_lost());
+    let kinds = [("damaged or missing", lost), ("unknown", unknown)];
+    let parts = kinds.into_iter().filter(|(_, findings)| !findings.is_empty()).map(|(kind, findings)| {
+        let names: Vec<String> =
+            findings.iter().map(|finding| finding.name.escape_debug().to_string()).collect();
+        format!("{kind}: {}", names.join(", "))
+    });
+    format!("{}: {}", dir.display(), parts.collect::<Vec<_>>().join("; "))
+}
+
+/// The command that makes a folder's files anew.
+pub(crate) fn repair_command(dir: &Path) -> String {
+    format!("rattlemap check {} --repair", quoted(&dir.display().to_string()))
+}

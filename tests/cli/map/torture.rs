@@ -1,0 +1,190 @@
+//! Flipped bits, cut ends and kills, at random. `RATTLEMAP_TORTURE=N` in the environment makes them N of each kind.
+
+use std::fmt::Debug;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use rattlemap::map::random::Random;
+use rattlemap::output::{Damage, Identity, Order, RecordFile};
+use rattlemap::record::{Record, valid};
+
+use super::*;
+
+/// How many attacks of a kind are made.
+fn count(default: usize) -> usize {
+    let asked = std::env::var("RATTLEMAP_TORTURE");
+    asked.map_or(default, |n| n.parse().expect("RATTLEMAP_TORTURE is a number of attacks"))
+}
+
+/// What came of a campaign, in a line that scripts read.
+fn report(kind: &str, count: usize, faults: &[String]) {
+    println!("torture: {kind} {count}, faults {}", faults.len());
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Another stream every time; what it did is in the text of a fault.
+fn random() -> Random {
+    Random::new(interrupts::moment() << 20 ^ u64::from(std::process::id()))
+}
+
+/// A file of batches of records of any bits, and what may be done to it.
+struct Victim {
+    path: PathBuf,
+    identity: Identity,
+    cells: Vec<(u32, Record)>,
+    good: Vec<u8>,
+}
+
+const BATCH: usize = 40;
+
+impl Victim {
+    fn new(folder: &TempDir) -> Victim {
+        let path = folder.path().join("records.bin");
+        let identity = Identity::new("cpu", "f64", "any", vec![("axis.0.count".into(), "many".into())]);
+        let mut random = Random::new(3);
+        let mut cell = |id: u32| {
+            let mut record: Record =
+                bytemuck::cast(std::array::from_fn::<u64, 20, _>(|_| match random.below(3) {
+                    0 => 0,
+                    1 => f64::NAN.to_bits(),
+                    _ => random.bits(),
+                }));
+            record.valid &= !valid::FILLED;
+            (id * 577 % 1009, record)
+        };
+        let cells: Vec<_> = (0..1009).map(&mut cell).collect();
+        let mut file = RecordFile::create(&path, &identity).unwrap();
+        cells.chunks(BATCH).for_each(|batch| file.append(batch).unwrap());
+        let good = fs::read(&path).unwrap();
+        Victim { path, identity, cells, good }
+    }
+
+    /// Whether these are the same to the bit; records of NaN are not equal otherwise.
+    fn is_same(a: &[(u32, Record)], b: &[(u32, Record)]) -> bool {
+        let same = |(a, b): (&(u32, Record), &(u32, Record))| {
+            a.0 == b.0 && bytemuck::bytes_of(&a.1) == bytemuck::bytes_of(&b.1)
+        };
+        a.len() == b.len() && a.iter().zip(b).all(same)
+    }
+
+    /// Resumes a file of these bytes, computes what is missing and reads all; how many cells were kept.
+    fn resume(&self, bytes: &[u8], order: Order) -> Result<(usize, Option<Damage>), String> {
+        fs::write(&self.path, bytes).unwrap();
+        let told = |what: &dyn Debug| format!("{what:?}");
+        let mut kept = Vec::new();
+        let take = |batch: &[(u32, Record)]| {
+            kept.extend_from_slice(batch);
+            true
+        };
+        let mut file =
+            RecordFile::resume(&self.path, &self.identity, order, take).map_err(|error| error.to_string())?;
+        let (count, damage) = (kept.len(), file.damage().cloned());
+        let is_kept = |id: u32| kept.iter().any(|cell| cell.0 == id);
+        let missing: Vec<_> = self.cells.iter().filter(|(id, _)| !is_kept(*id)).copied().collect();
+        if !missing.is_empty() {
+            file.append(&missing).map_err(|error| told(&error))?;
+        }
+        let mut all = Vec::new();
+        let take = |batch: &[(u32, Record)]| {
+            all.extend_from_slice(batch);
+            true
+        };
+        let extent =
+            RecordFile::read(&self.path, &self.identity, order, take).map_err(|error| told(&error))?;
+        all.sort_by_key(|cell| cell.0);
+        let mut expected = self.cells.clone();
+        expected.sort_by_key(|cell| cell.0);
+        match extent.damage {
+            None if Victim::is_same(&all, &expected) => Ok((count, damage)),
+            damage => Err(format!("{} cells in the end, {damage:?}", all.len())),
+        }
+    }
+
+    /// The same, with a panic as one more fault.
+    fn survives(&self, bytes: &[u8], order: Order) -> Result<(usize, Option<Damage>), String> {
+        catch_unwind(AssertUnwindSafe(|| self.resume(bytes, order)))
+            .unwrap_or_else(|_| Err("a panic".to_owned()))
+    }
+}
+
+#[test]
+fn what_is_written_is_read_back_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let victim = Victim::new(&folder);
+    assert_eq!(victim.resume(&victim.good, Order::AsKept), Ok((1009, None)));
+}
+
+#[test]
+fn flipped_bits_cost_their_batch_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (victim, mut random, attacks) = (Victim::new(&folder), random(), count(300));
+    let mut faults = Vec::new();
+    for nth in 0..attacks {
+        let mut bad = victim.good.clone();
+        let flips = 1 + nth % 2;
+        // Two in the header would be one too many.
+        let first = if flips == 1 { 0 } else { victim.good.len() / 8 };
+        let places: Vec<usize> =
+            (0..flips).map(|_| 8 * first + random.below(8 * (bad.len() - first))).collect();
+        places.iter().for_each(|&bit| bad[bit / 8] ^= 1 << (bit % 8));
+        match victim.survives(&bad, Order::Any) {
+            Ok((kept, damage))
+                if kept + flips * BATCH >= 1009 && (damage.is_some() || bad == victim.good) => {}
+            other => faults.push(format!("bits {places:?}: {other:?}")),
+        }
+        if let (0, Err(fault)) = (nth % 5, victim.survives(&bad, Order::AsKept)) {
+            faults.push(format!("bits {places:?}, in order: {fault}"));
+        }
+    }
+    report("corruptions", attacks, &faults);
+}
+
+#[test]
+fn a_file_may_end_anywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let (victim, mut random, attacks) = (Victim::new(&folder), random(), count(50));
+    let head = 2 * (16 + u32::from_le_bytes(victim.good[8..12].try_into().unwrap()) as usize);
+    let anywhere = (0..attacks).map(|_| random.below(victim.good.len()));
+    let mut faults = Vec::new();
+    for length in (0..=head).step_by(if attacks > 50 { 1 } else { 31 }).chain(anywhere) {
+        if let Err(fault) = victim.survives(&victim.good[..length], Order::Any) {
+            faults.push(format!("cut to {length} bytes: {fault}"));
+        }
+    }
+    report("cuts", attacks, &faults);
+}
+
+/// At any time, in the first milliseconds above all.
+#[cfg(unix)]
+#[test]
+fn killed_runs_can_be_resumed_whenever_it_was() {
+    let folder = folder();
+    let arguments = ["--engine", "cpu", "--set", "axis.0.count=8", "--set", "integration.early_stop=false"];
+    map(&folder, &[&arguments[..], &["--quiet", "--out", "whole"]].concat()).success();
+    let expected = records::bytes(&folder.path().join("whole"));
+    let (mut random, attacks) = (random(), count(6));
+    let mut faults = Vec::new();
+    for nth in 0..attacks {
+        let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"))
+            .current_dir(folder.path())
+            .args(["map", "s.toml", "--out", "cut"])
+            .args(arguments)
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let delay = Duration::from_micros(random.below(if nth % 3 == 2 { 1_000_000 } else { 40_000 }) as u64);
+        std::thread::sleep(delay);
+        run.kill().unwrap();
+        run.wait().unwrap();
+        let resume = ["map", "s.toml", "--out", "cut", "--resume", "--quiet"];
+        let resumed = command(&folder, &[&resume[..], &arguments].concat()).output().unwrap();
+        if !resumed.status.success() {
+            faults.push(format!("{delay:?}: {}", String::from_utf8_lossy(&resumed.stderr)));
+        } else if records::bytes(&folder.path().join("cut")) != expected {
+            faults.push(format!("{delay:?}: other bytes"));
+        }
+        fs::remove_dir_all(folder.path().join("cut")).ok();
+    }
+    report("kills", attacks, &faults);
+}
