@@ -5,7 +5,9 @@ use std::process::ExitCode;
 
 use crate::cli::say;
 use crate::gpu::Precision;
+use crate::map::printable::is_printable;
 use crate::validate::DEFAULT_SAMPLES;
+use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use rattlemap_dynamics::model::{REST, State};
 use rattlemap_dynamics::orbit::Settings;
@@ -34,16 +36,36 @@ pub(crate) struct Cli {
 /// # Errors
 /// The exit code.
 pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
-    P::try_parse().map_err(|error| {
+    P::try_parse().map_err(|mut error| {
         if error.use_stderr() {
-            // Plain: an argument that it quotes may hold escape sequences, and those must not pass for colours.
-            say::note(error.render().to_string().trim_end());
+            quote(&mut error);
+            // Plain: what it quotes must not pass for colours.
+            say::notes(error.render().to_string().trim_end());
         } else {
             // A closed stdout has no reader.
             let _ = error.print();
         }
         ExitCode::from(error.exit_code() as u8)
     })
+}
+
+/// Makes arguments that an error quotes fit for one line of a terminal.
+fn quote(error: &mut clap::Error) {
+    let context: Vec<_> = error.context().map(|(kind, value)| (kind, value.clone())).collect();
+    for (kind, value) in context {
+        let value = match value {
+            ContextValue::String(text) => ContextValue::String(say::quoted(text)),
+            ContextValue::Strings(list) => ContextValue::Strings(list.iter().map(say::quoted).collect()),
+            // Advice that cannot be shown as it would have to be typed is none.
+            ContextValue::StyledStrs(list)
+                if !list.iter().all(|text| text.to_string().chars().all(is_printable)) =>
+            {
+                ContextValue::None
+            }
+            _ => continue,
+        };
+        error.insert(kind, value);
+    }
 }
 
 #[derive(Debug, Subcommand)]

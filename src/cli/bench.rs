@@ -58,7 +58,10 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
         peaks: all.iter().map(|series| peak_of(ask, &series.engine)).collect(),
     };
     let files = write(&folder, &all, &asked)?;
-    say(ask, &format!("{}\n{}: {}", summary(&all, &asked), out.display(), files.join(", ")));
+    if !ask.run.quiet {
+        let summary = summary(&all, &asked);
+        say::notes(format_args!("{summary}\n{}: {}", say::path(&out), files.join(", ")));
+    }
     verdict(&all)
 }
 

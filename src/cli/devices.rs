@@ -7,7 +7,7 @@ use crate::output::{OutputError, print};
 
 use crate::cli::arguments::{EngineChoice, EngineOptions};
 use crate::cli::error::Failure;
-use crate::cli::{engine_choice, processor};
+use crate::cli::{engine_choice, processor, say};
 
 /// What engines are tried on.
 const MAIN_MAP: &str = include_str!("../../scenes/e_omega.toml");
@@ -24,7 +24,7 @@ pub(crate) fn run() -> Result<(), Failure> {
         let mesa = || "a software one comes with Mesa (Debian: mesa-vulkan-drivers)".to_owned();
         print(&format!(
             "no graphics adapter; {}",
-            gpu::narrowed_by(&AdapterChoice::default()).unwrap_or_else(mesa)
+            say::quoted(gpu::narrowed_by(&AdapterChoice::default()).unwrap_or_else(mesa))
         ))?;
     }
     let scene = Scene::parse(MAIN_MAP, "e_omega", &[], Purpose::Map)?;
@@ -32,7 +32,7 @@ pub(crate) fn run() -> Result<(), Failure> {
     let auto = EngineOptions { engine: EngineChoice::Auto, precision: None };
     let chosen = engine_choice::open(&plan, &auto)?;
     let (engine, precision) = (chosen.engine.name(), chosen.engine.precision());
-    print(&format!("auto takes {engine} ({precision}) for the main map: {}", chosen.why))?;
+    print(&format!("auto takes {engine} ({precision}) for the main map: {}", say::quoted(chosen.why)))?;
     Ok(())
 }
 
@@ -40,7 +40,7 @@ fn print_adapter(adapter: &AdapterReport) -> Result<(), OutputError> {
     let AdapterReport { info, precisions, largest_binding, most_lanes } = adapter;
     let names: Vec<&str> = precisions.iter().map(|precision| precision.name()).collect();
     let kind = if gpu::is_hardware(info) { "hardware" } else { "software" };
-    print(&format!("gpu: {}", gpu::describe(info)))?;
+    print(&format!("gpu: {}", say::quoted(gpu::describe(info))))?;
     print(&format!("  kind        {kind} ({:?})", info.device_type))?;
     print(&format!("  interface   {:?}, {}", info.backend, gpu::interface_rank(info)))?;
     print(&format!("  precision   {}", names.join(", ")))?;

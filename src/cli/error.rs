@@ -3,7 +3,6 @@
 use std::process::ExitCode;
 
 use crate::map::plan::NoMotion;
-use crate::map::printable;
 use crate::map::scene::SceneError;
 use crate::output::{FolderError, OutputError, RecordFileError};
 use anyhow::anyhow;
@@ -33,8 +32,7 @@ pub(crate) const SIGNALLED: i32 = 128;
 impl Failure {
     /// Says on stderr what went wrong, causes included, and returns the exit code.
     pub fn report(&self) -> ExitCode {
-        // One line, whatever it quotes.
-        say::note(printable::line(&format!("error: {self}")));
+        say::note(format_args!("error: {self}"));
         ExitCode::from(match self {
             Failure::Usage(_) => 2,
             Failure::Run(_) => 1,

@@ -97,15 +97,15 @@ impl Progress {
         }
     }
 
-    /// Clears the bar, if there is one, and says one last line unless quiet.
+    /// Clears the bar, if there is one, and says one last line, or several, unless quiet.
     pub fn finish(&self, line: &str) {
         match self {
             Progress::Quiet => {}
             Progress::Bar(bar) => {
                 bar.finish_and_clear();
-                say::note(line);
+                say::notes(line);
             }
-            Progress::Lines(_) => say::note(line),
+            Progress::Lines(_) => say::notes(line),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Messages to the user. A closed stderr ends no run.
+//! Messages to the user. A closed stderr ends no run, and nothing from outside reaches a terminal raw.
 
 use std::fmt::Display;
 use std::io::{Write, stderr};
@@ -6,15 +6,28 @@ use std::path::Path;
 
 use crate::map::printable;
 
-/// Says a line, or several, on stderr. Where that is closed or full they are dropped: nobody would read them, and the
-/// run goes on. What they hold from outside reaches no terminal raw: see [`printable`].
+/// Says a line on stderr, one whatever it quotes. Where stderr is closed or full it is dropped: nobody would read it,
+/// and the run goes on.
 pub fn note(line: impl Display) {
-    let text = format!("{line}\n");
+    write(&printable::line(&line.to_string()));
+}
+
+/// Says several lines; what they quote must be on one line each, as [`path`] makes it.
+pub(crate) fn notes(lines: impl Display) {
+    write(&printable::lines(&lines.to_string()));
+}
+
+fn write(text: &str) {
     // One write, lest lines of several threads mix.
-    let _ = stderr().write_all(printable::lines(&text).as_bytes());
+    let _ = stderr().write_all(format!("{text}\n").as_bytes());
 }
 
 /// A path within a message of several lines, on one of them.
 pub(crate) fn path(path: &Path) -> String {
-    printable::line(&path.display().to_string()).into_owned()
+    quoted(path.display())
+}
+
+/// The same of anything from outside.
+pub(crate) fn quoted(text: impl Display) -> String {
+    printable::line(&text.to_string()).into_owned()
 }

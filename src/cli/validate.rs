@@ -51,7 +51,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let device = lanes.device.as_deref();
     let files = write_validation(&folder, &cells, &made, device, &validation, clock.elapsed())?;
-    let summary = summary(&validation, device);
+    let summary = summary(&validation, device.map(say::quoted).as_deref());
     progress.finish(&format!("{summary}{note}\n{}: {}", say::path(dir), files.join(", ")));
     verdict(dir, &plan, &validation)?;
     // What was rewritten is good again.
@@ -86,10 +86,11 @@ fn run_again(subject: &Subject<'_>, sample: &Sample, made_on: &str) -> Result<(L
             Ok(gpu) => (Some(gpu), String::new()),
             Err(why) => match open(subject.precision, &AdapterChoice::default()) {
                 Some(gpu) => {
-                    let device = gpu::describe(gpu.adapter());
+                    let device = say::quoted(gpu::describe(gpu.adapter()));
+                    let why = say::quoted(why);
                     (Some(gpu), format!("\nlanes ran again on {device}, not on the map's own device: {why}"))
                 }
-                None => (None, format!("\nlanes were not run again: {why}")),
+                None => (None, format!("\nlanes were not run again: {}", say::quoted(why))),
             },
         },
         false => (None, String::new()),

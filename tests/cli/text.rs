@@ -44,6 +44,7 @@ impl Folder {
         let said = String::from_utf8(said).unwrap();
         let raw: Vec<char> = said.chars().filter(|&c| c != '\n' && !is_printable(c)).collect();
         assert!(raw.is_empty(), "{arguments:?}: {raw:?} in {said:?}");
+        assert!(!said.lines().any(|line| line.starts_with("fake line")), "{arguments:?}: {said}");
         said
     }
 }
@@ -116,21 +117,25 @@ fn arguments_and_the_environment_are_quoted_without_controls() {
     let folder = Folder::new();
     let evil = format!("{EVIL}\nfake line");
     for arguments in [
-        &[EVIL][..],
-        &["map", "s.toml", "--engine", EVIL],
-        &["map", "s.toml", "--precision", EVIL],
-        &["map", "s.toml", &format!("--{EVIL}")],
-        &["orbit", "--start", EVIL],
-        &["orbit", "--periods", EVIL],
-        &["validate", "o", "--samples", EVIL],
+        &[&*evil][..],
+        &["map", "s.toml", "--engine", &evil],
+        &["map", "s.toml", "--precision", &evil],
+        &["map", "s.toml", &format!("--{evil}")],
+        &["orbit", "--start", &evil],
+        &["orbit", "--periods", &evil],
+        &["validate", "o", "--samples", &evil],
     ] {
         let said = folder.says(2, &[], arguments);
-        // Colours are taken out by clap itself.
-        assert!(said.starts_with("error: ") && said.contains("\\u{9b}2J\\u{202e}c"), "{said}");
+        assert!(
+            said.starts_with("error: ") && said.contains("a\\u{1b}[31m") && said.contains("\\nfake line"),
+            "{said}"
+        );
     }
-    for name in ["WGPU_ADAPTER_NAME", "WGPU_BACKEND"] {
+    // An adapter that was named is not replaced by another engine.
+    for (name, code) in [("WGPU_ADAPTER_NAME", 2), ("WGPU_BACKEND", 0)] {
         let said = folder.says(2, &[(name, &evil)], &["map", "s.toml", "--engine", "gpu"]);
         quotes(&said);
+        folder.says(code, &[(name, &evil)], &["devices"]);
     }
     // Help and version are the program's own.
     assert!(folder.says(0, &[], &["--help"]).contains("Usage: rattlemap"), "no help");
