@@ -285,11 +285,12 @@ speed_table() {
                      median(4, key, 1), median(6, key, 1), median(7, key), median(8, key), median(9, key), median(10, key) } }'
 }
 
-# The largest map of each precision by the device's own clock. Device names have commas, and are left out.
+# The largest map of each precision by the device's own clock. Device names have commas, and are taken out.
 device_table() {
     echo "| precision | lanes | device busy | longest dispatch, s | idle between submissions, s | longest gap, s |"
     echo "| --- | --- | --- | --- | --- | --- |"
-    sed -E 's/"[^"]*"/device/' "$out/engines/engines.csv" | awk -F, '
+    local table="$out/engines/engines.csv"
+    { head -n 1 "$table" && { grep -F -- "$WGPU_ADAPTER_NAME" "$table" || true; }; } | sed -E 's/"[^"]*"/device/' | awk -F, '
         NR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next }
         $1 == "gpu" { if (!($2 in row)) order[++n] = $2
                       row[$2] = sprintf("| %s | %s | %.0f %% | %s | %s | %s |", $2, $at["lanes"], 100 * $at["device_share"],
