@@ -7,8 +7,8 @@
 # carried to a machine without Rust or a network. In steps, all of them unless some are named, what a reader of results
 # wants first before the rest; f32 before f64:
 #
-#     right       the lanes are right, cell by cell against the reference: 128 x 128 cells, 2,000 of them (32 x 32 or
-#                 8 x 8, a quarter of them, where there is no time for more)
+#     right       the lanes are right, cell by cell against the reference: 128 x 128 cells, 2,000 of them (of 16 x 16
+#                 a quarter, where there is no time for more)
 #     main        the main map as it is, 512 x 512 cells, all quantities and files
 #     classes     SIDE x SIDE cells (1024 unless given), decided: classes alone
 #     brute       the same cells by brute force: no early stops
@@ -89,7 +89,7 @@ cache_in() { export __GL_SHADER_DISK_CACHE_PATH="$1" MESA_SHADER_CACHE_DIR="$1" 
 cache_in "${MESA_SHADER_CACHE_DIR:-$work/cache}"
 
 # It lists them at once; what it says then of `auto` may take a trial.
-limited "$((longest_run > 10 ? longest_run / 2 : 5))" "$binary" devices | tee "$out/devices.txt" || true
+limited "$((deadline > 90 ? 30 : 3))" "$binary" devices | tee "$out/devices.txt" || true
 
 # The block of an adapter: its name, then "  key  value" lines. A software driver beside the hardware must not be
 # measured in its place.
@@ -139,11 +139,11 @@ disk() {
     local megabytes=256 began took
     ((deadline > 60)) || megabytes=16
     began="$(now)"
-    if limited 20 dd if=/dev/zero of="$out/.disk" bs=1M count="$megabytes" conv=fsync 2>"$work/said"; then
+    if limited "$((deadline > 90 ? 20 : 3))" dd if=/dev/zero of="$out/.disk" bs=1M count="$megabytes" conv=fsync 2>"$work/said"; then
         took="$(since "$began")"
         disk_told="$(awk -v mb="$megabytes" -v s="$took" 'BEGIN { printf "%.0f MB/s (%d MiB in %.2f s, written through)", mb * 1.048576 / s, mb, s }')"
     else
-        disk_told="not measured: $(tail -n 1 "$work/said")"
+        disk_told="not measured, $(tail -n 1 "$work/said" | grep . || echo "there was not enough time")"
     fi
     rm -f "$out/.disk"
 }
@@ -153,8 +153,7 @@ square() { sets+=(--set "axis.0.count=$1" --set "axis.1.count=$1"); }
 # As many cells as there is time for.
 right() {
     local precision="$1" cells
-    for cells in 128 32 8; do
-        ((cells <= side || cells == 8)) || continue
+    for cells in $((side < 128 ? side : 128)) 16; do
         ! right_of "$precision" "$cells" || return 0
     done
     missing "right, $precision: there was not enough time"
@@ -162,12 +161,12 @@ right() {
 
 # False if it was cut.
 right_of() {
-    local precision="$1" cells="$2" code=0 sets=() samples=2000
+    local precision="$1" cells="$2" code=0 sets=() samples=2000 until=$((SECONDS + longest_run))
     ((cells * cells / 4 >= samples)) || samples=$(((cells * cells + 3) / 4))
     square "$cells"
     limited "$longest_run" "$binary" map "$scenes/e_omega.toml" --engine gpu --precision "$precision" \
         --out "$work/right" --force "${sets[@]}" 2>"$work/said" || code=$?
-    ((code)) || limited "$longest_run" "$binary" validate "$work/right" --samples "$samples" 2>"$work/said" || code=$?
+    ((code)) || limited $((until - SECONDS)) "$binary" validate "$work/right" --samples "$samples" 2>"$work/said" || code=$?
     case $code in
         0) ;;
         124 | 125 | 137) return 1 ;;
@@ -286,11 +285,12 @@ speed_table() {
                      median(4, key, 1), median(6, key, 1), median(7, key), median(8, key), median(9, key), median(10, key) } }'
 }
 
-# The largest map of each precision by the device's own clock. Device names have commas, and are left out.
+# The largest map of each precision by the device's own clock. Device names have commas, and are taken out.
 device_table() {
     echo "| precision | lanes | device busy | longest dispatch, s | idle between submissions, s | longest gap, s |"
     echo "| --- | --- | --- | --- | --- | --- |"
-    sed -E 's/"[^"]*"/device/' "$out/engines/engines.csv" | awk -F, '
+    local table="$out/engines/engines.csv"
+    { head -n 1 "$table" && { grep -F -- "$WGPU_ADAPTER_NAME" "$table" || true; }; } | sed -E 's/"[^"]*"/device/' | awk -F, '
         NR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next }
         $1 == "gpu" { if (!($2 in row)) order[++n] = $2
                       row[$2] = sprintf("| %s | %s | %.0f %% | %s | %s | %s |", $2, $at["lanes"], 100 * $at["device_share"],

@@ -44,25 +44,33 @@ pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
             if ask.run.quick { f64::INFINITY } else { left.max(0.0) / (engines.len() - nth) as f64 };
         let is_first_lane = !all.iter().any(|series| series.engine.threads().is_none());
         match measure(ask, engine, &scratch, seconds, &mut answers, is_first_lane) {
-            Ok(series) => all.push(series),
+            Ok(series) => {
+                all.push(series);
+                // Whoever is stopped before the last engine has the others.
+                write(&folder, &all, &asked_of(ask, &all, budget))?;
+            }
             // The others are there to be measured all the same.
             Err(error) => say(ask, &format!("{} is left out: {error:#}", engine.label())),
         }
     }
     std::fs::remove_dir_all(scratch.path()).map_err(anyhow::Error::from)?;
-    let asked = Asked {
-        budget_seconds: budget,
-        quick: ask.run.quick,
-        cores: processor::cores(),
-        processor: processor::described(),
-        peaks: all.iter().map(|series| peak_of(ask, &series.engine)).collect(),
-    };
+    let asked = asked_of(ask, &all, budget);
     let files = write(&folder, &all, &asked)?;
     if !ask.run.quiet {
         let summary = summary(&all, &asked);
         say::notes(format_args!("{summary}\n{}: {}", say::path(&out), files.join(", ")));
     }
     verdict(&all)
+}
+
+fn asked_of(ask: &Engines, all: &[Series], budget_seconds: f64) -> Asked {
+    Asked {
+        budget_seconds,
+        quick: ask.run.quick,
+        cores: processor::cores(),
+        processor: processor::described(),
+        peaks: all.iter().map(|series| peak_of(ask, &series.engine)).collect(),
+    }
 }
 
 /// The CPU on all cores, which the others are compared with; adapters, the best first; the CPU

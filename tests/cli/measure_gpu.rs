@@ -2,18 +2,26 @@
 
 use std::collections::HashMap;
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
+use rattlemap::gpu;
 use tempfile::TempDir;
 
-/// Steps of the script for so many seconds, on the software driver where there is one.
-fn measure(out: &TempDir, seconds: u32, steps: &[&str]) -> String {
+/// The software adapter, whose speed is known to be low; none where there is none.
+fn software() -> Option<String> {
+    let adapters = pollster::block_on(gpu::adapters());
+    adapters.iter().find(|adapter| !gpu::is_hardware(&adapter.info)).map(|found| gpu::describe(&found.info))
+}
+
+/// Steps of the script for so many seconds, in f32 on this adapter.
+fn measure(adapter: &str, out: &TempDir, seconds: u32, side: u32, steps: &[&str]) -> String {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/measure_gpu.sh");
     let mut run = Command::new(script);
-    run.arg(assert_cmd::cargo::cargo_bin("rattlemap")).arg(out.path()).arg("8").args(steps);
-    run.env("WGPU_ADAPTER_NAME", "vulkan").env("PRECISIONS", "f32");
+    run.arg(assert_cmd::cargo::cargo_bin("rattlemap")).arg(out.path()).arg(side.to_string()).args(steps);
+    run.env("WGPU_ADAPTER_NAME", adapter).env("PRECISIONS", "f32");
     run.env("MEASURE_SECONDS", seconds.to_string());
     let output = run.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -35,7 +43,7 @@ fn rows(summary: &str) -> Vec<HashMap<&str, &str>> {
 #[test]
 fn a_card_is_measured_and_told_in_a_table() {
     let out = tempfile::tempdir().unwrap();
-    let summary = measure(&out, 90, &["classes"]);
+    let summary = measure(&software().unwrap_or_else(|| "vulkan".to_owned()), &out, 90, 8, &["classes"]);
     let rows = rows(&summary);
     assert_eq!(rows.len(), 1, "{summary}");
     let row = &rows[0];
@@ -47,25 +55,29 @@ fn a_card_is_measured_and_told_in_a_table() {
         "{row:?}"
     );
     assert!(number("lane-periods/s") > number("cells/s"), "{row:?}");
-    for part in ["- disk: ", " MB/s", "processor: ", "precision   f32"] {
+    for part in ["- disk: ", "processor: ", "precision   f32"] {
         assert!(summary.contains(part), "no {part}: {summary}");
     }
 }
 
 #[test]
 fn a_card_that_is_too_slow_is_cut_and_still_told() {
+    let Some(adapter) = software() else {
+        // Past the harness, which keeps what passing tests print.
+        let mut stderr = std::io::stderr();
+        writeln!(stderr, "SKIPPED: no software adapter that is sure to be too slow").unwrap();
+        return;
+    };
     let out = tempfile::tempdir().unwrap();
     let clock = Instant::now();
-    let summary = measure(&out, 10, &[]);
-    // It has these seconds, and those in which a run that is cut writes what it has.
-    assert!(clock.elapsed().as_secs() <= 20, "it took {:?}", clock.elapsed());
-    let told: Vec<(&str, &str)> = rows(&summary).iter().map(|row| (row["what"], row["cells"])).collect();
-    let names: Vec<&str> = told.iter().map(|&(what, _)| what).collect();
-    let all = ["main", "classes", "brute", "own_flow", "adaptive", "latency", "compile_cold", "compile_warm"];
-    assert_eq!(names, all, "{summary}");
-    let is_told = |&(_, cells): &(&str, &str)| {
-        cells.parse::<u32>().is_ok() || cells.starts_with("cut after ") || cells == "no time was left"
-    };
-    assert!(told.iter().all(is_told) && told[7].1 == "no time was left", "{summary}");
+    // 2 10^8 periods of lanes take it minutes.
+    let summary = measure(&adapter, &out, 18, 640, &["brute", "classes", "compile", "engines"]);
+    // A run that is cut has five seconds to write what it has.
+    assert!(clock.elapsed().as_secs() <= 18 + 8, "it took {:?}", clock.elapsed());
+    let rows = rows(&summary);
+    let told: Vec<[&str; 2]> = rows.iter().map(|row| ["what", "cells"].map(|name| row[name])).collect();
+    assert!(told[0][0] == "brute" && told[0][1].starts_with("cut after "), "{summary}");
+    let late = ["classes", "compile_cold", "compile_warm"].map(|what| [what, "no time was left"]);
+    assert_eq!(told[1..], late, "{summary}");
     assert!(summary.contains("- missing: engines: no time was left"), "{summary}");
 }

@@ -63,10 +63,10 @@ impl<'p> Gpu<'p> {
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
                 other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
             };
-            // Compiled now, not while somebody waits for cells.
-            let pool = engine.device.pool(&settings).await;
-            engine.pool = Some(pool.map_err(|error| engine.error(error, 0))?);
         }
+        // Compiled now, not while somebody waits for cells.
+        let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
+        engine.pool = plan.keeps_flows().then_some(pool);
         Ok(engine)
     }
 
