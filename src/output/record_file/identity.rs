@@ -15,7 +15,7 @@ use crate::record::RECORD_VERSION;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     record_version: u32,
-    /// For the reader's information; [`Identity::sources`] decides.
+    /// For the reader's information: the sources decide.
     crate_version: String,
     sources: String,
     target: String,
