@@ -342,8 +342,8 @@ pub(crate) struct Validate {
 
 /// Whether the files of a folder are what they were
 ///
-/// Compares every file with the size and the hash (SHA-256) in manifest.json, and names what is damaged, missing or
-/// unknown: then the exit code is 1. Nothing is written unless --repair is given: it makes tables, figures and report of a
+/// Compares every file with the size and the hash (SHA-256) in manifest.json. What is damaged or missing is named, and the
+/// exit code is 1; files that it does not list are named, too. Nothing is written unless --repair is given: it makes tables, figures and report of a
 /// map anew from records.bin. No scene file is needed.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \

@@ -36,14 +36,15 @@ pub(crate) fn run(ask: &Check) -> Result<(), Failure> {
         Some(folder) if findings.iter().any(Finding::is_lost) => mend(ask, folder, &command, &findings)?,
         _ => Vec::new(),
     };
-    let left: Vec<&Finding> = findings.iter().filter(|finding| !mended.contains(&finding.name)).collect();
+    // What is unknown has been named: it may be somebody's notes.
+    let is_left = |finding: &&Finding| finding.is_lost() && !mended.contains(&finding.name);
+    let left: Vec<&Finding> = findings.iter().filter(is_left).collect();
     if left.is_empty() {
         return Ok(());
     }
-    let lost = |name: &str| left.iter().any(|finding| finding.is_lost() && finding.name == name);
-    let remedy = if lost(VALIDATION) {
+    let remedy = if left.iter().any(|finding| finding.name == VALIDATION) {
         format!("; `rattlemap validate` makes {VALIDATION} and its section of the report anew")
-    } else if !ask.repair && command == MAP && left.iter().any(|finding| finding.is_lost()) {
+    } else if !ask.repair && command == MAP {
         format!("; `{}` makes anew what can be made of the records", finished_map::repair_command(dir))
     } else {
         String::new()
@@ -73,7 +74,7 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
     if command != MAP {
         return Err(Failure::Run(anyhow!(
             "{}: only the files of a map can be made from its records; run `rattlemap {}` again with --force",
-            told(dir, &findings.iter().collect::<Vec<_>>()),
+            told(dir, &findings.iter().filter(|finding| finding.is_lost()).collect::<Vec<_>>()),
             command.escape_debug()
         )));
     }

@@ -193,16 +193,10 @@ pub(crate) fn check_files(dir: &Path, listed: &[FileEntry]) -> Result<Vec<Findin
     Ok(findings)
 }
 
-/// Findings that stay, by kind.
-pub(crate) fn told(dir: &Path, left: &[&Finding]) -> String {
-    let (lost, unknown): (Vec<&Finding>, Vec<&Finding>) = left.iter().partition(|finding| finding.is_lost());
-    let kinds = [("damaged or missing", lost), ("unknown", unknown)];
-    let parts = kinds.into_iter().filter(|(_, findings)| !findings.is_empty()).map(|(kind, findings)| {
-        let names: Vec<String> =
-            findings.iter().map(|finding| finding.name.escape_debug().to_string()).collect();
-        format!("{kind}: {}", names.join(", "))
-    });
-    format!("{}: {}", dir.display(), parts.collect::<Vec<_>>().join("; "))
+/// Files that are lost.
+pub(crate) fn told(dir: &Path, lost: &[&Finding]) -> String {
+    let names: Vec<String> = lost.iter().map(|finding| finding.name.escape_debug().to_string()).collect();
+    format!("{}: damaged or missing: {}", dir.display(), names.join(", "))
 }
 
 /// The command that makes a folder's files anew.

@@ -55,8 +55,8 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     progress.finish(&format!("{summary}{note}\n{}: {}", say::path(dir), files.join(", ")));
     verdict(dir, &plan, &validation)?;
     // What was rewritten is good again.
-    let left: Vec<&Finding> =
-        findings.iter().filter(|finding| !files.contains(&finding.name.as_str())).collect();
+    let is_left = |finding: &&Finding| finding.is_lost() && !files.contains(&finding.name.as_str());
+    let left: Vec<&Finding> = findings.iter().filter(is_left).collect();
     match left.is_empty() {
         true => Ok(()),
         false => Err(Failure::Run(anyhow!(

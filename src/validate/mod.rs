@@ -308,6 +308,7 @@ fn judge(subject: &Subject<'_>, lanes: &Lanes) -> Judge {
 }
 
 /// What a judge beside the reference says of a cell of the reference's own map.
+#[cfg_attr(not(feature = "independent"), expect(unused_variables, reason = "for the ODE library alone"))]
 fn judged(subject: &Subject<'_>, id: u32, judge: Judge, lanes: &Lanes) -> Option<Record> {
     match judge {
         Judge::Reference => None,

@@ -2,6 +2,7 @@
 //! what is accepted is valid, and what is refused is told where, what and how to mend it.
 
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 use rattlemap::map::scene::{Axis, Place, Problem, Purpose, Scene, SceneError, Steps};
 use rattlemap_dynamics::model::{GearPair, Parameter};
 
@@ -184,27 +185,40 @@ fn arguments() -> impl Strategy<Value = Vec<String>> {
     prop::collection::vec(one, 0..2)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn mutated_scenes_are_refused_with_a_remedy_or_valid(
-        scene in prop::sample::select(SCENES.to_vec()), mutations in mutations(), sets in arguments(),
-    ) {
-        check(&mutated(scene, &mutations), &sets)?;
+/// Tries values of a strategy, 20,000 of them unless `RATTLEMAP_TORTURE` in the environment asks for others, and says so
+/// in a line that scripts read.
+fn torture<S: Strategy>(strategy: &S, test: impl Fn(S::Value) -> Result<(), TestCaseError>) {
+    let asked = std::env::var("RATTLEMAP_TORTURE").ok().and_then(|count| count.parse().ok());
+    let config = ProptestConfig {
+        cases: asked.unwrap_or(20_000),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    };
+    let cases = config.cases;
+    let ended = TestRunner::new(config).run(strategy, test);
+    println!("torture: scenes {cases}, faults {}", u32::from(ended.is_err()));
+    if let Err(fault) = ended {
+        panic!("{fault}");
     }
+}
 
-    #[test]
-    fn any_text_is_refused_with_a_remedy(text in "\\PC{0,80}(\\n\\PC{0,40}){0,6}") {
-        check(&text, &[])?;
-    }
+#[test]
+fn mutated_scenes_are_refused_with_a_remedy_or_valid() {
+    let scene = prop::sample::select(SCENES.to_vec());
+    torture(&(scene, mutations(), arguments()), |(scene, mutations, sets)| {
+        check(&mutated(scene, &mutations), &sets)
+    });
+}
+
+#[test]
+fn any_text_is_refused_with_a_remedy() {
+    torture(&"\\PC{0,80}(\\n\\PC{0,40}){0,6}", |text| check(&text, &[]));
 }
 
 /// Enough of the mutants are accepted, and every kind of refusal is met.
 #[test]
 fn mutants_reach_both_sides() {
     use proptest::strategy::ValueTree;
-    use proptest::test_runner::TestRunner;
     let mut runner = TestRunner::deterministic();
     let (mut accepted, mut kinds) = (0, std::collections::BTreeSet::new());
     let strategy = (prop::sample::select(SCENES.to_vec()), mutations(), arguments());
