@@ -466,7 +466,7 @@ fn a_map_is_validated_and_its_report_says_so() {
     assert_eq!(sampled, 150);
     assert_eq!(found["states"]["off"]["count"], 0);
     let page = fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(page.contains("\"validation\":{\"format\":1,\"command\":\"validate\""), "no section");
+    assert!(page.contains("\"validation\":{\"format\":2,\"command\":\"validate\""), "no section");
     // The same seed, the same bytes.
     let first = fs::read(out.join("validation.json")).unwrap();
     run(&["--samples", "150", "--seed", "3", "--quiet"]).success().stderr("");

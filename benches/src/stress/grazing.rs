@@ -146,7 +146,9 @@ pub fn judge(rows: &[Row]) -> Verdict {
         .sum();
     let made_up: usize =
         rows.iter().filter(|row| resolved(row) && row.distance < 0.0).map(|row| row.contacts).sum();
-    let worst = rows.iter().map(|row| row.speed_error / row.law).fold(0.0, farther);
+    // Where nothing met the wall there is no speed.
+    let met = rows.iter().filter(|row| row.contacts > 0);
+    let worst = met.map(|row| row.speed_error / row.law).fold(0.0, farther);
     let holds = missed == 0 && made_up == 0 && worst <= 1.0;
     let cells: usize = rows.iter().map(|row| row.cells).sum();
     Verdict {
