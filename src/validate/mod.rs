@@ -35,10 +35,11 @@ pub use states::{HORIZON, Off, StateCheck};
 
 use crate::gpu::Precision;
 use crate::map::plan::Plan;
+use crate::record::classify::classify;
 use crate::record::{Record, valid};
 use cell::Cell;
 use compare::{Answer, Bars, Compared};
-use rattlemap_dynamics::orbit::Budget;
+use rattlemap_dynamics::orbit::{Budget, Class};
 
 /// Cells that a sample has unless something else is asked for.
 pub const DEFAULT_SAMPLES: usize = 400;
@@ -334,7 +335,11 @@ fn replay_cell(subject: &Subject<'_>, id: u32, judge: Judge, lanes: &Lanes, is_u
     {
         // The same question, asked of the judge: may the reference say what it says, within rounding?
         fields = cell.bars.compare(cell.record, &Answer::new(judged, None));
-        kind = differs(&fields).then(|| explain::kind(&cell, &judged, &truth, explain::Lanes::default()));
+        kind = differs(&fields).then(|| match classify(&judged) {
+            // It contradicts nothing.
+            Class::Undecided => Kind::Budget,
+            _ => explain::kind(&cell, &judged, &truth, explain::Lanes::default()),
+        });
     }
     Replayed {
         id,

@@ -16,7 +16,7 @@ use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::output::{Identity, Order, RECORDS, RecordFile, inventory};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
-use rattlemap::validate::{Kind, Lanes, Sample, Stratum, Subject, Validation, replay, sample};
+use rattlemap::validate::{Judge, Kind, Lanes, Sample, Stratum, Subject, Validation, replay, sample};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Class, Status};
@@ -348,6 +348,23 @@ fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
         println!("{precision:?}: {} of {} are off", states.off.len(), states.compared);
         assert!(states.rate().is_too_many(), "{precision:?}: {states:?}");
     }
+}
+
+/// Lanes that leave open within 528 periods what the map's engine decides with more of them.
+#[test]
+fn a_judge_that_decides_nothing_contradicts_nothing() {
+    let (e, omega) = (0.6217008797653959, 2.247311827956989);
+    let sets = ["integration.undecided_periods=1584"];
+    let plan = planned([e, e + 1e-6], [omega, omega + 1e-6], 2, &sets);
+    let records = computed(&plan);
+    assert!(matches!(classify(&records[0]), Class::Periodic { .. }), "{:?}", records[0]);
+    let subject = Subject { plan: &plan, records: &records, precision: Precision::F64, is_lane: false };
+    let mut double = open(Precision::F64);
+    let lanes = pollster::block_on(Lanes::run(&subject, &only(vec![0]), None, Some(&mut *double))).unwrap();
+    let found = replay(&subject, &only(vec![0]), &lanes, &|_| {});
+    assert_eq!(found.judge, Judge::Lanes);
+    let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
+    assert_eq!(kinds, [Kind::Budget], "{:?}", found.mismatches);
 }
 
 /// Chatter meshes one impact sooner in one series of a hundred.
