@@ -25,15 +25,17 @@ const DECIDING: [&str; 12] = [
 ];
 
 /// Packages whose arithmetic, or whose code for a device, goes into a record.
-const PACKAGES: [&str; 10] = [
+const PACKAGES: [&str; 12] = [
     "bytemuck",
     "matrixmultiply",
     "naga",
     "nalgebra",
+    "num-complex",
     "rattlemap-dynamics",
     "safe_arch",
     "simba",
     "wgpu",
+    "wgpu-core",
     "wgpu-hal",
     "wide",
 ];

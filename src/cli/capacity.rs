@@ -24,18 +24,11 @@ pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(
     judge(scene, engine, &Free { memory: free_memory(), disk })
 }
 
-/// Refuses a finished map that this machine cannot read, before anything is allocated for it, or whose files it has
-/// no room to replace one by one.
-pub(crate) fn check_finished(scene: &Scene, engine: EngineChoice, dir: &Path) -> Result<(), Failure> {
-    let free = Free { memory: free_memory(), disk: free_disk(dir) };
-    let size = Size::of(scene);
-    judge_size(
-        scene,
-        engine,
-        &free,
-        Size { disk: size.largest_output, ..size },
-        "use a machine that has as much",
-    )
+/// Refuses a finished map that this machine cannot read, before anything is allocated for it. It is read by the CPU,
+/// whatever made it; files are replaced one by one, and stay as they are where there is no room.
+pub(crate) fn check_finished(scene: &Scene) -> Result<(), Failure> {
+    let free = Free { memory: free_memory(), disk: None };
+    judge_size(scene, EngineChoice::Cpu, &free, Size::of(scene), "use a machine that has as much")
 }
 
 /// Bytes of a folder's files that a map takes the place of.

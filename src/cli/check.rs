@@ -24,7 +24,7 @@ pub(crate) fn run(ask: &Check) -> Result<(), Failure> {
     finished_map::require_folder(dir)?;
     let folder = ask.repair.then(|| Folder::open(dir, true)).transpose()?;
     let (command, listed) = listed(dir)?;
-    let findings = check_files(dir, &listed)?;
+    let findings = check_files(dir, &listed, ask.quiet)?;
     if findings.is_empty() {
         if !ask.quiet {
             let count = listed.len();
@@ -73,7 +73,8 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
     let dir = &ask.folder;
     if command != MAP {
         return Err(Failure::Run(anyhow!(
-            "{}: only the files of a map can be made from its records; run `rattlemap {}` again with --force",
+            "{}: only the files of a map can be made from its records; the command that made the folder (`{}`) makes them \
+             again with --force",
             told(dir, &findings.iter().filter(|finding| finding.is_lost()).collect::<Vec<_>>()),
             command.escape_debug()
         )));
@@ -86,15 +87,15 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
         return Err(Failure::Run(anyhow!(
             "{}: {MANIFEST} is damaged, and cannot be believed; `{}` makes it and every file anew",
             dir.display(),
-            manifest.resume_command(dir)
+            manifest.remake_command(dir)
         )));
     }
     if lost.contains(&RECORDS) {
         return Err(Failure::Run(anyhow!(
-            "{}: {RECORDS} is damaged or missing, and nothing can be made of it; `{}` keeps what is good of it, \
-             computes the rest and makes every file anew",
+            "{}: {RECORDS} is damaged or missing, and nothing can be made of it; `{}` keeps what is good of it, if anything \
+             is, computes the rest and makes every file anew",
             dir.display(),
-            manifest.resume_command(dir)
+            manifest.remake_command(dir)
         )));
     }
     let finished = manifest.scene(dir)?;

@@ -15,7 +15,6 @@ use anyhow::{Context, anyhow};
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::cli::arguments::EngineChoice;
 use crate::cli::capacity;
 use crate::cli::error::Failure;
 use crate::cli::map::{order, quoted, unit};
@@ -104,16 +103,17 @@ impl Manifest {
     pub(crate) fn scene(&self, dir: &Path) -> Result<FinishedMap<'_>, Failure> {
         let name = dir.join(MANIFEST).display().to_string();
         let scene = Scene::parse(&self.scene, &name, &self.set, Purpose::Map)?;
-        let engine = if self.engine == "gpu" { EngineChoice::Gpu } else { EngineChoice::Cpu };
-        capacity::check_finished(&scene, engine, dir)?;
+        capacity::check_finished(&scene)?;
         Ok(FinishedMap { manifest: self, dir: dir.to_owned(), scene })
     }
 
-    /// The command that makes all files anew from what is good of the records.
-    pub(crate) fn resume_command(&self, dir: &Path) -> String {
+    /// The command that makes all files anew: from what is good of the records, if anything is.
+    pub(crate) fn remake_command(&self, dir: &Path) -> String {
+        let is_readable = matches!(Identity::read(&dir.join(RECORDS)), Ok(Some(_)));
+        let how = if is_readable { "--resume" } else { "--force" };
         let sets: String = self.set.iter().map(|set| format!(" --set {}", quoted(set))).collect();
         let out = quoted(&dir.display().to_string());
-        format!("rattlemap map SCENE --out {out}{sets} --resume")
+        format!("rattlemap map SCENE --out {out}{sets} {how}")
     }
 }
 
@@ -147,14 +147,15 @@ impl FinishedMap<'_> {
         let mut schedule = Schedule::new(plan);
         let mut records = vec![Record::default(); plan.run_count()];
         let order = order(&schedule);
-        let take = |batch: &[(u32, Record)]| sweep::replay(&mut schedule, &mut records, batch);
+        let take =
+            |batch: &[(u32, Record)]| plan.admits(batch) && sweep::replay(&mut schedule, &mut records, batch);
         let read = RecordFile::read(&path, &identity, order, take).map_err(unreadable)?;
         let Extent { count, damage, .. } = read;
         let unit = unit(plan);
         if !schedule.is_finished() {
             let cells = schedule.expected();
             let go_on =
-                format!("`{}` keeps them and computes the others", self.manifest.resume_command(&self.dir));
+                format!("`{}` keeps them and computes the others", self.manifest.remake_command(&self.dir));
             let told = damage.as_ref().map_or(String::new(), |damage| format!("{damage}: "));
             let error = anyhow!("{}: {told}{count} of {cells} {unit} are there; {go_on}", path.display());
             return Err(if damage.is_some() { Failure::Run(error) } else { Failure::Usage(error) });
@@ -183,11 +184,11 @@ fn unreadable(error: RecordFileError) -> Failure {
 }
 
 /// Compares a folder's files with their list, and says what is wrong with each.
-pub(crate) fn check_files(dir: &Path, listed: &[FileEntry]) -> Result<Vec<Finding>, Failure> {
+pub(crate) fn check_files(dir: &Path, listed: &[FileEntry], quiet: bool) -> Result<Vec<Finding>, Failure> {
     let findings = inventory::check(dir, listed);
     let findings =
         findings.with_context(|| format!("cannot read {}", dir.display())).map_err(Failure::Run)?;
-    for finding in &findings {
+    for finding in findings.iter().filter(|finding| finding.is_lost() || !quiet) {
         say::note(format_args!("{}: {finding}", dir.display()));
     }
     Ok(findings)

@@ -135,10 +135,10 @@ fn open_records<'f>(
     let path = folder.path().join(RECORDS);
     let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
     let (file, elapsed_before) = if ask.resume && path.is_file() {
-        let Work { schedule, records, .. } = work;
-        let order = order(schedule);
-        let file =
-            RecordFile::resume(&path, &identity, order, |batch| sweep::replay(schedule, records, batch))?;
+        let Work { plan, schedule, records } = work;
+        let (plan, order) = (*plan, order(schedule));
+        let take = |batch: &[(u32, Record)]| plan.admits(batch) && sweep::replay(schedule, records, batch);
+        let file = RecordFile::resume(&path, &identity, order, take)?;
         if let Some(damage) = file.damage() {
             let (path, count, unit) = (path.display(), file.count(), unit(work.plan));
             say::note(format_args!(

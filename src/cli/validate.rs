@@ -27,7 +27,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let folder = Folder::open(dir, true)?;
     folder.refuse_links(output::map::names())?;
     let manifest = Manifest::read(dir)?;
-    let findings = finished_map::check_files(dir, &manifest.files)?;
+    let findings = finished_map::check_files(dir, &manifest.files, ask.quiet)?;
     let finished = manifest.scene(dir)?;
     let plan = finished.plan()?;
     let (records, refined) = finished.records(&plan)?;

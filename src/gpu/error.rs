@@ -44,7 +44,7 @@ pub enum GpuError {
         message: String,
     },
     /// Somebody raised the flag that the device heeds.
-    #[error("stopped on demand; finished cells are kept")]
+    #[error("stopped on demand")]
     Halted,
     /// The device computes something else than what is known.
     #[error(

@@ -231,6 +231,12 @@ impl Plan {
         &self.budget
     }
 
+    /// Whether records may be of this plan's runs: periods that nobody searched for come of damage or malice alone.
+    pub fn admits(&self, kept: &[(u32, Record)]) -> bool {
+        let longest = self.budget.settings.max_period.max(1);
+        kept.iter().all(|(_, record)| record.period <= longest)
+    }
+
     /// How fine the grid of the lanes is at least.
     pub fn steps_per_period(&self) -> Steps {
         self.steps

@@ -49,8 +49,6 @@ pub struct Size {
     pub lane_tables: u64,
     /// Bytes on disk of records and outputs, about.
     pub disk: u64,
-    /// Bytes on disk of the largest output, about: when it is replaced there are two of it.
-    pub largest_output: u64,
 }
 
 impl Size {
@@ -66,7 +64,7 @@ impl Size {
             // One of each quantity, one of attractors.
             Format::Png => PNG * (scene.outputs().quantities.len() as u64 + 1),
         };
-        let per_files = || scene.outputs().files.iter().map(per_file);
+        let per_files: u64 = scene.outputs().files.iter().map(per_file).sum();
         let settings = scene.orbit_settings();
         let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
         let one_cell = periods * PER_PERIOD;
@@ -77,10 +75,7 @@ impl Size {
             memory_per_thread: one_cell,
             flows: if keeps_flows(flow_count(scene), runs) { flow_count(scene) * FLOW } else { 0 },
             lane_tables: lane_tables(scene, runs),
-            disk: runs
-                .saturating_mul(record_on_disk(scene))
-                .saturating_add(cells.saturating_mul(per_files().sum())),
-            largest_output: cells.saturating_mul(per_files().max().unwrap_or(0)),
+            disk: runs.saturating_mul(record_on_disk(scene)).saturating_add(cells.saturating_mul(per_files)),
         }
     }
 

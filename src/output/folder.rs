@@ -3,7 +3,8 @@
 
 mod lock;
 
-use std::fs;
+use std::borrow::Cow;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +19,7 @@ use lock::Lock;
 #[derive(Debug, Error)]
 pub enum FolderError {
     /// Something other than a folder has the name.
-    #[error("--out {}: there is a file of this name; choose another folder with --out", .path.display())]
+    #[error("{}: there is a file of this name; choose another folder", .path.display())]
     NotAFolder {
         /// The folder asked for.
         path: PathBuf,
@@ -34,7 +35,7 @@ pub enum FolderError {
         path: PathBuf,
     },
     /// Another command has the folder.
-    #[error("{}: another run is writing to this folder; wait for it, or choose another one with --out", .path.display())]
+    #[error("{}: another run is writing to this folder; wait for it, or choose another one", .path.display())]
     InUse {
         /// The folder asked for.
         path: PathBuf,
@@ -48,7 +49,7 @@ pub enum FolderError {
         reason: io::Error,
     },
     /// The folder cannot be made, read or written.
-    #[error("--out {}: cannot write there ({reason}); choose another folder with --out", .path.display())]
+    #[error("{}: cannot write there ({reason}); choose another folder", .path.display())]
     NotWritable {
         /// The folder asked for.
         path: PathBuf,
@@ -128,7 +129,9 @@ impl Folder {
         if let Err(reason) = links {
             return Err(OutputError::Write { path: target, reason: reason.into() });
         }
-        let written = write(&partial).and_then(|()| Ok(fs::rename(&partial, &target)?));
+        // On the disk before it has its name, or a power cut leaves an empty file of that name.
+        let whole = || Ok(File::open(&partial)?.sync_all().and_then(|()| fs::rename(&partial, &target))?);
+        let written = write(&partial).and_then(|()| whole());
         if written.is_err() {
             // Best effort: the error that matters is the one already at hand.
             let _ = fs::remove_file(&partial);
@@ -173,17 +176,23 @@ pub(super) fn partial(path: &Path) -> PathBuf {
     path.with_file_name(format!("{PARTIAL}{}", path.file_name().unwrap_or_default().to_string_lossy()))
 }
 
-/// Refuses to write a file through a symbolic link, to wherever that may point.
+/// Refuses to write to what is no plain file: a symbolic link leads anywhere.
 pub(super) fn refuse_link(path: &Path) -> io::Result<()> {
     match fs::symlink_metadata(path) {
-        Ok(data) if data.is_symlink() => {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            Err(io::Error::other(format!(
-                "{name} is a symbolic link, and no file is written through one; remove it"
-            )))
+        Ok(data) if data.is_symlink() => Err(io::Error::other(format!(
+            "{} is a symbolic link, and no file is written through one; remove it",
+            name_of(path)
+        ))),
+        // A pipe would be waited for until somebody reads it.
+        Ok(data) if !data.is_file() => {
+            Err(io::Error::other(format!("{} is no plain file; remove it", name_of(path))))
         }
         _ => Ok(()),
     }
+}
+
+fn name_of(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
 }
 
 /// Whether a folder has nothing in it but its lock.
@@ -273,6 +282,14 @@ mod tests {
             assert!(link.is_symlink() && fs::read_to_string(&outside).unwrap() == "precious", "{name}");
             fs::remove_file(link).unwrap();
         }
+        // A pipe would be waited for.
+        let pipe = inside.join("x.txt");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let folder = Folder::open(&inside, true).unwrap();
+        let named = folder.refuse_links(["x.txt"]).unwrap_err().to_string();
+        assert!(named.contains("x.txt is no plain file"), "{named}");
+        drop(folder);
+        fs::remove_file(pipe).unwrap();
         // The folder itself may be one.
         let link = root.path().join("link");
         std::os::unix::fs::symlink(&inside, &link).unwrap();

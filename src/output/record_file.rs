@@ -207,7 +207,10 @@ fn begin(path: &Path, header: &[u8], of: Option<(&File, &[Range<u64>])>) -> io::
             }
         }
         file.sync_all()?;
-        fs::rename(&partial, path)
+        fs::rename(&partial, path)?;
+        // The name, too; where a system does not let one open a folder it has to do without.
+        let _ = path.parent().map(|folder| File::open(folder).and_then(|folder| folder.sync_all()));
+        Ok(())
     };
     if let Err(reason) = write(&mut file) {
         // Best effort: the error that matters is the one already at hand.

@@ -37,6 +37,11 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes
     if status(claim).is_failure() {
         return if is_reproduced { Kind::Cap } else { Kind::Unexplained };
     }
+    // Early stops spare a costly cell what its judge has no allowance for.
+    if matches!(status(&truth.record), Status::TooStiff | Status::CapEvents) {
+        let is_own = lanes.again.is_some_and(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(claim));
+        return if is_own { Kind::Budget } else { Kind::Unexplained };
+    }
     let is_hidden = |answer: &Answer| is_reproduced && hides_period(cell, claim, answer);
     if is_hidden(truth) {
         return Kind::Border;

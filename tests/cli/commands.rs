@@ -145,7 +145,7 @@ fn files_in_the_way_of_the_output_are_refused() {
         for (out, part) in [("taken", "there is a file of this name"), ("taken/below", "cannot write there")]
         {
             let run = rattlemap(&folder).args(arguments).args(["--out", out, "--force"]).assert();
-            run.code(2).stdout("").stderr(says(&[&format!("--out {out}: {part}"), "choose another folder"]));
+            run.code(2).stdout("").stderr(says(&[&format!("{out}: {part}"), "choose another folder"]));
         }
     }
     assert_eq!(fs::read_to_string(folder.path().join("taken")).unwrap(), "precious");

@@ -350,6 +350,23 @@ fn a_lane_that_misses_one_impact_in_ten_thousand_is_found() {
     }
 }
 
+/// Cells that early stops make cheap enough for their allowance, which their judge, without them, has not.
+#[test]
+fn a_judge_without_an_allowance_says_so() {
+    let light =
+        ["parameters.m1=2e-5", "integration.transient_periods=200", "integration.observed_periods=12"];
+    let plan = planned([0.1, 0.4], [0.4, 0.5], 2, &[&light[..], &["integration.max_period=4"]].concat());
+    let records = computed(&plan);
+    println!("{:?}", records.iter().map(|r| (classify(r), r.status, r.periods_run)).collect::<Vec<_>>());
+    let found = validated(&plan, &records, Precision::F64, false);
+    let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
+    assert!(!kinds.is_empty() && kinds.iter().all(|kind| *kind == Kind::Budget), "{:?}", found.mismatches);
+    // Another's record is still none of this engine's.
+    let mut wrong = records;
+    wrong.iter_mut().for_each(|record| record.impacts_per_period += 1.0);
+    assert_eq!(unexplained(&validated(&plan, &wrong, Precision::F64, false)).len(), wrong.len());
+}
+
 /// Lanes that leave open within 528 periods what the map's engine decides with more of them.
 #[test]
 fn a_judge_that_decides_nothing_contradicts_nothing() {

@@ -292,7 +292,7 @@ impl<'a> Watch<'a> {
                     let at = self.strobes.len() - 1;
                     let found = Found { cycle, seed: seed.clone(), at, distance, reading: OnceCell::new() };
                     // A fixed point that lies in another domain than the motion now is no cycle.
-                    if !is_last && !self.reading(&found)?.closes {
+                    if !is_last && !self.reading(&found).is_ok_and(|reading| reading.closes) {
                         continue;
                     }
                     // The next check will tell whether it is being approached.

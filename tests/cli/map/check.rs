@@ -197,7 +197,7 @@ fn manifests_that_cannot_be_believed_are_refused() {
 
 /// Only integrated records are ever kept.
 #[test]
-fn filled_records_are_refused() {
+fn records_that_no_run_makes_are_refused() {
     let folder = folder();
     map(&folder, &FEW).success();
     let path = folder.path().join("out/s/records.bin");
@@ -208,9 +208,18 @@ fn filled_records_are_refused() {
         true
     };
     RecordFile::read(&path, &identity, Order::Any, take).unwrap();
-    cells.iter_mut().for_each(|(_, record)| record.valid |= valid::FILLED);
-    RecordFile::create(&path, &identity).unwrap().append(&cells).unwrap();
-    let filled = "a record that was filled, where only integrated ones are kept";
-    command(&folder, &["validate", "out/s", "--quiet"]).assert().code(1).stderr(says(&[filled, "--force"]));
-    map(&folder, &[&FEW[..], &["--resume"]].concat()).code(2).stderr(says(&[filled, "--force"]));
+    let filled = |record: &mut Record| record.valid |= valid::FILLED;
+    // A cycle that would take hours to integrate.
+    let endless = |record: &mut Record| record.period = 4_000_000_000;
+    for (spoil, why) in [
+        (&filled as &dyn Fn(&mut Record), "a record that was filled, where only integrated ones are kept"),
+        (&endless, "a batch of cells that nobody asked for"),
+    ] {
+        let mut cells = cells.clone();
+        cells.iter_mut().for_each(|(_, record)| spoil(record));
+        RecordFile::create(&path, &identity).unwrap().append(&cells).unwrap();
+        let run = command(&folder, &["validate", "out/s", "--quiet"]).assert().code(1);
+        run.stderr(says(&[why, "--force"]));
+        map(&folder, &[&FEW[..], &["--resume"]].concat()).code(2).stderr(says(&[why, "--force"]));
+    }
 }
