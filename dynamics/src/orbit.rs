@@ -18,7 +18,9 @@ mod reading;
 mod recurrence;
 mod trace;
 
-pub use analysis::{CHAOS_ERRORS, ESCAPE_GROWTH, analyse, analyse_flow, analyse_over, status_of};
+pub use analysis::{
+    CHAOS_ERRORS, ESCAPE_GROWTH, SHOWN_PERIODS, analyse, analyse_flow, analyse_over, analyse_until, status_of,
+};
 pub use approach::{LINEAR, SHOWN_CYCLES};
 pub use budget::Budget;
 pub use cell::{Measured, NEUTRAL_ORDER, measure, measure_until};

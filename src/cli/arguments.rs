@@ -19,7 +19,7 @@ pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
 /// contact located, cycles named by their word, and the Lyapunov exponent of each.
 ///
 /// All quantities are dimensionless. Exit code 0: done; 1: the run or a validation failed; 2: bad usage or scene,
-/// and nothing was computed.
+/// and nothing was computed; 130: interrupted by Ctrl-C, 143: by SIGTERM.
 #[derive(Debug, Parser)]
 #[command(version, bin_name = "rattlemap", arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
@@ -147,7 +147,7 @@ impl BenchOptions {
 ///
 /// Integrates each cell of the scene's two axes and writes tables (cells.csv, cells.npy), figures
 /// (map.png and others), an interactive page (report.html) and manifest.json. Records go to
-/// records.bin as they are computed: after Ctrl-C (exit code 1) or a crash, --resume goes on from
+/// records.bin as they are computed: after Ctrl-C (exit code 130) or a crash, --resume goes on from
 /// there, and every table and figure comes out byte for byte as if nothing had happened.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the main map with fewer cells:\n  \

@@ -1,6 +1,5 @@
 //! `rattlemap map`: a scene into a folder, resumable at every batch.
 
-mod interrupt;
 mod resume_command;
 mod stopped;
 mod summary;
@@ -25,9 +24,9 @@ use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
 use crate::cli::capacity;
 use crate::cli::engine_choice::{self, Chosen};
 use crate::cli::error::{Failure, fail_if};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
-use interrupt::Interrupt;
 pub(crate) use resume_command::quoted;
 use summary::summary;
 
@@ -39,6 +38,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let plan = Plan::new(&scene);
     plan.check()?;
     let interrupt = Interrupt::listen(ask.run.quiet)?;
+    interrupt.wait_for(Some("the engine is open"));
     let folder = open_folder(ask)?;
     let clock = Instant::now();
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))
@@ -227,7 +227,7 @@ fn integrate(
         progress.report(kept.file.count(), known);
         Ok(())
     };
-    let swept = match interrupt.begin() {
+    let swept = match interrupt.wait_for(Some("what has ended is kept")) {
         true => pollster::block_on(sweep::run(plan, schedule, engine, records, interrupt.raised(), keep)),
         false => Ok(false),
     };
