@@ -162,6 +162,11 @@ pub(crate) struct Map {
     /// Go on with an interrupted run of the same scene
     #[arg(long, conflicts_with = "force")]
     pub(crate) resume: bool,
+
+    /// Also print one JSON object on stdout when the map is done: folder, files, engine, device, classes, statuses,
+    /// seconds, and what was resumed
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// A scene, where its results go, and what to change about it.

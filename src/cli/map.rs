@@ -81,13 +81,18 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         lane_grid,
         refined: refined.clone(),
     };
+    let written = Instant::now();
     let files = output::map::write(&folder, &cells, &run)?;
+    let writing = written.elapsed();
     progress.finish(&format!(
         "{}\n{}: {}",
         summary(&cells, &run, lane_steps, clock.elapsed().as_secs_f64()),
         say::path(folder.path()),
         files.join(", ")
     ));
+    if ask.json {
+        output::map_json::print(folder.path(), &files, &cells, &run, writing)?;
+    }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")
 }
