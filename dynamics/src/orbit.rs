@@ -10,6 +10,7 @@ mod analysis;
 mod approach;
 mod budget;
 mod cell;
+mod instant;
 mod itinerary;
 mod prospects;
 #[cfg(test)]
@@ -24,6 +25,7 @@ pub use analysis::{
 pub use approach::{LINEAR, SHOWN_CYCLES};
 pub use budget::Budget;
 pub use cell::{Measured, NEUTRAL_ORDER, measure, measure_until};
+pub use instant::{LONGEST_TIME, state_at};
 pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;
 

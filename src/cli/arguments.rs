@@ -262,6 +262,11 @@ pub(crate) struct Orbit {
           value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     pub(crate) transient: u32,
 
+    /// Also tell the state at the time T since the start, which is at time 0 and phase 0: exact to
+    /// rounding. Chaos makes much of rounding after some time
+    #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = time)]
+    pub(crate) time: Option<f64>,
+
     /// Print one JSON object instead of a summary
     #[arg(long)]
     pub(crate) json: bool,
@@ -282,6 +287,13 @@ fn state(text: &str) -> Result<State, String> {
     numbers
         .and_then(|numbers| numbers.try_into().ok())
         .ok_or_else(|| "it must be four finite numbers, such as 0.1,0,-0.2,1.5".to_owned())
+}
+
+/// A time as `--time` takes it.
+fn time(text: &str) -> Result<f64, String> {
+    let time = text.trim().parse().ok().filter(|time: &f64| time.is_finite() && *time >= 0.0);
+    // Zero has one sign.
+    time.map(f64::abs).ok_or_else(|| "it must be a finite number, 0 or more: time since the start".to_owned())
 }
 
 impl Orbit {

@@ -43,7 +43,7 @@ const WITHIN_REACH: f64 = 0.3;
 const APPROACH_CHECKS: u32 = 4;
 
 /// Work that one motion may take: about a minute.
-const ALLOWANCE: Allowance<'static> =
+pub(super) const ALLOWANCE: Allowance<'static> =
     Allowance { steps: 1_000_000_000, events: 200_000_000, ..Allowance::UNLIMITED };
 
 /// An undecided motion that has taken this many steps is not observed for longer.
