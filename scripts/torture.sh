@@ -46,7 +46,7 @@ cargo test --quiet -p rattlemap --test cli --test core --no-run
 echo "== kills"
 attack $((60 * scale)) cli killed_runs_can_be_resumed
 echo "== corruptions and cuts"
-attack $((20000 * scale)) cli flipped_bits_cost
+attack $((10000 * scale)) cli flipped_bits_cost
 attack $((5000 * scale)) cli a_file_may_end_anywhere
 echo "== faults of the graphics driver"
 attack $((100 * scale)) cli a_driver_that_fails

@@ -10,6 +10,7 @@ mod analysis;
 mod approach;
 mod budget;
 mod cell;
+mod instant;
 mod itinerary;
 mod prospects;
 #[cfg(test)]
@@ -18,10 +19,13 @@ mod reading;
 mod recurrence;
 mod trace;
 
-pub use analysis::{CHAOS_ERRORS, ESCAPE_GROWTH, analyse, analyse_flow, analyse_over, status_of};
+pub use analysis::{
+    CHAOS_ERRORS, ESCAPE_GROWTH, SHOWN_PERIODS, analyse, analyse_flow, analyse_over, analyse_until, status_of,
+};
 pub use approach::{LINEAR, SHOWN_CYCLES};
 pub use budget::Budget;
 pub use cell::{Measured, NEUTRAL_ORDER, measure, measure_until};
+pub use instant::{LONGEST_TIME, state_at};
 pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;
 

@@ -19,7 +19,7 @@ pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
 /// contact located, cycles named by their word, and the Lyapunov exponent of each.
 ///
 /// All quantities are dimensionless. Exit code 0: done; 1: the run or a validation failed; 2: bad usage or scene,
-/// and nothing was computed.
+/// and nothing was computed; 130: interrupted by Ctrl-C, 143: by SIGTERM.
 #[derive(Debug, Parser)]
 #[command(version, bin_name = "rattlemap", arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
@@ -147,7 +147,7 @@ impl BenchOptions {
 ///
 /// Integrates each cell of the scene's two axes and writes tables (cells.csv, cells.npy), figures
 /// (map.png and others), an interactive page (report.html) and manifest.json. Records go to
-/// records.bin as they are computed: after Ctrl-C (exit code 1) or a crash, --resume goes on from
+/// records.bin as they are computed: after Ctrl-C (exit code 130) or a crash, --resume goes on from
 /// there, and every table and figure comes out byte for byte as if nothing had happened.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the main map with fewer cells:\n  \
@@ -162,6 +162,11 @@ pub(crate) struct Map {
     /// Go on with an interrupted run of the same scene
     #[arg(long, conflicts_with = "force")]
     pub(crate) resume: bool,
+
+    /// Also print one JSON object on stdout when the map is done: folder, files, engine, device, classes, statuses,
+    /// seconds, and what was resumed
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// A scene, where its results go, and what to change about it.
@@ -257,6 +262,11 @@ pub(crate) struct Orbit {
           value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     pub(crate) transient: u32,
 
+    /// Also tell the state at the time T since the start, which is at time 0 and phase 0: exact to
+    /// rounding. Chaos makes much of rounding after some time
+    #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = time)]
+    pub(crate) time: Option<f64>,
+
     /// Print one JSON object instead of a summary
     #[arg(long)]
     pub(crate) json: bool,
@@ -277,6 +287,13 @@ fn state(text: &str) -> Result<State, String> {
     numbers
         .and_then(|numbers| numbers.try_into().ok())
         .ok_or_else(|| "it must be four finite numbers, such as 0.1,0,-0.2,1.5".to_owned())
+}
+
+/// A time as `--time` takes it.
+fn time(text: &str) -> Result<f64, String> {
+    let time = text.trim().parse().ok().filter(|time: &f64| time.is_finite() && *time >= 0.0);
+    // Zero has one sign.
+    time.map(f64::abs).ok_or_else(|| "it must be a finite number, 0 or more: time since the start".to_owned())
 }
 
 impl Orbit {

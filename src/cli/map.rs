@@ -1,6 +1,5 @@
 //! `rattlemap map`: a scene into a folder, resumable at every batch.
 
-mod interrupt;
 mod resume_command;
 mod stopped;
 mod summary;
@@ -25,9 +24,9 @@ use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
 use crate::cli::capacity;
 use crate::cli::engine_choice::{self, Chosen};
 use crate::cli::error::{Failure, fail_if};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
-use interrupt::Interrupt;
 pub(crate) use resume_command::quoted;
 use summary::summary;
 
@@ -39,6 +38,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let plan = Plan::new(&scene);
     plan.check()?;
     let interrupt = Interrupt::listen(ask.run.quiet)?;
+    interrupt.wait_for(Some("the engine is open"));
     let folder = open_folder(ask)?;
     let clock = Instant::now();
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))
@@ -60,6 +60,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         None => Progress::new(total, resumed_cells, unit(&plan), ask.run.quiet),
     };
     integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
+    interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.file.count()));
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
     let Kept { elapsed_before, clock, .. } = kept;
@@ -81,13 +82,18 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         lane_grid,
         refined: refined.clone(),
     };
+    let written = Instant::now();
     let files = output::map::write(&folder, &cells, &run)?;
+    let writing = written.elapsed();
     progress.finish(&format!(
         "{}\n{}: {}",
         summary(&cells, &run, lane_steps, clock.elapsed().as_secs_f64()),
         say::path(folder.path()),
         files.join(", ")
     ));
+    if ask.json {
+        output::map_json::print(folder.path(), &files, &cells, &run, writing)?;
+    }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")
 }
@@ -227,7 +233,7 @@ fn integrate(
         progress.report(kept.file.count(), known);
         Ok(())
     };
-    let swept = match interrupt.begin() {
+    let swept = match interrupt.wait_for(Some("what has ended is kept")) {
         true => pollster::block_on(sweep::run(plan, schedule, engine, records, interrupt.raised(), keep)),
         false => Ok(false),
     };

@@ -9,6 +9,7 @@ mod devices;
 mod engine_choice;
 mod error;
 mod finished_map;
+mod interrupt;
 mod map;
 mod orbit;
 mod processor;

@@ -2,28 +2,67 @@
 
 use std::time::Instant;
 
-use rattlemap_dynamics::orbit::{self, Class};
+use anyhow::anyhow;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
 use super::arguments::{DEFAULT_RESTITUTION, Orbit};
 use super::error::{Failure, fail_if};
+use super::interrupt::Interrupt;
 use crate::map::scene;
-use crate::output::orbit::Asked;
+use crate::output::orbit::{Asked, Instant as At};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     let model = scene::single_cell(DEFAULT_RESTITUTION, &ask.set)?;
+    let flow = Flow::of(&*model)?;
+    check_time(ask.time, flow.period)?;
+    let interrupt = Interrupt::listen(true)?;
     let folder = ask.out.as_ref().map(|dir| Folder::open(dir, ask.force)).transpose()?;
     if let Some(folder) = &folder {
         folder.refuse_links(output::orbit::names())?;
     }
     let clock = Instant::now();
     let (start, settings) = (ask.start(), ask.settings());
-    let orbit = orbit::analyse(&*model, start, &settings)?;
-    let asked = Asked { start, settings, elapsed: clock.elapsed() };
-    output::orbit::print(&*model, &orbit, ask.json)?;
+    let interrupted =
+        || interrupt.failure(anyhow!("interrupted before the motion was decided; nothing was written"));
+    let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(interrupted);
+    let instant = ask.time.map(|time| at(time).map(|state| At { time, state })).transpose()?;
+    let (shown, halt) = (orbit::SHOWN_PERIODS, interrupt.raised());
+    let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(interrupted)?;
+    let asked = Asked { start, settings, elapsed: clock.elapsed(), instant };
+    output::orbit::print(&*model, &orbit, &asked, ask.json)?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
         output::orbit::write(&folder, &*model, &orbit, &asked)?;
     }
     fail_if(failed, "the integration failed; `status` says why")
+}
+
+/// Refuses a time that a minute is not enough for.
+fn check_time(time: Option<f64>, forcing_period: f64) -> Result<(), Failure> {
+    let most = LONGEST_TIME * forcing_period;
+    match time {
+        Some(time) if time > most => Err(Failure::Usage(anyhow!(
+            "--time {time:?}: it must be at most {most:.0}, {LONGEST_TIME:.0} forcing periods, which take a minute"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The state at a time; none once a signal has come.
+fn state_at(
+    model: &dyn Model,
+    flow: &Flow,
+    start: State,
+    time: f64,
+    interrupt: &Interrupt,
+) -> Result<Option<State>, Failure> {
+    orbit::state_at(flow, model.law(), start, time, interrupt.raised()).map_err(|stop| {
+        let status = orbit::status_of(stop).name();
+        Failure::Run(anyhow!(
+            "--time {time:?}: the motion cannot be followed as far ({status}); ask for an earlier time"
+        ))
+    })
 }

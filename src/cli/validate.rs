@@ -1,6 +1,8 @@
 //! `rattlemap validate`: a finished map's folder in, its validation beside it.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use crate::gpu::{self, AdapterChoice, Gpu, Precision};
@@ -15,12 +17,14 @@ use anyhow::{Context, anyhow};
 use crate::cli::arguments::Validate;
 use crate::cli::error::Failure;
 use crate::cli::finished_map::{self, Manifest};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::say;
 
 /// Reads, replays, writes.
 pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let clock = Instant::now();
+    let interrupt = Interrupt::listen(ask.quiet)?;
     let dir = &ask.folder;
     finished_map::require_folder(dir)?;
     // From here on: what is read must not be another map's by the time that something is written.
@@ -42,10 +46,26 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let count = sample.ids().len();
     let tell = |what: &str| (!ask.quiet).then(|| say::note(format_args!("{what}")));
     tell(&format!("running the lanes of {count} cells again"));
-    let (lanes, note) = run_again(&subject, &sample, &manifest.device)?;
+    let interrupted = |done: usize| {
+        let path = dir.display();
+        interrupt
+            .failure(anyhow!("interrupted after {done} of {count} cells, and nothing was written to {path}"))
+    };
+    interrupt.wait_for(Some("the engine is open"));
+    let again = run_again(&subject, &sample, &manifest.device, interrupt.raised());
+    if !interrupt.wait_for(None) {
+        return Err(interrupted(0));
+    }
+    let (lanes, note) = again?;
     tell(&format!("replaying {count} cells"));
     let progress = Progress::new(count, 0, "cells replayed", ask.quiet);
-    let validation = validate::replay(&subject, &sample, &lanes, &|done| progress.report(done, count));
+    let replayed = AtomicUsize::new(0);
+    let report = |done| {
+        replayed.fetch_max(done, Ordering::Relaxed);
+        progress.report(done, count);
+    };
+    let replay = validate::replay_until(&subject, &sample, &lanes, &report, interrupt.raised());
+    let Some(validation) = replay else { return Err(interrupted(replayed.into_inner())) };
     let attractors = coexistence::attractors(&plan, &records);
     let cells = Cells::new(scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
@@ -77,7 +97,12 @@ fn precision(manifest: &Manifest) -> anyhow::Result<Precision> {
 
 /// Runs the sample's lanes again, on the device that made the map or else on the best adapter there is; and in f64
 /// where that can. What is to be said about it, if anything.
-fn run_again(subject: &Subject<'_>, sample: &Sample, made_on: &str) -> Result<(Lanes, String), Failure> {
+fn run_again(
+    subject: &Subject<'_>,
+    sample: &Sample,
+    made_on: &str,
+    halt: &Arc<AtomicBool>,
+) -> Result<(Lanes, String), Failure> {
     let open =
         |precision: Precision, choice: &AdapterChoice| pollster::block_on(Gpu::open(precision, choice)).ok();
     let own = AdapterChoice { name: Some(made_on.to_owned()) };
@@ -100,6 +125,7 @@ fn run_again(subject: &Subject<'_>, sample: &Sample, made_on: &str) -> Result<(L
         true => None,
         false => open(Precision::F64, &own).or_else(|| open(Precision::F64, &AdapterChoice::default())),
     };
+    gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.heed(halt));
     let lanes = pollster::block_on(Lanes::run(subject, sample, gpu.as_mut(), double.as_mut()))
         .context("cannot run the sample's lanes again")?;
     Ok((lanes, note))

@@ -1,6 +1,6 @@
 //! Section points against one parameter, as in Fig. 5 of the paper.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
@@ -50,15 +50,30 @@ pub fn run(
     settings: &Settings,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Column>, ModelError> {
+    let columns = run_until(cells, start, settings, progress, &AtomicBool::new(false))?;
+    // Nobody raises the flag.
+    Ok(columns.unwrap_or_default())
+}
+
+/// [`run`] until a flag is raised; none if it was before the last column ended.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_until(
+    cells: &[(f64, Box<dyn Model>)],
+    start: Start,
+    settings: &Settings,
+    progress: &(dyn Fn(usize) + Sync),
+    halt: &AtomicBool,
+) -> Result<Option<Vec<Column>>, ModelError> {
     cells.iter().try_for_each(|(_, model)| Flow::validate(&**model).map(|_| ()))?;
     match start {
-        Start::Rest => side_by_side(cells, REST, settings, progress),
-        Start::State(state) => side_by_side(cells, state, settings, progress),
-        Start::Up => follow(cells.iter(), settings, progress),
+        Start::Rest => side_by_side(cells, REST, settings, progress, halt),
+        Start::State(state) => side_by_side(cells, state, settings, progress, halt),
+        Start::Up => follow(cells.iter(), settings, progress, halt),
         Start::Down => {
-            let mut columns = follow(cells.iter().rev(), settings, progress)?;
-            columns.reverse();
-            Ok(columns)
+            let columns = follow(cells.iter().rev(), settings, progress, halt)?;
+            Ok(columns.map(|columns| columns.into_iter().rev().collect()))
         }
     }
 }
@@ -68,14 +83,15 @@ fn side_by_side(
     start: State,
     settings: &Settings,
     progress: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<Column>, ModelError> {
+    halt: &AtomicBool,
+) -> Result<Option<Vec<Column>>, ModelError> {
     let done = AtomicUsize::new(0);
     cells
         .par_iter()
         .map(|(value, model)| {
-            let (column, _) = column(*value, &**model, start, settings)?;
+            let Some((column, _)) = column(*value, &**model, start, settings, halt)? else { return Ok(None) };
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-            Ok(column)
+            Ok(Some(column))
         })
         .collect()
 }
@@ -84,27 +100,32 @@ fn follow<'a>(
     cells: impl Iterator<Item = &'a (f64, Box<dyn Model>)>,
     settings: &Settings,
     progress: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<Column>, ModelError> {
+    halt: &AtomicBool,
+) -> Result<Option<Vec<Column>>, ModelError> {
     let mut start = REST;
     cells
         .enumerate()
         .map(|(i, (value, model))| {
-            let (column, end) = column(*value, &**model, start, settings)?;
+            let Some((column, end)) = column(*value, &**model, start, settings, halt)? else {
+                return Ok(None);
+            };
             start = end;
             progress(i + 1);
-            Ok(column)
+            Ok(Some(column))
         })
         .collect()
 }
 
-/// One column, and a state on its attractor to start the next one from.
+/// One column, and a state on its attractor to start the next one from; none once the flag is raised.
 fn column(
     value: f64,
     model: &dyn Model,
     start: State,
     settings: &Settings,
-) -> Result<(Column, State), ModelError> {
-    let orbit = orbit::analyse_over(model, start, settings, settings.observed_periods)?;
+    halt: &AtomicBool,
+) -> Result<Option<(Column, State)>, ModelError> {
+    let shown = settings.observed_periods;
+    let Some(orbit) = orbit::analyse_until(model, start, settings, shown, halt)? else { return Ok(None) };
     let end = if orbit.class == Class::Failed { REST } else { orbit.strobe };
     let points = orbit
         .events
@@ -117,5 +138,5 @@ fn column(
             after: event.after,
         })
         .collect();
-    Ok((Column { value, class: orbit.class, status: orbit.status, points }, end))
+    Ok(Some((Column { value, class: orbit.class, status: orbit.status, points }, end)))
 }

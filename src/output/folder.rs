@@ -63,10 +63,35 @@ pub enum FolderError {
 pub struct Folder {
     path: PathBuf,
     _lock: Lock,
+    // Dropped after the lock, whose file lies in it.
+    _made: Made,
+}
+
+/// Folders that were made for a run, outermost first; those that hold nothing in the end go again.
+#[derive(Debug)]
+struct Made(Vec<PathBuf>);
+
+impl Made {
+    /// Makes a folder and those around it.
+    fn folders(path: &Path) -> io::Result<Made> {
+        let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+        let mut missing: Vec<PathBuf> = path.ancestors().take_while(is_missing).map(Path::to_owned).collect();
+        missing.reverse();
+        let made = Made(missing);
+        fs::create_dir_all(path).map(|()| made)
+    }
+}
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        // The operating system removes no folder that holds anything.
+        let _ = self.0.iter().rev().try_for_each(fs::remove_dir);
+    }
 }
 
 impl Folder {
-    /// Makes the folder if need be and takes its lock.
+    /// Makes the folder if need be and takes its lock. A folder that was made here and holds nothing in the end goes
+    /// again.
     ///
     /// # Errors
     /// [`FolderError`] if it cannot be written, another command has it, or it has something in it and `force` is not
@@ -77,13 +102,14 @@ impl Folder {
             return Err(FolderError::NotAFolder { path });
         }
         // The lock's file shows that others can be written, too.
-        match fs::create_dir_all(&path).and_then(|()| Lock::take(&path)) {
+        let taken = Made::folders(&path).and_then(|made| Ok((Lock::take(&path)?, made)));
+        match taken {
             Err(reason) => Err(FolderError::NotWritable { path, reason }),
-            Ok(None) => Err(FolderError::InUse { path }),
-            Ok(Some(lock)) => match is_empty(&path) {
+            Ok((None, _)) => Err(FolderError::InUse { path }),
+            Ok((Some(lock), made)) => match is_empty(&path) {
                 Err(reason) => Err(FolderError::NotWritable { path, reason }),
                 Ok(false) if !force => Err(FolderError::NotEmpty { path }),
-                Ok(_) => Ok(Folder { path, _lock: lock }),
+                Ok(_) => Ok(Folder { path, _lock: lock, _made: made }),
             },
         }
     }
@@ -220,6 +246,21 @@ mod tests {
         assert!(matches!(Folder::open(&path, false), Err(FolderError::NotEmpty { .. })));
         Folder::open(&path, true).unwrap().remove(&["x.txt", "absent.txt"]).unwrap();
         Folder::open(&path, false).unwrap();
+    }
+
+    #[test]
+    fn folders_that_hold_nothing_go_again() {
+        let root = tempfile::tempdir().unwrap();
+        let [outer, inner] = ["a", "a/b/c"].map(|name| root.path().join(name));
+        drop(Folder::open(&inner, false).unwrap());
+        assert!(!outer.exists());
+        fs::create_dir(&outer).unwrap();
+        drop(Folder::open(&inner, false).unwrap());
+        assert_eq!(fs::read_dir(&outer).unwrap().count(), 0, "what was there before stays");
+        let folder = Folder::open(&inner, false).unwrap();
+        fs::write(root.path().join("a/b/x"), "").unwrap();
+        drop(folder);
+        assert!(root.path().join("a/b/x").exists() && !inner.exists());
     }
 
     #[test]

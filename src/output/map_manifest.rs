@@ -272,7 +272,7 @@ fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> IntegrationObject 
     }
 }
 
-fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
+pub(super) fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
     let mut counts: BTreeMap<_, _> = Status::ALL.iter().map(|&s| (names::status(s), 0)).collect();
     for status in cells.statuses() {
         *counts.entry(names::status(status)).or_default() += 1;
@@ -280,7 +280,7 @@ fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
     counts
 }
 
-fn tally(list: &[u8]) -> BTreeMap<u8, usize> {
+pub(super) fn tally(list: &[u8]) -> BTreeMap<u8, usize> {
     let mut counts = BTreeMap::new();
     list.iter().for_each(|&count| *counts.entry(count).or_default() += 1);
     counts

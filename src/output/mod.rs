@@ -14,6 +14,7 @@ mod layers;
 pub mod manifest;
 pub mod map;
 mod map_figure;
+pub mod map_json;
 mod map_manifest;
 mod names;
 pub mod orbit;

@@ -1,7 +1,7 @@
 //! One orbit on the terminal and in its folder: `orbit.json` and figures.
 
 use std::fs;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant as Clock};
 
 use serde::Serialize;
 
@@ -51,6 +51,17 @@ pub struct Asked {
     pub settings: Settings,
     /// How long it took.
     pub elapsed: Duration,
+    /// Where the motion is at the time that was asked for.
+    pub instant: Option<Instant>,
+}
+
+/// A state and its time since the start.
+#[derive(Clone, Copy, Debug)]
+pub struct Instant {
+    /// Since the start at phase 0.
+    pub time: f64,
+    /// Then.
+    pub state: State,
 }
 
 /// Every file that an orbit may write.
@@ -62,8 +73,9 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 ///
 /// # Errors
 /// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
-pub fn print(model: &dyn Model, orbit: &Orbit, json: bool) -> Result<(), OutputError> {
-    let text = if json { to_json(model, orbit)? } else { summary(model, orbit) };
+pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Result<(), OutputError> {
+    let text =
+        if json { to_json(model, orbit, asked.instant)? } else { summary(model, orbit, asked.instant) };
     super::print(&text)
 }
 
@@ -72,11 +84,11 @@ pub fn print(model: &dyn Model, orbit: &Orbit, json: bool) -> Result<(), OutputE
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
 pub fn write(folder: &Folder, model: &dyn Model, orbit: &Orbit, asked: &Asked) -> Result<usize, OutputError> {
-    let clock = Instant::now();
+    let clock = Clock::now();
     // Figures of an earlier orbit must not stand beside this one.
     folder.remove(&[MANIFEST, JSON])?;
     folder.remove(&orbit_figures::NAMES)?;
-    let json = to_json(model, orbit)?;
+    let json = to_json(model, orbit, asked.instant)?;
     folder.replace(JSON, |path| Ok(fs::write(path, json + "\n")?))?;
     let mut files = vec![JSON];
     if orbit.class != Class::Failed {

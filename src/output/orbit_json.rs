@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::names;
+use super::orbit::Instant;
 use super::parameters::Parameters;
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{Event, Orbit};
@@ -29,6 +30,11 @@ struct OrbitObject<'a> {
     periods_run: u64,
     strobe: Vec<f64>,
     events: Vec<EventObject>,
+    /// Since the start, as asked for, and the state then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    state: Option<Vec<f64>>,
 }
 
 #[derive(Serialize)]
@@ -59,7 +65,11 @@ impl EventObject {
 ///
 /// # Errors
 /// None that an [`Orbit`] can cause; serialisation is fallible by signature.
-pub(super) fn to_json(model: &dyn Model, orbit: &Orbit) -> serde_json::Result<String> {
+pub(super) fn to_json(
+    model: &dyn Model,
+    orbit: &Orbit,
+    instant: Option<Instant>,
+) -> serde_json::Result<String> {
     let components = model.state_names().len();
     let shown = |state: State| state[..components].to_vec();
     serde_json::to_string_pretty(&OrbitObject {
@@ -79,5 +89,7 @@ pub(super) fn to_json(model: &dyn Model, orbit: &Orbit) -> serde_json::Result<St
         periods_run: orbit.periods_run,
         strobe: shown(orbit.strobe),
         events: orbit.events.iter().map(|event| EventObject::new(event, shown)).collect(),
+        time: instant.map(|instant| instant.time),
+        state: instant.map(|instant| shown(instant.state)),
     })
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::names;
+use super::orbit::Instant;
 use rattlemap_dynamics::model::{Model, Side};
 use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
 
@@ -10,9 +11,10 @@ use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
 const DECIMALS: usize = 5;
 
 /// A summary of the orbit of a model in lines of aligned text.
-pub(super) fn summary(model: &dyn Model, orbit: &Orbit) -> String {
+pub(super) fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     let mut text = String::new();
-    for (label, value) in facts(model, orbit) {
+    let instant = instant.map(|instant| ("state".to_owned(), at(model, instant)));
+    for (label, value) in facts(model, orbit).into_iter().chain(instant) {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{label:<22}{value}");
     }
@@ -26,6 +28,13 @@ pub(super) fn summary(model: &dyn Model, orbit: &Orbit) -> String {
     let _ = writeln!(text, "\nevents over {span} (T = {:.DECIMALS$})", orbit.forcing_period);
     text.push_str(&events(model, &orbit.events));
     text
+}
+
+/// In all digits, since it was asked for by itself.
+fn at(model: &dyn Model, instant: Instant) -> String {
+    let values = model.state_names().into_iter().zip(instant.state);
+    let values: Vec<String> = values.map(|(name, value)| format!("{name}={value:?}")).collect();
+    format!("{} at t = {:?}", values.join(" "), instant.time)
 }
 
 fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {

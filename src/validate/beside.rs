@@ -11,7 +11,7 @@ use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Class, Status};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{Allowance, Happening, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// A record of a cycle as it would be on the cycle, if the reference confirms its exponent where it stands; none
@@ -22,7 +22,8 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
     if record.valid & said != said || !record.strobe.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let seed = Trajectory::<0>::new(&cell.flow, cell.law, record.strobe);
+    let seed = Trajectory::<0>::new(&cell.flow, cell.law, record.strobe)
+        .allowing(Allowance::UNLIMITED.until(cell.halt));
     let cycle = refine(&seed, StrobeMap::Periods(period))?;
     let is_slow = status(record) == Status::Slow;
     let reach = if is_slow { rules::near() } else { rules::ON_CYCLE };
@@ -59,7 +60,8 @@ fn may_be_read(cell: &Cell<'_>, state: State, said: f64, period: u32) -> bool {
 
 /// Whether an event of a cycle lies on phase 0, as far as the engine can tell.
 pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
-    let mut trajectory = Trajectory::<0>::new(&cell.flow, cell.law, state);
+    let mut trajectory =
+        Trajectory::<0>::new(&cell.flow, cell.law, state).allowing(Allowance::UNLIMITED.until(cell.halt));
     let mut met: Vec<Happening> = Vec::new();
     if (0..period).any(|_| trajectory.advance_period(&mut met).is_err()) {
         return false;

@@ -1,5 +1,7 @@
 //! One cell, and what the reference can be asked about it.
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::{Matrix4, Vector4};
 
 use super::Subject;
@@ -14,8 +16,8 @@ use crate::record::classify::{classify, status};
 use crate::record::distance::{self, farther};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, State};
-use rattlemap_dynamics::orbit::{Budget, Class, Status, measure};
-use rattlemap_dynamics::reference::Trajectory;
+use rattlemap_dynamics::orbit::{Budget, Class, Status, measure_until};
+use rattlemap_dynamics::reference::{Allowance, Trajectory};
 use rattlemap_dynamics::stability::{UNIT, multipliers};
 
 /// What a precision resolves of a motion or a parameter, relative to its size: some roundings, since errors gather
@@ -50,19 +52,22 @@ pub(super) struct Cell<'a> {
     pub(super) precision: Precision,
     resolution: f64,
     seed: u64,
+    /// Once it is raised, answers are of no use.
+    pub(super) halt: &'a AtomicBool,
 }
 
 /// A cell that is the same within the engine's resolution.
-pub(super) struct Moved {
+pub(super) struct Moved<'a> {
     flow: Box<Flow>,
     law: Law,
     start: State,
     resolution: f64,
     random: Random,
+    halt: &'a AtomicBool,
 }
 
 impl<'a> Cell<'a> {
-    pub(super) fn new(subject: &Subject<'a>, id: u32) -> Cell<'a> {
+    pub(super) fn new(subject: &Subject<'a>, id: u32, halt: &'a AtomicBool) -> Cell<'a> {
         let plan = subject.plan;
         let cell = plan.cell(id);
         let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
@@ -78,6 +83,7 @@ impl<'a> Cell<'a> {
             resolution: resolution(subject.precision),
             seed: u64::from(id) << 32,
             flow,
+            halt,
         }
     }
 
@@ -103,7 +109,8 @@ impl<'a> Cell<'a> {
 
     /// What the engine of the reference says of the cell, early stops and all.
     pub(super) fn again(&self, needs: &Needs) -> Record {
-        measured_record(&measure(&self.flow, self.law, self.start, &self.budget), needs)
+        let measured = measure_until(&self.flow, self.law, self.start, &self.budget, self.halt);
+        measured.map_or(Record::default(), |measured| measured_record(&measured, needs))
     }
 
     /// A budget of so many periods.
@@ -122,14 +129,16 @@ impl<'a> Cell<'a> {
     }
 
     fn reached(&self, flow: &Flow, law: Law, start: State) -> Answer {
-        let answer = answer(flow, law, start, &self.whole_budget(1));
-        let followed = || self::answer(flow, law, start, &self.whole_budget(FOLLOWED));
+        let answer = answer(flow, law, start, &self.whole_budget(1), self.halt);
+        let followed = || self::answer(flow, law, start, &self.whole_budget(FOLLOWED), self.halt);
         match classify(&answer.record) {
             Class::Periodic { .. } if status(&answer.record) == Status::Slow => {
                 let later = followed();
                 if classify(&later.record) == classify(&answer.record) { answer } else { later }
             }
-            Class::Undecided => self::answer(flow, law, start, &self.budget_of(self.budget.longest())),
+            Class::Undecided => {
+                self::answer(flow, law, start, &self.budget_of(self.budget.longest()), self.halt)
+            }
             _ => answer,
         }
     }
@@ -151,13 +160,13 @@ impl<'a> Cell<'a> {
     /// The same after so many periods.
     pub(super) fn moved_after(&self, k: u64, periods: u32) -> Option<Answer> {
         let moved = self.moved(k)?;
-        Some(answer(&moved.flow, moved.law, moved.start, &self.budget_of(periods)))
+        Some(answer(&moved.flow, moved.law, moved.start, &self.budget_of(periods), self.halt))
     }
 
     /// The same when it may take far longer than the plan allows.
     pub(super) fn moved_at_leisure(&self, k: u64) -> Option<Answer> {
         let moved = self.moved(k)?;
-        Some(answer(&moved.flow, moved.law, moved.start, &self.whole_budget(FOLLOWED)))
+        Some(answer(&moved.flow, moved.law, moved.start, &self.whole_budget(FOLLOWED), self.halt))
     }
 
     /// Averages over the periods that a record of chaos averages, from a start that is the same within the resolution.
@@ -166,13 +175,14 @@ impl<'a> Cell<'a> {
         let mut budget = self.budget_of(periods);
         let from = self.budget.exponent_from().min(periods / 2);
         (budget.settings.transient_periods, budget.settings.observed_periods) = (from, periods - from);
-        Some(answer(&moved.flow, moved.law, moved.start, &budget).record)
+        Some(answer(&moved.flow, moved.law, moved.start, &budget, self.halt).record)
     }
 
     /// Where the reference is after so many periods, and where it is from starts that are the same within the
     /// resolution if every period rounds.
     pub(super) fn states(&self, count: u64, periods: u32) -> Option<(State, Vec<State>)> {
-        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start);
+        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start)
+            .allowing(Allowance::UNLIMITED.until(self.halt));
         (0..periods).try_for_each(|_| trajectory.advance_period(&mut ())).ok()?;
         let moved = (0..count).filter_map(|k| self.moved(k)?.shaken(periods));
         Some((trajectory.state(), moved.collect()))
@@ -180,7 +190,8 @@ impl<'a> Cell<'a> {
 
     /// Whether a cycle through a state closes before so many periods, by no more than the resolution makes of it.
     pub(super) fn closes_earlier(&self, state: State, period: u32) -> bool {
-        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, state);
+        let mut trajectory =
+            Trajectory::<0>::new(&self.flow, self.law, state).allowing(Allowance::UNLIMITED.until(self.halt));
         let mut earlier = f64::INFINITY;
         for n in 1..period {
             if trajectory.advance_period(&mut ()).is_err() {
@@ -214,7 +225,8 @@ impl<'a> Cell<'a> {
     ) -> impl Iterator<Item = Trajectory<'_, N>> {
         (0..TURNS).filter_map(move |k| {
             let mut random = Random::new(self.seed ^ k);
-            let begun = Trajectory::<0>::new(&self.flow, self.law, state);
+            let begun = Trajectory::<0>::new(&self.flow, self.law, state)
+                .allowing(Allowance::UNLIMITED.until(self.halt));
             let mut trajectory = begun.carrying(tangents);
             for _ in 0..periods {
                 trajectory.advance_period(&mut ()).ok()?;
@@ -238,7 +250,7 @@ impl<'a> Cell<'a> {
     }
 
     /// The `k`th cell, at random, that is the same within the resolution: every parameter and the start are moved.
-    fn moved(&self, k: u64) -> Option<Moved> {
+    fn moved(&self, k: u64) -> Option<Moved<'_>> {
         let mut random = Random::new(self.seed ^ k);
         let mut model = self.model.clone();
         let units = self.units(&self.record.strobe);
@@ -261,14 +273,15 @@ impl<'a> Cell<'a> {
             self.start[i] + self.resolution * units[i % 2] * (2.0 * random.unit() - 1.0)
         });
         let flow = Box::new(Flow::new(&model.oscillator().ok()?));
-        Some(Moved { flow, law: model.law(), start, resolution: self.resolution, random })
+        Some(Moved { flow, law: model.law(), start, resolution: self.resolution, random, halt: self.halt })
     }
 }
 
-impl Moved {
+impl Moved<'_> {
     /// Where it is after so many periods if the state is moved within the resolution at each.
     fn shaken(&mut self, periods: u32) -> Option<State> {
-        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start);
+        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start)
+            .allowing(Allowance::UNLIMITED.until(self.halt));
         for _ in 0..periods {
             trajectory.advance_period(&mut ()).ok()?;
             trajectory.shake(shares(&mut self.random, self.resolution));
@@ -282,7 +295,9 @@ fn shares(random: &mut Random, resolution: f64) -> [f64; 4] {
     std::array::from_fn(|_| resolution * (2.0 * random.unit() - 1.0))
 }
 
-fn answer(flow: &Flow, law: Law, start: State, budget: &Budget) -> Answer {
-    let measured = measure(flow, law, start, budget);
+fn answer(flow: &Flow, law: Law, start: State, budget: &Budget, halt: &AtomicBool) -> Answer {
+    let Some(measured) = measure_until(flow, law, start, budget, halt) else {
+        return Answer::new(Record::default(), None);
+    };
     Answer::new(measured_record(&measured, &Needs::EVERYTHING), measured.word.as_ref())
 }

@@ -8,6 +8,8 @@
 pub mod dop853;
 pub mod flight;
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nalgebra::Matrix4;
 
 use crate::map::plan::Plan;
@@ -39,13 +41,15 @@ const LEAST_MULTIPLIER: f64 = 1e-4;
 
 /// A motion that is followed from strobe to strobe.
 #[derive(Clone)]
-struct Strobed {
+struct Strobed<'a> {
     solver: Solver,
     period: f64,
     flight: Flight,
     /// The last event before this period.
     before: Option<Ended>,
     tally: Tally,
+    /// Once it is raised, the motion is lost.
+    halt: &'a AtomicBool,
 }
 
 /// What was met on the way.
@@ -56,19 +60,23 @@ struct Tally {
     symbols: Vec<u8>,
 }
 
-impl Strobed {
-    fn new(oscillator: &Oscillator, law: Law, start: State) -> Strobed {
+impl Strobed<'_> {
+    fn new<'a>(oscillator: &Oscillator, law: Law, start: State, halt: &'a AtomicBool) -> Strobed<'a> {
         Strobed {
             solver: Solver { omega: oscillator.omega, tolerance: TOLERANCE },
             period: oscillator.period(),
             flight: Flight::new(oscillator, law, start),
             before: None,
             tally: Tally::default(),
+            halt,
         }
     }
 
     /// One forcing period; none for a motion that is lost.
     fn advance(&mut self) -> Option<()> {
+        if self.halt.load(Ordering::Relaxed) {
+            return None;
+        }
         let meshed = self.flight.meshing().is_some();
         self.solver.advance(&mut self.flight, 0.0, self.period)?;
         let mut meshing_since = meshed.then_some(0.0);
@@ -102,12 +110,17 @@ fn symbol(before: Ended, side: Side) -> u8 {
 
 /// What a run's cell is; none where nothing is claimed of it.
 pub fn record(plan: &Plan, id: u32, records: &[Record]) -> Option<Record> {
-    let cell = plan.cell(id);
-    follow(&plan.oscillator(cell.flow), plan.law(cell.law), plan.start(id, records), plan.budget())
+    record_until(plan, id, records, &super::NEVER)
 }
 
-fn follow(oscillator: &Oscillator, law: Law, start: State, budget: &Budget) -> Option<Record> {
-    let mut motion = Strobed::new(oscillator, law, start);
+/// [`record`] until a flag is raised; none if it was by then.
+pub(super) fn record_until(plan: &Plan, id: u32, records: &[Record], halt: &AtomicBool) -> Option<Record> {
+    let cell = plan.cell(id);
+    let (oscillator, start) = (plan.oscillator(cell.flow), plan.start(id, records));
+    follow(Strobed::new(&oscillator, plan.law(cell.law), start, halt), &oscillator, plan.budget())
+}
+
+fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> Option<Record> {
     let kept = 2 * budget.settings.max_period as usize + 1;
     let mut strobes = Vec::new();
     for _ in 0..budget.periods() {

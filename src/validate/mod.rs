@@ -22,7 +22,7 @@ mod rate;
 mod sample;
 mod states;
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
@@ -240,6 +240,32 @@ pub fn replay(
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
 ) -> Validation {
+    replay_whole(subject, sample, lanes, report, &NEVER)
+}
+
+/// [`replay`] until a flag is raised; none if it was by then.
+pub fn replay_until(
+    subject: &Subject<'_>,
+    sample: &Sample,
+    lanes: &Lanes,
+    report: &(dyn Fn(usize) + Sync),
+    halt: &AtomicBool,
+) -> Option<Validation> {
+    let validation = replay_whole(subject, sample, lanes, report, halt);
+    (!halt.load(Ordering::Relaxed)).then_some(validation)
+}
+
+/// A flag that nobody raises.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+/// What comes back once `halt` is raised is of no use.
+fn replay_whole(
+    subject: &Subject<'_>,
+    sample: &Sample,
+    lanes: &Lanes,
+    report: &(dyn Fn(usize) + Sync),
+    halt: &AtomicBool,
+) -> Validation {
     let judge = judge(subject, lanes);
     let (done, ids) = (AtomicUsize::new(0), sample.ids());
     let uniform = &sample.draws.iter().find(|draw| draw.stratum == Stratum::Uniform);
@@ -248,10 +274,17 @@ pub fn replay(
         .par_iter()
         // Cells differ a thousandfold in cost: no task holds more than one.
         .with_max_len(1)
-        .map(|&id| {
-            let replayed = replay_cell(subject, id, judge, lanes, uniform.binary_search(&id).is_ok());
-            report(done.fetch_add(1, Ordering::Relaxed) + 1);
-            replayed
+        .filter_map(|&id| {
+            let is_halted = || halt.load(Ordering::Relaxed);
+            if is_halted() {
+                return None;
+            }
+            let cell = Cell::new(subject, id, halt);
+            let replayed = replay_cell(subject, &cell, id, judge, lanes, uniform.binary_search(&id).is_ok());
+            (!is_halted()).then(|| {
+                report(done.fetch_add(1, Ordering::Relaxed) + 1);
+                replayed
+            })
         })
         .collect();
     let again = again(&mut replayed);
@@ -274,7 +307,7 @@ pub fn replay(
         again,
         agreement: agreement.to_vec(),
         chaos: chaos::tests(&chaos),
-        states: has_states.then(|| states::check(subject, lanes.states())),
+        states: has_states.then(|| states::check(subject, lanes.states(), halt)),
         mismatches,
         not_finite: not_finite(subject),
     }
@@ -310,35 +343,41 @@ fn judge(subject: &Subject<'_>, lanes: &Lanes) -> Judge {
 
 /// What a judge beside the reference says of a cell of the reference's own map.
 #[cfg_attr(not(feature = "independent"), expect(unused_variables, reason = "for the ODE library alone"))]
-fn judged(subject: &Subject<'_>, id: u32, judge: Judge, lanes: &Lanes) -> Option<Record> {
+fn judged(subject: &Subject<'_>, cell: &Cell<'_>, id: u32, judge: Judge, lanes: &Lanes) -> Option<Record> {
     match judge {
         Judge::Reference => None,
         Judge::Lanes => lanes.double(id).copied(),
         #[cfg(feature = "independent")]
-        Judge::Independent => independent::record(subject.plan, id, subject.records),
+        Judge::Independent => independent::record_until(subject.plan, id, subject.records, cell.halt),
         #[cfg(not(feature = "independent"))]
         Judge::Independent => None,
     }
 }
 
-fn replay_cell(subject: &Subject<'_>, id: u32, judge: Judge, lanes: &Lanes, is_uniform: bool) -> Replayed {
-    let cell = Cell::new(subject, id);
+fn replay_cell(
+    subject: &Subject<'_>,
+    cell: &Cell<'_>,
+    id: u32,
+    judge: Judge,
+    lanes: &Lanes,
+    is_uniform: bool,
+) -> Replayed {
     let own = (!subject.is_lane).then(|| cell.again(subject.plan.needs()));
     let again = own.as_ref().or(lanes.again(id));
     let truth = cell.truth();
     let mut fields = cell.bars.compare(cell.record, &truth);
     let differs = |fields: &[Compared]| fields.iter().any(|(_, differs)| differs.is_some());
     let ran = explain::Lanes { again, whole: lanes.whole(id), double: lanes.double(id) };
-    let mut kind = differs(&fields).then(|| explain::kind(&cell, cell.record, &truth, ran));
+    let mut kind = differs(&fields).then(|| explain::kind(cell, cell.record, &truth, ran));
     if kind.is_none()
-        && let Some(judged) = judged(subject, id, judge, lanes)
+        && let Some(judged) = judged(subject, cell, id, judge, lanes)
     {
         // The same question, asked of the judge: may the reference say what it says, within rounding?
         fields = cell.bars.compare(cell.record, &Answer::new(judged, None));
         kind = differs(&fields).then(|| match classify(&judged) {
             // It contradicts nothing.
             Class::Undecided => Kind::Budget,
-            _ => explain::kind(&cell, &judged, &truth, explain::Lanes::default()),
+            _ => explain::kind(cell, &judged, &truth, explain::Lanes::default()),
         });
     }
     Replayed {
@@ -346,7 +385,7 @@ fn replay_cell(subject: &Subject<'_>, id: u32, judge: Judge, lanes: &Lanes, is_u
         again: again.map(|again| bytemuck::bytes_of(again) == bytemuck::bytes_of(cell.record)),
         fields,
         kind,
-        chaos: is_uniform.then(|| chaos::differences(&cell)).flatten(),
+        chaos: is_uniform.then(|| chaos::differences(cell)).flatten(),
     }
 }
 

@@ -10,6 +10,8 @@ use super::cell::{Cell, resolution};
 use super::rate::Rate;
 use crate::record::distance::farther;
 use rattlemap_dynamics::model::State;
+use std::sync::atomic::AtomicBool;
+
 use rayon::prelude::*;
 
 /// Forcing periods after which states are compared: few enough for chaos to be foreseen.
@@ -55,10 +57,10 @@ impl StateCheck {
 }
 
 /// Compares the states of lanes after [`HORIZON`] periods; none for a lane that failed.
-pub(super) fn check(subject: &Subject<'_>, lanes: &[(u32, Option<State>)]) -> StateCheck {
+pub(super) fn check(subject: &Subject<'_>, lanes: &[(u32, Option<State>)], halt: &AtomicBool) -> StateCheck {
     let told: Vec<Off> = lanes
         .par_iter()
-        .filter_map(|&(id, state)| compare(&Cell::new(subject, id), id, state?, subject))
+        .filter_map(|&(id, state)| compare(&Cell::new(subject, id, halt), id, state?, subject))
         .collect();
     let (off, right): (Vec<Off>, Vec<Off>) = told.into_iter().partition(|lane| lane.distance > lane.bar);
     let mut distances: Vec<f64> = right.iter().map(|lane| lane.distance).collect();

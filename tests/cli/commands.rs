@@ -119,7 +119,7 @@ fn bad_set_is_refused_and_names_itself() {
 
 #[test]
 fn bad_orbit_requests_are_refused() {
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 12] = [
         (&["--start", "0,0,0"], "it must be four finite numbers"),
         (&["--start", "0,0,0,inf"], "it must be four finite numbers"),
         (
@@ -127,7 +127,15 @@ fn bad_orbit_requests_are_refused() {
             "--set e=1.5: `parameters.e = 1.5` is out of range: it must be between 0 and 1",
         ),
         (&["--set", "e=nan"], "`parameters.e = nan` is out of range"),
-        (&["--set", "mass=1"], "--set mass=1: unknown field `parameters.mass = 1`; valid names: m1"),
+        (
+            &["--set", "mass=1"],
+            "--set mass=1: unknown field `parameters.mass = 1`; valid names: m1 (equivalent mass of gear 1), m2 (",
+        ),
+        (&["--time", "-1"], "it must be a finite number, 0 or more"),
+        (&["--time", "inf"], "it must be a finite number, 0 or more"),
+        (&["--time", "nan"], "it must be a finite number, 0 or more"),
+        (&["--time", "1e300"], "--time 1e300: it must be at most 33659921, 30000000 forcing periods"),
+        (&["--set", "E=0.6"], "did you mean `e`? valid names: m1 (equivalent mass of gear 1), m2 ("),
         (&["--periods", "1"], "2..=10000000"),
         (&["--force"], "--out <DIR>"),
     ];
@@ -220,6 +228,31 @@ fn orbit_summary_is_for_the_eye() {
         "mesh_end",
         "Floquet",
     ]));
+}
+
+/// From the start, not from where the motion has settled.
+#[test]
+fn orbit_tells_the_state_at_a_time() {
+    use rattlemap::flow::Flow;
+    use rattlemap::model::GearPair;
+    use rattlemap::reference::Trajectory;
+    let at = |arguments: &[&str]| {
+        let fixed = ["orbit", "--start", "0.125,0,-0.25,1.5", "--time"];
+        rattlemap(&folder()).args(fixed).args(arguments).assert().success().get_output().stdout.clone()
+    };
+    let pair = GearPair::paper(0.605);
+    let flow = Flow::new(&pair.oscillator().unwrap());
+    let mut trajectory = Trajectory::new(&flow, pair.law(), [0.125, 0.0, -0.25, 1.5]);
+    (0..3).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
+    trajectory.advance_to(0.5, &mut ()).unwrap();
+    let time = format!("{:?}", 3.0 * flow.period + 0.5);
+    let orbit: serde_json::Value = serde_json::from_slice(&at(&[&time, "--json"])).unwrap();
+    assert_eq!(orbit["time"], 3.0 * flow.period + 0.5);
+    for (told, expected) in orbit["state"].as_array().unwrap().iter().zip(trajectory.state()) {
+        assert!((told.as_f64().unwrap() - expected).abs() < 1e-12, "{told} {expected}");
+    }
+    let text = String::from_utf8(at(&["0"])).unwrap();
+    assert!(text.contains("x1=0.125 v1=0.0 x2=-0.25 v2=1.5 at t = 0.0\n"), "{text}");
 }
 
 #[test]

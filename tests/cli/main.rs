@@ -4,6 +4,8 @@ mod bench;
 mod commands;
 #[cfg(unix)]
 mod faults;
+#[cfg(unix)]
+mod interrupts;
 mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;

@@ -1,5 +1,7 @@
 //! Deciding what a cell's motion is.
 
+use std::sync::atomic::AtomicBool;
+
 use super::approach::{HULL_CYCLES, LINEAR, SHOWN_CYCLES, stays};
 use super::itinerary::Recorder;
 use super::reading::Reading;
@@ -12,7 +14,7 @@ use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap};
 use crate::word::Word;
 
 /// Forcing periods whose events are shown where the motion is not periodic.
-const SHOWN_PERIODS: u32 = 8;
+pub const SHOWN_PERIODS: u32 = 8;
 
 /// Standard errors by which an exponent must exceed zero to be called chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
@@ -41,7 +43,7 @@ const WITHIN_REACH: f64 = 0.3;
 const APPROACH_CHECKS: u32 = 4;
 
 /// Work that one motion may take: about a minute.
-const ALLOWANCE: Allowance<'static> =
+pub(super) const ALLOWANCE: Allowance<'static> =
     Allowance { steps: 1_000_000_000, events: 200_000_000, ..Allowance::UNLIMITED };
 
 /// An undecided motion that has taken this many steps is not observed for longer.
@@ -77,12 +79,26 @@ pub fn analyse_over(
     Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, shown_periods))
 }
 
+/// [`analyse_over`] until a flag is raised; none if it was by then.
+///
+/// # Errors
+/// As [`analyse`].
+pub fn analyse_until(
+    model: &dyn Model,
+    start: State,
+    settings: &Settings,
+    shown_periods: u32,
+    halt: &AtomicBool,
+) -> Result<Option<Orbit>, ModelError> {
+    let (flow, allowance) = (Flow::of(model)?, ALLOWANCE.until(halt));
+    let analysis = Analysis { flow: &flow, law: model.law(), settings, shown_periods, allowance };
+    let orbit = analysis.orbit(start);
+    Ok((!allowance.is_halted()).then_some(orbit))
+}
+
 /// [`analyse_over`] on a flow that is at hand: maps share one among many cells.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, shown_periods: u32) -> Orbit {
-    let analysis = Analysis { flow, law, settings, shown_periods };
-    let mut periods_run = 0;
-    let run = analysis.run(start, &mut periods_run);
-    Orbit { periods_run, ..run.unwrap_or_else(|stop| failed(status_of(stop), start, flow.period)) }
+    Analysis { flow, law, settings, shown_periods, allowance: ALLOWANCE }.orbit(start)
 }
 
 /// The status that a stop gives a motion.
@@ -130,12 +146,21 @@ pub(super) struct Analysis<'a> {
     pub(super) law: Law,
     pub(super) settings: &'a Settings,
     pub(super) shown_periods: u32,
+    /// What the motion may take.
+    pub(super) allowance: Allowance<'a>,
 }
 
 impl Analysis<'_> {
+    fn orbit(&self, start: State) -> Orbit {
+        let mut periods_run = 0;
+        let run = self.run(start, &mut periods_run);
+        let orbit = run.unwrap_or_else(|stop| failed(status_of(stop), start, self.flow.period));
+        Orbit { periods_run, ..orbit }
+    }
+
     /// Counts in `periods_run` how long the motion is followed.
     fn run(&self, start: State, periods_run: &mut u64) -> Result<Orbit, Stop> {
-        let mut trajectory = Trajectory::new(self.flow, self.law, start).allowing(ALLOWANCE);
+        let mut trajectory = Trajectory::new(self.flow, self.law, start).allowing(self.allowance);
         for _ in 0..self.settings.transient_periods {
             trajectory.advance_period(&mut ())?;
             *periods_run += 1;

@@ -101,7 +101,7 @@ fn measure_within(
     allowance: Allowance<'_>,
 ) -> Measured {
     let settings = &budget.settings;
-    let analysis = Analysis { flow, law, settings, shown_periods: 0 };
+    let analysis = Analysis { flow, law, settings, shown_periods: 0, allowance };
     let mut watch = Watch {
         analysis: &analysis,
         budget,

@@ -30,6 +30,7 @@ fn command(ask: &Map, engine: EngineOptions, last: &str) -> String {
     }
     words.extend(engine.precision.map(|precision| format!("--precision {}", precision.name())));
     words.extend(ask.run.set.iter().map(|set| format!("--set {}", quoted(set))));
+    words.extend(ask.json.then(|| "--json".to_owned()));
     words.push(last.to_owned());
     words.join(" ")
 }

@@ -100,7 +100,7 @@ fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axi
     let section = Section::open(table.node, &table.path, &FIELDS)?;
     let field = section.require("parameter", "name one of the model's parameters")?;
     let name = field.text()?;
-    let index = model.index(name).map_err(|_| field.unknown_name(name, &names(model)))?;
+    let index = model.index(name).map_err(|_| field.unknown_among(name, &names(model), &meanings(model)))?;
     let parameter = model.parameters()[index].clone();
     if let Some(i) = before.iter().position(|axis| axis.index == index) {
         return Err(field.conflict(format!("axis {i} sweeps it already; name another parameter")));
@@ -136,7 +136,7 @@ pub(super) fn read_parameters(
     model: &dyn Model,
     axes: &[Axis],
 ) -> Result<Box<dyn Model>, SceneError> {
-    let section = root.section("parameters", &names(model))?;
+    let section = root.section_among("parameters", &names(model), &meanings(model))?;
     let mut base = model.boxed();
     for (index, parameter) in model.parameters().iter().enumerate() {
         let name = &*parameter.name;
@@ -165,6 +165,12 @@ pub(super) fn read_parameters(
 
 fn names(model: &dyn Model) -> Vec<&str> {
     model.parameters().iter().map(|parameter| &*parameter.name).collect()
+}
+
+/// The parameters with what they mean, as a list within a sentence.
+fn meanings(model: &dyn Model) -> String {
+    let of = |parameter: &Parameter| format!("{} ({})", parameter.name, parameter.meaning);
+    model.parameters().iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 /// The name of axis `i`'s parameter.

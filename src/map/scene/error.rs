@@ -146,9 +146,8 @@ pub enum Problem {
     },
 }
 
-/// The sentence for an unknown name: the nearest known one, if any is near, and all of them.
-pub(super) fn suggest(name: &str, known: &[&str]) -> String {
-    let all = known.join(", ");
+/// The sentence for an unknown name: the nearest known one, if any is near, and `all` of them, listed.
+pub(super) fn suggest(name: &str, known: &[&str], all: &str) -> String {
     let length = name.chars().count();
     // One slip per three letters; a name that is all slips resembles nothing.
     let most = (length / 3).max(1).min(length.saturating_sub(1));

@@ -16,6 +16,11 @@ pub(super) struct Section<'a> {
 impl<'a> Section<'a> {
     /// Opens the table `node` that stands at `path` and may have the fields `known`.
     pub(super) fn open(node: &'a Node, path: &str, known: &[&str]) -> Result<Self, SceneError> {
+        Section::open_among(node, path, known, &known.join(", "))
+    }
+
+    /// The same where `all` says what the known names mean.
+    fn open_among(node: &'a Node, path: &str, known: &[&str], all: &str) -> Result<Self, SceneError> {
         let Value::Table(table) = &node.value else {
             return Err(Field { path: path.to_owned(), node }.wrong_type(&format!("a table, [{path}]")));
         };
@@ -24,9 +29,9 @@ impl<'a> Section<'a> {
         let Some((name, node)) = unknown.next() else { return Ok(section) };
         // One is shown; a list of thousands would help nobody.
         let remedy = match unknown.count() {
-            0 => suggest(name, known),
-            1 => format!("{}; 1 more field beside it is unknown", suggest(name, known)),
-            more => format!("{}; {more} more fields beside it are unknown", suggest(name, known)),
+            0 => suggest(name, known, all),
+            1 => format!("{}; 1 more field beside it is unknown", suggest(name, known, all)),
+            more => format!("{}; {more} more fields beside it are unknown", suggest(name, known, all)),
         };
         let problem = Problem::UnknownField {
             field: section.path_of(&shorten(name)),
@@ -38,8 +43,18 @@ impl<'a> Section<'a> {
 
     /// Opens the table `name` inside this one; if it is absent every field has its default.
     pub(super) fn section(&self, name: &str, known: &[&str]) -> Result<Section<'a>, SceneError> {
+        self.section_among(name, known, &known.join(", "))
+    }
+
+    /// The same where `all` says what the known names mean.
+    pub(super) fn section_among(
+        &self,
+        name: &str,
+        known: &[&str],
+        all: &str,
+    ) -> Result<Section<'a>, SceneError> {
         match self.get(name) {
-            Some(field) => Section::open(field.node, &field.path, known),
+            Some(field) => Section::open_among(field.node, &field.path, known, all),
             None => Ok(Section { path: self.path_of(name), place: self.place.clone(), table: None }),
         }
     }
@@ -175,8 +190,13 @@ impl<'a> Field<'a> {
     }
 
     pub(super) fn unknown_name(&self, name: &str, known: &[&str]) -> SceneError {
+        self.unknown_among(name, known, &known.join(", "))
+    }
+
+    /// The same where `all` says what the known names mean.
+    pub(super) fn unknown_among(&self, name: &str, known: &[&str], all: &str) -> SceneError {
         let (field, value) = self.named();
-        self.error(Problem::UnknownName { field, value, remedy: suggest(name, known) })
+        self.error(Problem::UnknownName { field, value, remedy: suggest(name, known, all) })
     }
 
     fn named(&self) -> (String, String) {

@@ -148,7 +148,7 @@ fn unknown_fields_get_a_suggestion() {
         ("title =", "titel =", "s.toml:1:1: unknown field `titel = \"A scene\"`; did you mean `title`?"),
         ("[integration]", "[integraton]", "s.toml:13:2: unknown field `integraton = { ... }`; did you mean"),
         ("F = ", "omgea = ", "s.toml:5:1: unknown field `parameters.omgea = 50.0`; did you mean `omega`?"),
-        ("F = ", "f = ", "did you mean `F`? valid names: m1, m2,"),
+        ("F = ", "f = ", "did you mean `F`? valid names: m1 (equivalent mass of gear 1), m2 ("),
         ("count =", "cuont =", "s.toml:11:1: unknown field `axis.0.cuont = 4`; did you mean `count`?"),
         ("max_period", "max_periods", "s.toml:18:1: unknown field `integration.max_periods = 4`"),
         (

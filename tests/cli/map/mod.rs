@@ -5,6 +5,7 @@ mod check;
 mod engines;
 mod folders;
 mod interrupts;
+mod json;
 mod records;
 mod streams;
 mod torture;

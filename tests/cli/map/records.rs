@@ -251,6 +251,13 @@ fn nothing_kept_is_begun_anew() {
     begun(".rattlemap-probe", b"");
 }
 
+#[test]
+fn a_folder_that_is_not_there_is_begun_anew_and_says_so() {
+    let folder = folder();
+    let run = map(&folder, &["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--resume"]).success();
+    run.stderr(says(&["out/s: nothing was kept there yet; the map is begun anew", "12 of 12 cells"]));
+}
+
 /// The time that a map took is that of all its runs.
 #[test]
 fn elapsed_time_adds_up() {

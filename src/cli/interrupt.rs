@@ -1,8 +1,8 @@
 //! Ctrl-C and SIGTERM: the first one asks a run to end, the second one ends it.
 
 use std::process;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::Context;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -15,16 +15,30 @@ use crate::cli::say;
 pub(super) struct Interrupt {
     raised: Arc<AtomicBool>,
     signal: Arc<AtomicI32>,
-    /// Whether cells are under way by now.
-    integrating: Arc<AtomicBool>,
+    /// What has to be over before the command can end, if that may take a while.
+    waits_for: Arc<Mutex<Option<&'static str>>>,
+    /// What is said where nothing has to be over.
+    last_words: Arc<Mutex<Option<String>>>,
 }
 
 impl Interrupt {
     /// Listens from now on. A second signal ends the process at once, which record files survive.
+    ///
+    /// # Errors
+    /// If the operating system refuses.
     #[cfg(unix)]
     pub(super) fn listen(quiet: bool) -> Result<Interrupt, Failure> {
         let interrupt = Interrupt::default();
         let heard = interrupt.clone();
+        for signal in [SIGINT, SIGTERM] {
+            // In the handler itself: the thread below may wait for a terminal that takes no more text.
+            signal_hook::flag::register_conditional_shutdown(
+                signal,
+                SIGNALLED + signal,
+                Arc::clone(&interrupt.raised),
+            )
+            .context("cannot listen for signals")?;
+        }
         let mut signals =
             signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
         std::thread::spawn(move || signals.forever().for_each(|signal| heard.hear(signal, quiet)));
@@ -32,6 +46,9 @@ impl Interrupt {
     }
 
     /// Listens from now on.
+    ///
+    /// # Errors
+    /// If the operating system refuses.
     #[cfg(not(unix))]
     pub(super) fn listen(_: bool) -> Result<Interrupt, Failure> {
         let interrupt = Interrupt::default();
@@ -51,22 +68,37 @@ impl Interrupt {
     #[cfg(unix)]
     fn hear(&self, signal: i32, quiet: bool) {
         self.signal.store(signal, Ordering::Relaxed);
-        if self.raised.swap(true, Ordering::Relaxed) {
+        self.raised.store(true, Ordering::Relaxed);
+        if let Some(words) = &*self.last_words.lock().unwrap_or_else(PoisonError::into_inner) {
+            say::note(format_args!("error: interrupted; {words}"));
             process::exit(SIGNALLED + signal);
         }
-        let once = match self.integrating.load(Ordering::Relaxed) {
-            true => "what has ended is kept",
-            false => "the engine is open",
-        };
-        if !quiet {
-            say::note(format_args!("stopping as soon as {once}; Ctrl-C again ends at once"));
+        if quiet {
+            return;
         }
+        let once = self
+            .waits_for
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .map(|what| format!(" as soon as {what}"));
+        say::note(format_args!("stopping{}; Ctrl-C again ends at once", once.unwrap_or_default()));
     }
 
-    /// Says that cells are under way; false if nobody wants them any more.
-    pub(super) fn begin(&self) -> bool {
-        self.integrating.store(true, Ordering::Relaxed);
-        !self.raised.load(Ordering::Relaxed)
+    /// Says what a signal waits for from now on: nothing that takes long, or the end of `what`. False if one has
+    /// come already.
+    pub(super) fn wait_for(&self, what: Option<&'static str>) -> bool {
+        *self.waits_for.lock().unwrap_or_else(PoisonError::into_inner) = what;
+        !self.is_raised()
+    }
+
+    /// From now on a signal ends the process at once, and these words tell how to go on: all that took long is kept.
+    pub(super) fn ends_at_once(&self, words: String) {
+        *self.last_words.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
+    }
+
+    /// Whether a signal has come.
+    pub(super) fn is_raised(&self) -> bool {
+        self.raised.load(Ordering::Relaxed)
     }
 
     /// The flag that is raised.

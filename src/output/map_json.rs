@@ -1,0 +1,84 @@
+//! `map --json`: what a map came to, as one object; its fields are a contract.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::cells::Cells;
+use super::map_manifest::{RefinementObject, Run, statuses, tally};
+use super::{OutputError, names};
+use crate::map::plan::count_classes;
+
+#[derive(Serialize)]
+struct MapObject<'a> {
+    /// As it was named.
+    folder: String,
+    files: &'a [String],
+    engine: &'a str,
+    precision: &'a str,
+    device: &'a str,
+    cells: usize,
+    /// One per cell and start.
+    runs: usize,
+    classes: BTreeMap<&'static str, usize>,
+    statuses: BTreeMap<&'static str, usize>,
+    /// Cells by the number of attractors that their starts found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    attractors: Option<BTreeMap<u8, usize>>,
+    refinement: Option<RefinementObject>,
+    /// Forcing periods integrated.
+    periods: u64,
+    resumed: ResumedObject,
+    seconds: SecondsObject,
+}
+
+/// What an earlier run had done; zero where there was none.
+#[derive(Serialize)]
+struct ResumedObject {
+    runs: usize,
+    seconds: f64,
+}
+
+/// Of this run alone.
+#[derive(Serialize)]
+struct SecondsObject {
+    open: f64,
+    integrate: f64,
+    write: f64,
+}
+
+/// Prints to stdout what `run` has made of a map in a folder: `files` by name, written in so long.
+///
+/// # Errors
+/// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
+pub fn print(
+    folder: &Path,
+    files: &[String],
+    cells: &Cells<'_>,
+    run: &Run<'_>,
+    writing: Duration,
+) -> Result<(), OutputError> {
+    let object = MapObject {
+        folder: folder.to_string_lossy().into_owned(),
+        files,
+        engine: run.engine,
+        precision: run.precision,
+        device: run.device,
+        cells: cells.counts().iter().product(),
+        runs: cells.runs(),
+        classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
+        statuses: statuses(cells),
+        attractors: cells.attractors().map(tally),
+        refinement: run.refined.as_ref().map(RefinementObject::from),
+        periods: cells.periods(),
+        resumed: ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() },
+        seconds: SecondsObject {
+            open: run.opening.as_secs_f64(),
+            integrate: run.elapsed.as_secs_f64(),
+            write: writing.as_secs_f64(),
+        },
+    };
+    super::print(&serde_json::to_string_pretty(&object)?)
+}

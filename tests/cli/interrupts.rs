@@ -1,0 +1,84 @@
+//! Commands that keep nothing on their way, asked to stop: no folder is left, and how they ended is said.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// Cells that would take minutes each.
+const SLOW: &str = "parameters = { r1 = 0, r2 = 0 }\n\
+    axis = [{ parameter = 'e', min = 0.4, max = 0.8, count = 5 }]\n\
+    integration = { transient_periods = 1_000_000 }\n";
+
+/// Cells that a map decides at once, and whose whole budget takes minutes.
+const LONG: &str = "axis = [{ parameter = 'e', min = 0.6, max = 0.62, count = 4 }, \
+                    { parameter = 'omega', min = 5.6, max = 5.7, count = 2 }]\n\
+    integration = { transient_periods = 1_000_000 }\n";
+
+fn rattlemap(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("rattlemap"));
+    command.current_dir(folder).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    // No driver: opening one takes seconds, in which nothing can be stopped.
+    command.env("VK_DRIVER_FILES", "none").env("VK_ICD_FILENAMES", "none");
+    command
+}
+
+/// Sends a command a signal once it is at work, and expects that it ends soon, says how and is silent on stdout.
+#[track_caller]
+fn stops(folder: &Path, arguments: &[&str], says: &str) {
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        let run = rattlemap(folder, arguments).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(1000));
+        let clock = Instant::now();
+        Command::new("kill").args([signal, &run.id().to_string()]).status().unwrap();
+        let ended = run.wait_with_output().unwrap();
+        let (waited, said) = (clock.elapsed(), String::from_utf8(ended.stderr).unwrap());
+        assert_eq!(ended.status.code(), Some(code), "{said}");
+        assert!(waited < Duration::from_secs(2), "{waited:?}: {said}");
+        assert!(said.contains(says) && ended.stdout.is_empty(), "{said}");
+    }
+}
+
+fn folder(scene: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), scene).unwrap();
+    folder
+}
+
+#[test]
+fn a_diagram_that_is_stopped_leaves_no_folder() {
+    let folder = folder(SLOW);
+    for start in ["rest", "up"] {
+        let start = format!("start.policy={start}");
+        let says = "error: interrupted after 0 of 5 columns, and none is kept; nothing was written to out/s";
+        stops(folder.path(), &["bifurcation", "s.toml", "--set", &start], says);
+        assert!(!folder.path().join("out").exists());
+    }
+}
+
+#[test]
+fn an_orbit_that_is_stopped_leaves_no_folder() {
+    let folder = folder(SLOW);
+    let says = "error: interrupted before the motion was decided; nothing was written";
+    stops(folder.path(), &["orbit", "--transient", "1000000000", "--out", "a/b"], says);
+    assert!(!folder.path().join("a").exists());
+}
+
+#[test]
+fn a_validation_that_is_stopped_leaves_the_map_as_it_was() {
+    let folder = folder(LONG);
+    let made = rattlemap(folder.path(), &["map", "s.toml", "--engine", "cpu", "--quiet"]).output().unwrap();
+    assert!(made.status.success(), "{made:?}");
+    let names = || {
+        let entries = fs::read_dir(folder.path().join("out/s")).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    let before = names();
+    let says = " of 8 cells, and nothing was written to out/s";
+    stops(folder.path(), &["validate", "out/s"], says);
+    assert_eq!(names(), before);
+}
