@@ -10,6 +10,7 @@ mod engine_choice;
 mod error;
 mod finished_map;
 mod map;
+mod models;
 mod orbit;
 mod processor;
 mod progress;
@@ -37,6 +38,7 @@ pub fn run() -> ExitCode {
         Command::Map(ask) => map::run(&ask),
         Command::Orbit(ask) => orbit::run(&ask),
         Command::Bifurcation(ask) => bifurcation::run(&ask),
+        Command::Models(ask) => models::run(&ask),
         Command::Devices => devices::run(),
         Command::Validate(ask) => validate::run(&ask),
         Command::Check(ask) => check::run(&ask),

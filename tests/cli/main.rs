@@ -7,4 +7,5 @@ mod faults;
 mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;
+mod models;
 mod text;
