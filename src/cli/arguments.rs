@@ -73,6 +73,7 @@ pub(crate) enum Command {
     Map(Map),
     Orbit(Orbit),
     Bifurcation(Bifurcation),
+    Models(Models),
     /// What there is to compute on: adapters, precisions, limits, and what `--engine auto` takes
     ///
     /// A map is tried for a moment on each engine where nothing else decides. WGPU_ADAPTER_NAME (part of
@@ -323,6 +324,19 @@ impl Orbit {
 pub(crate) struct Bifurcation {
     #[command(flatten)]
     pub(crate) run: SceneOptions,
+}
+
+/// What can be swept: the models, or one of them on a page
+///
+/// Without a name: every model in one line. With one: equations, contact law, parameters with defaults and
+/// ranges, symbols of words, classes and statuses, the source.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    rattlemap models gear-pair")]
+pub(crate) struct Models {
+    /// The model
+    #[arg(value_name = "NAME")]
+    pub(crate) name: Option<String>,
 }
 
 /// How right a finished map is: a sample of its cells, judged by what did not make them

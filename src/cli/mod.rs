@@ -11,6 +11,7 @@ mod error;
 mod finished_map;
 mod interrupt;
 mod map;
+mod models;
 mod orbit;
 mod processor;
 mod progress;
@@ -38,6 +39,7 @@ pub fn run() -> ExitCode {
         Command::Map(ask) => map::run(&ask),
         Command::Orbit(ask) => orbit::run(&ask),
         Command::Bifurcation(ask) => bifurcation::run(&ask),
+        Command::Models(ask) => models::run(&ask),
         Command::Devices => devices::run(),
         Command::Validate(ask) => validate::run(&ask),
         Command::Check(ask) => check::run(&ask),

@@ -9,4 +9,5 @@ mod interrupts;
 mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;
+mod models;
 mod text;
