@@ -9,6 +9,7 @@ use crate::map::printable::is_printable;
 use crate::validate::DEFAULT_SAMPLES;
 use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
 use rattlemap_dynamics::orbit::Settings;
 
@@ -81,6 +82,7 @@ pub(crate) enum Command {
     Devices,
     Validate(Validate),
     Check(Check),
+    Completions(Completions),
     /// Measurements: how fast are maps on this machine's engines?
     ///
     /// Writes tables (CSV), figures (PNG) and manifest.json to a folder of its own.
@@ -391,6 +393,44 @@ pub(crate) struct Check {
     /// Say nothing unless something is wrong
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+/// What a shell needs to complete this command line, or its page for man, on stdout
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    rattlemap completions bash > ~/.local/share/bash-completion/completions/rattlemap\n  \
+    rattlemap completions man > ~/.local/share/man/man1/rattlemap.1")]
+pub(crate) struct Completions {
+    /// The shell, or man
+    #[arg(value_name = "SHELL")]
+    pub(crate) target: CompletionTarget,
+}
+
+/// Who wants to know of the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CompletionTarget {
+    Bash,
+    Elvish,
+    Fish,
+    #[value(name = "powershell")]
+    PowerShell,
+    Zsh,
+    /// A page for man
+    Man,
+}
+
+impl CompletionTarget {
+    /// The shell; none for man.
+    pub(crate) fn shell(self) -> Option<Shell> {
+        match self {
+            CompletionTarget::Bash => Some(Shell::Bash),
+            CompletionTarget::Elvish => Some(Shell::Elvish),
+            CompletionTarget::Fish => Some(Shell::Fish),
+            CompletionTarget::PowerShell => Some(Shell::PowerShell),
+            CompletionTarget::Zsh => Some(Shell::Zsh),
+            CompletionTarget::Man => None,
+        }
+    }
 }
 
 #[cfg(test)]

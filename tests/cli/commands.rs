@@ -201,6 +201,35 @@ fn every_command_has_help_with_an_example() {
 }
 
 #[test]
+fn shells_and_man_are_told_of_every_command() {
+    let told = |target: &str| {
+        let run = rattlemap(&folder()).args(["completions", target]).assert().success().stderr("");
+        String::from_utf8(run.get_output().stdout.clone()).unwrap()
+    };
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = told(shell);
+        for word in ["bifurcation", "validate", "resume", "repair"] {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+    let page = told("man");
+    assert!(page.contains(".TH rattlemap 1"), "{page}");
+    for word in ["rattlemap bifurcation", "rattlemap bench engines", "transient", "repair"] {
+        assert!(page.contains(word), "{word}: {page}");
+    }
+    // As a shell reads it.
+    let script = folder();
+    let path = script.path().join("rattlemap");
+    fs::write(&path, told("bash")).unwrap();
+    let ask = ". ./rattlemap; COMP_WORDS=(rattlemap map --res); COMP_CWORD=2; _rattlemap rattlemap --res map; \
+               echo \"${COMPREPLY[@]}\"";
+    if let Ok(run) = std::process::Command::new("bash").args(["-c", ask]).current_dir(&script).output() {
+        assert_eq!(String::from_utf8_lossy(&run.stdout).trim(), "--resume", "{run:?}");
+    }
+    rattlemap(&folder()).args(["completions", "tcsh"]).assert().code(2).stderr(says(&["bash", "man"]));
+}
+
+#[test]
 fn orbit_json_has_the_fields_of_the_contract() {
     let run = rattlemap(&folder()).args(["orbit", "--json"]).assert().success();
     let printed = &run.get_output().stdout;
