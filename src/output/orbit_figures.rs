@@ -2,6 +2,7 @@
 
 mod heading;
 mod motion;
+mod symbols;
 
 use std::path::{Path, PathBuf};
 
@@ -11,11 +12,12 @@ use self::motion::{Motion, Piece};
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{
-    Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MESHING, Marker, Rect, SMALL, Shape, save_figure, wall_color,
+    Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MEDIUM, MESHING, Marker, Rect, SMALL, Shape, save_figure,
+    wall_color,
 };
 use super::{DrawError, FigureError, OutputError};
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
-use rattlemap_dynamics::orbit::{EventKind, Orbit, Sample};
+use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Sample};
 
 /// The files that [`write`] makes.
 pub(super) const NAMES: [&str; 3] = ["phase_plane.png", "time_history.png", "gap.png"];
@@ -25,6 +27,8 @@ const LEFT: f64 = 130.0;
 const BETWEEN: f64 = 150.0;
 /// Room for the walls' names beside the gap.
 const WALL_NAMES: f64 = 97.0;
+/// Between a symbol of the word and its flight.
+const SYMBOL_AWAY: f64 = 30.0;
 const LINE: f64 = 2.2;
 const MESHING_LINE: f64 = 4.0;
 /// Opacity of the bands that show when the teeth mesh.
@@ -62,6 +66,7 @@ pub(super) fn write_each(
         bodies: model.bodies(),
         oscillator: model.oscillator()?,
         motion: Motion::new(orbit, trace),
+        cycle: matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods)),
         title: heading::parameters(model),
         subtitle: heading::character(orbit),
     };
@@ -78,6 +83,8 @@ struct Scene<'a> {
     bodies: Vec<&'a str>,
     oscillator: Oscillator,
     motion: Motion,
+    /// Forcing periods after which it comes round; none if it does not.
+    cycle: Option<f64>,
     title: String,
     subtitle: String,
 }
@@ -173,9 +180,28 @@ impl Scene<'_> {
         let at = |t: f64, state: &State| (t, self.gap(state));
         self.draw_lines(canvas, &frame, (DARK, MESHING), at)?;
         self.draw_markers(canvas, &frame, false, at)?;
+        self.draw_symbols(canvas, &frame)?;
         frame.draw_axes(canvas, split == bottom)?;
         if split < bottom {
             self.draw_penetration(canvas, Rect { top: split + 30.0, ..panel })?;
+        }
+        Ok(())
+    }
+
+    /// The word, symbol by symbol: behind its wall where a flight returns to it, else beside the flight.
+    fn draw_symbols(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), DrawError> {
+        let [upper, lower] = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
+        for (t, symbol) in symbols::symbols(&self.motion.events, self.cycle) {
+            let nearest = self.motion.points().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
+            let Some((_, state)) = nearest else { continue };
+            let (x, y) = frame.at(t, self.gap(state));
+            let at = match symbol {
+                '1' | '2' => (x, upper - SYMBOL_AWAY),
+                '4' | '5' => (x, lower + SYMBOL_AWAY),
+                '3' => (x + SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
+                _ => (x - SYMBOL_AWAY, y - 0.5 * SYMBOL_AWAY),
+            };
+            canvas.text(&symbol.to_string(), at, MEDIUM, Align::Center, DARK)?;
         }
         Ok(())
     }

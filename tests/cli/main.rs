@@ -11,3 +11,4 @@ mod map;
 mod measure_gpu;
 mod models;
 mod text;
+mod your_gears;

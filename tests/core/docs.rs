@@ -96,3 +96,31 @@ fn every_font_in_the_program_has_its_notice() {
         assert!(notice.contains(part), "{part}");
     }
 }
+
+/// What is made of the code's tables stands in the model's page word by word.
+#[test]
+fn the_page_of_the_model_has_the_tables_of_the_code() {
+    use rattlemap::model::GearPair;
+    use rattlemap_dynamics::orbit::{Class, Status};
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(root.join("docs/model.md")).unwrap();
+    // From the code's tables to the rows of the page's: first cells, in order.
+    let rows = |head: &str| -> Vec<String> {
+        let table = text.split_once(&format!("\n| {head} |")).unwrap_or_else(|| panic!("no table {head}")).1;
+        table.lines().skip(2).take_while(|line| line.starts_with('|')).map(str::to_owned).collect()
+    };
+    let parameters = GearPair::PARAMETERS.iter().map(|p| {
+        let default = p.default.map_or("-".to_owned(), |value| value.to_string());
+        format!("| {} | {default} | {} | {} |", p.name, p.range.requirement(), p.meaning)
+    });
+    assert_eq!(
+        rows("symbol | default"),
+        parameters.collect::<Vec<_>>(),
+        "docs/model.md: take the lines on the right"
+    );
+    let firsts = |head| -> Vec<String> {
+        rows(head).iter().map(|row| row.split('|').nth(1).unwrap().trim().to_owned()).collect()
+    };
+    assert_eq!(firsts("class | meaning"), Class::NAMES);
+    assert_eq!(firsts("status | meaning"), Status::ALL.map(|status| status.name().to_owned()));
+}
