@@ -10,6 +10,7 @@ mod builder;
 mod document;
 mod error;
 mod identity;
+mod keys;
 mod overrides;
 mod section;
 mod settings;
@@ -20,6 +21,7 @@ mod tests;
 pub use axis::{Axis, MAX_COUNT};
 pub use builder::SceneBuilder;
 pub use error::{Place, Problem, SceneError};
+pub use keys::{KEYS, Key, KeyDefault, Takes};
 pub use settings::{AUDIT, Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 

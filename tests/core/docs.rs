@@ -124,3 +124,34 @@ fn the_page_of_the_model_has_the_tables_of_the_code() {
     assert_eq!(firsts("class | meaning"), Class::NAMES);
     assert_eq!(firsts("status | meaning"), Status::ALL.map(|status| status.name().to_owned()));
 }
+
+/// `docs/scenes.md` lists the parser's own table of keys. With REGENERATE set the list is written anew.
+#[test]
+fn the_keys_of_scenes_are_those_of_the_parser() {
+    use rattlemap::map::scene::KEYS;
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scenes.md");
+    let text = fs::read_to_string(&path).unwrap();
+    let head = "| table | key | default | range | meaning |\n| --- | --- | --- | --- | --- |\n";
+    let (before, rest) = text.split_once(head).expect("the table of keys");
+    let end = rest.find("\n\n").expect("the end of the table of keys") + 1;
+    let row = |key: &rattlemap::map::scene::Key| {
+        let table = match key.table {
+            "" => String::new(),
+            "axis" => "`[[axis]]`".to_owned(),
+            table => format!("`[{table}]`"),
+        };
+        let (default, range) = (key.default.in_words(), key.takes.in_words());
+        format!("| {table} | {} | {default} | {range} | {} |\n", key.name, key.meaning)
+    };
+    let made: String = KEYS.iter().map(row).collect();
+    if std::env::var_os("REGENERATE").is_some() {
+        fs::write(&path, format!("{before}{head}{made}{}", &rest[end..])).unwrap();
+    } else {
+        assert_eq!(
+            &rest[..end],
+            made,
+            "docs/scenes.md differs from src/map/scene/keys.rs; \
+             `REGENERATE=1 cargo test --test core the_keys_of_scenes` writes it anew"
+        );
+    }
+}

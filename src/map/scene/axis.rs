@@ -2,13 +2,13 @@
 
 use super::document::{Node, Value};
 use super::error::{Place, SceneError};
+use super::keys;
 use super::section::{Field, Section};
 use rattlemap_dynamics::model::{Model, Parameter};
 
 /// The most values that one axis may have.
 pub const MAX_COUNT: u32 = 1_000_000;
 
-const FIELDS: [&str; 4] = ["parameter", "min", "max", "count"];
 const EXAMPLE: &str = "write [[axis]] with parameter, min, max and count";
 
 /// An inclusive linear range of one parameter.
@@ -97,7 +97,7 @@ fn count_node(at: &Node, count: usize) -> Node {
 }
 
 fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axis, SceneError> {
-    let section = Section::open(table.node, &table.path, &FIELDS)?;
+    let section = Section::open(table.node, &table.path, &keys::names("axis"))?;
     let field = section.require("parameter", "name one of the model's parameters")?;
     let name = field.text()?;
     let index = model.index(name).map_err(|_| field.unknown_among(name, &names(model), &meanings(model)))?;
@@ -176,7 +176,7 @@ fn meanings(model: &dyn Model) -> String {
 /// The name of axis `i`'s parameter.
 fn named<'a>(root: &Section<'a>, i: usize) -> Result<Field<'a>, SceneError> {
     let tables = root.require("axis", EXAMPLE)?.list("a list of tables, [[axis]]")?;
-    Section::open(tables[i].node, &tables[i].path, &FIELDS)?.require("parameter", EXAMPLE)
+    Section::open(tables[i].node, &tables[i].path, &keys::names("axis"))?.require("parameter", EXAMPLE)
 }
 
 fn is_argument(field: &Field<'_>) -> bool {

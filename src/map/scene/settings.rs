@@ -3,15 +3,16 @@
 use super::Purpose;
 use super::document::Value;
 use super::error::SceneError;
+use super::keys;
 use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 use rattlemap_dynamics::orbit;
 
 /// The most forcing periods that one field may ask for.
-const MAX_PERIODS: u32 = 1_000_000_000;
+pub(super) const MAX_PERIODS: u32 = 1_000_000_000;
 
 /// Characters of a title: figures have one line for it.
-const LONGEST_TITLE: usize = 200;
+pub(super) const LONGEST_TITLE: usize = 200;
 
 /// How fine the lanes' time grid is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,15 +200,7 @@ pub(super) fn read_title(field: &Field<'_>) -> Result<String, SceneError> {
 }
 
 pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneError> {
-    let known = [
-        "steps_per_period",
-        "transient_periods",
-        "observed_periods",
-        "early_stop",
-        "undecided_periods",
-        "max_period",
-    ];
-    let section = root.section("integration", &known)?;
+    let section = root.section("integration", &keys::names("integration"))?;
     let periods = |name, default| match section.get(name) {
         Some(field) => field.whole(1..=MAX_PERIODS),
         None => Ok(default),
@@ -255,8 +248,7 @@ fn read_max_period(section: &Section<'_>, observed_periods: u32) -> Result<u32, 
 }
 
 pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option<Refine>, SceneError> {
-    let known = ["minimum_grid", "rounds", "max_error", "audit", "word", "continuous"];
-    let section = root.section("refine", &known)?;
+    let section = root.section("refine", &keys::names("refine"))?;
     if !section.is_present() {
         return Ok(None);
     }
@@ -289,7 +281,7 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
 }
 
 pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {
-    let section = root.section("outputs", &["quantities", "files"])?;
+    let section = root.section("outputs", &keys::names("outputs"))?;
     let quantities = match section.get("quantities") {
         Some(field) => field.choices(&QUANTITIES)?,
         None => vec![Quantity::Class, Quantity::Lyapunov],

@@ -2,11 +2,12 @@
 
 use super::Purpose;
 use super::error::SceneError;
+use super::keys;
 use super::section::{Field, Section};
 use rattlemap_dynamics::model::{Model, REST, State};
 
 /// The most states that one cell may start from: attractors are counted in a byte.
-const MAX_STARTS: u32 = 255;
+pub(super) const MAX_STARTS: u32 = 255;
 
 /// The state in which cells start at phase 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,12 +59,11 @@ enum Policy {
     Down,
 }
 
-const FIELDS: [&str; 4] = ["policy", "state", "count", "seed"];
 const POLICIES: [(&str, Policy); 4] =
     [("rest", Policy::Rest), ("state", Policy::State), ("up", Policy::Up), ("down", Policy::Down)];
 
 pub(super) fn read(root: &Section<'_>, model: &dyn Model) -> Result<Start, SceneError> {
-    let section = root.section("start", &FIELDS)?;
+    let section = root.section("start", &keys::names("start"))?;
     let policy = section.get("policy").map_or(Ok(Policy::Rest), |field| field.choice(&POLICIES))?;
     match (policy, section.get("state")) {
         (Policy::State, Some(field)) => read_state(&field, model).map(Start::State),
@@ -102,7 +102,7 @@ fn read_state(field: &Field<'_>, model: &dyn Model) -> Result<State, SceneError>
 
 /// `count` and `seed`; none for one start per cell.
 pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<Draw>, SceneError> {
-    let section = root.section("start", &FIELDS)?;
+    let section = root.section("start", &keys::names("start"))?;
     let seed = section.get("seed").map(|field| field.whole(0..=u32::MAX)).transpose()?;
     let count = match section.get("count") {
         Some(field) => field.whole(1..=MAX_STARTS)?,
@@ -121,7 +121,7 @@ pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<D
 
 /// Refuses starts that do not fit each other, or a map that is refined.
 pub(super) fn check(root: &Section<'_>, start: Start, draw: Option<Draw>) -> Result<(), SceneError> {
-    let section = root.section("start", &FIELDS)?;
+    let section = root.section("start", &keys::names("start"))?;
     let is_refined = root.get("refine").is_some();
     match (section.get("policy"), section.get("count")) {
         (_, Some(count)) if draw.is_some() && start.follows() => Err(count.conflict(

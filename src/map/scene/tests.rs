@@ -1,6 +1,7 @@
 //! Every kind of refusal, and what a good scene says.
 
 mod built;
+mod keys;
 mod ranges;
 mod sets;
 mod texts;

@@ -1,0 +1,127 @@
+//! Every key of a scene, once: the parser knows these names, and `docs/scenes.md` is made from them.
+
+use super::axis::MAX_COUNT;
+use super::settings::{LONGEST_TITLE, MAX_PERIODS};
+use super::start::MAX_STARTS;
+use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
+
+/// One key.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    /// The table that it stands in; empty for those before any table.
+    pub table: &'static str,
+    /// Its name.
+    pub name: &'static str,
+    /// What holds where it is not written, as TOML.
+    pub default: KeyDefault,
+    /// What it takes.
+    pub takes: Takes,
+    /// One phrase.
+    pub meaning: &'static str,
+}
+
+/// What holds where a key is not written.
+#[derive(Clone, Copy, Debug)]
+pub enum KeyDefault {
+    /// This value.
+    Value(&'static str),
+    /// What the words say.
+    Words(&'static str),
+    /// Nothing: it must be written where it applies.
+    None,
+}
+
+/// The values that a key takes.
+#[derive(Clone, Copy, Debug)]
+pub enum Takes {
+    /// A whole number between these, ends included.
+    Whole(u32, u32),
+    /// The same, or "auto".
+    WholeOrAuto(u32, u32),
+    /// A number between 0 and 1, ends excluded.
+    Fraction,
+    /// true or false.
+    Flag,
+    /// One of these names.
+    OneOf(&'static [&'static str]),
+    /// A list of some of these names.
+    List(&'static [&'static str]),
+    /// Text of at most so many characters.
+    Text(usize),
+    /// What the words say; it depends on the model.
+    Words(&'static str),
+}
+
+use KeyDefault::{Value, Words};
+
+const fn key(
+    table: &'static str,
+    name: &'static str,
+    default: KeyDefault,
+    takes: Takes,
+    meaning: &'static str,
+) -> Key {
+    Key { table, name, default, takes, meaning }
+}
+
+const END: Takes = Takes::Words("the parameter's range");
+
+/// Every key, in the order in which messages list them; `[parameters]` has those of the model.
+#[rustfmt::skip]
+pub const KEYS: &[Key] = &[
+    key("", "title", Words("from the axes"), Takes::Text(LONGEST_TITLE), "heading of figures and of the report"),
+    key("", "model", Value("\"gear-pair\""), Takes::OneOf(&["gear-pair"]), "what moves"),
+    key("axis", "parameter", KeyDefault::None, Takes::Words("a parameter of the model"), "what the axis sweeps; the first axis runs along columns"),
+    key("axis", "min", KeyDefault::None, END, "first value"),
+    key("axis", "max", KeyDefault::None, END, "last value, greater than min"),
+    key("axis", "count", KeyDefault::None, Takes::Whole(2, MAX_COUNT), "values: min + (max - min) i / (count - 1)"),
+    key("integration", "steps_per_period", Value("\"auto\""), Takes::WholeOrAuto(1, MOST_STEPS), "grid of the lanes; the reference has none"),
+    key("integration", "transient_periods", Value("400"), Takes::Whole(1, MAX_PERIODS), "forcing periods before anything is read; an upper bound where cells may stop early"),
+    key("integration", "observed_periods", Value("128"), Takes::Whole(2, MAX_PERIODS), "forcing periods after that, likewise"),
+    key("integration", "early_stop", Value("true"), Takes::Flag, "cells stop once they are decided"),
+    key("integration", "undecided_periods", Value("0"), Takes::Whole(0, MAX_PERIODS), "periods that undecided cells get beyond these, with early stops alone"),
+    key("integration", "max_period", Value("64"), Takes::Whole(1, LONGEST_CYCLE), "longest cycle that is searched for; at most, and by default no more than, half of observed_periods"),
+    key("start", "policy", Value("\"rest\""), Takes::OneOf(&["rest", "state", "up", "down"]), "where cells start; up and down: where the neighbour along the last axis ended"),
+    key("start", "state", KeyDefault::None, Takes::Words("[x1, v1, x2, v2], finite"), "state at phase 0, with policy = \"state\" alone"),
+    key("start", "count", Value("1"), Takes::Whole(1, MAX_STARTS), "starts per cell of a map, all but the first drawn at random"),
+    key("start", "seed", Value("1"), Takes::Whole(0, u32::MAX), "decides the draw, with a count above 1 alone"),
+    key("refine", "minimum_grid", Value("8"), Takes::Whole(1, 1024), "every so many cells along an axis one is integrated in any case"),
+    key("refine", "rounds", Words("down to single cells"), Takes::Whole(0, 32), "how often a block is halved at most"),
+    key("refine", "max_error", Value("0.003"), Takes::Fraction, "share of filled cells that may be wrong; above it the map is refined further"),
+    key("refine", "audit", Words("2000, or a quarter of what is filled"), Takes::Whole(1, 10_000_000), "filled cells that an audit integrates at first"),
+    key("refine", "word", Value("false"), Takes::Flag, "a change of the word alone is a border"),
+    key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts and mesh fraction of filled cells"),
+    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]), "what is not asked for is not computed"),
+    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "html"]), "what is written; `bifurcation` knows csv and png"),
+];
+
+/// The names in one table.
+pub(super) fn names(table: &str) -> Vec<&'static str> {
+    KEYS.iter().filter(|key| key.table == table).map(|key| key.name).collect()
+}
+
+impl Takes {
+    /// In words.
+    pub fn in_words(self) -> String {
+        match self {
+            Takes::Whole(least, most) => format!("{least} to {most}"),
+            Takes::WholeOrAuto(least, most) => format!("\"auto\" or {least} to {most}"),
+            Takes::Fraction => "between 0 and 1, ends excluded".to_owned(),
+            Takes::Flag => "true or false".to_owned(),
+            Takes::OneOf(names) => names.join(", "),
+            Takes::List(names) => format!("a list of {}", names.join(", ")),
+            Takes::Text(most) => format!("text of at most {most} characters"),
+            Takes::Words(words) => words.to_owned(),
+        }
+    }
+}
+
+impl KeyDefault {
+    /// In words; a dash where there is none.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Value(words) | Words(words) => words,
+            KeyDefault::None => "-",
+        }
+    }
+}

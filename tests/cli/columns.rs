@@ -1,0 +1,54 @@
+//! The columns that docs/scenes.md lists are those of the files.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+
+const TEXT: &str = include_str!("../../docs/scenes.md");
+
+/// Names in the first column of the table under a heading.
+fn listed(heading: &str) -> Vec<&'static str> {
+    let text = TEXT.split_once(&format!("\n### {heading}\n")).unwrap_or_else(|| panic!("no {heading}")).1;
+    let rows = text.lines().skip_while(|line| !line.starts_with("| ---")).skip(1);
+    let rows = rows.take_while(|line| line.starts_with('|'));
+    rows.flat_map(|row| row.split('|').nth(1).unwrap().trim().split(", ")).collect()
+}
+
+fn run(folder: &Path, arguments: &[&str]) {
+    let mut command = Command::cargo_bin("rattlemap").unwrap();
+    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments).assert().code(0);
+}
+
+fn header(path: &Path) -> Vec<String> {
+    fs::read_to_string(path).unwrap().lines().next().unwrap().split(',').map(str::to_owned).collect()
+}
+
+fn fields(path: &Path) -> Vec<String> {
+    let object: serde_json::Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    object.as_object().unwrap().keys().cloned().collect()
+}
+
+fn sorted<T: Ord>(mut list: Vec<T>) -> Vec<T> {
+    list.sort_unstable();
+    list
+}
+
+#[test]
+fn columns_are_those_of_the_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let axis =
+        |name, min, max| format!("[[axis]]\nparameter = \"{name}\"\nmin = {min}\nmax = {max}\ncount = 3\n");
+    let [e, omega] = [axis("e", 0.3, 0.5), axis("omega", 5.0, 6.0)];
+    fs::write(dir.join("line.toml"), &e).unwrap();
+    fs::write(dir.join("plane.toml"), format!("{e}{omega}[start]\ncount = 2\n")).unwrap();
+    run(dir, &["map", "plane.toml", "--engine", "cpu", "--quiet"]);
+    run(dir, &["validate", "out/plane", "--quiet"]);
+    run(dir, &["bifurcation", "line.toml", "--quiet"]);
+    run(dir, &["orbit", "--set", "e=0.3", "--out", "out/orbit"]);
+    assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
+    assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
+    assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));
+    assert_eq!(sorted(fields(&dir.join("out/plane/validation.json"))), sorted(listed("validation.json")));
+}
