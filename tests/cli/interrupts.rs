@@ -7,15 +7,15 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
-/// Cells that would take minutes each.
+/// Cells that would take a quarter of an hour each.
 const SLOW: &str = "parameters = { r1 = 0, r2 = 0 }\n\
     axis = [{ parameter = 'e', min = 0.4, max = 0.8, count = 5 }]\n\
-    integration = { transient_periods = 1_000_000 }\n";
+    integration = { transient_periods = 1_000_000_000 }\n";
 
 /// Cells that a map decides at once, and whose whole budget takes minutes.
 const LONG: &str = "axis = [{ parameter = 'e', min = 0.6, max = 0.62, count = 4 }, \
                     { parameter = 'omega', min = 5.6, max = 5.7, count = 2 }]\n\
-    integration = { transient_periods = 1_000_000 }\n";
+    integration = { transient_periods = 1_000_000_000 }\n";
 
 fn rattlemap(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("rattlemap"));
