@@ -75,6 +75,16 @@ pub enum RecordFileError {
         /// The file.
         path: PathBuf,
     },
+    /// Another version wrote it.
+    #[error(
+        "{} is another version's: its records have other fields; make the map anew with --force, or go on with the \
+         version that began it",
+        .path.display()
+    )]
+    OtherFields {
+        /// The file.
+        path: PathBuf,
+    },
     /// The operating system will not have it.
     #[error("{}: {reason}", .path.display())]
     Io {
