@@ -10,11 +10,11 @@ mod scale;
 mod words;
 
 pub(super) use colors::Color;
-pub(super) use words::{Words, read as read_words};
 
 use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
+use super::words::Spelled;
 use crate::map::scene::Quantity;
 use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
@@ -56,15 +56,15 @@ pub(super) struct Bar {
     pub(super) high: f64,
 }
 
-/// The layers that the scene asks for, the first being the map itself. Words are read once,
-/// for the report needs them, too.
-pub(super) fn of(cells: &Cells<'_>, words: Option<&Words>) -> Vec<Layer> {
+/// The layers that the scene asks for, the first being the map itself, patterns before words.
+pub(super) fn of(cells: &Cells<'_>, spelled: &Spelled) -> Vec<Layer> {
     let mut layers = Vec::new();
     if cells.asks(Quantity::Class) {
         layers.push(classes::layer(cells));
     }
     layers.extend(SCALES.iter().filter(|scale| cells.asks(scale.quantity)).map(|scale| scale.layer(cells)));
-    layers.extend(words.map(words::layer));
+    layers.extend(spelled.patterns.as_ref().map(words::patterns));
+    layers.extend(spelled.words.as_ref().map(words::words));
     layers.extend(cells.attractors().map(attractors::layer));
     layers
 }

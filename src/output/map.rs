@@ -10,6 +10,8 @@ use serde_json::Value;
 use super::folder::PARTIAL;
 use super::unfinished::UNFINISHED;
 use super::validation_json::ValidationObject;
+use super::words::{self, Spelled};
+use super::words_csv::Rows;
 use super::{
     Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, inventory, layers, map_figure,
     map_manifest, report, unfinished,
@@ -22,19 +24,22 @@ pub use super::map_manifest::{Made, Run};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
+const WORDS: &str = "words.csv";
 const HTML: &str = "report.html";
 /// What a validation found.
 pub const VALIDATION: &str = "validation.json";
 
 /// Every file that a map may have beside its records.
-const ALL: [&str; 11] = [
+const ALL: [&str; 13] = [
     MANIFEST,
     CSV,
     NPY,
+    WORDS,
     "map.png",
     "lyapunov.png",
     "impacts.png",
     "mesh.png",
+    "pattern.png",
     "word.png",
     "attractors.png",
     HTML,
@@ -135,34 +140,46 @@ fn write_files(
     validation: Option<&Value>,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
+    let spelled = words::read(cells);
     // Side by side, for each of them has parts that one core must do alone.
     let (tables, pictures) = rayon::join(
-        || write_tables(folder, cells, wanted),
-        || write_pictures(folder, cells, validation, wanted),
+        || write_tables(folder, cells, &spelled, wanted),
+        || write_pictures(folder, cells, &spelled, validation, wanted),
     );
     let mut files = tables?;
     files.extend(pictures?);
     Ok(files)
 }
 
-fn write_tables(folder: &Folder, cells: &Cells<'_>, wanted: Wanted<'_>) -> Result<Vec<String>, OutputError> {
-    let write_if = |format, name: &str, write: fn(&Path, &Cells<'_>) -> Result<(), WriteError>| {
-        if cells.scene().outputs().files.contains(&format) && wanted(name) {
-            folder.replace(name, |path| write(path, cells)).map(|()| Some(name.to_owned()))
+fn write_tables(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    spelled: &Spelled,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    type Write<'w> = &'w (dyn Fn(&Path) -> Result<(), WriteError> + Sync);
+    let write_if = |is_asked: bool, name: &str, write: Write<'_>| {
+        if is_asked && wanted(name) {
+            folder.replace(name, write).map(|()| Some(name.to_owned()))
         } else {
             Ok(None)
         }
     };
+    let asks = |format| cells.scene().outputs().files.contains(&format);
+    let rows = Rows::new(spelled);
+    let has_words = spelled.words.is_some() || spelled.patterns.is_some();
     let (csv, npy) = rayon::join(
-        || write_if(Format::Csv, CSV, cells_csv::write),
-        || write_if(Format::Npy, NPY, cells_npy::write),
+        || write_if(asks(Format::Csv), CSV, &|path| cells_csv::write(path, cells)),
+        || write_if(asks(Format::Npy), NPY, &|path| cells_npy::write(path, cells, &rows)),
     );
-    Ok([csv?, npy?].into_iter().flatten().collect())
+    let words = write_if(asks(Format::Npy) && has_words, WORDS, &|path| rows.write(path));
+    Ok([csv?, npy?, words?].into_iter().flatten().collect())
 }
 
 fn write_pictures(
     folder: &Folder,
     cells: &Cells<'_>,
+    spelled: &Spelled,
     validation: Option<&Value>,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
@@ -173,8 +190,7 @@ fn write_pictures(
     if !wants_page && !wants_figures {
         return Ok(files);
     }
-    let words = layers::read_words(cells);
-    let layers = layers::of(cells, words.as_ref());
+    let layers = layers::of(cells, spelled);
     if wants_figures {
         let named = layers.iter().map(|layer| (layer, format!("{}.png", layer.name)));
         let named: Vec<_> = named.filter(|(_, name)| wanted(name)).collect();
@@ -184,7 +200,7 @@ fn write_pictures(
         files.extend(named.into_iter().map(|(_, name)| name));
     }
     if wants_page {
-        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref(), validation))?;
+        folder.replace(HTML, |path| report::write(path, cells, &layers, spelled, validation))?;
         files.push(HTML.to_owned());
     }
     Ok(files)

@@ -29,6 +29,8 @@ mod report;
 mod stdout;
 pub mod unfinished;
 mod validation_json;
+mod words;
+mod words_csv;
 
 pub use cells::Cells;
 pub use error::{DrawError, FigureError, OutputError, WriteError};
