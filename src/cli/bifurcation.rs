@@ -15,7 +15,7 @@ use crate::map::{bifurcation, scene};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
-    let ask = &ask.run;
+    let ask = &scene_file::with_figures(&ask.run, scene::Purpose::Bifurcation)?;
     let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
     let interrupt = Interrupt::listen(ask.quiet)?;
     let folder = Folder::open(&ask.out(), ask.force)?;

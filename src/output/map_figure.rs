@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use plotters::style::RGBColor;
-
 use super::cells::Cells;
 use super::layers::{Bar, Entry, Layer};
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::draw_head;
-use super::plot_style::{Align, BELOW, Canvas, DARK, Rect, SMALL, save_figure};
+use super::plot_style::{Align, BELOW, Canvas, DARK, RGBColor, Rect, SMALL, save_figure};
 use super::{DrawError, FigureError};
 use crate::map::scene::{self, Scene, Start};
 
@@ -33,7 +31,7 @@ const ABOVE_BAR: f64 = 26.0;
 /// Height of a picture's inside at least.
 const LOWEST: f64 = 700.0;
 
-/// Draws a layer as a PNG.
+/// Draws a layer, in the format that the file's name tells.
 ///
 /// # Errors
 /// A file that cannot be written, by name.

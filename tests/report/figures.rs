@@ -5,6 +5,7 @@ use std::path::Path;
 
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, SectionPoint};
+use rattlemap::map::scene::Format;
 use rattlemap::output::{bifurcation_figure, orbit_figures};
 use rattlemap_dynamics::model::{GearPair, Side, State};
 use rattlemap_dynamics::orbit::{Class, Event, EventKind, Orbit, Sample, Status};
@@ -97,7 +98,8 @@ fn distinct_colors(picture: &RgbImage) -> usize {
 fn orbit_figures_show_motion_meshing_and_events() {
     let dir = tempfile::tempdir().unwrap();
     let (orbit, trace) = meshing_orbit();
-    let files = orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace).unwrap();
+    let files =
+        orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &[Format::Png]).unwrap();
     let names: Vec<_> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect();
     assert_eq!(names, ["phase_plane.png", "time_history.png", "gap.png"]);
     for file in &files {
@@ -136,7 +138,8 @@ fn motion_without_contact_without_data_or_without_numbers_is_drawn() {
         (&blown_up, Class::Failed),
     ] {
         let orbit = Orbit { class, lyapunov: f64::NAN, ..orbit(vec![]) };
-        let files = orbit_figures::write(dir.path(), &GearPair::paper(0.5), &orbit, trace).unwrap();
+        let files =
+            orbit_figures::write(dir.path(), &GearPair::paper(0.5), &orbit, trace, &[Format::Png]).unwrap();
         files.iter().for_each(|file| assert!(distinct_colors(&read(file)) > 10, "{}", file.display()));
     }
 }
@@ -198,6 +201,7 @@ fn a_file_that_cannot_be_written_is_named() {
     let error = bifurcation_figure::write(&dir.join("b.png"), "", "e", &[]).unwrap_err();
     assert!(format!("{error:#}").contains("b.png"), "{error:#}");
     let (orbit, trace) = meshing_orbit();
-    let error = orbit_figures::write(&dir, &GearPair::paper(0.5), &orbit, &trace).unwrap_err();
+    let error =
+        orbit_figures::write(&dir, &GearPair::paper(0.5), &orbit, &trace, &[Format::Png]).unwrap_err();
     assert!(format!("{error:#}").contains("phase_plane.png"), "{error:#}");
 }

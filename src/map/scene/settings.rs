@@ -145,8 +145,12 @@ pub enum Format {
     Csv,
     /// Structured array.
     Npy,
-    /// Figure.
+    /// Figures as pixels.
     Png,
+    /// Figures as lines and text; maps in them as pixels.
+    Svg,
+    /// The same.
+    Pdf,
     /// Interactive report.
     Html,
 }
@@ -168,8 +172,14 @@ const QUANTITIES: [(&str, Quantity); 6] = [
     ("symmetric", Quantity::Symmetric),
     ("word", Quantity::Word),
 ];
-const FORMATS: [(&str, Format); 4] =
-    [("csv", Format::Csv), ("npy", Format::Npy), ("png", Format::Png), ("html", Format::Html)];
+const FORMATS: [(&str, Format); 6] = [
+    ("csv", Format::Csv),
+    ("npy", Format::Npy),
+    ("png", Format::Png),
+    ("svg", Format::Svg),
+    ("pdf", Format::Pdf),
+    ("html", Format::Html),
+];
 
 impl Quantity {
     /// The name in scenes.
@@ -179,7 +189,10 @@ impl Quantity {
 }
 
 impl Format {
-    /// The name in scenes.
+    /// Those of figures.
+    pub const FIGURES: [Format; 3] = [Format::Png, Format::Svg, Format::Pdf];
+
+    /// The name in scenes; of figures also what their files' names end with.
     pub fn name(self) -> &'static str {
         name(&FORMATS, self)
     }
@@ -287,15 +300,17 @@ pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outpu
         None => vec![Quantity::Class, Quantity::Lyapunov],
     };
     // A diagram's points have no fixed number per column, so there is no array of it.
-    let writable = match purpose {
+    let usual = match purpose {
         Purpose::Map => vec![Format::Csv, Format::Npy, Format::Png, Format::Html],
         Purpose::Bifurcation => vec![Format::Csv, Format::Png],
     };
-    let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: writable }) };
+    let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: usual }) };
     let files = field.choices(&FORMATS)?;
-    if let Some(i) = files.iter().position(|format| !writable.contains(format)) {
+    if let Some(i) =
+        files.iter().position(|format| !Format::FIGURES.contains(format) && !usual.contains(format))
+    {
         let name = files[i].name();
-        return Err(field.conflict(format!("`bifurcation` writes csv and png; drop \"{name}\"")));
+        return Err(field.conflict(format!("`bifurcation` writes csv, png, svg and pdf; drop \"{name}\"")));
     }
     Ok(Outputs { quantities, files })
 }

@@ -1,8 +1,6 @@
 //! The head of a figure: title, subtitle and a legend in rows.
 
-use plotters::style::RGBColor;
-
-use super::{Align, Canvas, DARK, LARGE, MEDIUM, Marker, Point, Rect, SMALL};
+use super::{Align, Canvas, DARK, LARGE, MEDIUM, Marker, Point, RGBColor, Rect, SMALL};
 use crate::output::DrawError;
 
 /// Width of a legend's key, and the room on either side of its text.
