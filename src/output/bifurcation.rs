@@ -4,7 +4,8 @@ use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, inventory};
+use super::symbols::axis_label;
+use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, caption, inventory};
 use crate::map::bifurcation::Column;
 use crate::map::scene::{Format, Scene};
 
@@ -41,9 +42,11 @@ pub fn write(
         files.push(CSV);
     }
     for (_, name) in FIGURES.into_iter().filter(|(format, _)| wanted.contains(format)) {
-        let label = format!("{} {}", parameter.meaning, parameter.name);
-        let title = format!("{}, {}", scene.title(), scene.start().in_words());
-        folder.replace(name, |path| Ok(bifurcation_figure::write(path, &title, &label, columns)?))?;
+        let label = axis_label(parameter);
+        let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
+        folder.replace(name, |path| {
+            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], &label, columns)?)
+        })?;
         files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;

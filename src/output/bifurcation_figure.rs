@@ -33,13 +33,23 @@ const CURVE_DOT: f64 = 1.3;
 ///
 /// # Errors
 /// A file that cannot be written, by name.
-pub fn write(path: &Path, title: &str, axis_label: &str, columns: &[Column]) -> Result<(), FigureError> {
-    save_figure(path, SIZE, |canvas| draw(canvas, title, axis_label, columns))
+pub fn write(
+    path: &Path,
+    [title, subtitle]: [&str; 2],
+    axis_label: &str,
+    columns: &[Column],
+) -> Result<(), FigureError> {
+    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis_label, columns))
 }
 
-fn draw(canvas: &Canvas<'_>, title: &str, axis_label: &str, columns: &[Column]) -> Result<(), DrawError> {
+fn draw(
+    canvas: &Canvas<'_>,
+    [title, subtitle]: [&str; 2],
+    axis_label: &str,
+    columns: &[Column],
+) -> Result<(), DrawError> {
     let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
-    let top = draw_head(canvas, title, "", &legend(!left_out.is_empty()))? + 14.0;
+    let top = draw_head(canvas, title, subtitle, &legend(!left_out.is_empty()))? + 14.0;
     let whole = canvas.panel(LEFT, top);
     let bottom = whole.bottom;
     let middle = (top + bottom) / 2.0;

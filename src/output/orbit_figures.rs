@@ -13,6 +13,7 @@ use super::plot_style::{
     Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MEDIUM, MESHING, Marker, RGBColor, Rect, SMALL, Shape,
     save_figure, wall_color,
 };
+use super::symbols::symbol;
 use super::{DrawError, FigureError, OutputError};
 use crate::map::scene::Format;
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
@@ -77,7 +78,7 @@ pub(super) fn write_each(
     mut place: impl FnMut(&'static str, &dyn Fn(&Path) -> Result<(), FigureError>) -> Result<(), OutputError>,
 ) -> Result<(), OutputError> {
     let scene = Scene {
-        names: model.state_names().into_iter().map(subscripted).collect(),
+        names: model.state_names().into_iter().map(symbol).collect(),
         bodies: model.bodies(),
         oscillator: model.oscillator()?,
         motion: Motion::new(orbit, trace),
@@ -430,10 +431,4 @@ fn name(side: Side) -> &'static str {
         Side::Right => "right",
         Side::Left => "left",
     }
-}
-
-/// A component's name with its digits below the line.
-fn subscripted(name: &str) -> String {
-    let below = |c: char| c.to_digit(10).and_then(|digit| char::from_u32(0x2080 + digit));
-    name.chars().map(|c| below(c).unwrap_or(c)).collect()
 }

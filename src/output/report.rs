@@ -24,7 +24,8 @@ use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
-use super::{WriteError, names, replay};
+use super::symbols::symbol;
+use super::{WriteError, caption, names, replay};
 use crate::map::scene::Quantity;
 use rattlemap_dynamics::orbit::Status;
 
@@ -36,6 +37,9 @@ const SCRIPT: &str = include_str!("report/page.js");
 struct Data<'a> {
     title: String,
     subtitle: String,
+    /// Every parameter that no axis sweeps, and what the model is taken from.
+    fixed: String,
+    source: Option<&'static str>,
     axes: Vec<AxisData>,
     /// What follows the two `--set` of the axes in the command that replays a cell.
     replay: String,
@@ -56,6 +60,7 @@ struct Data<'a> {
 #[derive(Serialize)]
 struct AxisData {
     parameter: String,
+    symbol: String,
     meaning: String,
     min: f64,
     max: f64,
@@ -87,6 +92,8 @@ struct BarData {
     colors: Vec<String>,
     low: f64,
     high: f64,
+    /// Sentences on what lies beyond its ends.
+    left_out: Vec<String>,
 }
 
 /// An array over the cells.
@@ -112,6 +119,8 @@ pub(super) fn write(
     let data = Data {
         title: scene.title().to_owned(),
         subtitle: subtitle(scene),
+        fixed: caption::all_fixed(scene),
+        source: caption::source(scene.base()),
         axes: scene.axes().iter().map(AxisData::from).collect(),
         replay: replay::arguments(scene),
         starts: starts(cells),
@@ -224,6 +233,7 @@ impl From<&crate::map::scene::Axis> for AxisData {
         let parameter = axis.parameter();
         AxisData {
             parameter: parameter.name.to_string(),
+            symbol: symbol(&parameter.name),
             meaning: parameter.meaning.to_string(),
             min: axis.min(),
             max: axis.max(),
@@ -250,6 +260,7 @@ impl From<&Layer> for LayerData {
                 colors: bar.colors.iter().step_by(6).map(hex).collect(),
                 low: bar.low,
                 high: bar.high,
+                left_out: bar.left_out(layer.indices.len()),
             }),
             indices: packed("u8", &layer.indices),
         }

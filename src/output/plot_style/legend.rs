@@ -59,7 +59,7 @@ impl Entry {
     }
 }
 
-/// Draws title, subtitle (may be empty) and legend; returns where the panels may start.
+/// Draws title, subtitle (of several lines, or none) and legend; returns where the panels may start.
 pub fn draw_head(
     canvas: &Canvas<'_>,
     title: &str,
@@ -68,9 +68,9 @@ pub fn draw_head(
 ) -> Result<f64, DrawError> {
     let mut y = 40.0;
     draw_fitted(canvas, title, y, LARGE)?;
-    if !subtitle.is_empty() {
-        y += 40.0;
-        draw_fitted(canvas, subtitle, y, MEDIUM)?;
+    for (i, line) in subtitle.lines().enumerate() {
+        y += if i == 0 { 40.0 } else { 34.0 };
+        draw_fitted(canvas, line, y, MEDIUM)?;
     }
     y += 44.0;
     for row in rows(canvas, entries)?.into_iter().filter(|row| !row.is_empty()) {

@@ -108,7 +108,7 @@ impl<'c> Page<'c> {
 
     fn path(&mut self, points: &[Point]) {
         for (i, (x, y)) in points.iter().enumerate() {
-            let [x, y] = [*x, *y].map(|v| hundredths(v));
+            let [x, y] = [*x, *y].map(hundredths);
             if i == 0 {
                 self.content.move_to(x, y)
             } else {

@@ -3,6 +3,7 @@
 mod adaptive;
 mod check;
 mod engines;
+mod figures;
 mod folders;
 mod interrupts;
 mod json;
