@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::map::scene::{Place, Problem, Purpose, Scene, SceneError};
+use crate::map::scene::{FileText, Place, Problem, Purpose, Scene, SceneError};
 
 /// Reads and parses the scene file at `path`; messages call it by that path.
 ///
@@ -14,7 +14,22 @@ pub(crate) fn load(path: &Path, sets: &[String], purpose: Purpose) -> Result<Sce
         place: Place::File { file: name.as_str().into() },
         problem: Problem::Unreadable { reason: error.to_string() },
     })?;
-    Scene::parse(&text, &name, sets, purpose)
+    let find = |file: &str| {
+        let beside = path.parent().unwrap_or(Path::new("")).join(file);
+        find(&beside)
+    };
+    Scene::parse_beside(&text, &name, sets, purpose, &find)
+}
+
+/// Reads a table of cells.
+pub(crate) fn find(path: &Path) -> Result<FileText, String> {
+    let name = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok(FileText { name, text }),
+        Err(error) => Err(format!(
+            "cannot be read at {name} ({error}); give the path of a CSV table, relative to the scene's folder"
+        )),
+    }
 }
 
 #[cfg(test)]

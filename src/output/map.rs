@@ -23,12 +23,15 @@ pub use super::map_manifest::{Made, Run};
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const HTML: &str = "report.html";
+/// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
+pub const LIST: &str = "list.csv";
 /// What a validation found.
 pub const VALIDATION: &str = "validation.json";
 
 /// Every file that a map may have beside its records.
-const ALL: [&str; 11] = [
+const ALL: [&str; 12] = [
     MANIFEST,
+    LIST,
     CSV,
     NPY,
     "map.png",
@@ -142,6 +145,10 @@ fn write_files(
     );
     let mut files = tables?;
     files.extend(pictures?);
+    if let Some(list) = cells.scene().list().filter(|_| wanted(LIST)) {
+        folder.replace(LIST, |path| Ok(fs::write(path, list.to_csv())?))?;
+        files.push(LIST.to_owned());
+    }
     Ok(files)
 }
 
