@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::arguments::{FigureFormat, SceneOptions};
-use crate::map::scene::{Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::map::scene::{FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 
 /// The `--set` that says what is written.
 const FILES: &str = "outputs.files=";
@@ -18,7 +18,22 @@ pub(crate) fn load(path: &Path, sets: &[String], purpose: Purpose) -> Result<Sce
         place: Place::File { file: name.as_str().into() },
         problem: Problem::Unreadable { reason: error.to_string() },
     })?;
-    Scene::parse(&text, &name, sets, purpose)
+    let find = |file: &str| {
+        let beside = path.parent().unwrap_or(Path::new("")).join(file);
+        find(&beside)
+    };
+    Scene::parse_beside(&text, &name, sets, purpose, &find)
+}
+
+/// Reads a table of cells.
+pub(crate) fn find(path: &Path) -> Result<FileText, String> {
+    let name = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok(FileText { name, text }),
+        Err(error) => Err(format!(
+            "cannot be read at {name} ({error}); give the path of a CSV table, relative to the scene's folder"
+        )),
+    }
 }
 
 /// The options with `--format` told as one more `--set`: that is what a manifest keeps and what resuming compares.

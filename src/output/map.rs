@@ -24,6 +24,8 @@ pub use super::map_manifest::{Made, Run};
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const HTML: &str = "report.html";
+/// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
+pub const LIST: &str = "list.csv";
 /// What a validation found.
 pub const VALIDATION: &str = "validation.json";
 
@@ -32,7 +34,7 @@ const LAYERS: [&str; 6] = ["map", "lyapunov", "impacts", "mesh", "word", "attrac
 
 /// Every file that a map may have beside its records.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let tables = [MANIFEST, CSV, NPY, HTML, VALIDATION].map(str::to_owned);
+    let tables = [MANIFEST, LIST, CSV, NPY, HTML, VALIDATION].map(str::to_owned);
     let figures = LAYERS.into_iter().flat_map(|layer| Format::FIGURES.map(|format| figure(layer, format)));
     tables.into_iter().chain(figures).collect()
 });
@@ -143,6 +145,10 @@ fn write_files(
     );
     let mut files = tables?;
     files.extend(pictures?);
+    if let Some(list) = cells.scene().list().filter(|_| wanted(LIST)) {
+        folder.replace(LIST, |path| Ok(fs::write(path, list.to_csv())?))?;
+        files.push(LIST.to_owned());
+    }
     Ok(files)
 }
 

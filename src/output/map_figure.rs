@@ -5,12 +5,12 @@ use std::path::Path;
 use super::caption;
 use super::cells::Cells;
 use super::layers::{Bar, Layer, share};
-use super::plot_style::axes::{Axis, Frame};
+use super::plot_style::axes::{self, Axis, Frame};
 use super::plot_style::legend::draw_head;
 use super::plot_style::{Align, BELOW, Canvas, DARK, RGBColor, Rect, SMALL, save_figure};
 use super::symbols::{axis_label, number, symbol};
 use super::{DrawError, FigureError};
-use crate::map::scene::{self, Scene, Start};
+use crate::map::scene::{self, Scale, Scene, Start};
 
 const LEFT: f64 = 140.0;
 const TOP: f64 = 162.0;
@@ -119,10 +119,23 @@ pub(super) fn subtitle(scene: &Scene) -> String {
     format!("every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{filled}")
 }
 
-/// An axis on which cells lie at their values: it reaches half a cell further.
+/// An axis on which cells lie at their values, or in the order of these where they are listed: it reaches half a cell
+/// further.
 fn axis(axis: &scene::Axis) -> Axis {
-    let half = (axis.max() - axis.min()) / (axis.count() - 1) as f64 / 2.0;
-    Axis::exact(&axis_label(axis.parameter()), axis.min() - half, axis.max() + half)
+    let (min, max, steps) = (axis.min(), axis.max(), (axis.count() - 1) as f64);
+    let label = axis_label(axis.parameter());
+    match axis.scale() {
+        Scale::Linear => {
+            let half = (max - min) / steps / 2.0;
+            Axis::exact(&label, min - half, max + half)
+        }
+        Scale::Log => {
+            let half = (max.log10() - min.log10()) / steps / 2.0;
+            let ends = Axis::exact(&label, min.log10() - half, max.log10() + half);
+            Axis { scale: axes::Scale::Logarithmic, ..ends }
+        }
+        Scale::Values => Axis::listed(&label, axis.values()),
+    }
 }
 
 fn rgb([r, g, b]: [u8; 3]) -> RGBColor {

@@ -26,7 +26,7 @@ use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
 use super::symbols::symbol;
 use super::{WriteError, caption, names, replay};
-use crate::map::scene::Quantity;
+use crate::map::scene::{Quantity, Rule, Scale, Scene};
 use rattlemap_dynamics::orbit::Status;
 
 const PAGE: &str = include_str!("report/page.html");
@@ -41,7 +41,8 @@ struct Data<'a> {
     fixed: String,
     source: Option<&'static str>,
     axes: Vec<AxisData>,
-    /// What follows the two `--set` of the axes in the command that replays a cell.
+    derived: Vec<DerivedData>,
+    /// What follows the `--set` of swept and derived parameters in the command that replays a cell.
     replay: String,
     /// Where cells start that follow their neighbours: four numbers per cell.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -65,6 +66,19 @@ struct AxisData {
     min: f64,
     max: f64,
     count: usize,
+    scale: &'static str,
+    /// Of an axis that is not linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    values: Option<Vec<f64>>,
+}
+
+/// A parameter that follows others: its values over the cells, along the axes on which they depend alone.
+#[derive(Serialize)]
+struct DerivedData {
+    parameter: String,
+    along: [bool; 2],
+    #[serde(flatten)]
+    values: Packed,
 }
 
 #[derive(Serialize)]
@@ -122,6 +136,7 @@ pub(super) fn write(
         fixed: caption::all_fixed(scene),
         source: caption::source(scene.base()),
         axes: scene.axes().iter().map(AxisData::from).collect(),
+        derived: derived(scene),
         replay: replay::arguments(scene),
         starts: starts(cells),
         layers: layers.par_iter().map(LayerData::from).collect(),
@@ -167,6 +182,21 @@ fn policy(style: &str, script: &str) -> String {
     let [style, script] =
         [style, script].map(|part| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part))));
     format!("default-src 'none'; script-src {script}; style-src {style}; base-uri 'none'; form-action 'none'")
+}
+
+/// Derived parameters in the order of the scene's.
+fn derived(scene: &Scene) -> Vec<DerivedData> {
+    let points = scene.points();
+    let [columns, rows] = points.counts();
+    let of = |rule: &Rule| {
+        let along = [0, 1].map(|i| scene.axes().get(i).is_some_and(|axis| rule.follows(axis.index())));
+        let counts = [if along[0] { columns } else { 1 }, if along[1] { rows } else { 1 }];
+        let cells = (0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| j * columns + i));
+        let values: Vec<f64> = cells.map(|cell| points.model(cell).value(rule.index())).collect();
+        let parameter = rule.parameter().name.to_string();
+        DerivedData { parameter, along, values: packed("f64", &values) }
+    };
+    points.derived().rules().iter().map(of).collect()
 }
 
 /// Starts that a cell's record does not tell, in full: the command that replays it needs them.
@@ -238,6 +268,8 @@ impl From<&crate::map::scene::Axis> for AxisData {
             min: axis.min(),
             max: axis.max(),
             count: axis.count(),
+            scale: axis.scale().name(),
+            values: (axis.scale() != Scale::Linear).then(|| axis.values().collect()),
         }
     }
 }

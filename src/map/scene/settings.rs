@@ -293,24 +293,35 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
     Ok(Some(Refine { minimum_grid, rounds, max_error, audit, word, continuous }))
 }
 
-pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {
+pub(super) fn read_outputs(
+    root: &Section<'_>,
+    purpose: Purpose,
+    is_list: bool,
+) -> Result<Outputs, SceneError> {
     let section = root.section("outputs", &keys::names("outputs"))?;
     let quantities = match section.get("quantities") {
         Some(field) => field.choices(&QUANTITIES)?,
         None => vec![Quantity::Class, Quantity::Lyapunov],
     };
-    // A diagram's points have no fixed number per column, so there is no array of it.
-    let usual = match purpose {
-        Purpose::Map => vec![Format::Csv, Format::Npy, Format::Png, Format::Html],
-        Purpose::Bifurcation => vec![Format::Csv, Format::Png],
+    // A diagram's points have no fixed number per column, so there is no array of it; a list of cells has no picture.
+    let (usual, figures, remedy): (_, &[Format], _) = match (purpose, is_list) {
+        (Purpose::Map, true) => (
+            vec![Format::Csv, Format::Npy],
+            &[],
+            "a list of cells has no picture, it is written as csv and npy",
+        ),
+        (Purpose::Map, false) => {
+            (vec![Format::Csv, Format::Npy, Format::Png, Format::Html], &Format::FIGURES, "")
+        }
+        (Purpose::Bifurcation, _) => {
+            (vec![Format::Csv, Format::Png], &Format::FIGURES, "`bifurcation` writes csv, png, svg and pdf")
+        }
     };
     let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: usual }) };
     let files = field.choices(&FORMATS)?;
-    if let Some(i) =
-        files.iter().position(|format| !Format::FIGURES.contains(format) && !usual.contains(format))
-    {
+    if let Some(i) = files.iter().position(|format| !figures.contains(format) && !usual.contains(format)) {
         let name = files[i].name();
-        return Err(field.conflict(format!("`bifurcation` writes csv, png, svg and pdf; drop \"{name}\"")));
+        return Err(field.conflict(format!("{remedy}; drop \"{name}\"")));
     }
     Ok(Outputs { quantities, files })
 }

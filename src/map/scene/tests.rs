@@ -1,6 +1,9 @@
 //! Every kind of refusal, and what a good scene says.
 
+mod axes;
 mod built;
+mod cells;
+mod derived;
 mod keys;
 mod ranges;
 mod sets;

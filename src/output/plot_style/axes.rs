@@ -37,6 +37,8 @@ pub struct Axis {
     pub high: f64,
     /// How values lie on it.
     pub scale: Scale,
+    /// Of an axis of listed values, which lie at 0, 1, 2 ...: how each is written.
+    pub listed: Vec<String>,
 }
 
 impl Axis {
@@ -45,7 +47,14 @@ impl Axis {
         let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 0.0) };
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-6);
         let (low, high) = if high - low > least { (low, high) } else { (low - 0.5, low + 0.5) };
-        Axis { label: label.to_owned(), low, high, scale: Scale::Linear }
+        Axis { label: label.to_owned(), low, high, scale: Scale::Linear, listed: Vec::new() }
+    }
+
+    /// An axis of values that have as much room as each other, half of it on either side.
+    pub fn listed(label: &str, values: impl Iterator<Item = f64>) -> Axis {
+        let listed: Vec<String> = values.map(|value| value.to_string().replace('-', "\u{2212}")).collect();
+        let high = listed.len() as f64 - 0.5;
+        Axis { listed, ..Axis::exact(label, -0.5, high) }
     }
 
     /// A logarithmic axis from the value `low` to the value `high`, both positive; widened as [`Axis::exact`] where

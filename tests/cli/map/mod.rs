@@ -1,6 +1,7 @@
 //! `rattlemap map` as scripts see it: files of the contract, refusals, resumption.
 
 mod adaptive;
+mod axes;
 mod check;
 mod engines;
 mod figures;
