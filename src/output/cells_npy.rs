@@ -7,7 +7,7 @@ use std::path::Path;
 use npyz::{DType, Field, TypeStr, TypeWrite, WriterBuilder};
 
 use super::cells::{Cells, Row};
-use super::cells_csv::ATTRACTORS;
+use super::cells_csv::{ATTRACTORS, places, swept};
 use super::words_csv::Rows;
 use super::{WriteError, names};
 use crate::map::scene::Quantity;
@@ -22,10 +22,14 @@ struct Shown {
     pattern: u32,
 }
 
-/// A column beside those of the axes.
+/// Types of the places on the axes, and of the values there, as NumPy writes them.
+const PLACE_KIND: &str = "<u4";
+const VALUE_KIND: &str = "<f8";
+
+/// A column after those.
 struct Column {
     name: &'static str,
-    /// As NumPy writes it.
+    /// Its type.
     kind: &'static str,
     /// What has to be asked for.
     of: Option<Quantity>,
@@ -40,11 +44,6 @@ const fn column(
 ) -> Column {
     Column { name, kind, of, put }
 }
-
-const INDICES: [Column; 2] = [
-    column("i", "<u4", None, |shown, to| to.extend((shown.row.indices[0] as u32).to_le_bytes())),
-    column("j", "<u4", None, |shown, to| to.extend((shown.row.indices[1] as u32).to_le_bytes())),
-];
 
 #[rustfmt::skip]
 const COLUMNS: [Column; 12] = [
@@ -80,12 +79,13 @@ fn put_float(value: Option<f64>, to: &mut Vec<u8>) {
 /// # Errors
 /// If the file cannot be written.
 pub(super) fn write(path: &Path, cells: &Cells<'_>, rows: &Rows<'_>) -> Result<(), WriteError> {
-    let axes = cells.scene().axes().iter().map(|axis| (&*axis.parameter().name, "<f8"));
+    let places = places(cells);
     let is_asked = |column: &&Column| column.of.is_none_or(|quantity| cells.asks(quantity));
     let counted = cells.attractors().map(|_| &COUNTED);
     let columns: Vec<&Column> = COLUMNS.iter().filter(is_asked).chain(counted).collect();
-    let of = |column: &Column| (column.name, column.kind);
-    let named = INDICES.iter().map(of).chain(axes).chain(columns.iter().copied().map(of));
+    let place = places.iter().map(|&name| (name, PLACE_KIND));
+    let value = swept(cells).map(|name| (name, VALUE_KIND));
+    let named = place.chain(value).chain(columns.iter().map(|column| (column.name, column.kind)));
     let fields = named.map(|(name, kind)| {
         let kind: TypeStr = kind.parse()?;
         Ok(Field { name: name.to_owned(), dtype: DType::Plain(kind) })
@@ -102,8 +102,9 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>, rows: &Rows<'_>) -> Result<(
     for id in 0..count {
         let shown = Shown { row: cells.row(id), word: rows.word(id), pattern: rows.pattern(id) };
         bytes.0.clear();
-        INDICES.iter().for_each(|column| (column.put)(&shown, &mut bytes.0));
-        shown.row.values.iter().for_each(|value| bytes.0.extend(value.to_le_bytes()));
+        let indices = &shown.row.indices[..places.len()];
+        indices.iter().for_each(|&index| bytes.0.extend((index as u32).to_le_bytes()));
+        cells.values(id).iter().for_each(|value| bytes.0.extend(value.to_le_bytes()));
         columns.iter().for_each(|column| (column.put)(&shown, &mut bytes.0));
         array.push(&bytes)?;
     }
