@@ -1,7 +1,7 @@
 //! Maps: many motions. A scene says what is asked ([`scene`]); its cells are numbered ([`plan`])
 //! and put in order ([`schedule`]); an engine takes them up and hands back records ([`engine`],
 //! [`sweep`]). Over one axis it is a bifurcation diagram ([`bifurcation`]); several starts per cell
-//! count attractors ([`coexistence`]). [`run`] does all of it at once.
+//! count attractors ([`coexistence`]); two maps of one grid are compared ([`compare`]). [`run`] does all of it at once.
 
 pub mod printable;
 pub mod random;
@@ -18,6 +18,7 @@ pub mod sweep;
 
 pub mod bifurcation;
 pub mod coexistence;
+pub mod compare;
 
 #[cfg(not(target_arch = "wasm32"))]
 mod run;

@@ -110,7 +110,7 @@ impl Scene {
             title,
             base: axis::read_parameters(&root, model, &axes)?,
             integration: settings::read_integration(&root)?,
-            start: start::read(&root, model)?,
+            start: start::read(&root, model, purpose)?,
             draw: start::read_draw(&root, purpose)?,
             refine: settings::read_refine(&root, purpose)?,
             outputs: settings::read_outputs(&root, purpose)?,

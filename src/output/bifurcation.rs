@@ -1,18 +1,19 @@
-//! The folder of a bifurcation diagram: table, figure and manifest.
+//! The folder of a bifurcation diagram: tables, figure and manifest.
 
 use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, inventory};
+use super::{Folder, OutputError, bifurcation_columns_csv, bifurcation_csv, bifurcation_figure, inventory};
 use crate::map::bifurcation::Column;
 use crate::map::scene::{Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
+const COLUMNS_CSV: &str = "bifurcation_columns.csv";
 const PNG: &str = "bifurcation.png";
 
 /// Every file that a bifurcation diagram may write.
-pub const NAMES: [&str; 3] = [MANIFEST, CSV, PNG];
+pub const NAMES: [&str; 4] = [MANIFEST, CSV, COLUMNS_CSV, PNG];
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one
 /// is complete. Returns the files' names.
@@ -36,7 +37,8 @@ pub fn write(
         folder.replace(CSV, |path| {
             bifurcation_csv::write(path, &parameter.name, &scene.base().state_names(), columns)
         })?;
-        files.push(CSV);
+        folder.replace(COLUMNS_CSV, |path| bifurcation_columns_csv::write(path, &parameter.name, columns))?;
+        files.extend([CSV, COLUMNS_CSV]);
     }
     if wanted.contains(&Format::Png) {
         let label = format!("{} {}", parameter.meaning, parameter.name);

@@ -9,7 +9,7 @@ use super::inventory::FileEntry;
 use super::manifest::{AxisObject, Head, StartObject, TimingsObject, start};
 use super::names;
 use super::parameters::Parameters;
-use crate::map::bifurcation::Column;
+use crate::map::bifurcation::{Column, Hysteresis, hysteresis};
 use crate::map::plan::count_classes;
 use crate::map::scene::Scene;
 
@@ -26,10 +26,30 @@ pub(super) struct Manifest<'a> {
     parameters: Parameters,
     start: StartObject,
     integration: IntegrationObject,
+    /// Columns by class, of both passes together where there are two.
     classes: BTreeMap<&'static str, usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hysteresis: Option<HysteresisObject>,
     elapsed_seconds: f64,
     timings: TimingsObject,
     files: &'a [FileEntry],
+}
+
+/// Values at which class or period depend on the direction.
+#[derive(Serialize)]
+struct HysteresisObject {
+    columns: usize,
+    differing: usize,
+    /// First and last value of each run of neighbours.
+    ranges: Vec<[f64; 2]>,
+    /// Values at which words alone differ.
+    by_word: usize,
+}
+
+impl From<Hysteresis> for HysteresisObject {
+    fn from(Hysteresis { columns, differing, ranges, by_word }: Hysteresis) -> Self {
+        HysteresisObject { columns, differing, ranges, by_word }
+    }
 }
 
 #[derive(Serialize)]
@@ -65,6 +85,7 @@ impl<'a> Manifest<'a> {
                 max_period: settings.max_period,
             },
             classes: names::CLASSES.into_iter().zip(classes).collect(),
+            hysteresis: hysteresis(columns).map(HysteresisObject::from),
             elapsed_seconds: elapsed.as_secs_f64(),
             timings: TimingsObject { integrate: elapsed.as_secs_f64(), write: writing.as_secs_f64() },
             files,

@@ -92,6 +92,7 @@ pub(super) fn subtitle(scene: &Scene) -> String {
         Start::State([x1, v1, x2, v2]) => format!("from ({x1}, {v1}, {x2}, {v2})"),
         Start::Up => format!("from the attractor at the next lower {last}"),
         Start::Down => format!("from the attractor at the next higher {last}"),
+        Start::Both => format!("from the attractors at the next {last} on either side"),
     };
     let more_starts = match scene.draw() {
         Some(draw) => format!(", attractors counted with {} random states more", draw.count - 1),

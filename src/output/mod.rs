@@ -1,6 +1,7 @@
 //! Results, written down: files in a guarded folder, and text for the terminal.
 
 pub mod bifurcation;
+mod bifurcation_columns_csv;
 mod bifurcation_csv;
 pub mod bifurcation_figure;
 mod bifurcation_manifest;

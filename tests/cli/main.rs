@@ -1,6 +1,7 @@
 //! The program as scripts see it.
 
 mod bench;
+mod bifurcation;
 mod columns;
 mod commands;
 #[cfg(unix)]
