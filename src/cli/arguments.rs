@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use crate::cli::say;
 use crate::gpu::Precision;
 use crate::map::printable::is_printable;
+use crate::map::scene::Along;
 use crate::validate::DEFAULT_SAMPLES;
 use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -326,10 +327,40 @@ impl Orbit {
 #[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
     rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200\n\n\
     And with hysteresis, up and down in one figure:\n  \
-    rattlemap bifurcation scenes/paper_fig5.toml --set start.policy=both")]
+    rattlemap bifurcation scenes/paper_fig5.toml --set start.policy=both\n\n\
+    One line of a map's plane:\n  \
+    rattlemap bifurcation scenes/e_omega.toml --along e --at omega=5.6")]
 pub(crate) struct Bifurcation {
     #[command(flatten)]
     pub(crate) run: SceneOptions,
+
+    /// The axis to run along, of a scene of two. What the scene asks of a map alone is left out ([refine],
+    /// start.count, html, npy). Writes to out/<scene's name>.NAME.OTHER=VALUE unless told
+    #[arg(long, value_name = "NAME")]
+    along: Option<String>,
+
+    /// Where the other axis stays: any value that the parameter may have, on the grid or not
+    #[arg(long, value_name = "NAME=VALUE", requires = "along", allow_hyphen_values = true)]
+    at: Vec<String>,
+}
+
+impl Bifurcation {
+    /// The line of a plane, if one was asked for.
+    pub(crate) fn along(&self) -> Option<Along> {
+        self.along.clone().map(|parameter| Along { parameter, at: self.at.clone() })
+    }
+
+    /// The folder to write to: a line of a map's scene has one beside the map's own.
+    pub(crate) fn out(&self) -> PathBuf {
+        let Some(along) = self.along.as_ref().filter(|_| self.run.out.is_none()) else {
+            return self.run.out();
+        };
+        let at: String =
+            self.at.iter().map(|at| format!(".{}", at.replace(char::is_whitespace, ""))).collect();
+        let mut name = self.run.scene.file_stem().unwrap_or_default().to_owned();
+        name.push(format!(".{along}{at}"));
+        Path::new("out").join(name)
+    }
 }
 
 /// What can be swept: the models, or one of them on a page

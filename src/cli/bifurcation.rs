@@ -16,10 +16,11 @@ use crate::map::{bifurcation, scene};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
-    let ask = &ask.run;
-    let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
+    let (along, out, ask) = (ask.along(), ask.out(), &ask.run);
+    let purpose = scene::Purpose::Bifurcation;
+    let scene = scene_file::load_along(&ask.scene, &ask.set, purpose, along.as_ref())?;
     let interrupt = Interrupt::listen(ask.quiet)?;
-    let folder = Folder::open(&ask.out(), ask.force)?;
+    let folder = Folder::open(&out, ask.force)?;
     folder.refuse_links(output::bifurcation::NAMES)?;
     let cells = scene.line();
     let count = bifurcation::column_count(cells.len(), scene.start());
@@ -38,7 +39,8 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
         );
         return Err(interrupt.failure(words));
     };
-    let files = output::bifurcation::write(&folder, &scene, &ask.set, &columns, clock.elapsed())?;
+    let asked = output::bifurcation::Asked { sets: &ask.set, along: along.as_ref() };
+    let files = output::bifurcation::write(&folder, &scene, asked, &columns, clock.elapsed())?;
     let name = &scene.axes()[0].parameter().name;
     let differing = hysteresis(&columns).map(|found| format!("{}\n", told(&found, name)));
     let files = format!("{}: {}", say::path(folder.path()), files.join(", "));

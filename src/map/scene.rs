@@ -5,6 +5,7 @@
 //! later. `--set` arguments are applied before anything is checked, so a value is judged
 //! the same way wherever it came from.
 
+mod along;
 mod axis;
 mod builder;
 mod document;
@@ -18,6 +19,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+pub use along::Along;
 pub use axis::{Axis, MAX_COUNT};
 pub use builder::SceneBuilder;
 pub use error::{Place, Problem, SceneError};
@@ -81,6 +83,21 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] for the first thing that is wrong.
     pub fn parse(text: &str, name: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
+        Scene::parse_along(text, name, sets, purpose, None)
+    }
+
+    /// The same where a bifurcation diagram may run along one of several axes. Of such a scene, what its text asks of a
+    /// map alone is left out: `[refine]`, further starts, files that diagrams have not.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first thing that is wrong, in the scene or in `along`.
+    pub fn parse_along(
+        text: &str,
+        name: &str,
+        sets: &[String],
+        purpose: Purpose,
+        along: Option<&Along>,
+    ) -> Result<Scene, SceneError> {
         let mut document = document::read(text, name)?;
         for set in sets {
             overrides::apply(&mut document, set)?;
@@ -88,7 +105,11 @@ impl Scene {
         if let Some(model) = Section::open(&document, "", &TOP_LEVEL)?.get("model") {
             model.choice(&[(DEFAULT_MODEL, ())])?;
         }
-        Scene::read(text.to_owned(), &document, &GearPair::paper(0.0), purpose)
+        let model = GearPair::paper(0.0);
+        if purpose == Purpose::Bifurcation {
+            along::take(&mut document, &model, along)?;
+        }
+        Scene::read(text.to_owned(), &document, &model, purpose)
     }
 
     /// A scene without a file: see [`SceneBuilder`].

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::bifurcation::Asked;
 use super::inventory::FileEntry;
 use super::manifest::{AxisObject, Head, StartObject, TimingsObject, start};
 use super::names;
@@ -22,6 +23,11 @@ pub(super) struct Manifest<'a> {
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
+    /// Of a line of a plane: the swept axis and where the other one stays, as the arguments say it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    along: Option<&'a str>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    at: &'a [String],
     axis: AxisObject,
     parameters: Parameters,
     start: StartObject,
@@ -62,7 +68,7 @@ struct IntegrationObject {
 impl<'a> Manifest<'a> {
     pub(super) fn new(
         scene: &'a Scene,
-        sets: &'a [String],
+        asked: Asked<'a>,
         columns: &[Column],
         [elapsed, writing]: [Duration; 2],
         files: &'a [FileEntry],
@@ -75,7 +81,9 @@ impl<'a> Manifest<'a> {
             engine: "reference f64",
             title: scene.title(),
             scene: scene.text(),
-            set: sets,
+            set: asked.sets,
+            along: asked.along.map(|along| along.parameter.as_str()),
+            at: asked.along.map_or(&[], |along| &along.at),
             axis: axis.into(),
             parameters: Parameters::of_scene(scene),
             start: start(scene),

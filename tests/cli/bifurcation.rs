@@ -91,3 +91,29 @@ fn a_map_does_not_go_both_ways_and_says_what_does() {
     let run = rattlemap(&folder()).args(["map", scene, "--set", "start.policy=both"]).assert();
     run.code(2).stderr(says(&["`start.policy = both` does not fit: a map shows one", "`rattlemap compare`"]));
 }
+
+#[test]
+fn one_axis_of_a_plane_at_exactly_a_value_of_the_other() {
+    let folder = folder();
+    let plane = "title = 'A plane'\n[[axis]]\nparameter = 'e'\nmin = 0.3\nmax = 0.5\ncount = 3\n\
+                 [[axis]]\nparameter = 'omega'\nmin = 5.0\nmax = 6.0\ncount = 2\n[refine]\n\
+                 [outputs]\nfiles = ['html', 'npy', 'csv']\n";
+    let line = "parameters = { omega = 5.65 }\n[[axis]]\nparameter = 'e'\nmin = 0.3\nmax = 0.5\ncount = 3\n";
+    fs::write(folder.path().join("plane.toml"), plane).unwrap();
+    fs::write(folder.path().join("line.toml"), line).unwrap();
+    let of_plane = ["bifurcation", "plane.toml", "--along", "e"];
+    let run = rattlemap(&folder).args(["bifurcation", "plane.toml"]).assert();
+    run.code(2).stderr(says(&["needs 1 axis", "--along e --at omega=VALUE"]));
+    let run = rattlemap(&folder).args(of_plane).assert();
+    run.code(2).stderr(says(&["--along e: `--at omega=VALUE` is missing"]));
+    assert!(!folder.path().join("out").exists(), "an output folder was made");
+    rattlemap(&folder).args(of_plane).args(["--at", "omega=5.65"]).assert().success();
+    rattlemap(&folder).args(["bifurcation", "line.toml"]).assert().success();
+    let [out, alone] = ["out/plane.e.omega=5.65", "out/line"].map(|name| folder.path().join(name));
+    assert_eq!(names(&out), ["bifurcation.csv", "bifurcation_columns.csv", "manifest.json"]);
+    assert_eq!(columns(&out), columns(&alone));
+    let manifest = manifest(&out);
+    assert_eq!((&manifest["along"], &manifest["at"]), (&"e".into(), &serde_json::json!(["omega=5.65"])));
+    assert_eq!((&manifest["scene"], &manifest["parameters"]["omega"]), (&plane.into(), &5.65.into()));
+    rattlemap(&folder).args(["bifurcation", "line.toml", "--at", "omega=5"]).assert().code(2);
+}

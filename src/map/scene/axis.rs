@@ -28,6 +28,11 @@ impl Axis {
         &self.parameter
     }
 
+    /// The parameter's place in the model's table.
+    pub(crate) fn index(&self) -> usize {
+        self.index
+    }
+
     /// Gives a model the axis' value `i`.
     pub(crate) fn set(&self, model: &mut dyn Model, i: usize) {
         // Between two ends in the parameter's range, which is an interval.
