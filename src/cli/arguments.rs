@@ -82,6 +82,7 @@ pub(crate) enum Command {
     /// a name) and WGPU_BACKEND (vulkan, metal, dx12) in the environment narrow the adapters down.
     Devices,
     Validate(Validate),
+    Compare(Compare),
     Check(Check),
     Completions(Completions),
     /// Measurements: how fast are maps on this machine's engines?
@@ -402,6 +403,47 @@ pub(crate) struct Validate {
     /// Decides which cells: the same seed, the same sample
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(crate) seed: u64,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Where two finished maps of one grid differ: by class, by period
+///
+/// For hysteresis (start.policy up against down), engine against engine, version against version. Other parameters may
+/// differ, and are named; the axes must have the same values. Writes compare.csv (one row per differing cell), compare.png
+/// and manifest.json. Of cells of one period it says in how many symmetry and words differ (an orbit and its mirror image
+/// have one word), and by how much exponents do at most. Filled cells count as any other.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the hysteresis of a plane:\n  \
+    rattlemap map scenes/e_omega.toml --set start.policy=up --out out/up\n  \
+    rattlemap map scenes/e_omega.toml --set start.policy=down --out out/down\n  \
+    rattlemap compare out/up out/down")]
+pub(crate) struct Compare {
+    /// The folder of a finished map
+    #[arg(value_name = "A")]
+    pub(crate) a: PathBuf,
+
+    /// The folder of another one
+    #[arg(value_name = "B")]
+    pub(crate) b: PathBuf,
+
+    /// Exit with code 1 if any cell differs
+    #[arg(long)]
+    pub(crate) fail: bool,
+
+    /// Where to write [default: out/compare/<A's name>-<B's name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Replace the files of an earlier comparison; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Also print one JSON object on stdout: who made the maps, what their scenes ask differently, and all counts
+    #[arg(long)]
+    pub(crate) json: bool,
 
     /// Say nothing unless something is wrong
     #[arg(long)]

@@ -54,14 +54,23 @@ const NAMED: usize = 6;
 
 /// Where the two passes disagree.
 fn told(found: &Hysteresis, name: &str) -> String {
-    let Hysteresis { columns, differing, ranges, by_word } = found;
-    let more = match by_word {
-        0 => String::new(),
-        count => format!("; by word alone in {count}"),
+    let Hysteresis { columns, differing, ranges, by_word, word_ranges } = found;
+    let by_class = match differing {
+        0 => format!("up and down have the same class and period in all {columns} columns"),
+        _ => format!(
+            "up and down differ by class or period in {differing} of {columns} columns, at {name} = {}",
+            listed(ranges)
+        ),
     };
-    if ranges.is_empty() {
-        return format!("up and down have the same class and period in all {columns} columns{more}");
+    match by_word {
+        0 => by_class,
+        _ => {
+            format!("{by_class}\nby word alone they differ in {by_word}, at {name} = {}", listed(word_ranges))
+        }
     }
+}
+
+fn listed(ranges: &[[f64; 2]]) -> String {
     let range = |[first, last]: &[f64; 2]| match first == last {
         true => format!("{first:?}"),
         false => format!("{first:?} to {last:?}"),
@@ -70,8 +79,5 @@ fn told(found: &Hysteresis, name: &str) -> String {
     if ranges.len() > NAMED {
         list.push(format!("{} more ranges", ranges.len() - NAMED));
     }
-    let list = list.join(", ");
-    format!(
-        "up and down differ by class or period in {differing} of {columns} columns, at {name} = {list}{more}"
-    )
+    list.join(", ")
 }

@@ -75,6 +75,8 @@ pub struct Comparison {
     /// Words of cells of one period. Those of an orbit and its mirror image are one: which of the two a start reaches
     /// says nothing.
     pub words: Tally,
+    /// The cells whose words differ, by id, ascending.
+    pub other_word: Vec<u32>,
     /// Exponents of integrated cells of one period that were compared.
     pub exponents: usize,
     /// The largest of their differences; none where nothing was compared.
@@ -114,6 +116,7 @@ pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
         kinds: Vec::with_capacity(a.records.len()),
         symmetric: Tally::default(),
         words: Tally::default(),
+        other_word: Vec::new(),
         exponents: 0,
         exponent: None,
         attractors: Tally::default(),
@@ -136,7 +139,9 @@ impl Comparison {
     fn take_cycles(&mut self, id: usize, a: &Record, b: &Record) {
         let have = |bit| a.valid & b.valid & bit != 0;
         self.symmetric.take(have(valid::SYMMETRIC).then_some(a.symmetric != b.symmetric));
-        self.words.take(a.spelling().zip(b.spelling()).and_then(|(a, b)| differ(&a, &b)));
+        let has_other_word = a.spelling().zip(b.spelling()).and_then(|(a, b)| differ(&a, &b));
+        self.words.take(has_other_word);
+        self.other_word.extend((has_other_word == Some(true)).then_some(id as u32));
         if have(valid::LYAPUNOV) && (a.valid | b.valid) & valid::FILLED == 0 {
             self.exponents += 1;
             // Minus infinity both, where multipliers are zero.
@@ -198,6 +203,8 @@ mod tests {
         assert_eq!((found.differing(), Kind::ALL.map(|kind| found.count(kind))), (3, [2, 1]));
         // What is said of cycles is said of those of one period.
         assert_eq!((found.exponents, found.symmetric.compared, found.words.compared), (1, 1, 1));
+        let filled = b.map(|record| Record { valid: record.valid | valid::FILLED, ..record });
+        assert_eq!(of(&a, &filled).kinds, found.kinds, "filled cells are cells");
     }
 
     #[test]
@@ -212,6 +219,7 @@ mod tests {
         let found = of(&a, &b);
         assert_eq!(found.differing(), 0);
         assert_eq!(found.words, Tally { compared: 3, differing: 1 }, "a mirror image has the same word");
+        assert_eq!(found.other_word, [1]);
         assert_eq!(found.symmetric, Tally { compared: 3, differing: 1 });
         assert_eq!((found.exponents, found.exponent), (3, Some(Largest { difference: 0.5, id: 2 })));
     }

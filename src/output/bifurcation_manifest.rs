@@ -50,11 +50,13 @@ struct HysteresisObject {
     ranges: Vec<[f64; 2]>,
     /// Values at which words alone differ.
     by_word: usize,
+    word_ranges: Vec<[f64; 2]>,
 }
 
 impl From<Hysteresis> for HysteresisObject {
-    fn from(Hysteresis { columns, differing, ranges, by_word }: Hysteresis) -> Self {
-        HysteresisObject { columns, differing, ranges, by_word }
+    fn from(found: Hysteresis) -> Self {
+        let Hysteresis { columns, differing, ranges, by_word, word_ranges } = found;
+        HysteresisObject { columns, differing, ranges, by_word, word_ranges }
     }
 }
 

@@ -57,7 +57,7 @@ fn bar_top(layer: &Layer) -> f64 {
 }
 
 /// Pixels for a number of cells.
-fn side(count: usize) -> f64 {
+pub(super) fn side(count: usize) -> f64 {
     let pixels = if count <= SIDE { count * (SIDE / count) } else { count.min(LONGEST_SIDE) };
     pixels as f64
 }
@@ -114,7 +114,7 @@ pub(super) fn subtitle(scene: &Scene) -> String {
 }
 
 /// An axis on which cells lie at their values: it reaches half a cell further.
-fn axis(axis: &scene::Axis) -> Axis {
+pub(super) fn axis(axis: &scene::Axis) -> Axis {
     let half = (axis.max() - axis.min()) / (axis.count() - 1) as f64 / 2.0;
     let label = format!("{} {}", axis.parameter().meaning, axis.parameter().name);
     Axis::exact(&label, axis.min() - half, axis.max() + half)

@@ -47,6 +47,8 @@ fn columns_are_those_of_the_files() {
     run(dir, &["validate", "out/plane", "--quiet"]);
     run(dir, &["bifurcation", "line.toml", "--quiet", "--set", "start.policy=both"]);
     run(dir, &["orbit", "--set", "e=0.3", "--out", "out/orbit"]);
+    run(dir, &["compare", "out/plane", "out/plane", "--quiet"]);
+    assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));

@@ -12,32 +12,54 @@ pub struct Hysteresis {
     pub differing: usize,
     /// Runs of neighbouring values at which they do: the first and the last value of each.
     pub ranges: Vec<[f64; 2]>,
-    /// Values at which class and period are the same and the words alone differ. Those of an orbit and its mirror
-    /// image are one.
+    /// Values at which class and period are the same and the words alone differ, as where one way leads to motion
+    /// without contact and the other one to rattling. Words of an orbit and its mirror image are one.
     pub by_word: usize,
+    /// Runs of neighbouring ones, as above.
+    pub word_ranges: Vec<[f64; 2]>,
 }
 
 /// Compares the two passes of a diagram by class and period; none if it shows one alone.
 pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     let pass = |direction| columns.iter().filter(move |column| column.direction == Some(direction));
     let [up, down] = Direction::BOTH.map(pass);
-    let mut found = Hysteresis { columns: 0, differing: 0, ranges: Vec::new(), by_word: 0 };
-    let mut is_within = false;
+    let (mut differing, mut by_word) = (Runs::default(), Runs::default());
     for (up, down) in up.zip(down) {
-        found.columns += 1;
         let differs = Kind::of(up.class, down.class).is_some();
-        if differs {
-            found.differing += 1;
-            match found.ranges.last_mut() {
-                Some(range) if is_within => range[1] = up.value,
-                _ => found.ranges.push([up.value; 2]),
-            }
-        } else if up.word.as_ref().zip(down.word.as_ref()).is_some_and(|(up, down)| words_differ(up, down)) {
-            found.by_word += 1;
-        }
-        is_within = differs;
+        differing.take(up.value, differs);
+        let words = up.word.as_ref().zip(down.word.as_ref());
+        by_word.take(up.value, !differs && words.is_some_and(|(up, down)| words_differ(up, down)));
     }
-    (found.columns > 0).then_some(found)
+    (differing.seen > 0).then_some(Hysteresis {
+        columns: differing.seen,
+        differing: differing.count,
+        ranges: differing.ranges,
+        by_word: by_word.count,
+        word_ranges: by_word.ranges,
+    })
+}
+
+/// Values at which something holds, as runs of neighbours.
+#[derive(Default)]
+struct Runs {
+    seen: usize,
+    count: usize,
+    ranges: Vec<[f64; 2]>,
+    /// Whether it held at the value before.
+    is_within: bool,
+}
+
+impl Runs {
+    fn take(&mut self, value: f64, holds: bool) {
+        match self.ranges.last_mut() {
+            Some(range) if holds && self.is_within => range[1] = value,
+            _ if holds => self.ranges.push([value; 2]),
+            _ => {}
+        }
+        self.seen += 1;
+        self.count += usize::from(holds);
+        self.is_within = holds;
+    }
 }
 
 #[cfg(test)]
@@ -66,7 +88,8 @@ mod tests {
             spell(i, word);
         }
         let ranges = vec![[1.0, 2.0], [5.0, 5.0]];
-        let expected = Hysteresis { columns: 7, differing: 3, ranges, by_word: 1 };
+        let expected =
+            Hysteresis { columns: 7, differing: 3, ranges, by_word: 1, word_ranges: vec![[0.0, 0.0]] };
         assert_eq!(hysteresis(&both), Some(expected));
         assert_eq!(hysteresis(&[column(None, 0.0, one)]), None);
     }
