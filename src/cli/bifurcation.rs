@@ -12,13 +12,15 @@ use super::interrupt::Interrupt;
 use super::progress::Progress;
 use super::{say, scene_file};
 use crate::map::bifurcation::{Hysteresis, hysteresis};
-use crate::map::{bifurcation, scene};
+use crate::map::{bifurcation, plan, scene};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
-    let (along, out, ask) = (ask.along(), ask.out(), &ask.run);
-    let purpose = scene::Purpose::Bifurcation;
-    let scene = scene_file::load_along(&ask.scene, &ask.set, purpose, along.as_ref())?;
+    let (along, out) = (ask.along(), ask.out());
+    let (along, purpose) = (along.as_ref(), scene::Purpose::Bifurcation);
+    let ask = &scene_file::with_figures(&ask.run, purpose, along)?;
+    let scene = scene_file::load_along(&ask.scene, &ask.set, purpose, along)?;
+    plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(ask.quiet)?;
     let folder = Folder::open(&out, ask.force)?;
     folder.refuse_links(output::bifurcation::NAMES)?;
@@ -39,7 +41,7 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
         );
         return Err(interrupt.failure(words));
     };
-    let asked = output::bifurcation::Asked { sets: &ask.set, along: along.as_ref() };
+    let asked = output::bifurcation::Asked { sets: &ask.set, along };
     let files = output::bifurcation::write(&folder, &scene, asked, &columns, clock.elapsed())?;
     let name = &scene.axes()[0].parameter().name;
     let differing = hysteresis(&columns).map(|found| format!("{}\n", told(&found, name)));

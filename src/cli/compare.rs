@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 
-use super::arguments::Compare;
+use super::arguments::{Compare, FigureFormat};
 use super::error::Failure;
 use super::finished_map::{self, Manifest};
 use super::interrupt::Interrupt;
@@ -13,7 +13,7 @@ use super::say;
 use crate::map::coexistence;
 use crate::map::compare::{Comparison, Kind, Side, Tally, compare};
 use crate::map::plan::Plan;
-use crate::map::scene::{Quantity, Scene};
+use crate::map::scene::{Points, Quantity, Scene};
 use crate::output::compare::{Compared, MapSide};
 use crate::output::map::Made;
 use crate::output::{self, Cells, Folder};
@@ -22,7 +22,7 @@ use crate::output::{self, Cells, Folder};
 pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
     let clock = Instant::now();
     let interrupt = Interrupt::listen(ask.quiet)?;
-    let dirs = [&ask.a, &ask.b];
+    let (dirs, formats) = ([&ask.a, &ask.b], FigureFormat::scene(&ask.format));
     for dir in dirs {
         finished_map::require_folder(dir)?;
     }
@@ -70,7 +70,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         }
     };
     let compared = Compared { sides: [side(0), side(1)], comparison: &comparison };
-    let files = output::compare::write(&folder, &compared, clock.elapsed())?;
+    let files = output::compare::write(&folder, &compared, &formats, clock.elapsed())?;
     if !ask.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
         say::notes(format_args!("{}\n{files}", summary(&compared, scenes[0])));
@@ -126,6 +126,21 @@ fn require_classes(dirs: [&PathBuf; 2], scenes: [&Scene; 2]) -> Result<(), Failu
 
 /// Refuses maps whose cells lie elsewhere.
 fn require_one_grid(dirs: [&PathBuf; 2], scenes: [&Scene; 2]) -> Result<(), Failure> {
+    let [dir_a, dir_b] = dirs.map(|dir| dir.display());
+    if scenes.iter().any(|scene| scene.list().is_some()) {
+        let [a, b] = scenes.map(Scene::points);
+        let names = |points: &Points| points.swept().map(|p| p.name.to_string()).collect::<Vec<_>>();
+        let is_same = a.counts() == b.counts()
+            && names(a) == names(b)
+            && (0..a.counts()[0] * a.counts()[1]).all(|cell| a.values(cell) == b.values(cell));
+        return match is_same {
+            true => Ok(()),
+            false => Err(Failure::Usage(anyhow!(
+                "maps of other cells cannot be compared: {dir_a} and {dir_b} are of two lists, or one is of none; make \
+                 one of them again with the other's cells"
+            ))),
+        };
+    }
     let [a, b] = scenes.map(Scene::axes);
     for (number, (a, b)) in a.iter().zip(b).enumerate() {
         let is_same = a.parameter().name == b.parameter().name
@@ -138,10 +153,8 @@ fn require_one_grid(dirs: [&PathBuf; 2], scenes: [&Scene; 2]) -> Result<(), Fail
             });
             let values = if a == b { ", and not the same ones between" } else { "" };
             return Err(Failure::Usage(anyhow!(
-                "maps of two grids cannot be compared: axis {number} of {} is {a}, of {} {b}{values}; make one of them \
-                 again with the other's axes",
-                dirs[0].display(),
-                dirs[1].display()
+                "maps of two grids cannot be compared: axis {number} of {dir_a} is {a}, of {dir_b} {b}{values}; make one \
+                 of them again with the other's axes"
             )));
         }
     }
@@ -186,8 +199,7 @@ fn beside(comparison: &Comparison, scene: &Scene) -> Option<String> {
         (compared > 0).then(|| format!("{differing} of {compared} {what}"))
     };
     let exponents = comparison.exponent.map(|largest| {
-        let columns = scene.axes()[0].count();
-        let place = scene.named(&[largest.id % columns, largest.id / columns]);
+        let place = scene.points().named(largest.id);
         format!("exponents of {} by {:.1e} at most, at {place}", comparison.exponents, largest.difference)
     });
     let parts = [tally("in symmetry", comparison.symmetric), tally("by word", comparison.words), exponents];

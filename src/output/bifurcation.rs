@@ -4,16 +4,22 @@ use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::{Folder, OutputError, bifurcation_columns_csv, bifurcation_csv, bifurcation_figure, inventory};
+use super::plot_style::axes::Scale;
+use super::symbols::{axis_label, symbol};
+use super::{
+    Folder, OutputError, bifurcation_columns_csv, bifurcation_csv, bifurcation_figure, caption, inventory,
+};
 use crate::map::bifurcation::Column;
-use crate::map::scene::{Along, Format, Scene};
+use crate::map::scene::{self, Along, Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
-const PNG: &str = "bifurcation.png";
+/// The figure, by format.
+const FIGURES: [(Format, &str); 3] =
+    [(Format::Png, "bifurcation.png"), (Format::Svg, "bifurcation.svg"), (Format::Pdf, "bifurcation.pdf")];
 
 /// Every file that a bifurcation diagram may write.
-pub const NAMES: [&str; 4] = [MANIFEST, CSV, COLUMNS_CSV, PNG];
+pub const NAMES: [&str; 6] = [MANIFEST, CSV, COLUMNS_CSV, FIGURES[0].1, FIGURES[1].1, FIGURES[2].1];
 
 /// How a diagram was asked for, beside its scene.
 #[derive(Clone, Copy, Debug)]
@@ -49,11 +55,18 @@ pub fn write(
         folder.replace(COLUMNS_CSV, |path| bifurcation_columns_csv::write(path, &parameter.name, columns))?;
         files.extend([CSV, COLUMNS_CSV]);
     }
-    if wanted.contains(&Format::Png) {
-        let label = format!("{} {}", parameter.meaning, parameter.name);
-        let title = format!("{}, {}", title(scene, asked.along), scene.start().in_words());
-        folder.replace(PNG, |path| Ok(bifurcation_figure::write(path, &title, &label, columns)?))?;
-        files.push(PNG);
+    for (_, name) in FIGURES.into_iter().filter(|(format, _)| wanted.contains(format)) {
+        let label = axis_label(parameter);
+        let subtitle =
+            format!("{}{}; {}", line(asked.along), scene.start().in_words(), caption::of_scene(scene));
+        let scale = match scene.axes()[0].scale() {
+            scene::Scale::Log => Scale::Logarithmic,
+            scene::Scale::Linear | scene::Scale::Values => Scale::Linear,
+        };
+        folder.replace(name, |path| {
+            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], (&label, scale), columns)?)
+        })?;
+        files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;
     let times = [elapsed, clock.elapsed()];
@@ -62,11 +75,15 @@ pub fn write(
     Ok(files)
 }
 
-/// The scene's title, and of a line of a plane which one it is: the title is that of a map.
-fn title(scene: &Scene, along: Option<&Along>) -> String {
+/// Of a line of a plane, which one it is: the scene's title is that of a map.
+fn line(along: Option<&Along>) -> String {
     let Some(Along { parameter, at }) = along.filter(|along| !along.at.is_empty()) else {
-        return scene.title().to_owned();
+        return String::new();
     };
-    let at = at.iter().map(|at| at.replacen('=', " = ", 1)).collect::<Vec<_>>().join(", ");
-    format!("{}: {parameter} at {at}", scene.title())
+    let at: Vec<String> = at
+        .iter()
+        .filter_map(|at| at.split_once('='))
+        .map(|(name, value)| format!("{} = {}", symbol(name.trim()), value.trim()))
+        .collect();
+    format!("along {} at {}, ", symbol(parameter), at.join(", "))
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::bifurcation::Asked;
 use super::inventory::FileEntry;
-use super::manifest::{AxisObject, Head, StartObject, TimingsObject, start};
+use super::manifest::{AxisObject, DerivedObject, Head, StartObject, TimingsObject, derived, start};
 use super::names;
 use super::parameters::Parameters;
 use crate::map::bifurcation::{Column, Hysteresis, hysteresis};
@@ -30,6 +30,8 @@ pub(super) struct Manifest<'a> {
     at: &'a [String],
     axis: AxisObject,
     parameters: Parameters,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    derived: BTreeMap<String, DerivedObject>,
     start: StartObject,
     integration: IntegrationObject,
     /// Columns by class, of both passes together where there are two.
@@ -88,6 +90,7 @@ impl<'a> Manifest<'a> {
             at: asked.along.map_or(&[], |along| &along.at),
             axis: axis.into(),
             parameters: Parameters::of_scene(scene),
+            derived: derived(scene),
             start: start(scene),
             integration: IntegrationObject {
                 transient_periods: settings.transient_periods,

@@ -10,13 +10,16 @@ use super::manifest::{Head, MANIFEST};
 use super::map_manifest::Made;
 use super::{Cells, Folder, OutputError, compare_csv, compare_figure, names};
 use crate::map::compare::{Comparison, Kind, Tally};
+use crate::map::scene::Format;
 use rattlemap_dynamics::orbit::Class;
 
 const CSV: &str = "compare.csv";
-const PNG: &str = "compare.png";
+/// The figure, by format.
+const FIGURES: [(Format, &str); 3] =
+    [(Format::Png, "compare.png"), (Format::Svg, "compare.svg"), (Format::Pdf, "compare.pdf")];
 
 /// Every file that a comparison may write.
-pub const NAMES: [&str; 3] = [MANIFEST, CSV, PNG];
+pub const NAMES: [&str; 5] = [MANIFEST, CSV, FIGURES[0].1, FIGURES[1].1, FIGURES[2].1];
 
 /// One of two maps.
 #[derive(Clone, Copy, Debug)]
@@ -206,21 +209,27 @@ impl<'a> Object<'a> {
     }
 }
 
-/// Writes table and figure, and the manifest last: a folder that has one is complete. `reading` is how long it took to
-/// read the maps. Returns the files' names.
+/// Writes the table, the figure in these formats, and the manifest last: a folder that has one is complete. A list of
+/// cells has no figure. `reading` is how long it took to read the maps. Returns the files' names.
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write(
     folder: &Folder,
     compared: &Compared<'_>,
+    formats: &[Format],
     reading: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
     folder.remove(&NAMES)?;
     folder.replace(CSV, |path| compare_csv::write(path, compared))?;
-    folder.replace(PNG, |path| Ok(compare_figure::write(path, compared)?))?;
-    let listed = inventory::entries(folder, &[CSV, PNG])?;
+    let mut files = vec![CSV];
+    let has_figure = compared.sides[0].cells.scene().list().is_none();
+    for (_, name) in FIGURES.into_iter().filter(|(format, _)| has_figure && formats.contains(format)) {
+        folder.replace(name, |path| Ok(compare_figure::write(path, compared)?))?;
+        files.push(name);
+    }
+    let listed = inventory::entries(folder, &files)?;
     let manifest = Manifest {
         head: Head::of("compare"),
         object: Object::of(compared),
@@ -228,7 +237,8 @@ pub fn write(
         files: &listed,
     };
     inventory::write_manifest(folder, &manifest)?;
-    Ok(vec![CSV, PNG, MANIFEST])
+    files.push(MANIFEST);
+    Ok(files)
 }
 
 /// Prints to stdout what was found: one object, its fields a contract.

@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use plotters::style::RGBColor;
-
 use super::compare::Compared;
 use super::layers::Color;
 use super::map_figure::{axis, side};
 use super::plot_style::axes::Frame;
 use super::plot_style::legend::draw_head;
-use super::plot_style::{Align, BELOW, Canvas, DARK, Rect, SMALL, save_figure};
+use super::plot_style::{Align, BELOW, Canvas, DARK, RGBColor, Rect, SMALL, save_figure};
 use super::{DrawError, FigureError};
 use crate::map::compare::Kind;
 use rattlemap_dynamics::orbit::Class;
@@ -65,7 +63,7 @@ fn place(classes: [Class; 2]) -> usize {
     }
 }
 
-/// Draws the comparison as a PNG.
+/// Draws the comparison in the format that the file's name tells.
 ///
 /// # Errors
 /// A file that cannot be written, by name.

@@ -5,6 +5,7 @@ mod bifurcation_columns_csv;
 mod bifurcation_csv;
 pub mod bifurcation_figure;
 mod bifurcation_manifest;
+pub mod caption;
 mod cells;
 mod cells_csv;
 mod cells_npy;
@@ -31,6 +32,7 @@ mod record_file;
 mod replay;
 mod report;
 mod stdout;
+mod symbols;
 pub mod unfinished;
 mod validation_json;
 

@@ -1,12 +1,10 @@
 //! The panel of exponents: the largest Lyapunov exponent of each column, with its standard error.
 
-use plotters::style::RGBColor;
-
 use super::{Look, direction_color, mixed};
 use crate::map::bifurcation::{Column, Direction};
 use crate::output::DrawError;
 use crate::output::plot_style::axes::{Axis, Frame};
-use crate::output::plot_style::{Canvas, DARK, FAINT, MESHING, Marker, Rect, Shape};
+use crate::output::plot_style::{Canvas, DARK, FAINT, MESHING, Marker, RGBColor, Rect, Shape};
 use rattlemap_dynamics::orbit::Class;
 
 /// Height of one pass' strip of classes.

@@ -8,6 +8,11 @@ use crate::output::DrawError;
 const PADDING: f64 = 0.06;
 /// Tick marks' length.
 const TICK: f64 = 7.0;
+/// The length of those without a label.
+const MINOR: f64 = 4.0;
+/// The smallest type of an axis' name, and what is left free beyond its ends.
+const SMALLEST: f64 = 16.0;
+const MARGIN: f64 = 12.0;
 /// Pixels between ticks at least: labels beside each other need more room than stacked ones.
 const APART: (f64, f64) = (90.0, 60.0);
 const APART_ON_BAR: f64 = 45.0;
@@ -32,6 +37,8 @@ pub struct Axis {
     pub high: f64,
     /// How values lie on it.
     pub scale: Scale,
+    /// Of an axis of listed values, which lie at 0, 1, 2 ...: how each is written.
+    pub listed: Vec<String>,
 }
 
 impl Axis {
@@ -40,7 +47,20 @@ impl Axis {
         let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 0.0) };
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-6);
         let (low, high) = if high - low > least { (low, high) } else { (low - 0.5, low + 0.5) };
-        Axis { label: label.to_owned(), low, high, scale: Scale::Linear }
+        Axis { label: label.to_owned(), low, high, scale: Scale::Linear, listed: Vec::new() }
+    }
+
+    /// An axis of values that have as much room as each other, half of it on either side.
+    pub fn listed(label: &str, values: impl Iterator<Item = f64>) -> Axis {
+        let listed: Vec<String> = values.map(|value| value.to_string().replace('-', "\u{2212}")).collect();
+        let high = listed.len() as f64 - 0.5;
+        Axis { listed, ..Axis::exact(label, -0.5, high) }
+    }
+
+    /// A logarithmic axis from the value `low` to the value `high`, both positive; widened as [`Axis::exact`] where
+    /// they are not.
+    pub fn logarithmic(label: &str, low: f64, high: f64) -> Axis {
+        Axis { scale: Scale::Logarithmic, ..Axis::exact(label, low.log10(), high.log10()) }
     }
 
     /// An axis that holds all finite `values` with some room.
@@ -77,6 +97,17 @@ impl Axis {
             Scale::Logarithmic => value.log10().clamp(self.low, self.high),
         }
     }
+}
+
+/// The name of an axis, in smaller type if it is too long.
+fn draw_name(canvas: &Canvas<'_>, name: &str, at: Point, room: f64, align: Align) -> Result<(), DrawError> {
+    let size = (MEDIUM * room / canvas.text_width(name, MEDIUM)?.max(1.0)).clamp(SMALLEST, MEDIUM);
+    canvas.text(&canvas.fitted(name, size, room + 1.0)?, at, size, align, DARK)
+}
+
+/// Of the mark beside a label, which a minor tick does not have.
+fn mark_length(label: &str) -> f64 {
+    if label.is_empty() { MINOR } else { TICK }
 }
 
 /// The smallest and the largest finite value, if there is one.
@@ -122,11 +153,12 @@ impl Frame {
     /// Draws the grid; comes before the data.
     pub fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
         let Rect { left, top, right, bottom } = self.rect;
-        for tick in self.x_ticks() {
+        let is_major = |tick: &Tick| !tick.label.is_empty();
+        for tick in self.x_ticks().into_iter().filter(is_major) {
             let x = self.x_pixel(tick.at);
             canvas.stroke(&[(x, top), (x, bottom)], 1.0, GRID)?;
         }
-        for tick in self.y_ticks(APART.1) {
+        for tick in self.y_ticks(APART.1).into_iter().filter(is_major) {
             let y = self.y_pixel(tick.at);
             canvas.stroke(&[(left, y), (right, y)], 1.0, GRID)?;
         }
@@ -142,12 +174,13 @@ impl Frame {
         let mut widest = 0f64;
         for Tick { at, label } in self.y_ticks(APART.1) {
             let y = self.y_pixel(at);
-            canvas.stroke(&[(left - TICK, y), (left, y)], 1.5, DARK)?;
+            canvas.stroke(&[(left - mark_length(&label), y), (left, y)], 1.5, DARK)?;
             canvas.text(&label, (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
             widest = widest.max(canvas.text_width(&label, SMALL)?);
         }
         let y_label = (left - TICK - 6.0 - widest - 26.0, (top + bottom) / 2.0);
-        canvas.text(&self.y.label, y_label, MEDIUM, Align::Upwards, DARK)
+        let room = 2.0 * y_label.1.min(canvas.size().1 - y_label.1) - 2.0 * MARGIN;
+        draw_name(canvas, &self.y.label, y_label, room, Align::Upwards)
     }
 
     /// Draws the lower edge with its ticks, and labels if they are wanted.
@@ -156,14 +189,15 @@ impl Frame {
         canvas.stroke(&[(left, bottom), (right, bottom)], 1.5, DARK)?;
         for Tick { at, label } in self.x_ticks() {
             let x = self.x_pixel(at);
-            canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
+            canvas.stroke(&[(x, bottom), (x, bottom + mark_length(&label))], 1.5, DARK)?;
             if labels {
                 canvas.text(&label, (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
             }
         }
         if labels {
             let middle = ((left + right) / 2.0, bottom + TICK + 54.0);
-            canvas.text(&self.x.label, middle, MEDIUM, Align::Center, DARK)?;
+            let room = 2.0 * middle.0.min(canvas.size().0 - middle.0) - 2.0 * MARGIN;
+            draw_name(canvas, &self.x.label, middle, room, Align::Center)?;
         }
         Ok(())
     }
@@ -173,7 +207,7 @@ impl Frame {
         let right = self.rect.right;
         for Tick { at, label } in self.y_ticks(APART_ON_BAR) {
             let y = self.y_pixel(at);
-            canvas.stroke(&[(right, y), (right + TICK, y)], 1.5, DARK)?;
+            canvas.stroke(&[(right, y), (right + mark_length(&label), y)], 1.5, DARK)?;
             canvas.text(&label, (right + TICK + 7.0, y), SMALL, Align::Left, DARK)?;
         }
         Ok(())

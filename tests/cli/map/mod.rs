@@ -1,8 +1,10 @@
 //! `rattlemap map` as scripts see it: files of the contract, refusals, resumption.
 
 mod adaptive;
+mod axes;
 mod check;
 mod engines;
+mod figures;
 mod folders;
 mod interrupts;
 mod json;
