@@ -15,7 +15,7 @@ use crate::map::{bifurcation, plan, scene};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
-    let ask = &ask.run;
+    let ask = &scene_file::with_figures(&ask.run, scene::Purpose::Bifurcation)?;
     let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(ask.quiet)?;

@@ -7,7 +7,7 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
-use super::arguments::{DEFAULT_RESTITUTION, Orbit};
+use super::arguments::{DEFAULT_RESTITUTION, FigureFormat, Orbit};
 use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use crate::map::scene;
@@ -35,7 +35,7 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     output::orbit::print(&*model, &orbit, &asked, ask.json)?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
-        output::orbit::write(&folder, &*model, &orbit, &asked)?;
+        output::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;
     }
     fail_if(failed, "the integration failed; `status` says why")
 }

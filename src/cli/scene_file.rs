@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
-use crate::map::scene::{FileText, Place, Problem, Purpose, Scene, SceneError};
+use super::arguments::{FigureFormat, SceneOptions};
+use crate::map::scene::{FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+
+/// The `--set` that says what is written.
+const FILES: &str = "outputs.files=";
 
 /// Reads and parses the scene file at `path`; messages call it by that path.
 ///
@@ -30,6 +34,24 @@ pub(crate) fn find(path: &Path) -> Result<FileText, String> {
             "cannot be read at {name} ({error}); give the path of a CSV table, relative to the scene's folder"
         )),
     }
+}
+
+/// The options with `--format` told as one more `--set`: that is what a manifest keeps and what resuming compares.
+///
+/// # Errors
+/// As [`load`], where there is such an option.
+pub(crate) fn with_figures(options: &SceneOptions, purpose: Purpose) -> Result<SceneOptions, SceneError> {
+    let mut options = options.clone();
+    let formats = FigureFormat::scene(&std::mem::take(&mut options.format));
+    if formats.is_empty() {
+        return Ok(options);
+    }
+    let written = load(&options.scene, &options.set, purpose)?.outputs().files.clone();
+    let others = written.into_iter().filter(|format| !Format::FIGURES.contains(format));
+    let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
+    options.set.retain(|set| !set.starts_with(FILES));
+    options.set.push(format!("{FILES}[{}]", names.join(",")));
+    Ok(options)
 }
 
 #[cfg(test)]

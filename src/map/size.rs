@@ -62,7 +62,7 @@ impl Size {
             Format::Html if scene.start().follows() => HTML + HTML_START,
             Format::Html => HTML,
             // One of each quantity, one of attractors.
-            Format::Png => PNG * (scene.outputs().quantities.len() as u64 + 1),
+            Format::Png | Format::Svg | Format::Pdf => PNG * (scene.outputs().quantities.len() as u64 + 1),
         };
         let per_files: u64 = scene.outputs().files.iter().map(per_file).sum();
         let settings = scene.orbit_settings();

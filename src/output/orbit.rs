@@ -11,6 +11,7 @@ use super::orbit_json::to_json;
 use super::orbit_summary::summary;
 use super::parameters::Parameters;
 use super::{Folder, OutputError, orbit_figures};
+use crate::map::scene::Format;
 use rattlemap_dynamics::model::{Model, Oscillator, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
@@ -79,11 +80,17 @@ pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Res
     super::print(&text)
 }
 
-/// Writes the orbit and, unless it failed, its figures; the manifest last. Returns the number of files.
+/// Writes the orbit and, unless it failed, its figures in these formats; the manifest last. Returns the number of files.
 ///
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
-pub fn write(folder: &Folder, model: &dyn Model, orbit: &Orbit, asked: &Asked) -> Result<usize, OutputError> {
+pub fn write(
+    folder: &Folder,
+    model: &dyn Model,
+    orbit: &Orbit,
+    asked: &Asked,
+    formats: &[Format],
+) -> Result<usize, OutputError> {
     let clock = Clock::now();
     // Figures of an earlier orbit must not stand beside this one.
     folder.remove(&[MANIFEST, JSON])?;
@@ -94,10 +101,10 @@ pub fn write(folder: &Folder, model: &dyn Model, orbit: &Orbit, asked: &Asked) -
     if orbit.class != Class::Failed {
         let samples = samples_per_period(&model.oscillator()?);
         let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
-        orbit_figures::write_each(model, orbit, &trace, |name, save| {
+        orbit_figures::write_each(model, orbit, &trace, formats, |name, save| {
+            files.push(name);
             folder.replace(name, |path| Ok(save(path)?))
         })?;
-        files.extend(orbit_figures::NAMES);
     }
     let listed = inventory::entries(folder, &files)?;
     let Settings { transient_periods, observed_periods, max_period } = asked.settings;

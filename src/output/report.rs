@@ -24,7 +24,8 @@ use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
-use super::{WriteError, names, replay};
+use super::symbols::symbol;
+use super::{WriteError, caption, names, replay};
 use crate::map::scene::{Quantity, Rule, Scale, Scene};
 use rattlemap_dynamics::orbit::Status;
 
@@ -36,6 +37,9 @@ const SCRIPT: &str = include_str!("report/page.js");
 struct Data<'a> {
     title: String,
     subtitle: String,
+    /// Every parameter that no axis sweeps, and what the model is taken from.
+    fixed: String,
+    source: Option<&'static str>,
     axes: Vec<AxisData>,
     derived: Vec<DerivedData>,
     /// What follows the `--set` of swept and derived parameters in the command that replays a cell.
@@ -57,6 +61,7 @@ struct Data<'a> {
 #[derive(Serialize)]
 struct AxisData {
     parameter: String,
+    symbol: String,
     meaning: String,
     min: f64,
     max: f64,
@@ -101,6 +106,8 @@ struct BarData {
     colors: Vec<String>,
     low: f64,
     high: f64,
+    /// Sentences on what lies beyond its ends.
+    left_out: Vec<String>,
 }
 
 /// An array over the cells.
@@ -126,6 +133,8 @@ pub(super) fn write(
     let data = Data {
         title: scene.title().to_owned(),
         subtitle: subtitle(scene),
+        fixed: caption::all_fixed(scene),
+        source: caption::source(scene.base()),
         axes: scene.axes().iter().map(AxisData::from).collect(),
         derived: derived(scene),
         replay: replay::arguments(scene),
@@ -254,6 +263,7 @@ impl From<&crate::map::scene::Axis> for AxisData {
         let parameter = axis.parameter();
         AxisData {
             parameter: parameter.name.to_string(),
+            symbol: symbol(&parameter.name),
             meaning: parameter.meaning.to_string(),
             min: axis.min(),
             max: axis.max(),
@@ -282,6 +292,7 @@ impl From<&Layer> for LayerData {
                 colors: bar.colors.iter().step_by(6).map(hex).collect(),
                 low: bar.low,
                 high: bar.high,
+                left_out: bar.left_out(layer.indices.len()),
             }),
             indices: packed("u8", &layer.indices),
         }

@@ -95,7 +95,7 @@ pub const KEYS: &[Key] = &[
     key("refine", "word", Value("false"), Takes::Flag, "a change of the word alone is a border"),
     key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts and mesh fraction of filled cells"),
     key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]), "what is not asked for is not computed"),
-    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "html"]), "what is written; `bifurcation` knows csv and png, a list of cells csv and npy"),
+    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "what is written; png, svg and pdf are figures; `bifurcation` knows them and csv, a list of cells csv and npy"),
 ];
 
 /// The names in one table.

@@ -181,12 +181,12 @@ function drawAxes(p) {
   }
   pen.font = "14px system-ui, sans-serif";
   pen.textAlign = "center";
-  const name = ({ meaning, parameter }) => `${meaning} ${parameter}`;
-  pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44);
+  const name = ({ meaning, symbol }) => `${meaning}, ${symbol}`;
+  pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
   pen.save();
   pen.translate(14, p.y + p.height / 2);
   pen.rotate(-Math.PI / 2);
-  pen.fillText(name(map.axes[1]), 0, 0);
+  pen.fillText(name(map.axes[1]), 0, 0, p.height + 40);
   pen.restore();
 }
 
@@ -216,7 +216,7 @@ function facts({ i, j }) {
   // Of a filled cell nothing was measured.
   const between = (text) => (text !== undefined && source === "filled" ? `${text}, interpolated` : text);
   return [
-    [map.axes[0].parameter, a], [map.axes[1].parameter, b], ...derivedValues({ i, j }),
+    [map.axes[0].symbol, a], [map.axes[1].symbol, b], ...derivedValues({ i, j }),
     ["class", kind === "periodic" ? `period ${at("period")}` : kind],
     ["exponent", between(error && exponent ? `${exponent} \u00b1 ${error}` : exponent)],
     ["impacts per period", between(number("impacts_per_period"))],
@@ -271,13 +271,14 @@ function showLayer(index) {
     const ramp = element("div", undefined, "ramp");
     ramp.style.background = `linear-gradient(to right, ${shown.bar.colors.map((c) => `#${c}`).join(",")})`;
     const scale = element("div", undefined, "ticks");
-    const { low, high, label } = shown.bar;
+    const { low, high, label, left_out: leftOut } = shown.bar;
     for (const [value, text] of ticks(low, high, 6)) {
       const tick = element("span", text);
       tick.style.left = `${(100 * (value - low)) / (high - low)}%`;
       scale.append(tick);
     }
-    byId("bar").append(...(label === shown.title ? [] : [element("div", label)]), ramp, scale);
+    byId("bar").append(...(label === shown.title ? [] : [element("div", label)]), ramp, scale,
+      ...leftOut.map((text) => element("div", text, "beyond")));
   }
   byId("legend").replaceChildren(...shown.entries.map(({ color, text, cells }) => {
     const patch = element("span", undefined, "patch");
@@ -539,6 +540,7 @@ function tellValidation(found) {
 async function start() {
   byId("title").textContent = map.title;
   byId("subtitle").textContent = map.subtitle;
+  byId("fixed").textContent = (map.fixed ? `Fixed: ${map.fixed}. ` : "") + (map.source ? `Model: \u201c${map.source}\u201d.` : "");
   byId("layers").append(...map.layers.map(({ short }, k) => {
     const button = element("button", short);
     button.type = "button";

@@ -4,6 +4,7 @@ mod adaptive;
 mod axes;
 mod check;
 mod engines;
+mod figures;
 mod folders;
 mod interrupts;
 mod json;
