@@ -30,7 +30,7 @@ const BAR_HEIGHT: f64 = 260.0;
 /// Length of the arrow at an end beyond which there are values.
 const ARROW: f64 = 18.0;
 /// Room for a bar's name, and between it and the entries above.
-const BAR_HEAD: f64 = 44.0;
+const BAR_HEAD: f64 = 50.0;
 const ABOVE_BAR: f64 = 26.0;
 /// Height of a picture's inside at least.
 const LOWEST: f64 = 700.0;

@@ -185,7 +185,7 @@ fn figures_in_svg_and_pdf_have_lines_and_text() {
         let text = String::from_utf8_lossy(pdf);
         assert!(text.contains("+Ubuntu-Light") && text.contains("/FontFile2") && !text.contains("Date"));
         // A reader finds the letters: the map from glyphs to characters has omega, 03C9.
-        let map = String::from_utf8(stream(pdf, "/Type/CMap")).unwrap();
+        let map = String::from_utf8(stream(pdf, "/Type /CMap")).unwrap();
         assert!(map.to_uppercase().contains("<03C9>"), "{map}");
     }
     assert!(files[0].len() < 150_000, "a line of few pixels has few points: {}", files[0].len());
