@@ -38,12 +38,13 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let plan = Plan::new(&scene);
     plan.check()?;
     let interrupt = Interrupt::listen(ask.run.quiet)?;
-    interrupt.wait_for(Some("the engine is open"));
     let folder = open_folder(ask)?;
+    interrupt.ends_at_once(stopped::before_anything(ask, &plan), folder.leaver());
     let clock = Instant::now();
     let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))
         .map_err(|failure| stopped::before_it_began(failure, ask, &folder, &plan))?;
     let opening = clock.elapsed();
+    interrupt.wait_for(None);
     if !ask.run.quiet && !why.is_empty() {
         say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
     }
@@ -60,7 +61,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         None => Progress::new(total, resumed_cells, unit(&plan), ask.run.quiet),
     };
     integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
-    interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.file.count()));
+    interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.file.count()), || {});
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
     let Kept { elapsed_before, clock, .. } = kept;

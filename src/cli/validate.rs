@@ -51,7 +51,9 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         interrupt
             .failure(anyhow!("interrupted after {done} of {count} cells, and nothing was written to {path}"))
     };
-    interrupt.wait_for(Some("the engine is open"));
+    let path = dir.display();
+    let words = format!("none of {count} cells was replayed, and nothing was written to {path}");
+    interrupt.ends_at_once(words, folder.leaver());
     let again = run_again(&subject, &sample, &manifest.device, interrupt.raised());
     if !interrupt.wait_for(None) {
         return Err(interrupted(0));

@@ -4,7 +4,7 @@
 mod lock;
 
 use std::borrow::Cow;
-use std::fs::{self, File};
+use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -62,9 +62,9 @@ pub enum FolderError {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    _lock: Lock,
+    lock: Lock,
     // Dropped after the lock, whose file lies in it.
-    _made: Made,
+    made: Made,
 }
 
 /// Folders that were made for a run, outermost first; those that hold nothing in the end go again.
@@ -109,7 +109,7 @@ impl Folder {
             Ok((Some(lock), made)) => match is_empty(&path) {
                 Err(reason) => Err(FolderError::NotWritable { path, reason }),
                 Ok(false) if !force => Err(FolderError::NotEmpty { path }),
-                Ok(_) => Ok(Folder { path, _lock: lock, _made: made }),
+                Ok(_) => Ok(Folder { path, lock, made }),
             },
         }
     }
@@ -134,6 +134,16 @@ impl Folder {
         fs::read_dir(path).is_ok_and(|entries| entries.flatten().any(|entry| !is_leftover(&entry)))
     }
 
+    /// What leaves the folder as it was, as far as nothing was written to it, where the process is about to end without
+    /// dropping this.
+    pub fn leaver(&self) -> impl FnOnce() + Send + use<> {
+        let (lock, made) = (self.lock.path().to_owned(), Made(self.made.0.clone()));
+        move || {
+            let _ = fs::remove_file(lock);
+            drop(made);
+        }
+    }
+
     /// Where it is, as the user named it.
     pub fn path(&self) -> &Path {
         &self.path
@@ -156,7 +166,9 @@ impl Folder {
             return Err(OutputError::Write { path: target, reason: reason.into() });
         }
         // On the disk before it has its name, or a power cut leaves an empty file of that name.
-        let whole = || Ok(File::open(&partial)?.sync_all().and_then(|()| fs::rename(&partial, &target))?);
+        // Windows wants to see that whoever asks for it may write.
+        let synced = || OpenOptions::new().write(true).open(&partial)?.sync_all();
+        let whole = || Ok(synced().and_then(|()| fs::rename(&partial, &target))?);
         let written = write(&partial).and_then(|()| whole());
         if written.is_err() {
             // Best effort: the error that matters is the one already at hand.
@@ -261,6 +273,21 @@ mod tests {
         fs::write(root.path().join("a/b/x"), "").unwrap();
         drop(folder);
         assert!(root.path().join("a/b/x").exists() && !inner.exists());
+    }
+
+    /// As a process does that ends without dropping anything.
+    #[test]
+    fn a_folder_can_be_left_as_it_was() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = Folder::open(&root.path().join("a/b"), false).unwrap();
+        let leave = folder.leaver();
+        std::mem::forget(folder);
+        leave();
+        assert!(!root.path().join("a").exists());
+        fs::write(root.path().join("x"), "").unwrap();
+        let folder = Folder::open(root.path(), true).unwrap();
+        folder.leaver()();
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "what was there before stays");
     }
 
     #[test]

@@ -11,5 +11,6 @@ mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;
 mod models;
+mod systems;
 mod text;
 mod your_gears;

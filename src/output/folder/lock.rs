@@ -44,6 +44,13 @@ impl Lock {
     }
 }
 
+impl Lock {
+    /// Its file.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
 impl Drop for Lock {
     fn drop(&mut self) {
         // A file that stays is in nobody's way.
