@@ -20,6 +20,8 @@ use plotters::prelude::*;
 use plotters::style::register_font;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+pub(super) use ticks::superscript;
+
 use super::{DrawError, FigureError};
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::EventKind;

@@ -1,5 +1,6 @@
 //! The words above an orbit's figures.
 
+use crate::output::plot_style::superscript;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::{Class, Orbit};
 
@@ -61,15 +62,6 @@ fn shortened(word: &str) -> String {
         text += &power;
     }
     text
-}
-
-fn superscript(digit: char) -> char {
-    match digit {
-        '1' => '\u{b9}',
-        '2' => '\u{b2}',
-        '3' => '\u{b3}',
-        _ => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
-    }
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ use crate::output::DrawError;
 const PADDING: f64 = 0.06;
 /// Tick marks' length.
 const TICK: f64 = 7.0;
+/// The length of those without a label.
+const MINOR: f64 = 4.0;
 /// Pixels between ticks at least: labels beside each other need more room than stacked ones.
 const APART: (f64, f64) = (90.0, 60.0);
 const APART_ON_BAR: f64 = 45.0;
@@ -41,6 +43,12 @@ impl Axis {
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-6);
         let (low, high) = if high - low > least { (low, high) } else { (low - 0.5, low + 0.5) };
         Axis { label: label.to_owned(), low, high, scale: Scale::Linear }
+    }
+
+    /// A logarithmic axis from the value `low` to the value `high`, both positive; widened as [`Axis::exact`] where
+    /// they are not.
+    pub fn logarithmic(label: &str, low: f64, high: f64) -> Axis {
+        Axis { scale: Scale::Logarithmic, ..Axis::exact(label, low.log10(), high.log10()) }
     }
 
     /// An axis that holds all finite `values` with some room.
@@ -77,6 +85,11 @@ impl Axis {
             Scale::Logarithmic => value.log10().clamp(self.low, self.high),
         }
     }
+}
+
+/// Of the mark beside a label, which a minor tick does not have.
+fn mark_length(label: &str) -> f64 {
+    if label.is_empty() { MINOR } else { TICK }
 }
 
 /// The smallest and the largest finite value, if there is one.
@@ -122,11 +135,12 @@ impl Frame {
     /// Draws the grid; comes before the data.
     pub fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<(), DrawError> {
         let Rect { left, top, right, bottom } = self.rect;
-        for tick in self.x_ticks() {
+        let is_major = |tick: &Tick| !tick.label.is_empty();
+        for tick in self.x_ticks().into_iter().filter(is_major) {
             let x = self.x_pixel(tick.at);
             canvas.stroke(&[(x, top), (x, bottom)], 1.0, GRID)?;
         }
-        for tick in self.y_ticks(APART.1) {
+        for tick in self.y_ticks(APART.1).into_iter().filter(is_major) {
             let y = self.y_pixel(tick.at);
             canvas.stroke(&[(left, y), (right, y)], 1.0, GRID)?;
         }
@@ -142,7 +156,7 @@ impl Frame {
         let mut widest = 0f64;
         for Tick { at, label } in self.y_ticks(APART.1) {
             let y = self.y_pixel(at);
-            canvas.stroke(&[(left - TICK, y), (left, y)], 1.5, DARK)?;
+            canvas.stroke(&[(left - mark_length(&label), y), (left, y)], 1.5, DARK)?;
             canvas.text(&label, (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
             widest = widest.max(canvas.text_width(&label, SMALL)?);
         }
@@ -156,7 +170,7 @@ impl Frame {
         canvas.stroke(&[(left, bottom), (right, bottom)], 1.5, DARK)?;
         for Tick { at, label } in self.x_ticks() {
             let x = self.x_pixel(at);
-            canvas.stroke(&[(x, bottom), (x, bottom + TICK)], 1.5, DARK)?;
+            canvas.stroke(&[(x, bottom), (x, bottom + mark_length(&label))], 1.5, DARK)?;
             if labels {
                 canvas.text(&label, (x, bottom + TICK + 17.0), SMALL, Align::Center, DARK)?;
             }
@@ -173,7 +187,7 @@ impl Frame {
         let right = self.rect.right;
         for Tick { at, label } in self.y_ticks(APART_ON_BAR) {
             let y = self.y_pixel(at);
-            canvas.stroke(&[(right, y), (right + TICK, y)], 1.5, DARK)?;
+            canvas.stroke(&[(right, y), (right + mark_length(&label), y)], 1.5, DARK)?;
             canvas.text(&label, (right + TICK + 7.0, y), SMALL, Align::Left, DARK)?;
         }
         Ok(())
