@@ -1,10 +1,13 @@
 //! `rattlemap map`: a scene into a folder, resumable at every batch.
 
+mod dry_run;
+mod forecast;
 mod resume_command;
 mod stopped;
 mod summary;
 
 use std::error::Error;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::gpu::Precision;
@@ -34,14 +37,17 @@ use summary::summary;
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
-    capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
+    let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
     let plan = Plan::new(&scene);
     plan.check()?;
+    if ask.dry_run {
+        return dry_run::run(ask, &scene, &plan, free);
+    }
     let interrupt = Interrupt::listen(ask.run.quiet)?;
     let folder = open_folder(ask)?;
     interrupt.ends_at_once(stopped::before_anything(ask, &plan), folder.leaver());
     let clock = Instant::now();
-    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))
+    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, folder.path()))
         .map_err(|failure| stopped::before_it_began(failure, ask, &folder, &plan))?;
     let opening = clock.elapsed();
     interrupt.wait_for(None);
@@ -113,12 +119,12 @@ fn open_folder(ask: &Map) -> Result<Folder, Failure> {
 
 /// The engine that was asked for; where that is left open, an interrupted run goes on with
 /// its own.
-fn engine_of(ask: &Map, folder: &Folder) -> EngineOptions {
+fn engine_of(ask: &Map, folder: &Path) -> EngineOptions {
     let asked = ask.engine;
     if !ask.resume || asked.engine != EngineChoice::Auto || asked.precision.is_some() {
         return asked;
     }
-    match Identity::read(&folder.path().join(RECORDS)) {
+    match Identity::read(&folder.join(RECORDS)) {
         Ok(Some(identity)) if identity.engine() == "cpu" => {
             EngineOptions { engine: EngineChoice::Cpu, ..asked }
         }

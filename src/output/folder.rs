@@ -114,17 +114,45 @@ impl Folder {
         }
     }
 
+    /// Looks whether a folder can be opened and the files `names` written there, and touches nothing: neither makes it
+    /// nor locks it.
+    ///
+    /// # Errors
+    /// As [`Folder::open`] and [`Folder::refuse_links`], as far as it can be seen.
+    pub fn check<'n>(
+        path: &Path,
+        force: bool,
+        names: impl IntoIterator<Item = &'n str>,
+    ) -> Result<(), FolderError> {
+        let own = || path.to_owned();
+        if path.exists() && !path.is_dir() {
+            return Err(FolderError::NotAFolder { path: own() });
+        }
+        let absolute = std::path::absolute(path).unwrap_or_else(|_| own());
+        let around = absolute.ancestors().find(|folder| folder.exists()).unwrap_or(path);
+        match fs::metadata(around) {
+            Ok(data) if data.is_dir() && !data.permissions().readonly() => {}
+            Ok(_) => {
+                let reason = io::Error::other(format!("{} cannot be written", around.display()));
+                return Err(FolderError::NotWritable { path: own(), reason });
+            }
+            Err(reason) => return Err(FolderError::NotWritable { path: own(), reason }),
+        }
+        if Lock::is_held(path) {
+            return Err(FolderError::InUse { path: own() });
+        }
+        if !force && path.is_dir() && !is_empty(path).unwrap_or(false) {
+            return Err(FolderError::NotEmpty { path: own() });
+        }
+        refuse_links_in(path, names)
+    }
+
     /// Looks whether one of the files `names` is a symbolic link, before there is something to write to it.
     ///
     /// # Errors
     /// [`FolderError::Link`] for the first one.
     pub fn refuse_links<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
-        let check = |name| {
-            let path = self.path.join(name);
-            refuse_link(&path).and_then(|()| refuse_link(&partial(&path)))
-        };
-        let checked = names.into_iter().try_for_each(check);
-        checked.map_err(|reason| FolderError::Link { path: self.path.clone(), reason })
+        refuse_links_in(&self.path, names)
     }
 
     /// Whether a folder has anything in it but what a run leaves that was killed before it kept anything.
@@ -201,6 +229,15 @@ impl Folder {
         }
         Ok(())
     }
+}
+
+fn refuse_links_in<'n>(folder: &Path, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
+    let check = |name| {
+        let path = folder.join(name);
+        refuse_link(&path).and_then(|()| refuse_link(&partial(&path)))
+    };
+    let checked = names.into_iter().try_for_each(check);
+    checked.map_err(|reason| FolderError::Link { path: folder.to_owned(), reason })
 }
 
 /// What a run that was killed at once may leave in a folder: nothing of value. Earlier versions left a probe.
@@ -326,6 +363,25 @@ mod tests {
         // What a killed process leaves is no lock.
         fs::write(root.path().join(LOCK), "").unwrap();
         Folder::open(root.path(), false).unwrap();
+    }
+
+    /// It says what opening says, and leaves no trace.
+    #[test]
+    fn a_folder_is_checked_without_being_touched() {
+        let root = tempfile::tempdir().unwrap();
+        let [new, file] = ["a/b", "file"].map(|name| root.path().join(name));
+        Folder::check(&new, false, ["x.txt"]).unwrap();
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
+        fs::write(&file, "").unwrap();
+        assert!(matches!(Folder::check(&file, true, []), Err(FolderError::NotAFolder { .. })));
+        assert!(matches!(Folder::check(&file.join("x"), true, []), Err(FolderError::NotWritable { .. })));
+        assert!(matches!(Folder::check(root.path(), false, []), Err(FolderError::NotEmpty { .. })));
+        Folder::check(root.path(), true, ["file"]).unwrap();
+        let folder = Folder::open(&new, false).unwrap();
+        assert!(matches!(Folder::check(&new, true, []), Err(FolderError::InUse { .. })));
+        drop(folder);
+        fs::create_dir_all(new.join("x.txt")).unwrap();
+        assert!(matches!(Folder::check(&new, true, ["x.txt"]), Err(FolderError::Link { .. })));
     }
 
     #[cfg(unix)]

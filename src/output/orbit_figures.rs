@@ -2,6 +2,7 @@
 
 mod heading;
 mod motion;
+pub(super) mod spectrum;
 mod symbols;
 
 use std::path::{Path, PathBuf};

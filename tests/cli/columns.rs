@@ -50,5 +50,7 @@ fn columns_are_those_of_the_files() {
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));
+    assert_eq!(header(&dir.join("out/orbit/trajectory.csv")), listed("trajectory.csv"));
+    assert_eq!(header(&dir.join("out/orbit/spectrum.csv")), listed("spectrum.csv"));
     assert_eq!(sorted(fields(&dir.join("out/plane/validation.json"))), sorted(listed("validation.json")));
 }

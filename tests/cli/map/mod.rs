@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod check;
+mod dry_run;
 mod engines;
 mod folders;
 mod interrupts;
@@ -92,7 +93,8 @@ fn names(folder: &Path) -> Vec<String> {
 fn a_map_writes_the_files_of_the_contract() {
     let folder = folder();
     map(&folder, &["--engine", "cpu"]).success().stdout("").stderr(says(&[
-        "320 cells on cpu (f64)",
+        "320 cells in ",
+        " s on cpu (f64): ",
         "cells/s",
         "periods/s",
         "periodic",
