@@ -9,24 +9,30 @@ use std::{env, fs};
 use sha2::{Digest, Sha256};
 
 /// What decides the bits of a record, or the order of work that records are replayed in.
-const DECIDING: [&str; 12] = [
+const DECIDING: [&str; 17] = [
     "dynamics/src",
     "shaders",
     "src/gpu",
     "src/record",
     "src/map/engine.rs",
     "src/map/engine",
+    "src/map/expression.rs",
+    "src/map/expression",
     "src/map/plan.rs",
     "src/map/plan",
     "src/map/random.rs",
     "src/map/scene/axis.rs",
+    "src/map/scene/derived.rs",
+    "src/map/scene/list.rs",
+    "src/map/scene/points.rs",
     "src/map/schedule.rs",
     "src/map/schedule",
 ];
 
 /// Packages whose arithmetic, or whose code for a device, goes into a record.
-const PACKAGES: [&str; 12] = [
+const PACKAGES: [&str; 13] = [
     "bytemuck",
+    "libm",
     "matrixmultiply",
     "naga",
     "nalgebra",

@@ -27,7 +27,7 @@
 //!     .build()?;
 //! let map = map::run(&scene, Processor::Cpu)?;
 //! for cell in map.cells() {
-//!     let [force, omega] = cell.values;
+//!     let (force, omega) = (cell.values[0], cell.values[1]);
 //!     println!("{force} {omega}: {:?}, {} impacts", cell.class, cell.record.impacts_per_period);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())

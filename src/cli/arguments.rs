@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use crate::cli::say;
 use crate::gpu::Precision;
 use crate::map::printable::is_printable;
+use crate::map::scene::Format;
 use crate::validate::DEFAULT_SAMPLES;
 use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -152,7 +153,7 @@ impl BenchOptions {
 /// (map.png and others), an interactive page (report.html) and manifest.json. Records go to
 /// records.bin as they are computed: after Ctrl-C (exit code 130) or a crash, --resume goes on from
 /// there, and every table and figure comes out byte for byte as if nothing had happened.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = "Example, the main map with fewer cells:\n  \
     rattlemap map scenes/e_omega.toml --set axis.0.count=128 --set axis.1.count=128")]
 pub(crate) struct Map {
@@ -178,7 +179,7 @@ pub(crate) struct Map {
 }
 
 /// A scene, where its results go, and what to change about it.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct SceneOptions {
     /// The scene: a TOML file
     #[arg(value_name = "SCENE")]
@@ -198,6 +199,10 @@ pub(crate) struct SceneOptions {
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
+    /// Formats of figures, instead of the scene's (outputs.files): some of png, svg, pdf
+    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
+    pub(crate) format: Vec<FigureFormat>,
+
     /// Say nothing unless something is wrong
     #[arg(long)]
     pub(crate) quiet: bool,
@@ -208,6 +213,26 @@ impl SceneOptions {
     pub(crate) fn out(&self) -> PathBuf {
         let default = || Path::new("out").join(self.scene.file_stem().unwrap_or_default());
         self.out.clone().unwrap_or_else(default)
+    }
+}
+
+/// Formats of figures by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FigureFormat {
+    /// Pixels
+    Png,
+    /// Lines and text for browsers and editors; maps as pixels, one per cell
+    Svg,
+    /// The same for papers
+    Pdf,
+}
+
+impl FigureFormat {
+    /// As scenes name them, each once.
+    pub(crate) fn scene(formats: &[FigureFormat]) -> Vec<Format> {
+        let [png, svg, pdf] = Format::FIGURES;
+        let all = [(FigureFormat::Png, png), (FigureFormat::Svg, svg), (FigureFormat::Pdf, pdf)];
+        all.into_iter().filter(|(named, _)| formats.contains(named)).map(|(_, format)| format).collect()
     }
 }
 
@@ -283,6 +308,17 @@ pub(crate) struct Orbit {
     /// time histories
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+
+    /// Formats of figures: some of png, svg, pdf
+    #[arg(
+        long,
+        value_name = "FORMAT,...",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "png",
+        requires = "out"
+    )]
+    pub(crate) format: Vec<FigureFormat>,
 
     /// Write even if the folder is not empty
     #[arg(long, requires = "out")]

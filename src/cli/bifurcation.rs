@@ -11,12 +11,13 @@ use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress::Progress;
 use super::{say, scene_file};
-use crate::map::{bifurcation, scene};
+use crate::map::{bifurcation, plan, scene};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
-    let ask = &ask.run;
+    let ask = &scene_file::with_figures(&ask.run, scene::Purpose::Bifurcation)?;
     let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
+    plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(ask.quiet)?;
     let folder = Folder::open(&ask.out(), ask.force)?;
     folder.refuse_links(output::bifurcation::NAMES)?;

@@ -40,7 +40,11 @@ fn replaced(out: &Path) -> u64 {
 }
 
 fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
-    judge_size(scene, engine, free, Size::of(scene), "lower axis.0.count or axis.1.count")
+    let remedy = match scene.list() {
+        Some(_) => "shorten the list of cells",
+        None => "lower axis.0.count or axis.1.count",
+    };
+    judge_size(scene, engine, free, Size::of(scene), remedy)
 }
 
 fn judge_size(
@@ -60,7 +64,10 @@ fn judge_size(
     };
     let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
     let starts = if size.runs > size.cells { format!(", {} runs,", size.runs) } else { String::new() };
-    let map = format!("a map of {} = {} cells{starts}", counts.join(" x "), size.cells);
+    let map = match scene.list() {
+        Some(_) => format!("a list of {} cells{starts}", size.cells),
+        None => format!("a map of {} = {} cells{starts}", counts.join(" x "), size.cells),
+    };
     let refuse = |what: &str, needed: u64, available: u64| {
         Err(Failure::Usage(anyhow!(
             "{map} needs about {} of {what}, and {} are free; {remedy}{}",

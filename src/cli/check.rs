@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::map::coexistence;
 use crate::output::inventory::{FileEntry, Finding};
 use crate::output::manifest::MANIFEST;
-use crate::output::map::{VALIDATION, repair};
+use crate::output::map::{LIST, VALIDATION, repair};
 use crate::output::{self, Cells, Folder, RECORDS};
 use anyhow::{Context, anyhow};
 use serde_json::Value;
@@ -94,6 +94,14 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
         return Err(Failure::Run(anyhow!(
             "{}: {RECORDS} is damaged or missing, and nothing can be made of it; `{}` keeps what is good of it, if anything \
              is, computes the rest and makes every file anew",
+            dir.display(),
+            manifest.remake_command(dir)
+        )));
+    }
+    if lost.contains(&LIST) {
+        return Err(Failure::Run(anyhow!(
+            "{}: {LIST} is damaged or missing, and nothing tells which cells it listed; with the scene's own table `{}` \
+             makes every file anew",
             dir.display(),
             manifest.remake_command(dir)
         )));

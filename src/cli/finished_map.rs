@@ -4,11 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::map::plan::Plan;
-use crate::map::scene::{Purpose, Scene};
+use crate::map::scene::{FileText, Purpose, Scene};
 use crate::map::schedule::{Refined, Schedule};
 use crate::map::sweep;
 use crate::output::inventory::{self, FileEntry, Finding};
 use crate::output::manifest::{FORMAT, MANIFEST};
+use crate::output::map::LIST;
 use crate::output::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::record::Record;
 use anyhow::{Context, anyhow};
@@ -102,7 +103,18 @@ impl Manifest {
     /// The scene, if its map fits this machine.
     pub(crate) fn scene(&self, dir: &Path) -> Result<FinishedMap<'_>, Failure> {
         let name = dir.join(MANIFEST).display().to_string();
-        let scene = Scene::parse(&self.scene, &name, &self.set, Purpose::Map)?;
+        // The folder's own copy: the file that the scene names may be elsewhere by now, or another.
+        let find = |_: &str| {
+            let path = dir.join(LIST);
+            let text = fs::read_to_string(&path).map_err(|error| {
+                format!(
+                    "was copied to {}, which cannot be read ({error}); make the map again with --force",
+                    path.display()
+                )
+            })?;
+            Ok(FileText { name: path.display().to_string(), text })
+        };
+        let scene = Scene::parse_beside(&self.scene, &name, &self.set, Purpose::Map, &find)?;
         capacity::check_finished(&scene)?;
         Ok(FinishedMap { manifest: self, dir: dir.to_owned(), scene })
     }

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 
 use crate::gpu::Precision;
 use crate::map::coexistence;
+use crate::map::effect;
 use crate::map::engine::Engine;
 use crate::map::plan::Plan;
 use crate::map::scene::{Purpose, Scene, Steps};
@@ -35,6 +36,7 @@ use summary::summary;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
+    let ask = &Map { run: scene_file::with_figures(&ask.run, Purpose::Map)?, ..ask.clone() };
     let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
     let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
@@ -88,12 +90,24 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         resumed_cells,
         lane_grid,
         refined: refined.clone(),
+        without_effect: effect::without_effect(
+            &plan,
+            &records,
+            effect::ROUNDING[usize::from(precision == "f64")],
+        )
+        .iter()
+        .map(|parameter| parameter.name.to_string())
+        .collect(),
     };
     let written = Instant::now();
     let files = output::map::write(&folder, &cells, &run)?;
     let writing = written.elapsed();
+    let idle = run.without_effect.iter().map(|name| {
+        format!("\n{name} changed nothing that was measured: along it every cell is like the others")
+    });
+    let idle: String = idle.collect();
     progress.finish(&format!(
-        "{}\n{}: {}",
+        "{}{idle}\n{}: {}",
         summary(&cells, &run, lane_steps, clock.elapsed().as_secs_f64()),
         say::path(folder.path()),
         files.join(", ")

@@ -9,7 +9,7 @@ use rattlemap_dynamics::orbit::Status;
 use crate::cli::arguments::{DEFAULT_RESTITUTION, Models};
 use crate::cli::error::Failure;
 use crate::cli::say;
-use crate::output::print;
+use crate::output::{caption, print};
 
 /// A model as this command knows it.
 struct Page {
@@ -18,8 +18,6 @@ struct Page {
     summary: &'static str,
     /// Equations and contact law, above the parameters.
     equations: &'static str,
-    /// What it is taken from.
-    source: &'static str,
 }
 
 fn pages() -> Vec<Page> {
@@ -27,8 +25,6 @@ fn pages() -> Vec<Page> {
         model: Box::new(GearPair::paper(DEFAULT_RESTITUTION)),
         summary: "two gears on elastic supports that mesh through a backlash; a harmonic force on gear 1",
         equations: GEAR_PAIR,
-        source: "\"Study on the Nonlinear Dynamic Behavior of Rattling Vibration in Gear Systems\"; numbers in brackets \
-                 are its equations",
     }]
 }
 
@@ -63,7 +59,9 @@ impl Page {
         for status in Status::ALL {
             let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
         }
-        text + &format!("\n{ERRORS}\n\nSource\n\n    {}\n", self.source)
+        let source = caption::source(&*self.model)
+            .map_or(String::new(), |title| format!("\"{title}\"; numbers in brackets are its equations"));
+        text + &format!("\n{ERRORS}\n\nSource\n\n    {source}\n")
     }
 }
 

@@ -7,7 +7,7 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
-use super::arguments::{DEFAULT_RESTITUTION, Orbit};
+use super::arguments::{DEFAULT_RESTITUTION, FigureFormat, Orbit};
 use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::say;
@@ -36,7 +36,8 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     output::orbit::print(&*model, &orbit, &asked, ask.json)?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
-        let files = output::orbit::write(&folder, &*model, &orbit, &asked)?;
+        let files =
+            output::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
     }
     fail_if(failed, "the integration failed; `status` says why")

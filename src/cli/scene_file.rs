@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
-use crate::map::scene::{Place, Problem, Purpose, Scene, SceneError};
+use super::arguments::{FigureFormat, SceneOptions};
+use crate::map::scene::{FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+
+/// The `--set` that says what is written.
+const FILES: &str = "outputs.files=";
 
 /// Reads and parses the scene file at `path`; messages call it by that path.
 ///
@@ -14,7 +18,40 @@ pub(crate) fn load(path: &Path, sets: &[String], purpose: Purpose) -> Result<Sce
         place: Place::File { file: name.as_str().into() },
         problem: Problem::Unreadable { reason: error.to_string() },
     })?;
-    Scene::parse(&text, &name, sets, purpose)
+    let find = |file: &str| {
+        let beside = path.parent().unwrap_or(Path::new("")).join(file);
+        find(&beside)
+    };
+    Scene::parse_beside(&text, &name, sets, purpose, &find)
+}
+
+/// Reads a table of cells.
+pub(crate) fn find(path: &Path) -> Result<FileText, String> {
+    let name = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok(FileText { name, text }),
+        Err(error) => Err(format!(
+            "cannot be read at {name} ({error}); give the path of a CSV table, relative to the scene's folder"
+        )),
+    }
+}
+
+/// The options with `--format` told as one more `--set`: that is what a manifest keeps and what resuming compares.
+///
+/// # Errors
+/// As [`load`], where there is such an option.
+pub(crate) fn with_figures(options: &SceneOptions, purpose: Purpose) -> Result<SceneOptions, SceneError> {
+    let mut options = options.clone();
+    let formats = FigureFormat::scene(&std::mem::take(&mut options.format));
+    if formats.is_empty() {
+        return Ok(options);
+    }
+    let written = load(&options.scene, &options.set, purpose)?.outputs().files.clone();
+    let others = written.into_iter().filter(|format| !Format::FIGURES.contains(format));
+    let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
+    options.set.retain(|set| !set.starts_with(FILES));
+    options.set.push(format!("{FILES}[{}]", names.join(",")));
+    Ok(options)
 }
 
 #[cfg(test)]

@@ -200,7 +200,7 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), Failu
         .take(NAMED + 1)
         .map(|id| {
             let [i, j] = plan.indices(id);
-            format!("({i}, {j})")
+            if plan.is_list() { i.to_string() } else { format!("({i}, {j})") }
         })
         .collect();
     let more = if named.len() > NAMED { ", ..." } else { "" };

@@ -1,8 +1,9 @@
 //! Maps: many motions. A scene says what is asked ([`scene`]); its cells are numbered ([`plan`])
 //! and put in order ([`schedule`]); an engine takes them up and hands back records ([`engine`],
 //! [`sweep`]). Over one axis it is a bifurcation diagram ([`bifurcation`]); several starts per cell
-//! count attractors ([`coexistence`]). [`run`] does all of it at once.
+//! count attractors ([`coexistence`]); what changed nothing is named ([`effect`]). [`run`] does all of it at once.
 
+pub mod expression;
 pub mod printable;
 pub mod random;
 
@@ -18,6 +19,7 @@ pub mod sweep;
 
 pub mod bifurcation;
 pub mod coexistence;
+pub mod effect;
 
 #[cfg(not(target_arch = "wasm32"))]
 mod run;

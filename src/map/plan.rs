@@ -3,15 +3,18 @@
 //! Cell `id = j * count0 + i` has index `i` on the first axis and `j` on the second. It
 //! needs a flow, which depends on everything but the contact law, and a law; cells that
 //! differ in parameters of the law alone share their flow. Engines get cells in
-//! Morton order: whatever the batch, its cells are neighbours and behave alike.
+//! Morton order: whatever the batch, its cells are neighbours and behave alike. The cells of a list are one row:
+//! they have the numbers of their places in it, and come in that order.
 //!
 //! A cell with several starts is as many runs. Run `k` of the cell `id` has the number
 //! `k * cell_count + id`, so that the first runs are the map itself.
 
 mod morton;
+mod parts;
 mod start;
 
 pub(crate) use morton::key as morton_key;
+pub(crate) use parts::Parts;
 
 use std::ops::Range;
 
@@ -20,7 +23,7 @@ use thiserror::Error;
 
 pub(crate) use start::followed;
 
-use crate::map::scene::{Axis, Quantity, Refine, Scene, Start, Steps};
+use crate::map::scene::{Axis, Points, Quantity, Refine, Scene, Start, Steps};
 use crate::record::Record;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, State};
@@ -77,18 +80,26 @@ pub struct NoMotion {
     pub reason: ModelError,
 }
 
-/// What a cell is made of.
-#[derive(Clone, Copy)]
-enum Part {
-    Flow,
-    Law,
+/// Looks for cells of a scene with one axis in which the model has no motion.
+///
+/// # Errors
+/// [`NoMotion`] for the first of them.
+pub fn check_line(scene: &Scene) -> Result<(), NoMotion> {
+    let points = scene.points();
+    (0..points.counts()[0]).try_for_each(|cell| checked(points, cell))
+}
+
+fn checked(points: &Points, cell: usize) -> Result<(), NoMotion> {
+    let verdict = Flow::validate(&*points.model(cell));
+    verdict.map(|_| ()).map_err(|reason| NoMotion { cell: points.named(cell), reason })
 }
 
 /// A scene as cells, flows and laws.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    base: Box<dyn Model>,
-    axes: [Axis; 2],
+    points: Points,
+    flows: Parts,
+    laws: Parts,
     starts: Starts,
     budget: Budget,
     steps: Steps,
@@ -101,16 +112,19 @@ impl Plan {
     /// Plans a map. The scene must have been read for a map, and its [`Size`](crate::map::size::Size) accepted.
     ///
     /// # Panics
-    /// If the scene has not two axes, or more runs than a `u32` numbers: reading a scene for a
+    /// If the scene has neither two axes nor a list, or more runs than a `u32` numbers: reading a scene for a
     /// map and asking its size rule that out.
     pub fn new(scene: &Scene) -> Plan {
-        let [first, second] = scene.axes() else { panic!("a map has two axes") };
+        assert!(scene.axes().len() == 2 || scene.list().is_some(), "a map has two axes, or a list of cells");
         assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
+        let points = scene.points().clone();
+        let [columns, rows] = points.counts();
         let needs = needs(&scene.outputs().quantities);
         let integration = scene.integration();
         Plan {
-            base: scene.base().boxed(),
-            axes: [first.clone(), second.clone()],
+            flows: Parts::flows(&points),
+            laws: Parts::laws(&points),
+            points,
             starts: Starts::new(scene.start(), scene.draw()),
             budget: Budget {
                 settings: scene.orbit_settings(),
@@ -122,30 +136,22 @@ impl Plan {
             steps: integration.steps_per_period,
             refine: scene.refine(),
             needs,
-            order: morton::order(first.count(), second.count()),
+            order: morton::order(columns, rows),
         }
     }
 
     /// Looks for cells in which the model has no motion. A model that has one wherever its parameters are
-    /// in their ranges, as the gear pair but for overflow, has none.
+    /// in their ranges, as the gear pair but for overflow, has none, unless a derived parameter leaves its range.
     ///
     /// # Errors
     /// [`NoMotion`] for one of them, before anything is computed.
     pub fn check(&self) -> Result<(), NoMotion> {
-        let flows = (0..self.flow_count() as u32).into_par_iter();
-        flows.try_for_each(|flow| self.verdict(Part::Flow, flow))?;
-        (0..self.law_count() as u32).into_par_iter().try_for_each(|law| self.verdict(Part::Law, law))
-    }
-
-    fn verdict(&self, part: Part, index: u32) -> Result<(), NoMotion> {
-        let model = self.part_model(part, index);
-        Flow::validate(&*model).map(|_| ()).map_err(|reason| {
-            let value = |axis: &Axis| {
-                let name = &*axis.parameter().name;
-                format!("{name} = {:?}", model.get(name).unwrap_or(f64::NAN))
-            };
-            NoMotion { cell: self.axes.each_ref().map(value).join(", "), reason }
-        })
+        let verdict = |parts: &Parts| {
+            let each = (0..parts.count() as u32).into_par_iter();
+            each.try_for_each(|part| checked(&self.points, parts.cell(part)))
+        };
+        verdict(&self.flows)?;
+        verdict(&self.laws)
     }
 
     /// The same cells with at most `periods` forcing periods each, half of them observed: for
@@ -160,9 +166,23 @@ impl Plan {
         plan
     }
 
-    /// The two axes.
-    pub fn axes(&self) -> &[Axis; 2] {
-        &self.axes
+    /// The two axes; none where cells are listed.
+    pub fn axes(&self) -> &[Axis] {
+        self.points.axes()
+    }
+
+    /// Whether cells are listed: those of neighbouring numbers are no neighbours then.
+    pub fn is_list(&self) -> bool {
+        self.points.list().is_some()
+    }
+
+    /// Cells along the two axes; a list is one row.
+    pub fn counts(&self) -> [usize; 2] {
+        self.points.counts()
+    }
+
+    pub(crate) fn points(&self) -> &Points {
+        &self.points
     }
 
     /// How many cells there are.
@@ -199,10 +219,11 @@ impl Plan {
     /// The run that the run `id` starts from the last state of, if cells follow their
     /// neighbours; none at the end where following begins.
     pub fn before(&self, id: u32) -> Option<u32> {
-        let (j, columns) = (self.indices(id)[1], self.axes[0].count() as u32);
+        let [columns, rows] = self.counts();
+        let (j, columns) = (self.indices(id)[1], columns as u32);
         match self.policy() {
             Start::Up if j > 0 => Some(id - columns),
-            Start::Down if j + 1 < self.axes[1].count() => Some(id + columns),
+            Start::Down if j + 1 < rows => Some(id + columns),
             _ => None,
         }
     }
@@ -254,14 +275,14 @@ impl Plan {
 
     /// Indices on the two axes of a run's cell.
     pub fn indices(&self, id: u32) -> [usize; 2] {
-        let (cell, count) = (id as usize % self.cell_count(), self.axes[0].count());
-        [cell % count, cell / count]
+        self.points.indices(id as usize % self.cell_count())
     }
 
     /// What the run `id` is made of. One that follows its neighbour starts at rest here: only
     /// the neighbour's record says where it does ([`Plan::start`]).
     pub fn cell(&self, id: u32) -> Cell {
-        Cell { id, flow: self.flow_of(id), law: self.part(id, Part::Law), start: self.own_start(id) }
+        let law = self.laws.of(id as usize % self.cell_count());
+        Cell { id, flow: self.flow_of(id), law, start: self.own_start(id) }
     }
 
     /// The runs at these places of the order, each made as [`Plan::cell`] says.
@@ -270,31 +291,12 @@ impl Plan {
     }
 
     fn flow_of(&self, id: u32) -> u32 {
-        self.part(id, Part::Flow)
-    }
-
-    /// Which axes a part of a cell depends on.
-    fn shaping(&self, part: Part) -> [bool; 2] {
-        self.axes.each_ref().map(|axis| match part {
-            Part::Flow => axis.parameter().shapes.oscillator(),
-            Part::Law => axis.parameter().shapes.law(),
-        })
-    }
-
-    /// The index among laws, or among flows, of a run's cell.
-    fn part(&self, id: u32, part: Part) -> u32 {
-        let [i, j] = self.indices(id);
-        match self.shaping(part) {
-            [true, true] => id % self.cell_count() as u32,
-            [true, false] => i as u32,
-            [false, true] => j as u32,
-            [false, false] => 0,
-        }
+        self.flows.of(id as usize % self.cell_count())
     }
 
     /// How many distinct flows there are.
     pub fn flow_count(&self) -> usize {
-        self.count(Part::Flow)
+        self.flows.count()
     }
 
     /// Whether several runs share a flow, and all flows can be kept.
@@ -304,12 +306,7 @@ impl Plan {
 
     /// How many distinct laws there are.
     pub fn law_count(&self) -> usize {
-        self.count(Part::Law)
-    }
-
-    fn count(&self, part: Part) -> usize {
-        let counts = self.axes.iter().zip(self.shaping(part));
-        counts.map(|(axis, shapes)| if shapes { axis.count() } else { 1 }).product()
+        self.laws.count()
     }
 
     /// The oscillator of flow `index`.
@@ -317,7 +314,7 @@ impl Plan {
     /// # Panics
     /// If the model has none there: [`Plan::check`] tells before.
     pub fn oscillator(&self, index: u32) -> Oscillator {
-        match self.part_model(Part::Flow, index).oscillator() {
+        match self.points.model(self.flows.cell(index)).oscillator() {
             Ok(oscillator) => oscillator,
             Err(error) => panic!("a plan that was not checked: {error}"),
         }
@@ -325,28 +322,12 @@ impl Plan {
 
     /// The contact law `index`.
     pub fn law(&self, index: u32) -> Law {
-        self.part_model(Part::Law, index).law()
-    }
-
-    /// The model as far as a part of a cell depends on it.
-    fn part_model(&self, part: Part, index: u32) -> Box<dyn Model> {
-        self.model_at(self.shaping(part), index)
-    }
-
-    /// The base with the axes in `which` set to flat index `index` among them.
-    fn model_at(&self, which: [bool; 2], index: u32) -> Box<dyn Model> {
-        let mut model = self.base.clone();
-        let mut rest = index as usize;
-        for (axis, _) in self.axes.iter().zip(which).filter(|(_, chosen)| *chosen) {
-            axis.set(&mut *model, rest % axis.count());
-            rest /= axis.count();
-        }
-        model
+        self.points.model(self.laws.cell(index)).law()
     }
 
     /// The model of the run `id`.
     pub fn model(&self, id: u32) -> Box<dyn Model> {
-        self.model_at([true; 2], id % self.cell_count() as u32)
+        self.points.model(id as usize % self.cell_count())
     }
 }
 

@@ -33,7 +33,7 @@ pub enum Processor {
 #[derive(Debug, Error)]
 pub enum MapError {
     /// The scene is not one of a map.
-    #[error("a map has two axes, and this scene has {axes}")]
+    #[error("a map has two axes or a list of cells, and this scene has {axes} axes")]
     Axes {
         /// How many the scene has.
         axes: usize,
@@ -76,7 +76,7 @@ pub enum MapError {
 ///     .build()?;
 /// let map = map::run(&scene, Processor::Cpu)?;
 /// for cell in map.cells() {
-///     let [force, omega] = cell.values;
+///     let (force, omega) = (cell.values[0], cell.values[1]);
 ///     println!("{force} {omega}: {:?}, {} impacts", cell.class, cell.record.impacts_per_period);
 /// }
 /// # use rattlemap::orbit::Class;
@@ -92,7 +92,7 @@ pub enum MapError {
 /// # Errors
 /// [`MapError`]: those of the scene before anything is computed.
 pub fn run(scene: &Scene, on: Processor) -> Result<Map, MapError> {
-    if scene.axes().len() != 2 {
+    if scene.axes().len() != 2 && scene.list().is_none() {
         return Err(MapError::Axes { axes: scene.axes().len() });
     }
     let runs = scene.run_count();
@@ -131,12 +131,12 @@ pub struct Map {
 }
 
 /// One cell of a finished map.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MapCell<'m> {
-    /// Places on the two axes.
+    /// Places on the two axes; in a list its place, and 0.
     pub indices: [usize; 2],
-    /// The two parameters.
-    pub values: [f64; 2],
+    /// Of the axes' parameters; in a list of its columns.
+    pub values: Vec<f64>,
     /// What was measured; its bits in `valid` say what of it there is.
     pub record: &'m Record,
     /// What the motion is.
@@ -144,9 +144,9 @@ pub struct MapCell<'m> {
 }
 
 impl Map {
-    /// How many cells lie along each axis.
+    /// How many cells lie along each axis; a list is one row.
     pub fn counts(&self) -> [usize; 2] {
-        self.plan.axes().each_ref().map(|axis| axis.count())
+        self.plan.counts()
     }
 
     /// Every cell, the first axis the fastest. Of several starts each has the first.
@@ -166,9 +166,8 @@ impl Map {
 
     fn cell_of(&self, id: u32) -> MapCell<'_> {
         let indices = self.plan.indices(id);
-        let [first, second] = self.plan.axes();
         let record = &self.records[id as usize];
-        let values = [first.value(indices[0]), second.value(indices[1])];
+        let values = self.plan.points().values(id as usize);
         MapCell { indices, values, record, class: classify(record) }
     }
 

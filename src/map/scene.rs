@@ -7,33 +7,43 @@
 
 mod axis;
 mod builder;
+mod derived;
 mod document;
 mod error;
 mod identity;
 mod keys;
+mod list;
 mod overrides;
+mod parameters;
+mod points;
 mod section;
 mod settings;
 mod start;
 #[cfg(test)]
 mod tests;
 
-pub use axis::{Axis, MAX_COUNT};
+pub use axis::{Axis, MAX_COUNT, Scale};
 pub use builder::SceneBuilder;
+pub(crate) use derived::Rule;
 pub use error::{Place, Problem, SceneError};
 pub use keys::{KEYS, Key, KeyDefault, Takes};
+pub use list::{FileText, FindFile, List};
+pub(crate) use points::Points;
 pub use settings::{AUDIT, Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 
+use derived::Derived;
 use document::Node;
+use parameters::Beside;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Model, Parameter};
+use rattlemap_dynamics::model::{ModelError, ParameterError};
 use rattlemap_dynamics::orbit;
 use section::Section;
 
 /// What stands outside of any table, and the tables.
-const TOP_LEVEL: [&str; 8] =
-    ["title", "model", "parameters", "axis", "integration", "start", "refine", "outputs"];
+const TOP_LEVEL: [&str; 10] =
+    ["title", "model", "parameters", "derived", "axis", "cells", "integration", "start", "refine", "outputs"];
 
 /// The model of scenes that name none.
 const DEFAULT_MODEL: &str = "gear-pair";
@@ -62,8 +72,7 @@ impl Purpose {
 pub struct Scene {
     text: String,
     title: String,
-    base: Box<dyn Model>,
-    axes: Vec<Axis>,
+    points: Points,
     integration: Integration,
     start: Start,
     draw: Option<Draw>,
@@ -72,7 +81,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads a scene from its text.
+    /// Reads a scene from its text, which must do without files beside it.
     ///
     /// `name` is what messages call the text, usually the file's path as the user gave it;
     /// `sets` are `NAME=VALUE` arguments, later ones winning over earlier ones and all of
@@ -81,6 +90,21 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] for the first thing that is wrong.
     pub fn parse(text: &str, name: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
+        let find: FindFile<'_> = &|_| Err("names a file, and no files are read here; list axes".to_owned());
+        Scene::parse_beside(text, name, sets, purpose, find)
+    }
+
+    /// The same where a list of cells may stand in a file of its own, which `find` reads: nothing here does.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first thing that is wrong, in the text or in that file.
+    pub fn parse_beside(
+        text: &str,
+        name: &str,
+        sets: &[String],
+        purpose: Purpose,
+        find: FindFile<'_>,
+    ) -> Result<Scene, SceneError> {
         let mut document = document::read(text, name)?;
         for set in sets {
             overrides::apply(&mut document, set)?;
@@ -88,7 +112,7 @@ impl Scene {
         if let Some(model) = Section::open(&document, "", &TOP_LEVEL)?.get("model") {
             model.choice(&[(DEFAULT_MODEL, ())])?;
         }
-        Scene::read(text.to_owned(), &document, &GearPair::paper(0.0), purpose)
+        Scene::read(text.to_owned(), &document, &GearPair::paper(0.0), purpose, find)
     }
 
     /// A scene without a file: see [`SceneBuilder`].
@@ -97,26 +121,44 @@ impl Scene {
     }
 
     /// Reads the tree of a scene whose model is known.
-    fn read(text: String, document: &Node, model: &dyn Model, purpose: Purpose) -> Result<Scene, SceneError> {
+    fn read(
+        text: String,
+        document: &Node,
+        model: &dyn Model,
+        purpose: Purpose,
+        find: FindFile<'_>,
+    ) -> Result<Scene, SceneError> {
         let root = Section::open(document, "", &TOP_LEVEL)?;
         let (command, axis_count) = purpose.needs();
-        let axes = axis::read(&root, model, axis_count, command)?;
-        let title = match root.get("title") {
-            Some(title) => settings::read_title(&title)?,
-            None => default_title(model, &axes),
+        let list = list::read(&root, model, purpose, find)?;
+        let axes = match list {
+            Some(_) => Vec::new(),
+            None => axis::read(&root, model, axis_count, command)?,
         };
+        let is_swept = |index: usize| {
+            let is_column = |list: &List| list.indices().any(|column| column == index);
+            axes.iter().any(|axis| axis.index() == index) || list.as_ref().is_some_and(is_column)
+        };
+        let derived = derived::read(&root, model, is_swept)?;
+        let beside = Beside { axes: &axes, list: list.as_ref(), derived: &derived };
+        let base = parameters::read(&root, model, beside)?;
+        let title = root.get("title").map(|title| settings::read_title(&title)).transpose()?;
+        let is_list = list.is_some();
+        let points = Points::new(base, axes, list, derived);
         let scene = Scene {
             text,
-            title,
-            base: axis::read_parameters(&root, model, &axes)?,
+            title: title.unwrap_or_else(|| default_title(model, &points)),
             integration: settings::read_integration(&root)?,
             start: start::read(&root, model)?,
             draw: start::read_draw(&root, purpose)?,
             refine: settings::read_refine(&root, purpose)?,
-            outputs: settings::read_outputs(&root, purpose)?,
-            axes,
+            outputs: settings::read_outputs(&root, purpose, is_list)?,
+            points,
         };
         start::check(&root, scene.start, scene.draw)?;
+        if is_list {
+            list::check(&root, scene.start.follows())?;
+        }
         scene.check_corners(&root)?;
         Ok(scene)
     }
@@ -124,21 +166,29 @@ impl Scene {
     /// Refuses a scene whose model has no motion in a cell at a corner. What lies between is looked at
     /// by [`Plan::check`](crate::map::plan::Plan::check), once the size is known to be sane.
     fn check_corners(&self, root: &Section<'_>) -> Result<(), SceneError> {
-        for corner in 0..1usize << self.axes.len() {
-            let end = |(i, axis): (usize, &Axis)| if corner >> i & 1 == 0 { 0 } else { axis.count() - 1 };
-            let indices: Vec<usize> = self.axes.iter().enumerate().map(end).collect();
-            let model = self.cell(&indices);
+        let [columns, rows] = self.points.counts();
+        for cell in [0, columns - 1, columns * (rows - 1), columns * rows - 1] {
+            let model = self.points.model(cell);
             if let Err(error) = Flow::validate(&*model) {
-                return Err(root.no_motion(&self.named(&indices), &error));
+                let named = self.points.named(cell);
+                // What derives a value that is out of range is what has to change.
+                let derives = match &error {
+                    ModelError::Parameter(ParameterError::OutOfRange { name, .. }) => self.rule(name),
+                    _ => None,
+                };
+                let table = root.section_among("derived", &axis::names(&*model), "")?;
+                return Err(match derives.and_then(|rule| table.get(&rule.parameter().name)) {
+                    Some(field) => field.no_motion(&named, &error),
+                    None => root.no_motion(&named, &error),
+                });
             }
         }
         Ok(())
     }
 
-    /// The axes' values in a cell, in words.
-    pub(crate) fn named(&self, indices: &[usize]) -> String {
-        let value = |(axis, &i): (&Axis, &usize)| format!("{} = {:?}", axis.parameter().name, axis.value(i));
-        self.axes.iter().zip(indices).map(value).collect::<Vec<_>>().join(", ")
+    /// What derives a parameter.
+    fn rule(&self, name: &str) -> Option<&derived::Rule> {
+        self.points.derived().rules().iter().find(|rule| rule.parameter().name == name)
     }
 
     /// The text that was parsed, without the `--set` arguments; of a scene that was built, the
@@ -152,26 +202,47 @@ impl Scene {
         &self.title
     }
 
-    /// The axes in their order, which is meaning: the first runs along columns.
+    /// The axes in their order, which is meaning: the first runs along columns. None where cells are listed.
     pub fn axes(&self) -> &[Axis] {
-        &self.axes
+        self.points.axes()
     }
 
-    /// The model in the first cell: swept parameters at their `min`.
+    /// The list of cells, where one stands in the place of axes.
+    pub fn list(&self) -> Option<&List> {
+        self.points.list()
+    }
+
+    pub(crate) fn points(&self) -> &Points {
+        &self.points
+    }
+
+    /// The model in the first cell: swept parameters at the first of their values.
     pub fn base(&self) -> &dyn Model {
-        &*self.base
+        self.points.base()
     }
 
-    /// Whether an axis sweeps a parameter.
+    /// The parameters that cells differ in: those of the axes, or the columns of a list. Derived ones are not among
+    /// them.
+    pub fn swept(&self) -> impl Iterator<Item = &Parameter> {
+        self.points.swept()
+    }
+
+    /// Whether an axis or a column sets a parameter.
     pub fn sweeps(&self, parameter: &Parameter) -> bool {
-        self.axes.iter().any(|axis| axis.parameter().name == parameter.name)
+        self.swept().any(|swept| swept.name == parameter.name)
     }
 
-    /// Names and values of the parameters that no axis sweeps.
+    /// The parameters that follow others, each with its expression, in an order in which they can be computed.
+    pub fn derived(&self) -> impl Iterator<Item = (&Parameter, &str)> {
+        self.points.derived().rules().iter().map(|rule| (rule.parameter(), rule.text()))
+    }
+
+    /// Names and values of the parameters that are the same in every cell by being set so: neither swept nor derived.
     pub fn fixed(&self) -> impl Iterator<Item = (&str, f64)> {
-        let all = self.base.parameters().iter().enumerate();
-        let fixed = all.filter(|(_, parameter)| !self.sweeps(parameter));
-        fixed.map(|(index, parameter)| (&*parameter.name, self.base.value(index)))
+        let base = self.base();
+        let all = base.parameters().iter().enumerate();
+        let fixed = all.filter(|&(index, p)| !self.sweeps(p) && !self.points.derived().has(index));
+        fixed.map(|(index, parameter)| (&*parameter.name, base.value(index)))
     }
 
     /// How long each cell is integrated, and what for.
@@ -206,7 +277,7 @@ impl Scene {
 
     /// How many cells there are.
     pub fn cell_count(&self) -> u64 {
-        self.axes.iter().map(|axis| axis.count() as u64).product()
+        self.points.counts().iter().map(|&count| count as u64).product()
     }
 
     /// How many runs there are: one per cell and start.
@@ -214,15 +285,14 @@ impl Scene {
         self.cell_count().saturating_mul(self.draw.map_or(1, |draw| u64::from(draw.count)))
     }
 
-    /// The model in the cell with the given index on each axis.
+    /// The model in the cell with the given index on each axis; with the place in a list that stands for axes.
     ///
     /// # Panics
     /// If there are not as many indices as axes.
     pub fn cell(&self, indices: &[usize]) -> Box<dyn Model> {
-        assert_eq!(indices.len(), self.axes.len(), "one index per axis");
-        let mut model = self.base.clone();
-        self.axes.iter().zip(indices).for_each(|(axis, &i)| axis.set(&mut *model, i));
-        model
+        assert_eq!(indices.len(), self.axes().len().max(1), "one index per axis");
+        let [columns, _] = self.points.counts();
+        self.points.model(indices[0] + columns * indices.get(1).unwrap_or(&0))
     }
 
     /// Axis value and model of every cell of a scene with one axis, in order.
@@ -230,8 +300,8 @@ impl Scene {
     /// # Panics
     /// If the scene does not have exactly one axis.
     pub fn line(&self) -> Vec<(f64, Box<dyn Model>)> {
-        let count = self.axes[0].count();
-        (0..count).map(|i| (self.axes[0].value(i), self.cell(&[i]))).collect()
+        let [axis] = self.axes() else { panic!("a line has one axis") };
+        axis.values().enumerate().map(|(i, value)| (value, self.points.model(i))).collect()
     }
 }
 
@@ -247,12 +317,18 @@ pub fn single_cell(e: f64, sets: &[String]) -> Result<Box<dyn Model>, SceneError
         overrides::apply(&mut document, set)?;
     }
     let root = Section::open(&document, "", &["parameters"])?;
-    let pair = axis::read_parameters(&root, &GearPair::paper(0.0), &[])?;
+    let beside = Beside { axes: &[], list: None, derived: &Derived::default() };
+    let pair = parameters::read(&root, &GearPair::paper(0.0), beside)?;
     Flow::validate(&*pair).map_err(|error| root.no_motion("", &error))?;
     Ok(pair)
 }
 
-fn default_title(model: &dyn Model, axes: &[Axis]) -> String {
-    let names: Vec<&str> = axes.iter().map(|axis| &*axis.parameter().meaning).collect();
-    format!("{}: {}", model.title(), names.join(" x "))
+fn default_title(model: &dyn Model, points: &Points) -> String {
+    match points.list() {
+        Some(list) => format!("{}: the cells of {}", model.title(), list.file()),
+        None => {
+            let names: Vec<&str> = points.swept().map(|parameter| &*parameter.meaning).collect();
+            format!("{}: {}", model.title(), names.join(" x "))
+        }
+    }
 }

@@ -1,8 +1,8 @@
 //! How large a map is, estimated before anything is allocated.
 
 use crate::gpu;
-use crate::map::plan::keeps_flows;
-use crate::map::scene::{Axis, Format, Quantity, Scene, Steps};
+use crate::map::plan::{Parts, keeps_flows};
+use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::record::Record;
 
 /// Bytes per cell in memory beside its record: its place in the order, and what the outputs
@@ -62,19 +62,21 @@ impl Size {
             Format::Html if scene.start().follows() => HTML + HTML_START,
             Format::Html => HTML,
             // One of each quantity, one of attractors.
-            Format::Png => PNG * (scene.outputs().quantities.len() as u64 + 1),
+            Format::Png | Format::Svg | Format::Pdf => PNG * (scene.outputs().quantities.len() as u64 + 1),
         };
         let per_files: u64 = scene.outputs().files.iter().map(per_file).sum();
         let settings = scene.orbit_settings();
         let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
         let one_cell = periods * PER_PERIOD;
+        let parts = Parts::flows(scene.points());
+        let flow_count = parts.count() as u64;
         Size {
             cells,
             runs,
             memory: runs.saturating_mul(record + MEMORY_BESIDE),
             memory_per_thread: one_cell,
-            flows: if keeps_flows(flow_count(scene), runs) { flow_count(scene) * FLOW } else { 0 },
-            lane_tables: lane_tables(scene, runs),
+            flows: if keeps_flows(flow_count, runs) { flow_count * FLOW } else { 0 },
+            lane_tables: lane_tables(scene, &parts, runs),
             disk: runs.saturating_mul(record_on_disk(scene)).saturating_add(cells.saturating_mul(per_files)),
         }
     }
@@ -105,19 +107,10 @@ fn record_on_disk(scene: &Scene) -> u64 {
     RECORD + 2 * NUMBER + scene.outputs().quantities.iter().map(quantity).sum::<u64>()
 }
 
-/// Distinct flows: one per value of the axes that are no contact law's.
-fn flow_count(scene: &Scene) -> u64 {
-    flow_axes(scene).map(|axis| axis.count() as u64).product()
-}
-
-fn flow_axes(scene: &Scene) -> impl Iterator<Item = &Axis> {
-    scene.axes().iter().filter(|axis| axis.parameter().shapes.oscillator())
-}
-
 /// Bytes of the constants that lanes read at a time, from flows spread over the map. Where there
 /// are too many to be kept, those at hand are neighbours, and may all be as large as the largest.
-fn lane_tables(scene: &Scene, runs: u64) -> u64 {
-    let flows = flow_count(scene);
+fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
+    let flows = parts.count() as u64;
     let steps = match scene.integration().steps_per_period {
         Steps::Auto => None,
         Steps::PerPeriod(steps) => Some(steps),
@@ -125,17 +118,9 @@ fn lane_tables(scene: &Scene, runs: u64) -> u64 {
     let looked_at = flows.min(FLOWS_LOOKED_AT as u64);
     let bytes = |nth: u64| {
         // Both ends are among them.
-        let mut flow = (flows - 1) * nth / (looked_at - 1).max(1);
-        let index = |axis: &Axis| {
-            if !axis.parameter().shapes.oscillator() {
-                return 0;
-            }
-            let i = flow % axis.count() as u64;
-            flow /= axis.count() as u64;
-            i as usize
-        };
-        let indices: Vec<usize> = scene.axes().iter().map(index).collect();
-        scene.cell(&indices).oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
+        let flow = (flows - 1) * nth / (looked_at - 1).max(1);
+        let model = scene.points().model(parts.cell(flow as u32));
+        model.oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
     };
     if keeps_flows(flows, runs) {
         let sum: u64 = (0..looked_at).map(bytes).sum();

@@ -4,15 +4,18 @@ use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, inventory};
+use super::symbols::axis_label;
+use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, caption, inventory};
 use crate::map::bifurcation::Column;
 use crate::map::scene::{Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
-const PNG: &str = "bifurcation.png";
+/// The figure, by format.
+const FIGURES: [(Format, &str); 3] =
+    [(Format::Png, "bifurcation.png"), (Format::Svg, "bifurcation.svg"), (Format::Pdf, "bifurcation.pdf")];
 
 /// Every file that a bifurcation diagram may write.
-pub const NAMES: [&str; 3] = [MANIFEST, CSV, PNG];
+pub const NAMES: [&str; 5] = [MANIFEST, CSV, FIGURES[0].1, FIGURES[1].1, FIGURES[2].1];
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one
 /// is complete. Returns the files' names.
@@ -38,11 +41,13 @@ pub fn write(
         })?;
         files.push(CSV);
     }
-    if wanted.contains(&Format::Png) {
-        let label = format!("{} {}", parameter.meaning, parameter.name);
-        let title = format!("{}, {}", scene.title(), scene.start().in_words());
-        folder.replace(PNG, |path| Ok(bifurcation_figure::write(path, &title, &label, columns)?))?;
-        files.push(PNG);
+    for (_, name) in FIGURES.into_iter().filter(|(format, _)| wanted.contains(format)) {
+        let label = axis_label(parameter);
+        let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
+        folder.replace(name, |path| {
+            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], &label, columns)?)
+        })?;
+        files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;
     let times = [elapsed, clock.elapsed()];

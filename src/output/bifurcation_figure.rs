@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
-use plotters::style::RGBColor;
-
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::{Canvas, FAINT, Marker, Rect, Shape, save_figure, wall_color};
+use super::plot_style::{Bitmap, Canvas, FAINT, Marker, RGBColor, Rect, Shape, save_figure, wall_color};
 use super::{DrawError, FigureError};
 use crate::map::bifurcation::Column;
 use rattlemap_dynamics::model::Side;
@@ -25,7 +23,8 @@ const DOT: (f64, f64) = (0.7, 2.2);
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
 
-/// Draws the displacement of both gears at every section point `|z| = b` as a PNG.
+/// Draws the displacement of both gears at every section point `|z| = b` in the format that the file's name
+/// tells.
 ///
 /// One dot per point, coloured by wall; where dots pile up they darken with the
 /// logarithm of their number, so that the density of a chaotic band shows. Columns
@@ -34,13 +33,23 @@ const CURVE_DOT: f64 = 1.3;
 ///
 /// # Errors
 /// A file that cannot be written, by name.
-pub fn write(path: &Path, title: &str, axis_label: &str, columns: &[Column]) -> Result<(), FigureError> {
-    save_figure(path, SIZE, |canvas| draw(canvas, title, axis_label, columns))
+pub fn write(
+    path: &Path,
+    [title, subtitle]: [&str; 2],
+    axis_label: &str,
+    columns: &[Column],
+) -> Result<(), FigureError> {
+    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis_label, columns))
 }
 
-fn draw(canvas: &Canvas<'_>, title: &str, axis_label: &str, columns: &[Column]) -> Result<(), DrawError> {
+fn draw(
+    canvas: &Canvas<'_>,
+    [title, subtitle]: [&str; 2],
+    axis_label: &str,
+    columns: &[Column],
+) -> Result<(), DrawError> {
     let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
-    let top = draw_head(canvas, title, "", &legend(!left_out.is_empty()))? + 14.0;
+    let top = draw_head(canvas, title, subtitle, &legend(!left_out.is_empty()))? + 14.0;
     let whole = canvas.panel(LEFT, top);
     let bottom = whole.bottom;
     let middle = (top + bottom) / 2.0;
@@ -93,14 +102,18 @@ fn value_axis(label: &str, columns: &[Column]) -> Axis {
     Axis::exact(label, low - room, high + room)
 }
 
-/// Counts the dots on every canvas pixel, then blends each pixel once.
+/// Pixels of the cloud of points to a pixel of the figure.
+const FINE: f64 = 2.0;
+
+/// Counts the dots on every pixel of the cloud, then gives each pixel its colour once.
 fn draw_points(
     canvas: &Canvas<'_>,
     frame: &Frame,
     component: usize,
     columns: &[Column],
 ) -> Result<(), DrawError> {
-    let (left, top, width, height) = Canvas::fine_rect(frame.rect);
+    let Rect { left, top, right, bottom } = frame.rect;
+    let [width, height] = [right - left, bottom - top].map(|side| (FINE * side).round().max(0.0) as usize);
     let mut counts = vec![[0u32; 2]; width * height];
     let [fine, joined] = [DOT.0, CURVE_DOT].map(|least| dot(frame, columns, least));
     for column in columns {
@@ -110,9 +123,9 @@ fn draw_points(
             if !(x.is_finite() && y.is_finite()) {
                 continue;
             }
-            let (x, y) = Canvas::fine_pixel((x, y));
+            let (x, y) = ((FINE * (x - left)).round() as i32, (FINE * (y - top)).round() as i32);
             for (dx, dy) in dot {
-                let (column, row) = (x + dx - left, y + dy - top);
+                let (column, row) = (x.saturating_add(*dx), y.saturating_add(*dy));
                 if (0..width as i32).contains(&column) && (0..height as i32).contains(&row) {
                     counts[row as usize * width + column as usize][point.side as usize] += 1;
                 }
@@ -120,19 +133,19 @@ fn draw_points(
         }
     }
     let darkest = darkest(&counts);
+    let mut cloud = Bitmap::clear([width, height]);
     for (i, [right, left_wall]) in counts.iter().enumerate().filter(|(_, sides)| **sides != [0, 0]) {
         let (count, share) = (f64::from(right + left_wall), f64::from(*right) / f64::from(right + left_wall));
         let opacity = SINGLE + (1.0 - SINGLE) * (count.ln() / darkest.ln()).min(1.0);
-        let at = (left + (i % width) as i32, top + (i / width) as i32);
-        canvas.blend(at, mixed(share), opacity)?;
+        cloud.set(i, mixed(share), opacity);
     }
-    Ok(())
+    canvas.image(frame.rect, cloud)
 }
 
-/// The canvas pixels of one dot of radius `least` or more around its centre.
+/// The cloud's pixels of one dot of radius `least` or more around its centre.
 fn dot(frame: &Frame, columns: &[Column], least: f64) -> Vec<(i32, i32)> {
     let spacing = (frame.rect.right - frame.rect.left) / columns.len().max(1) as f64;
-    let radius = Canvas::fine_length((0.4 * spacing).clamp(least, DOT.1));
+    let radius = FINE * (0.4 * spacing).clamp(least, DOT.1);
     let reach = radius.ceil() as i32;
     let all = (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy)));
     all.filter(|(dx, dy)| f64::from(*dx).hypot(f64::from(*dy)) <= radius).collect()

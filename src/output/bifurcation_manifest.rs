@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::inventory::FileEntry;
-use super::manifest::{AxisObject, Head, StartObject, TimingsObject, start};
+use super::manifest::{AxisObject, DerivedObject, Head, StartObject, TimingsObject, derived, start};
 use super::names;
 use super::parameters::Parameters;
 use crate::map::bifurcation::Column;
@@ -24,6 +24,8 @@ pub(super) struct Manifest<'a> {
     set: &'a [String],
     axis: AxisObject,
     parameters: Parameters,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    derived: BTreeMap<String, DerivedObject>,
     start: StartObject,
     integration: IntegrationObject,
     classes: BTreeMap<&'static str, usize>,
@@ -58,6 +60,7 @@ impl<'a> Manifest<'a> {
             set: sets,
             axis: axis.into(),
             parameters: Parameters::of_scene(scene),
+            derived: derived(scene),
             start: start(scene),
             integration: IntegrationObject {
                 transient_periods: settings.transient_periods,

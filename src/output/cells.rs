@@ -24,7 +24,6 @@ pub(super) const SOURCES: [Source; 2] = [Source::Integrated, Source::Filled];
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Row {
     pub(super) indices: [usize; 2],
-    pub(super) values: [f64; 2],
     pub(super) class: Option<Class>,
     pub(super) period: Option<u32>,
     pub(super) lyapunov: Option<f64>,
@@ -78,9 +77,24 @@ impl<'a> Cells<'a> {
         Cells { attractors, ..self }
     }
 
-    /// Cells along the two axes.
+    /// Cells along the two axes; a list is one row.
     pub fn counts(&self) -> [usize; 2] {
-        self.plan.axes().each_ref().map(|axis| axis.count())
+        self.plan.counts()
+    }
+
+    /// Values of the swept parameters in the cell of the run `id`.
+    pub(super) fn values(&self, id: usize) -> Vec<f64> {
+        self.plan.points().values(id % self.plan.cell_count())
+    }
+
+    /// Values of the derived parameters there, by name.
+    pub(super) fn derived(&self, id: usize) -> Vec<(&'a str, f64)> {
+        let rules = self.plan.points().derived().rules();
+        if rules.is_empty() {
+            return Vec::new();
+        }
+        let model = self.plan.model(id as u32);
+        rules.iter().map(|rule| (&*rule.parameter().name, model.value(rule.index()))).collect()
     }
 
     /// The class of every cell, by id.
@@ -143,7 +157,6 @@ impl<'a> Cells<'a> {
     pub(super) fn row(&self, id: usize) -> Row {
         let record = &self.records[id];
         let indices = self.plan.indices(id as u32);
-        let [first, second] = self.plan.axes();
         let class = classify(record);
         let periodic = matches!(class, Class::Periodic { .. });
         let is_filled = record.valid & valid::FILLED != 0;
@@ -156,7 +169,6 @@ impl<'a> Cells<'a> {
         let lyapunov = asked(Quantity::Lyapunov, valid::LYAPUNOV, record.lyapunov);
         Row {
             indices,
-            values: [first.value(indices[0]), second.value(indices[1])],
             class: asks_class.then_some(class),
             period: (asks_class && periodic).then_some(record.period),
             lyapunov,

@@ -39,10 +39,9 @@ pub(super) const FIELDS: [&str; 11] = [
 /// If the file cannot be written.
 pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
     let mut file = BufWriter::new(File::create(path)?);
-    let axes = cells.scene().axes().iter().map(|axis| &*axis.parameter().name);
     let mut header = csv::Writer::from_writer(Vec::new());
     let counted = cells.attractors().map(|_| ATTRACTORS);
-    header.write_record(["i", "j"].into_iter().chain(axes).chain(FIELDS).chain(counted))?;
+    header.write_record(places(cells).iter().copied().chain(swept(cells)).chain(FIELDS).chain(counted))?;
     file.write_all(&finished(header)?)?;
     let [columns, rows] = cells.counts();
     let count = columns * rows;
@@ -57,12 +56,25 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
     Ok(file.flush()?)
 }
 
+/// Names of the first fields, which a list does not have: there a row's number tells as much.
+pub(super) fn places(cells: &Cells<'_>) -> &'static [&'static str] {
+    if cells.scene().list().is_some() { &[] } else { &["i", "j"] }
+}
+
+/// Names of the fields after those.
+pub(super) fn swept<'a>(cells: &Cells<'a>) -> impl Iterator<Item = &'a str> {
+    cells.scene().swept().map(|parameter| &*parameter.name)
+}
+
 fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> Result<Vec<u8>, WriteError> {
     let mut table = csv::Writer::from_writer(Vec::with_capacity(160 * ids.len()));
+    let places = places(cells);
     for id in ids {
         let row = cells.row(id);
+        let places = row.indices[..places.len()].iter().map(|index| index.to_string());
+        let values = cells.values(id).into_iter().map(|value| format!("{value:?}"));
         let counted = row.attractors.map(|count| count.to_string());
-        table.write_record(fields(&row, cells.word(id)).into_iter().chain(counted))?;
+        table.write_record(places.chain(values).chain(fields(&row, cells.word(id))).chain(counted))?;
     }
     finished(table)
 }
@@ -71,13 +83,9 @@ fn finished(table: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, WriteError> {
     table.into_inner().map_err(|error| error.into_error().into())
 }
 
-fn fields(row: &Row, word: Option<Spelling>) -> [String; 15] {
+fn fields(row: &Row, word: Option<Spelling>) -> [String; 11] {
     let float = |value: Option<f64>| value.map_or(String::new(), |x| format!("{x:?}"));
     [
-        row.indices[0].to_string(),
-        row.indices[1].to_string(),
-        format!("{:?}", row.values[0]),
-        format!("{:?}", row.values[1]),
         row.class.map_or(String::new(), |class| names::class(class).to_owned()),
         row.period.map_or(String::new(), |period| period.to_string()),
         float(row.lyapunov),

@@ -7,17 +7,17 @@ use std::path::Path;
 use npyz::{DType, Field, TypeStr, TypeWrite, WriterBuilder};
 
 use super::cells::{Cells, Row};
-use super::cells_csv::{ATTRACTORS, FIELDS};
+use super::cells_csv::{ATTRACTORS, FIELDS, places, swept};
 use super::{WriteError, names};
 use crate::record::Spelling;
 
 /// What stands for an absent class or an absent symmetry.
 pub(super) const ABSENT: i8 = -1;
 
-/// NumPy's types of `i`, `j` and the axes, then of [`FIELDS`].
-const TYPES: [&str; 15] = [
-    "<u4", "<u4", "<f8", "<f8", "|i1", "<u2", "<f8", "<f8", "<f8", "<f8", "|i1", "|S64", "|i1", "<u4", "|i1",
-];
+/// NumPy's types of the places on the axes, of the values there, then of [`FIELDS`].
+const PLACE_TYPE: &str = "<u4";
+const VALUE_TYPE: &str = "<f8";
+const TYPES: [&str; 11] = ["|i1", "<u2", "<f8", "<f8", "<f8", "<f8", "|i1", "|S64", "|i1", "<u4", "|i1"];
 const ATTRACTORS_TYPE: &str = "|u1";
 const WORD_BYTES: usize = 64;
 
@@ -29,10 +29,11 @@ const WORD_BYTES: usize = 64;
 /// # Errors
 /// If the file cannot be written.
 pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
-    let axes = cells.scene().axes().iter().map(|axis| &*axis.parameter().name);
-    let names = ["i", "j"].into_iter().chain(axes).chain(FIELDS);
+    let places = places(cells);
+    let first =
+        places.iter().map(|&name| (name, PLACE_TYPE)).chain(swept(cells).map(|name| (name, VALUE_TYPE)));
     let counted = cells.attractors().map(|_| (ATTRACTORS, ATTRACTORS_TYPE));
-    let fields = names.zip(TYPES).chain(counted).map(|(name, kind)| {
+    let fields = first.chain(FIELDS.into_iter().zip(TYPES)).chain(counted).map(|(name, kind)| {
         let kind: TypeStr = kind.parse()?;
         Ok(Field { name: name.to_owned(), dtype: DType::Plain(kind) })
     });
@@ -45,13 +46,20 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
         .writer(BufWriter::new(File::create(path)?))
         .begin_nd()?;
     for id in 0..count {
-        array.push(&Packed(cells.row(id), cells.word(id)))?;
+        let (row, word) = (cells.row(id), cells.word(id));
+        array.push(&Packed { places: places.len(), values: cells.values(id), row, word })?;
     }
     Ok(array.finish()?)
 }
 
 /// A row as bytes in the order of [`TYPES`].
-struct Packed(Row, Option<Spelling>);
+struct Packed {
+    /// How many of the row's indices are told.
+    places: usize,
+    values: Vec<f64>,
+    row: Row,
+    word: Option<Spelling>,
+}
 
 struct PackedWriter;
 
@@ -67,10 +75,11 @@ impl npyz::Serialize for Packed {
 impl TypeWrite for PackedWriter {
     type Value = Packed;
 
-    fn write_one<W: Write>(&self, mut to: W, Packed(row, word): &Packed) -> io::Result<()> {
+    fn write_one<W: Write>(&self, mut to: W, packed: &Packed) -> io::Result<()> {
+        let Packed { places, values, row, word } = packed;
         let mut bytes = Vec::with_capacity(WORD_BYTES + 64);
-        row.indices.iter().for_each(|&index| bytes.extend((index as u32).to_le_bytes()));
-        row.values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        row.indices[..*places].iter().for_each(|&index| bytes.extend((index as u32).to_le_bytes()));
+        values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         bytes.extend(row.class.map_or(ABSENT, names::class_code).to_le_bytes());
         bytes.extend((row.period.unwrap_or(0) as u16).to_le_bytes());
         for value in [row.lyapunov, row.lyapunov_error, row.impacts_per_period, row.mesh_fraction] {

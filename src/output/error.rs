@@ -4,8 +4,6 @@ use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use plotters::drawing::DrawingAreaErrorKind;
-use plotters::prelude::{BitMapBackend, DrawingBackend};
 use rattlemap_dynamics::model::ModelError;
 
 /// A result that was not written; its text is one line with the file and the reason.
@@ -82,8 +80,27 @@ pub enum FigureError {
     },
 }
 
-/// What drawing on a canvas may come to.
-pub type DrawError = DrawingAreaErrorKind<<BitMapBackend<'static> as DrawingBackend>::ErrorType>;
+/// A picture that could not be put into a file's form.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// It has no pixels, or more than memory holds.
+    #[error("it has {width} x {height} pixels")]
+    Size {
+        /// Across.
+        width: u32,
+        /// From top to bottom.
+        height: u32,
+    },
+    /// Pixels as PNG.
+    #[error(transparent)]
+    Png(#[from] png::EncodingError),
+    /// The typeface in a PDF.
+    #[error("its typeface cannot be embedded: {0}")]
+    Typeface(#[from] subsetter::Error),
+    /// Text in memory.
+    #[error(transparent)]
+    Text(#[from] std::fmt::Error),
+}
 
 impl FigureError {
     pub(super) fn draw(path: &Path, reason: DrawError) -> FigureError {

@@ -15,6 +15,7 @@ pub(super) use words::{Words, read as read_words};
 use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
+use super::symbols::number;
 use crate::map::scene::Quantity;
 use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
@@ -54,6 +55,29 @@ pub(super) struct Bar {
     pub(super) colors: Vec<Color>,
     pub(super) low: f64,
     pub(super) high: f64,
+    /// Cells whose numbers lie below `low` and above `high`.
+    pub(super) beyond: [usize; 2],
+}
+
+impl Bar {
+    /// What the bar does not show, if anything; `total` are all cells.
+    pub(super) fn left_out(&self, total: usize) -> Vec<String> {
+        let [below, above] = self.beyond;
+        let sides = [(above, "above", self.high), (below, "below", self.low)];
+        let told = sides.into_iter().filter(|(cells, ..)| *cells > 0);
+        told.map(|(cells, side, end)| format!("values {side} {}: {}", number(end), share(cells, total)))
+            .collect()
+    }
+}
+
+/// Cells as a share of all, or their number if they are few.
+pub(super) fn share(cells: usize, total: usize) -> String {
+    let percent = 100.0 * cells as f64 / total as f64;
+    match cells {
+        _ if percent >= 0.1 => format!("{percent:.1} %"),
+        1 => "1 cell".to_owned(),
+        cells => format!("{cells} cells"),
+    }
 }
 
 /// The layers that the scene asks for, the first being the map itself. Words are read once,
@@ -84,7 +108,7 @@ const SCALES: [Scale; 3] = [
         quantity: Quantity::Lyapunov,
         name: "lyapunov",
         short: "exponent",
-        title: "largest Lyapunov exponent",
+        title: "largest Lyapunov exponent, \u{3bb}",
         field: |row| row.lyapunov,
         colors: diverging,
     },
@@ -116,6 +140,7 @@ impl Scale {
             |sign: f64| values.iter().flatten().map(move |value| sign * value).filter(|size| *size > 0.0);
         let high = nice_bound(sizes(1.0));
         let low = if sizes(-1.0).next().is_some() { -nice_bound(sizes(-1.0)) } else { 0.0 };
+        let beyond = beyond(values.iter().flatten().copied(), low, high);
         let value_of = |share: f64| low + share * (high - low);
         let level = |value: f64| {
             let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
@@ -136,9 +161,16 @@ impl Scale {
             indices: values.par_iter().map(|value| value.map_or(LEVELS, level)).collect(),
             palette: colors.iter().copied().chain([NO_VALUE]).collect(),
             entries: if absent > 0 { vec![entry] } else { Vec::new() },
-            bar: Some(Bar { label: self.title, colors, low, high }),
+            bar: Some(Bar { label: self.title, colors, low, high, beyond }),
         }
     }
+}
+
+/// How many numbers lie below and above the ends of a scale.
+fn beyond(values: impl Iterator<Item = f64>, low: f64, high: f64) -> [usize; 2] {
+    values.fold([0, 0], |[below, above], value| {
+        [below + usize::from(value < low), above + usize::from(value > high)]
+    })
 }
 
 /// Every cell id, to be mapped in parallel and in order.

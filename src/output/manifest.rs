@@ -1,8 +1,10 @@
 //! `manifest.json`: what those of all commands have in common.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
-use crate::map::scene::{Axis, Scene, Start};
+use crate::map::scene::{Axis, Scale, Scene, Start};
 
 /// The manifest's name. It is the last file that a run writes: a folder that has one is complete.
 pub const MANIFEST: &str = "manifest.json";
@@ -39,6 +41,11 @@ pub(super) struct AxisObject {
     min: f64,
     max: f64,
     count: usize,
+    /// linear, log or values.
+    scale: &'static str,
+    /// Where they are listed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    values: Option<Vec<f64>>,
 }
 
 impl From<&Axis> for AxisObject {
@@ -48,8 +55,42 @@ impl From<&Axis> for AxisObject {
             min: axis.min(),
             max: axis.max(),
             count: axis.count(),
+            scale: axis.scale().name(),
+            values: (axis.scale() == Scale::Values).then(|| axis.values().collect()),
         }
     }
+}
+
+/// A parameter that follows others.
+#[derive(Serialize)]
+pub(super) struct DerivedObject {
+    expression: String,
+    /// Its least and its greatest value over all cells.
+    min: f64,
+    max: f64,
+}
+
+/// The derived parameters of a scene, by name.
+pub(super) fn derived(scene: &Scene) -> BTreeMap<String, DerivedObject> {
+    let points = scene.points();
+    let rules = points.derived().rules();
+    let mut objects: Vec<DerivedObject> = rules
+        .iter()
+        .map(|rule| {
+            let expression = rule.text().to_owned();
+            DerivedObject { expression, min: f64::INFINITY, max: f64::NEG_INFINITY }
+        })
+        .collect();
+    let [columns, rows] = points.counts();
+    // A scene without any has no cell looked at.
+    for cell in (0..columns * rows).take(if rules.is_empty() { 0 } else { usize::MAX }) {
+        let model = points.model(cell);
+        for (rule, object) in rules.iter().zip(&mut objects) {
+            let value = model.value(rule.index());
+            (object.min, object.max) = (object.min.min(value), object.max.max(value));
+        }
+    }
+    rules.iter().map(|rule| rule.parameter().name.to_string()).zip(objects).collect()
 }
 
 #[derive(Serialize)]

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
@@ -23,27 +24,29 @@ pub use super::map_manifest::{Made, Run};
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const HTML: &str = "report.html";
+/// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
+pub const LIST: &str = "list.csv";
 /// What a validation found.
 pub const VALIDATION: &str = "validation.json";
 
+/// The layers of which there are figures, in every format of figures.
+const LAYERS: [&str; 6] = ["map", "lyapunov", "impacts", "mesh", "word", "attractors"];
+
 /// Every file that a map may have beside its records.
-const ALL: [&str; 11] = [
-    MANIFEST,
-    CSV,
-    NPY,
-    "map.png",
-    "lyapunov.png",
-    "impacts.png",
-    "mesh.png",
-    "word.png",
-    "attractors.png",
-    HTML,
-    VALIDATION,
-];
+static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
+    let tables = [MANIFEST, LIST, CSV, NPY, HTML, VALIDATION].map(str::to_owned);
+    let figures = LAYERS.into_iter().flat_map(|layer| Format::FIGURES.map(|format| figure(layer, format)));
+    tables.into_iter().chain(figures).collect()
+});
+
+/// The name of a figure's file.
+fn figure(layer: &str, format: Format) -> String {
+    format!("{layer}.{}", format.name())
+}
 
 /// Every file that a map may write, records included.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    ALL.into_iter().chain([RECORDS, UNFINISHED])
+    ALL.iter().map(String::as_str).chain([RECORDS, UNFINISHED])
 }
 
 /// Removes what an earlier run left, but for its records: files must not stand beside a
@@ -53,7 +56,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// If a file cannot be removed.
 pub fn clear(folder: &Folder) -> Result<(), OutputError> {
     folder.remove(&ALL)?;
-    folder.remove(&ALL.map(|name| format!("{PARTIAL}{name}")))
+    folder.remove(&ALL.iter().map(|name| format!("{PARTIAL}{name}")).collect::<Vec<_>>())
 }
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one is
@@ -142,6 +145,10 @@ fn write_files(
     );
     let mut files = tables?;
     files.extend(pictures?);
+    if let Some(list) = cells.scene().list().filter(|_| wanted(LIST)) {
+        folder.replace(LIST, |path| Ok(fs::write(path, list.to_csv())?))?;
+        files.push(LIST.to_owned());
+    }
     Ok(files)
 }
 
@@ -169,14 +176,16 @@ fn write_pictures(
     let asks = |format| cells.scene().outputs().files.contains(&format);
     let mut files = Vec::new();
     let wants_page = asks(Format::Html) && wanted(HTML);
-    let wants_figures = asks(Format::Png) && ALL.iter().any(|name| name.ends_with(".png") && wanted(name));
+    let formats: Vec<Format> = Format::FIGURES.into_iter().filter(|&format| asks(format)).collect();
+    let names = |layer| formats.iter().map(move |&format| figure(layer, format));
+    let wants_figures = LAYERS.iter().any(|layer| names(*layer).any(|name| wanted(&name)));
     if !wants_page && !wants_figures {
         return Ok(files);
     }
     let words = layers::read_words(cells);
     let layers = layers::of(cells, words.as_ref());
     if wants_figures {
-        let named = layers.iter().map(|layer| (layer, format!("{}.png", layer.name)));
+        let named = layers.iter().flat_map(|layer| names(layer.name).map(move |name| (layer, name)));
         let named: Vec<_> = named.filter(|(_, name)| wanted(name)).collect();
         named.par_iter().try_for_each(|(layer, name)| {
             folder.replace(name, |path| Ok(map_figure::write(path, cells, layer)?))

@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use plotters::style::RGBColor;
-
+use super::caption;
 use super::cells::Cells;
-use super::layers::{Bar, Entry, Layer};
-use super::plot_style::axes::{Axis, Frame};
+use super::layers::{Bar, Layer, share};
+use super::plot_style::axes::{self, Axis, Frame};
 use super::plot_style::legend::draw_head;
-use super::plot_style::{Align, BELOW, Canvas, DARK, Rect, SMALL, save_figure};
+use super::plot_style::{Align, BELOW, Canvas, DARK, RGBColor, Rect, SMALL, save_figure};
+use super::symbols::{axis_label, number, symbol};
 use super::{DrawError, FigureError};
-use crate::map::scene::{self, Scene, Start};
+use crate::map::scene::{self, Scale, Scene, Start};
 
 const LEFT: f64 = 140.0;
-const TOP: f64 = 130.0;
+const TOP: f64 = 162.0;
 /// Room for the legend beside the map.
 const BESIDE: f64 = 460.0;
 /// Between map and legend.
@@ -27,13 +27,15 @@ const ROW: f64 = 33.0;
 const PATCH: (f64, f64) = (34.0, 20.0);
 const BAR_WIDTH: f64 = 34.0;
 const BAR_HEIGHT: f64 = 260.0;
+/// Length of the arrow at an end beyond which there are values.
+const ARROW: f64 = 18.0;
 /// Room for a bar's name, and between it and the entries above.
 const BAR_HEAD: f64 = 44.0;
 const ABOVE_BAR: f64 = 26.0;
 /// Height of a picture's inside at least.
 const LOWEST: f64 = 700.0;
 
-/// Draws a layer as a PNG.
+/// Draws a layer, in the format that the file's name tells.
 ///
 /// # Errors
 /// A file that cannot be written, by name.
@@ -47,7 +49,11 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>, layer: &Layer) -> Result<(),
 /// Height of what stands beside the map: entries, then the bar.
 fn legend_height(layer: &Layer) -> f64 {
     let entries = ROW * layer.entries.len() as f64;
-    layer.bar.as_ref().map_or(entries, |_| bar_top(layer) + BAR_HEAD + BAR_HEIGHT)
+    let below = |bar: &Bar| match bar.left_out(1).len() {
+        0 => 0.0,
+        lines => ARROW + ROW * lines as f64,
+    };
+    layer.bar.as_ref().map_or(entries, |bar| bar_top(layer) + BAR_HEAD + BAR_HEIGHT + below(bar))
 }
 
 /// Where the bar begins, below the legend's top.
@@ -69,7 +75,8 @@ fn draw(
     [width, height]: [f64; 2],
 ) -> Result<(), DrawError> {
     let scene = cells.scene();
-    draw_head(canvas, scene.title(), &format!("{}; {}", layer.title, subtitle(scene)), &[])?;
+    let subtitle = format!("{}; {}\n{}", layer.title, subtitle(scene), caption::of_scene(scene));
+    draw_head(canvas, scene.title(), &subtitle, &[])?;
     let rect = Rect { left: LEFT, top: TOP, right: LEFT + width, bottom: TOP + height };
     let [columns, _] = cells.counts();
     canvas
@@ -79,17 +86,17 @@ fn draw(
     let left = rect.right + GAP;
     draw_entries(canvas, layer, (left, TOP), cells)?;
     match &layer.bar {
-        Some(bar) => draw_bar(canvas, bar, (left, TOP + bar_top(layer))),
+        Some(bar) => draw_bar(canvas, bar, (left, TOP + bar_top(layer)), cells.counts().iter().product()),
         None => Ok(()),
     }
 }
 
 /// Where cells start and how long they run: what a map means depends on it.
 pub(super) fn subtitle(scene: &Scene) -> String {
-    let last = scene.axes().last().map_or("", |axis| &*axis.parameter().name);
+    let last = scene.axes().last().map_or(String::new(), |axis| symbol(&axis.parameter().name));
     let start = match scene.start() {
         Start::Rest => "from rest".to_owned(),
-        Start::State([x1, v1, x2, v2]) => format!("from ({x1}, {v1}, {x2}, {v2})"),
+        Start::State(state) => format!("from ({})", state.map(number).join(", ")),
         Start::Up => format!("from the attractor at the next lower {last}"),
         Start::Down => format!("from the attractor at the next higher {last}"),
     };
@@ -112,11 +119,23 @@ pub(super) fn subtitle(scene: &Scene) -> String {
     format!("every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{filled}")
 }
 
-/// An axis on which cells lie at their values: it reaches half a cell further.
+/// An axis on which cells lie at their values, or in the order of these where they are listed: it reaches half a cell
+/// further.
 fn axis(axis: &scene::Axis) -> Axis {
-    let half = (axis.max() - axis.min()) / (axis.count() - 1) as f64 / 2.0;
-    let label = format!("{} {}", axis.parameter().meaning, axis.parameter().name);
-    Axis::exact(&label, axis.min() - half, axis.max() + half)
+    let (min, max, steps) = (axis.min(), axis.max(), (axis.count() - 1) as f64);
+    let label = axis_label(axis.parameter());
+    match axis.scale() {
+        Scale::Linear => {
+            let half = (max - min) / steps / 2.0;
+            Axis::exact(&label, min - half, max + half)
+        }
+        Scale::Log => {
+            let half = (max.log10() - min.log10()) / steps / 2.0;
+            let ends = Axis::exact(&label, min.log10() - half, max.log10() + half);
+            Axis { scale: axes::Scale::Logarithmic, ..ends }
+        }
+        Scale::Values => Axis::listed(&label, axis.values()),
+    }
 }
 
 fn rgb([r, g, b]: [u8; 3]) -> RGBColor {
@@ -137,7 +156,7 @@ fn draw_entries(
         let patch = Rect { left, top: y - PATCH.1 / 2.0, right: left + PATCH.0, bottom: y + PATCH.1 / 2.0 };
         canvas.fill(patch, rgb(entry.color), 1.0)?;
         canvas.outline(patch, 1.0)?;
-        let share = share(entry, total);
+        let share = share(entry.cells, total);
         let room = right - left - PATCH.0 - 14.0 - canvas.text_width(&share, SMALL)? - 16.0;
         let text = canvas.fitted(&entry.text, SMALL, room)?;
         canvas.text(&text, (left + PATCH.0 + 14.0, y), SMALL, Align::Left, DARK)?;
@@ -146,23 +165,30 @@ fn draw_entries(
     Ok(())
 }
 
-fn share(entry: &Entry, total: usize) -> String {
-    let percent = 100.0 * entry.cells as f64 / total as f64;
-    match entry.cells {
-        _ if percent >= 0.1 => format!("{percent:.1} %"),
-        1 => "1 cell".to_owned(),
-        cells => format!("{cells} cells"),
-    }
-}
-
-fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64)) -> Result<(), DrawError> {
+fn draw_bar(canvas: &Canvas<'_>, bar: &Bar, (left, top): (f64, f64), total: usize) -> Result<(), DrawError> {
     canvas.text(bar.label, (left, top + 12.0), SMALL, Align::Left, DARK)?;
     let top = top + BAR_HEAD;
     let rect = Rect { left, top, right: left + BAR_WIDTH, bottom: top + BAR_HEIGHT };
     canvas.raster(rect, [1, bar.colors.len()], |[_, row]| bar.colors[row])?;
     canvas.outline(rect, 1.0)?;
     let frame = Frame { rect, x: Axis::exact("", 0.0, 1.0), y: Axis::exact("", bar.low, bar.high) };
-    frame.draw_scale(canvas)
+    frame.draw_scale(canvas)?;
+    // What lies beyond an end has its colour.
+    let [below, above] = bar.beyond;
+    let arrows =
+        [(below, bar.colors.first(), rect.bottom, ARROW), (above, bar.colors.last(), rect.top, -ARROW)];
+    for (cells, color, end, length) in arrows {
+        if let (Some(&color), true) = (color, cells > 0) {
+            let corners = [(left, end), (left + BAR_WIDTH / 2.0, end + length), (rect.right, end)];
+            canvas.polygon(&corners, rgb(color))?;
+            canvas.stroke(&corners, 1.0, DARK)?;
+        }
+    }
+    for (row, text) in bar.left_out(total).iter().enumerate() {
+        let y = rect.bottom + ARROW + ROW * (row as f64 + 0.5);
+        canvas.text(text, (left, y), SMALL, Align::Left, DARK)?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -170,42 +196,99 @@ mod tests {
     use super::*;
     use crate::map::plan::Plan;
     use crate::map::scene::Purpose;
+    use crate::output::layers::Entry;
     use crate::record::Record;
 
     const LOW: [u8; 3] = [1, 2, 3];
     const HIGH: [u8; 3] = [4, 5, 6];
 
-    /// Of a map that is lower than its legend, the whole bar is in the picture.
-    #[test]
-    fn long_legends_make_room_for_themselves() {
-        let text = "[[axis]]\nparameter = 'e'\nmin = 0.0\nmax = 1.0\ncount = 8\n\
-                    [[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 12.0\ncount = 600\n";
-        let scene = Scene::parse(text, "s", &[], Purpose::Map).unwrap();
+    const TEXT: &str = "[parameters]\nk = 900.0\n[[axis]]\nparameter = 'e'\nmin = 0.0\nmax = 1.0\ncount = 8\n\
+                        [[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 12.0\ncount = 600\n";
+    const CELLS: usize = 8 * 600;
+
+    /// Draws a layer to `name` in a folder of its own; the file's bytes.
+    fn drawn(name: &str, layer: &Layer) -> Vec<u8> {
+        let scene = Scene::parse(TEXT, "s", &[], Purpose::Map).unwrap();
         let plan = Plan::new(&scene);
         let records = vec![Record::default(); plan.run_count()];
         let cells = Cells::new(&scene, &plan, &records);
         let dir = tempfile::tempdir().unwrap();
-        for count in [0, 1, 21, 60] {
-            let entry = |n: usize| Entry { color: [200; 3], text: format!("period {n}"), cells: 1 };
-            let bar = Bar { label: "exponent", colors: vec![LOW, [120; 3], HIGH], low: 0.0, high: 1.0 };
-            let layer = Layer {
-                name: "map",
-                short: "map",
-                title: "a map",
-                indices: vec![0; records.len()],
-                palette: vec![[255; 3]],
-                entries: (0..count).map(entry).collect(),
-                bar: Some(bar),
-            };
-            let path = dir.path().join("map.png");
-            write(&path, &cells, &layer).unwrap();
-            let picture = image::open(&path).unwrap().to_rgb8();
-            let pixels = |color: [u8; 3]| picture.pixels().filter(|pixel| pixel.0 == color).count();
+        let path = dir.path().join(name);
+        write(&path, &cells, layer).unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    fn layer(entries: usize, beyond: [usize; 2]) -> Layer {
+        let entry = |n: usize| Entry { color: [200; 3], text: format!("period {n}"), cells: 1 };
+        let colors = vec![LOW, [120; 3], HIGH];
+        Layer {
+            name: "map",
+            short: "map",
+            title: "a map",
+            // One cell in seven.
+            indices: (0..CELLS).map(|id| u8::from(id % 7 == 3)).collect(),
+            palette: vec![[255, 254, 250], [9, 99, 199]],
+            entries: (0..entries).map(entry).collect(),
+            bar: Some(Bar { label: "exponent", colors, low: -0.4, high: 1.0, beyond }),
+        }
+    }
+
+    fn count(png: &[u8], color: [u8; 3]) -> f64 {
+        let picture = image::load_from_memory(png).unwrap().to_rgb8();
+        picture.pixels().filter(|pixel| pixel.0 == color).count() as f64
+    }
+
+    /// Of a map that is lower than its legend, the whole bar is in the picture.
+    #[test]
+    fn long_legends_make_room_for_themselves() {
+        for entries in [0, 1, 21, 60] {
+            let picture = drawn("map.png", &layer(entries, [0, 0]));
             // Each of three colours has a third of the bar, less the outline.
             let least = (BAR_WIDTH - 4.0) * (BAR_HEIGHT / 3.0 - 4.0);
             for color in [LOW, HIGH] {
-                assert!(pixels(color) as f64 > least, "{count} entries: {} of {least}", pixels(color));
+                assert!(count(&picture, color) > least, "{entries} entries: {}", count(&picture, color));
             }
         }
+    }
+
+    #[test]
+    fn a_bar_says_what_lies_beyond_its_ends() {
+        let [plain, clipped] = [[0, 0], [3, 600]].map(|beyond| drawn("map.png", &layer(60, beyond)));
+        let arrow = 0.5 * BAR_WIDTH * ARROW;
+        for color in [LOW, HIGH] {
+            let more = count(&clipped, color) - count(&plain, color);
+            assert!(more > 0.6 * arrow && more < 1.1 * arrow, "{more} of {arrow}");
+        }
+        let svg = String::from_utf8(drawn("map.svg", &layer(2, [3, 600]))).unwrap();
+        assert!(
+            svg.contains(">values above 1: 12.5 %<") && svg.contains(">values below \u{2212}0.4: 3 cells<")
+        );
+        assert!(!String::from_utf8(drawn("map.svg", &layer(2, [0, 0]))).unwrap().contains("values "));
+    }
+
+    /// One pixel per cell, and text as text with the symbols of the field.
+    #[test]
+    fn a_map_in_svg_has_its_cells_as_pixels_and_its_words_as_text() {
+        use base64::Engine;
+        let layer = layer(1, [0, 0]);
+        let svg = String::from_utf8(drawn("map.svg", &layer)).unwrap();
+        let data = svg.split("base64,").nth(1).unwrap().split('"').next().unwrap();
+        let png = base64::engine::general_purpose::STANDARD.decode(data).unwrap();
+        let picture = image::load_from_memory(&png).unwrap().to_rgb8();
+        assert_eq!(picture.dimensions(), (8, 600));
+        for (id, index) in layer.indices.iter().enumerate() {
+            let pixel = picture.get_pixel(id as u32 % 8, 599 - id as u32 / 8);
+            assert_eq!(pixel.0, layer.palette[usize::from(*index)], "cell {id}");
+        }
+        for text in [
+            "coefficient of restitution, e",
+            "excitation frequency, \u{3c9}",
+            "k = 900; all other parameters at their defaults",
+        ] {
+            assert!(svg.contains(&format!(">{text}</text>")), "{text}");
+        }
+        assert!(!svg.contains("omega") && svg.matches("<text").count() > 15);
+        assert_eq!(svg.matches("image-rendering:pixelated").count(), 2);
+        assert_eq!(drawn("map.pdf", &layer), drawn("map.pdf", &layer), "the same bytes again");
     }
 }

@@ -30,6 +30,8 @@ struct MapObject<'a> {
     refinement: Option<RefinementObject>,
     /// Forcing periods integrated.
     periods: u64,
+    /// Swept parameters that changed nothing that was measured.
+    without_effect: &'a [String],
     resumed: ResumedObject,
     seconds: SecondsObject,
 }
@@ -73,6 +75,7 @@ pub fn print(
         attractors: cells.attractors().map(tally),
         refinement: run.refined.as_ref().map(RefinementObject::from),
         periods: cells.periods(),
+        without_effect: &run.without_effect,
         resumed: ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() },
         seconds: SecondsObject {
             open: run.opening.as_secs_f64(),

@@ -8,12 +8,13 @@ use serde::Serialize;
 use super::cells::{Cells, SOURCES};
 use super::cells_npy::ABSENT;
 use super::inventory::FileEntry;
-use super::manifest::{AxisObject, Head, StartObject, start};
+use super::manifest::{AxisObject, DerivedObject, Head, StartObject, derived, start};
+use super::map::LIST;
 use super::names;
 use super::parameters::Parameters;
 use super::record_file::Identity;
 use crate::map::plan::count_classes;
-use crate::map::scene::{Scene, Steps};
+use crate::map::scene::{List, Scene, Steps};
 use crate::map::schedule::{Audit, Deviation, Refined};
 use rattlemap_dynamics::orbit::Status;
 
@@ -53,6 +54,8 @@ pub struct Run<'a> {
     pub lane_grid: Option<[u32; 2]>,
     /// How an adaptive map went.
     pub refined: Option<Refined>,
+    /// Swept parameters that changed nothing that was measured.
+    pub without_effect: Vec<String>,
 }
 
 /// It names neither the machine's paths nor its users.
@@ -72,7 +75,12 @@ pub(super) struct Manifest<'a> {
     scene: &'a str,
     set: &'a [String],
     axes: Vec<AxisObject>,
+    /// The list in the place of axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    list: Option<ListObject>,
     parameters: Parameters,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    derived: BTreeMap<String, DerivedObject>,
     start: StartObject,
     integration: IntegrationObject,
     quantities: Vec<String>,
@@ -83,6 +91,8 @@ pub(super) struct Manifest<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     attractors: Option<BTreeMap<u8, usize>>,
     periods: u64,
+    /// Swept parameters that changed nothing that was measured.
+    without_effect: &'a [String],
     codes: Codes,
     /// Of all runs that the map took.
     elapsed_seconds: f64,
@@ -90,6 +100,28 @@ pub(super) struct Manifest<'a> {
     refinement: Option<RefinementObject>,
     timings: TimingsObject,
     files: &'a [FileEntry],
+}
+
+/// Which cells there are, where they are listed.
+#[derive(Serialize)]
+struct ListObject {
+    /// The copy in the folder, which has the same values.
+    file: &'static str,
+    columns: Vec<String>,
+    cells: usize,
+    /// SHA-256 of names and values.
+    hash: String,
+}
+
+impl From<&List> for ListObject {
+    fn from(list: &List) -> ListObject {
+        ListObject {
+            file: LIST,
+            columns: list.parameters().map(|parameter| parameter.name.to_string()).collect(),
+            cells: list.len(),
+            hash: list.hash().to_owned(),
+        }
+    }
 }
 
 /// Seconds by phase; `integrate` of all runs that the map took, the others of the last. Validation adds its own.
@@ -216,7 +248,7 @@ struct Codes {
 /// The manifest of a map that `run` has made.
 pub(super) fn map<'a>(
     cells: &Cells<'a>,
-    run: &Run<'a>,
+    run: &'a Run<'a>,
     writing: Duration,
     files: &'a [FileEntry],
 ) -> Manifest<'a> {
@@ -233,7 +265,9 @@ pub(super) fn map<'a>(
         scene: scene.text(),
         set: run.sets,
         axes: scene.axes().iter().map(AxisObject::from).collect(),
+        list: scene.list().map(ListObject::from),
         parameters: Parameters::of_scene(scene),
+        derived: derived(scene),
         start: start(scene),
         integration: integration(scene, run.lane_grid),
         quantities: scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect(),
@@ -242,6 +276,7 @@ pub(super) fn map<'a>(
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
         periods: cells.periods(),
+        without_effect: &run.without_effect,
         codes: codes(),
         elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,

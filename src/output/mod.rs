@@ -4,6 +4,7 @@ pub mod bifurcation;
 mod bifurcation_csv;
 pub mod bifurcation_figure;
 mod bifurcation_manifest;
+pub mod caption;
 mod cells;
 mod cells_csv;
 mod cells_npy;
@@ -29,6 +30,7 @@ mod record_file;
 mod replay;
 mod report;
 mod stdout;
+mod symbols;
 pub mod unfinished;
 mod validation_json;
 

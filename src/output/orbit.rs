@@ -12,6 +12,7 @@ use super::orbit_spectrum::Spectrum;
 use super::orbit_summary::summary;
 use super::parameters::Parameters;
 use super::{Folder, OutputError, orbit_figures, orbit_tables};
+use crate::map::scene::Format;
 use rattlemap_dynamics::model::{Model, Oscillator, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
@@ -28,8 +29,7 @@ pub(super) fn samples_per_period(oscillator: &Oscillator) -> usize {
 
 const JSON: &str = "orbit.json";
 const TRAJECTORY: &str = "trajectory.csv";
-/// Table and figure.
-const SPECTRUM: [&str; 2] = ["spectrum.csv", "spectrum.png"];
+const SPECTRUM: &str = "spectrum.csv";
 
 /// Samples in the table of the motion, and in a forcing period at least.
 const TABLED: usize = 2000;
@@ -74,7 +74,8 @@ pub struct Instant {
 
 /// Every file that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, JSON, TRAJECTORY].into_iter().chain(SPECTRUM).chain(orbit_figures::NAMES)
+    let figures = orbit_figures::NAMES.into_iter().chain(orbit_figures::spectrum::NAMES);
+    [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures)
 }
 
 /// Prints the orbit to stdout, as JSON or as a summary for the eye.
@@ -87,7 +88,8 @@ pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Res
     super::print(&text)
 }
 
-/// Writes the orbit and, unless it failed, its tables and figures; the manifest last. Returns their names.
+/// Writes the orbit and, unless it failed, its tables, and its figures in these formats; the manifest last. Returns their
+/// names.
 ///
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
@@ -96,6 +98,7 @@ pub fn write(
     model: &dyn Model,
     orbit: &Orbit,
     asked: &Asked,
+    formats: &[Format],
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
     // Figures of an earlier orbit must not stand beside this one.
@@ -106,18 +109,19 @@ pub fn write(
     if orbit.class != Class::Failed {
         let samples = samples_per_period(&model.oscillator()?);
         let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
-        orbit_figures::write_each(model, orbit, &trace, |name, save| {
+        orbit_figures::write_each(model, orbit, &trace, formats, |name, save| {
+            files.push(name);
             folder.replace(name, |path| Ok(save(path)?))
         })?;
-        files.extend(orbit_figures::NAMES);
         write_trajectory(folder, model, orbit)?;
         files.push(TRAJECTORY);
         if let Some(spectrum) = Spectrum::of(model, orbit)? {
-            let [table, figure] = SPECTRUM;
-            folder.replace(table, |path| orbit_tables::write_spectrum(path, &spectrum))?;
-            folder
-                .replace(figure, |path| Ok(orbit_figures::spectrum::save(path, model, orbit, &spectrum)?))?;
-            files.extend(SPECTRUM);
+            folder.replace(SPECTRUM, |path| orbit_tables::write_spectrum(path, &spectrum))?;
+            files.push(SPECTRUM);
+            orbit_figures::spectrum::write_each(model, orbit, &spectrum, formats, |name, save| {
+                files.push(name);
+                folder.replace(name, |path| Ok(save(path)?))
+            })?;
         }
     }
     let listed = inventory::entries(folder, &files)?;

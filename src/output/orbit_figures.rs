@@ -7,21 +7,31 @@ mod symbols;
 
 use std::path::{Path, PathBuf};
 
-use plotters::style::RGBColor;
-
 use self::motion::{Motion, Piece};
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{
-    Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MEDIUM, MESHING, Marker, Rect, SMALL, Shape, save_figure,
-    wall_color,
+    Align, Canvas, DARK, FAINT, GEAR_1, GEAR_2, MEDIUM, MESHING, Marker, RGBColor, Rect, SMALL, Shape,
+    save_figure, wall_color,
 };
+use super::symbols::symbol;
 use super::{DrawError, FigureError, OutputError};
+use crate::map::scene::Format;
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Sample};
 
-/// The files that [`write`] makes.
-pub(super) const NAMES: [&str; 3] = ["phase_plane.png", "time_history.png", "gap.png"];
+/// Every file that [`write`] may make.
+pub(super) const NAMES: [&str; 9] = [
+    "phase_plane.png",
+    "phase_plane.svg",
+    "phase_plane.pdf",
+    "time_history.png",
+    "time_history.svg",
+    "time_history.pdf",
+    "gap.png",
+    "gap.svg",
+    "gap.pdf",
+];
 const WIDTH: u32 = 1600;
 const LEFT: f64 = 130.0;
 /// Between the two phase planes: room for the labels of the right one.
@@ -36,7 +46,7 @@ const MESHING_LINE: f64 = 4.0;
 const BAND: f64 = 0.16;
 const TIME_LABEL: &str = "time in forcing periods, t / T";
 
-/// Draws an orbit as `phase_plane.png`, `time_history.png` and `gap.png` in `dir`.
+/// Draws an orbit as `phase_plane`, `time_history` and `gap` in `dir`, each in every one of the `formats` of figures.
 ///
 /// `trace` holds samples in order of time, from phase 0 on, over at least one forcing
 /// period; the events of `orbit` are merged into it so that corners and velocity jumps
@@ -50,9 +60,14 @@ pub fn write(
     model: &dyn Model,
     orbit: &Orbit,
     trace: &[Sample],
+    formats: &[Format],
 ) -> Result<Vec<PathBuf>, OutputError> {
-    write_each(model, orbit, trace, |name, save| Ok(save(&dir.join(name))?))?;
-    Ok(NAMES.map(|name| dir.join(name)).to_vec())
+    let mut files = Vec::new();
+    write_each(model, orbit, trace, formats, |name, save| {
+        files.push(dir.join(name));
+        Ok(save(&dir.join(name))?)
+    })?;
+    Ok(files)
 }
 
 /// Draws the figures; `place` gets the name of each and what saves it at a path.
@@ -60,10 +75,11 @@ pub(super) fn write_each(
     model: &dyn Model,
     orbit: &Orbit,
     trace: &[Sample],
+    formats: &[Format],
     mut place: impl FnMut(&'static str, &dyn Fn(&Path) -> Result<(), FigureError>) -> Result<(), OutputError>,
 ) -> Result<(), OutputError> {
     let scene = Scene {
-        names: model.state_names().into_iter().map(subscripted).collect(),
+        names: model.state_names().into_iter().map(symbol).collect(),
         bodies: model.bodies(),
         oscillator: model.oscillator()?,
         motion: Motion::new(orbit, trace),
@@ -71,10 +87,17 @@ pub(super) fn write_each(
         title: heading::parameters(model),
         subtitle: heading::character(orbit),
     };
-    let [phase_plane, time_history, gap] = NAMES;
-    place(phase_plane, &|path| save_figure(path, (WIDTH, 980), |canvas| scene.draw_phase_planes(canvas)))?;
-    place(time_history, &|path| save_figure(path, (WIDTH, 1150), |canvas| scene.draw_time_history(canvas)))?;
-    place(gap, &|path| save_figure(path, (WIDTH, 1050), |canvas| scene.draw_gap(canvas)))
+    let mut place_each = |figure: &str, height, draw: &dyn Fn(&Canvas<'_>) -> Result<(), DrawError>| {
+        let is_asked =
+            |name: &&str| formats.iter().any(|format| *name == format!("{figure}.{}", format.name()));
+        NAMES
+            .into_iter()
+            .filter(is_asked)
+            .try_for_each(|name| place(name, &|path| save_figure(path, (WIDTH, height), draw)))
+    };
+    place_each("phase_plane", 980, &|canvas| scene.draw_phase_planes(canvas))?;
+    place_each("time_history", 1150, &|canvas| scene.draw_time_history(canvas))?;
+    place_each("gap", 1050, &|canvas| scene.draw_gap(canvas))
 }
 
 /// One orbit on its way onto paper.
@@ -409,10 +432,4 @@ fn name(side: Side) -> &'static str {
         Side::Right => "right",
         Side::Left => "left",
     }
-}
-
-/// A component's name with its digits below the line.
-fn subscripted(name: &str) -> String {
-    let below = |c: char| c.to_digit(10).and_then(|digit| char::from_u32(0x2080 + digit));
-    name.chars().map(|c| below(c).unwrap_or(c)).collect()
 }

@@ -1,31 +1,38 @@
 //! What all figures share: canvas, palette, type, strokes and markers.
 //!
-//! Positions and sizes are in pixels of the finished picture, as `f64`. A [`Canvas`] is
-//! drawn at twice that resolution and averaged down, because plotters rounds glyphs and
-//! outlines to whole pixels. Lines are rasterised here: plotters fills a thick polyline
-//! as one polygon, which leaves holes wherever a trajectory crosses itself.
+//! Positions and sizes are in pixels of the finished picture, as `f64`. A [`Canvas`] keeps what is drawn, as few kinds of
+//! [`Item`]; [`save_figure`] writes them as PNG, SVG or PDF.
 
 pub mod axes;
 mod fitting;
 pub mod labels;
 pub mod legend;
+mod pdf;
+mod png;
 mod raster;
+mod svg;
 mod ticks;
+mod typeface;
 
+use std::cell::RefCell;
+use std::fs;
 use std::path::Path;
-use std::sync::Once;
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
-use plotters::style::register_font;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-
-pub(super) use ticks::superscript;
-
-use super::{DrawError, FigureError};
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::EventKind;
 
+pub use raster::Bitmap;
+pub(super) use ticks::superscript;
+
+use super::{DrawError, FigureError};
+use typeface::Typeface;
+
+/// Red, green and blue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RGBColor(pub u8, pub u8, pub u8);
+
+/// Paper.
+pub const WHITE: RGBColor = RGBColor(0xff, 0xff, 0xff);
 /// Text, axes and outlines.
 pub const DARK: RGBColor = RGBColor(0x26, 0x26, 0x26);
 /// Lines that should not draw the eye: velocity jumps, marks without data.
@@ -52,11 +59,14 @@ const RIGHT: f64 = 58.0;
 /// The same, below.
 pub const BELOW: f64 = 105.0;
 
-/// Canvas pixels per pixel of the finished picture, along each direction.
-const FINE: u32 = 2;
-const FONT: &str = "figure";
-/// Height of capitals and digits over font size, as plotters scales Ubuntu Light.
-const CAP_HEIGHT: f64 = 0.62;
+/// Pixels to an inch of the printed figure: text of most figures is then of 7 points, lines are of half a point.
+const PER_INCH: f64 = 200.0;
+/// Points of a line closer to the one before than this many pixels are left out.
+const THIN: f64 = 0.1;
+/// Nothing is drawn further away than this, in pixels.
+const FAR: f64 = 1e5;
+/// Length of dashes and of the gaps between them.
+const DASH: f64 = 5.0;
 
 /// The colour of a wall (Okabe and Ito's colour-blind safe set).
 pub fn wall_color(side: Side) -> RGBColor {
@@ -130,13 +140,52 @@ pub struct Marker {
     pub hollow: bool,
 }
 
-/// A picture being drawn.
-pub struct Canvas<'a> {
-    area: DrawingArea<BitMapBackend<'a>, Shift>,
-    size: (f64, f64),
+/// A shape that is filled.
+#[derive(Debug)]
+enum Shaped {
+    Rect(Rect),
+    Circle { center: Point, radius: f64 },
+    Polygon(Vec<Point>),
 }
 
-/// Draws a picture of `size` pixels on white and saves it as PNG.
+/// What a picture consists of, in the order in which it is drawn.
+#[derive(Debug)]
+enum Item {
+    Area {
+        shape: Shaped,
+        color: RGBColor,
+        opacity: f64,
+    },
+    /// With round joints and ends; two points at least.
+    Line {
+        path: Vec<Point>,
+        width: f64,
+        color: RGBColor,
+        is_dashed: bool,
+    },
+    /// `at` lies on the baseline: where it begins, its middle or its end. `em` is the size of the type.
+    Text {
+        text: String,
+        at: Point,
+        em: f64,
+        align: Align,
+        color: RGBColor,
+    },
+    Image {
+        rect: Rect,
+        bitmap: Bitmap,
+    },
+}
+
+/// A picture being drawn.
+#[derive(Debug)]
+pub struct Canvas<'a> {
+    items: RefCell<Vec<Item>>,
+    size: (f64, f64),
+    typeface: &'a Typeface,
+}
+
+/// Draws a picture of `size` pixels on white and saves it: as SVG or PDF if the file's name ends so, else as PNG.
 ///
 /// # Errors
 /// What `draw` returns, or that the file could not be written; both name the file.
@@ -145,49 +194,21 @@ pub fn save_figure(
     (width, height): (u32, u32),
     draw: impl FnOnce(&Canvas<'_>) -> Result<(), DrawError>,
 ) -> Result<(), FigureError> {
-    register_fonts();
-    let fine = (width * FINE, height * FINE);
-    let mut pixels = vec![0xff; 3 * (fine.0 * fine.1) as usize];
-    {
-        let area = BitMapBackend::with_buffer(&mut pixels, fine).into_drawing_area();
-        let canvas = Canvas { area, size: (width.into(), height.into()) };
-        draw(&canvas).map_err(|reason| FigureError::draw(path, reason))?;
-    }
-    let pixels = averaged(&pixels, (width, height));
-    let mut file = BitMapBackend::new(path, (width, height));
-    file.blit_bitmap((0, 0), (width, height), &pixels)
-        .and_then(|()| file.present())
-        .map_err(|reason| FigureError::save(path, reason))
-}
-
-fn register_fonts() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        // Cannot fail: the bytes are compiled in and a test draws with them.
-        let _ = register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
-    });
-}
-
-/// The mean over each block of `FINE` by `FINE` pixels.
-fn averaged(fine: &[u8], (width, height): (u32, u32)) -> Vec<u8> {
-    let (w, n) = (width as usize, FINE as usize);
-    let mut coarse = Vec::with_capacity(3 * w * height as usize);
-    for block in fine.chunks_exact(3 * w * n * n) {
-        for x in 0..w {
-            for channel in 0..3 {
-                let at = |i: usize, j: usize| u32::from(block[3 * (i * w * n + x * n + j) + channel]);
-                let sum: u32 = (0..n * n).map(|k| at(k / n, k % n)).sum();
-                coarse.push(((sum + FINE * FINE / 2) / (FINE * FINE)) as u8);
-            }
+    let canvas = Canvas {
+        items: RefCell::default(),
+        size: (width.into(), height.into()),
+        typeface: Typeface::of_figures(),
+    };
+    let encoded = || {
+        draw(&canvas)?;
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("svg") => Ok(svg::encoded(&canvas)?.into_bytes()),
+            Some("pdf") => pdf::encoded(&canvas),
+            _ => png::encoded(&canvas),
         }
-    }
-    coarse
-}
-
-/// The nearest canvas pixel.
-fn fine(at: Point) -> (i32, i32) {
-    let scale = f64::from(FINE);
-    ((at.0 * scale).round() as i32, (at.1 * scale).round() as i32)
+    };
+    let bytes = encoded().map_err(|reason| FigureError::draw(path, reason))?;
+    fs::write(path, bytes).map_err(|reason| FigureError::save(path, reason))
 }
 
 impl Canvas<'_> {
@@ -201,13 +222,29 @@ impl Canvas<'_> {
         Rect { left, top, right: self.size.0 - RIGHT, bottom: self.size.1 - BELOW }
     }
 
-    /// Fills a rectangle.
-    pub fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<(), DrawError> {
-        let corners = [fine((rect.left, rect.top)), fine((rect.right, rect.bottom))];
-        self.area.draw(&Rectangle::new(corners, color.mix(opacity).filled()))
+    fn add(&self, item: Item) {
+        self.items.borrow_mut().push(item);
     }
 
-    /// Writes one line of text.
+    fn area(&self, shape: Shaped, color: RGBColor, opacity: f64) {
+        self.add(Item::Area { shape, color, opacity });
+    }
+
+    /// Fills a rectangle.
+    pub fn fill(&self, rect: Rect, color: RGBColor, opacity: f64) -> Result<(), DrawError> {
+        if rect.right > rect.left && rect.bottom > rect.top {
+            self.area(Shaped::Rect(rect), color, opacity);
+        }
+        Ok(())
+    }
+
+    /// Fills a polygon.
+    pub fn polygon(&self, corners: &[Point], color: RGBColor) -> Result<(), DrawError> {
+        self.area(Shaped::Polygon(corners.to_vec()), color, 1.0);
+        Ok(())
+    }
+
+    /// Writes one line of text. Raised digits and minus are those of Unicode.
     pub fn text(
         &self,
         text: &str,
@@ -216,69 +253,64 @@ impl Canvas<'_> {
         align: Align,
         color: RGBColor,
     ) -> Result<(), DrawError> {
-        let size = size * f64::from(FINE);
-        // Plotters puts the baseline half a size below the top of its box; going back from
-        // there by half the height of a capital centres digits and capitals on the anchor.
-        let shift = ((CAP_HEIGHT - 1.0) / 2.0 * size).round() as i32;
-        let (x, y) = fine(at);
-        let font = FontDesc::new(FontFamily::Name(FONT), size, FontStyle::Normal);
-        let (font, h_pos, at) = match align {
-            Align::Left => (font, HPos::Left, (x, y + shift)),
-            Align::Center => (font, HPos::Center, (x, y + shift)),
-            Align::Right => (font, HPos::Right, (x, y + shift)),
-            Align::Upwards => (font.transform(FontTransform::Rotate270), HPos::Center, (x + shift, y)),
+        let em = self.typeface.em(size);
+        let half = self.typeface.cap_height(em) / 2.0;
+        let at = match align {
+            Align::Upwards => (at.0 + half, at.1),
+            _ => (at.0, at.1 + half),
         };
-        let style = font.color(&color).pos(Pos::new(h_pos, VPos::Top));
-        self.area.draw_text(text, &style, at)
+        if !text.is_empty() {
+            self.add(Item::Text { text: text.to_owned(), at, em, align, color });
+        }
+        Ok(())
     }
 
     /// Draws an event marker, with a thin white rim that sets it off from the line.
     pub fn marker(&self, at: Point, marker: Marker) -> Result<(), DrawError> {
         let Marker { shape, color, radius, hollow } = marker;
+        if !(at.0.abs() < FAR && at.1.abs() < FAR) {
+            return Ok(());
+        }
         // Small markers are many, and the rim of one would wipe out its neighbour.
         if radius > 4.0 {
-            self.shape(at, shape, radius + 1.0, WHITE)?;
+            self.shape(at, shape, radius + 1.0, WHITE);
         }
-        self.shape(at, shape, radius, color)?;
-        if hollow { self.shape(at, shape, 0.6 * radius, WHITE) } else { Ok(()) }
+        self.shape(at, shape, radius, color);
+        if hollow {
+            self.shape(at, shape, 0.6 * radius, WHITE);
+        }
+        Ok(())
     }
 
-    fn shape(&self, at: Point, shape: Shape, radius: f64, color: RGBColor) -> Result<(), DrawError> {
-        let corner = |dx: f64, dy: f64| fine((at.0 + dx * radius, at.1 + dy * radius));
-        match shape {
-            Shape::Circle => {
-                let radius = radius * f64::from(FINE);
-                self.area.draw(&Circle::new(fine(at), radius.round() as i32, color.filled()))?;
-            }
+    fn shape(&self, at: Point, shape: Shape, radius: f64, color: RGBColor) {
+        let corner = |dx: f64, dy: f64| (at.0 + dx * radius, at.1 + dy * radius);
+        let shaped = match shape {
+            Shape::Circle => Shaped::Circle { center: at, radius },
             Shape::Square => {
-                let corners = [corner(-0.85, -0.85), corner(0.85, 0.85)];
-                self.area.draw(&Rectangle::new(corners, color.filled()))?;
+                let ((left, top), (right, bottom)) = (corner(-0.85, -0.85), corner(0.85, 0.85));
+                Shaped::Rect(Rect { left, top, right, bottom })
             }
             Shape::Triangle => {
-                let corners = vec![corner(0.0, -1.25), corner(1.1, 0.75), corner(-1.1, 0.75)];
-                self.area.draw(&Polygon::new(corners, color.filled()))?;
+                Shaped::Polygon(vec![corner(0.0, -1.25), corner(1.1, 0.75), corner(-1.1, 0.75)])
             }
-        }
+        };
+        self.area(shaped, color, 1.0);
+    }
+
+    /// Draws a polyline with round joints and ends; points that are not finite are left out.
+    pub fn stroke(&self, path: &[Point], width: f64, color: RGBColor) -> Result<(), DrawError> {
+        self.line(path, width, color, false);
         Ok(())
     }
 
-    /// Draws a polyline with round joints and ends.
-    pub fn stroke(&self, path: &[Point], width: f64, color: RGBColor) -> Result<(), DrawError> {
-        let scale = f64::from(FINE);
-        let path: Vec<Point> = path.iter().map(|p| (p.0 * scale, p.1 * scale)).collect();
-        let Some(mut coverage) = Coverage::of(&path, width * scale, self.area.dim_in_pixel()) else {
-            return Ok(());
-        };
-        if let [dot] = path[..] {
-            coverage.add(dot, dot);
+    fn line(&self, path: &[Point], width: f64, color: RGBColor, is_dashed: bool) {
+        match thinned(path) {
+            path if path.is_empty() => {}
+            path if path.len() == 1 => {
+                self.area(Shaped::Circle { center: path[0], radius: width / 2.0 }, color, 1.0);
+            }
+            path => self.add(Item::Line { path, width, color, is_dashed }),
         }
-        for ends in path.windows(2) {
-            coverage.add(ends[0], ends[1]);
-        }
-        for (at, share) in coverage.pixels() {
-            self.area.draw_pixel(at, &color.mix(share.into()))?;
-        }
-        Ok(())
     }
 
     /// Draws the border of a rectangle.
@@ -290,105 +322,27 @@ impl Canvas<'_> {
 
     /// Draws a dashed straight line.
     pub fn dashes(&self, from: Point, to: Point, width: f64, color: RGBColor) -> Result<(), DrawError> {
-        const DASH: f64 = 5.0;
-        let length = (to.0 - from.0).hypot(to.1 - from.1);
-        if length == 0.0 || !length.is_finite() {
-            return Ok(());
-        }
-        let at = |s: f64| {
-            let share = (s / length).min(1.0);
-            (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1))
-        };
-        for i in 0..(length / (2.0 * DASH)).ceil() as u32 {
-            let start = 2.0 * DASH * f64::from(i);
-            self.stroke(&[at(start), at(start + DASH)], width, color)?;
-        }
+        self.line(&[from, to], width, color, true);
         Ok(())
     }
-
-    /// The canvas pixels inside a rectangle: `(left, top, width, height)`.
-    pub fn fine_rect(rect: Rect) -> (i32, i32, usize, usize) {
-        let (left, top) = fine((rect.left, rect.top));
-        let (right, bottom) = fine((rect.right, rect.bottom));
-        (left, top, (right - left).max(0) as usize, (bottom - top).max(0) as usize)
-    }
-
-    /// The canvas pixel at a position.
-    pub fn fine_pixel(at: Point) -> (i32, i32) {
-        fine(at)
-    }
-
-    /// A length in canvas pixels.
-    pub fn fine_length(length: f64) -> f64 {
-        length * f64::from(FINE)
-    }
-
-    /// Blends one canvas pixel.
-    pub fn blend(&self, at: (i32, i32), color: RGBColor, opacity: f64) -> Result<(), DrawError> {
-        self.area.draw_pixel(at, &color.mix(opacity))
-    }
 }
 
-/// How much of each canvas pixel a stroke covers.
-///
-/// Collected before it is blended, so that short segments do not darken one another's rims.
-struct Coverage {
-    left: i32,
-    top: i32,
-    width: usize,
-    share: Vec<f32>,
-    reach: f64,
-}
-
-impl Coverage {
-    /// Nothing covered yet; none if the path has no point on the canvas.
-    fn of(path: &[Point], stroke_width: f64, (width, height): (u32, u32)) -> Option<Coverage> {
-        let reach = stroke_width / 2.0 + 0.5;
-        let bounds = |values: &mut dyn Iterator<Item = f64>, size: u32| {
-            let (low, high) = values.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
-            let low = (low - reach).floor().clamp(0.0, size.into()) as i32;
-            (low, (high + reach).ceil().clamp(low.into(), size.into()) as i32)
-        };
-        let (left, right) = bounds(&mut path.iter().map(|p| p.0), width);
-        let (top, bottom) = bounds(&mut path.iter().map(|p| p.1), height);
-        let (width, height) = ((right - left) as usize, (bottom - top) as usize);
-        (width * height > 0).then(|| Coverage { left, top, width, share: vec![0.0; width * height], reach })
-    }
-
-    /// Covers the pixels near the segment from `a` to `b`.
-    fn add(&mut self, a: Point, b: Point) {
-        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
-        let length2 = dx * dx + dy * dy;
-        let first = ((a.1.min(b.1) - self.reach).floor() as i32).max(self.top);
-        let height = (self.share.len() / self.width) as i32;
-        let last = ((a.1.max(b.1) + self.reach).ceil() as i32).min(self.top + height - 1);
-        for y in first..=last {
-            // Pixel centres lie at halves.
-            let py = f64::from(y) + 0.5;
-            let along = if dy == 0.0 {
-                (0.0, 1.0)
-            } else {
-                ((py - self.reach - a.1) / dy, (py + self.reach - a.1) / dy)
-            };
-            let at = |s: f64| a.0 + s.clamp(0.0, 1.0) * dx;
-            let ends = (at(along.0), at(along.1));
-            let from = ((ends.0.min(ends.1) - self.reach).floor() as i32).max(self.left);
-            let to = ((ends.0.max(ends.1) + self.reach).ceil() as i32).min(self.left + self.width as i32 - 1);
-            let row = (y - self.top) as usize * self.width;
-            for x in from..=to {
-                let (qx, qy) = (f64::from(x) + 0.5 - a.0, py - a.1);
-                let foot = if length2 > 0.0 { ((qx * dx + qy * dy) / length2).clamp(0.0, 1.0) } else { 0.0 };
-                let share = (self.reach - (qx - foot * dx).hypot(qy - foot * dy)).clamp(0.0, 1.0) as f32;
-                let cell = &mut self.share[row + (x - self.left) as usize];
-                *cell = cell.max(share);
-            }
+/// A path without points that are not finite or too close to the one before; its end is kept.
+fn thinned(path: &[Point]) -> Vec<Point> {
+    let near = |v: f64| v.clamp(-FAR, FAR);
+    let finite = path.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
+    let mut points: Vec<Point> = Vec::with_capacity(path.len());
+    let mut skipped = None;
+    for at in finite.map(|p| (near(p.0), near(p.1))) {
+        if points.last().is_some_and(|last| (at.0 - last.0).hypot(at.1 - last.1) < THIN) {
+            skipped = Some(at);
+        } else {
+            points.push(at);
+            skipped = None;
         }
     }
-
-    fn pixels(&self) -> impl Iterator<Item = ((i32, i32), f32)> {
-        let covered = self.share.iter().enumerate().filter(|(_, share)| **share > 0.0);
-        covered.map(|(i, &share)| {
-            ((self.left + (i % self.width) as i32, self.top + (i / self.width) as i32), share)
-        })
+    if points.len() > 1 {
+        points.extend(skipped);
     }
+    points
 }

@@ -5,15 +5,15 @@ use crate::map::scene::{Scene, Start};
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::Settings;
 
-/// What follows the two `--set` of the axes: parameters that differ from `orbit`'s own
+/// What follows the `--set` of swept and derived parameters: others that differ from `orbit`'s own
 /// defaults, the start, and how long to integrate.
 pub(super) fn arguments(scene: &Scene) -> String {
     let mut words = Vec::new();
     let base = scene.base();
-    for (index, parameter) in base.parameters().iter().enumerate() {
-        let value = base.value(index);
-        if !scene.sweeps(parameter) && parameter.default != Some(value) {
-            words.push(format!(" --set {}={value:?}", parameter.name));
+    for (name, value) in scene.fixed() {
+        let parameter = base.parameters().iter().find(|parameter| parameter.name == name);
+        if parameter.is_some_and(|parameter| parameter.default != Some(value)) {
+            words.push(format!(" --set {name}={value:?}"));
         }
     }
     if let Start::State(state) = scene.start() {
@@ -37,10 +37,9 @@ fn start(model: &dyn Model, state: State) -> String {
 /// The whole command for the run `id`.
 pub(super) fn command(cells: &Cells<'_>, id: usize) -> String {
     let scene = cells.scene();
-    let set = |(axis, i): (&crate::map::scene::Axis, usize)| {
-        format!(" --set {}={:?}", axis.parameter().name, axis.value(i))
-    };
-    let sets: String = scene.axes().iter().zip(cells.row(id).indices).map(set).collect();
+    let swept = scene.swept().map(|parameter| &*parameter.name).zip(cells.values(id));
+    let sets = swept.chain(cells.derived(id)).map(|(name, value)| format!(" --set {name}={value:?}"));
+    let sets: String = sets.collect();
     // A later argument wins over the scene's own.
     let own = if cells.has_own_start(id) { start(scene.base(), cells.start(id)) } else { String::new() };
     format!("rattlemap orbit{sets}{}{own}", arguments(scene))

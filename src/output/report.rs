@@ -24,8 +24,9 @@ use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer, Words};
 use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
-use super::{WriteError, names, replay};
-use crate::map::scene::Quantity;
+use super::symbols::symbol;
+use super::{WriteError, caption, names, replay};
+use crate::map::scene::{Quantity, Rule, Scale, Scene};
 use rattlemap_dynamics::orbit::Status;
 
 const PAGE: &str = include_str!("report/page.html");
@@ -36,8 +37,12 @@ const SCRIPT: &str = include_str!("report/page.js");
 struct Data<'a> {
     title: String,
     subtitle: String,
+    /// Every parameter that no axis sweeps, and what the model is taken from.
+    fixed: String,
+    source: Option<&'static str>,
     axes: Vec<AxisData>,
-    /// What follows the two `--set` of the axes in the command that replays a cell.
+    derived: Vec<DerivedData>,
+    /// What follows the `--set` of swept and derived parameters in the command that replays a cell.
     replay: String,
     /// Where cells start that follow their neighbours: four numbers per cell.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,10 +61,24 @@ struct Data<'a> {
 #[derive(Serialize)]
 struct AxisData {
     parameter: String,
+    symbol: String,
     meaning: String,
     min: f64,
     max: f64,
     count: usize,
+    scale: &'static str,
+    /// Of an axis that is not linear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    values: Option<Vec<f64>>,
+}
+
+/// A parameter that follows others: its values over the cells, along the axes on which they depend alone.
+#[derive(Serialize)]
+struct DerivedData {
+    parameter: String,
+    along: [bool; 2],
+    #[serde(flatten)]
+    values: Packed,
 }
 
 #[derive(Serialize)]
@@ -87,6 +106,8 @@ struct BarData {
     colors: Vec<String>,
     low: f64,
     high: f64,
+    /// Sentences on what lies beyond its ends.
+    left_out: Vec<String>,
 }
 
 /// An array over the cells.
@@ -112,7 +133,10 @@ pub(super) fn write(
     let data = Data {
         title: scene.title().to_owned(),
         subtitle: subtitle(scene),
+        fixed: caption::all_fixed(scene),
+        source: caption::source(scene.base()),
         axes: scene.axes().iter().map(AxisData::from).collect(),
+        derived: derived(scene),
         replay: replay::arguments(scene),
         starts: starts(cells),
         layers: layers.par_iter().map(LayerData::from).collect(),
@@ -158,6 +182,21 @@ fn policy(style: &str, script: &str) -> String {
     let [style, script] =
         [style, script].map(|part| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(part))));
     format!("default-src 'none'; script-src {script}; style-src {style}; base-uri 'none'; form-action 'none'")
+}
+
+/// Derived parameters in the order of the scene's.
+fn derived(scene: &Scene) -> Vec<DerivedData> {
+    let points = scene.points();
+    let [columns, rows] = points.counts();
+    let of = |rule: &Rule| {
+        let along = [0, 1].map(|i| scene.axes().get(i).is_some_and(|axis| rule.follows(axis.index())));
+        let counts = [if along[0] { columns } else { 1 }, if along[1] { rows } else { 1 }];
+        let cells = (0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| j * columns + i));
+        let values: Vec<f64> = cells.map(|cell| points.model(cell).value(rule.index())).collect();
+        let parameter = rule.parameter().name.to_string();
+        DerivedData { parameter, along, values: packed("f64", &values) }
+    };
+    points.derived().rules().iter().map(of).collect()
 }
 
 /// Starts that a cell's record does not tell, in full: the command that replays it needs them.
@@ -224,10 +263,13 @@ impl From<&crate::map::scene::Axis> for AxisData {
         let parameter = axis.parameter();
         AxisData {
             parameter: parameter.name.to_string(),
+            symbol: symbol(&parameter.name),
             meaning: parameter.meaning.to_string(),
             min: axis.min(),
             max: axis.max(),
             count: axis.count(),
+            scale: axis.scale().name(),
+            values: (axis.scale() != Scale::Linear).then(|| axis.values().collect()),
         }
     }
 }
@@ -250,6 +292,7 @@ impl From<&Layer> for LayerData {
                 colors: bar.colors.iter().step_by(6).map(hex).collect(),
                 low: bar.low,
                 high: bar.high,
+                left_out: bar.left_out(layer.indices.len()),
             }),
             indices: packed("u8", &layer.indices),
         }

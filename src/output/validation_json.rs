@@ -165,7 +165,7 @@ impl ValidationObject {
 
 fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
     let row = cells.row(mismatch.id as usize);
-    let axes = cells.scene().axes().iter().map(|axis| axis.parameter().name.to_string());
+    let swept = cells.scene().swept().map(|parameter| parameter.name.to_string());
     let differences = mismatch.differences.iter().map(|difference| DifferenceObject {
         field: difference.field.name(),
         map: difference.record.clone(),
@@ -175,7 +175,7 @@ fn mismatched(cells: &Cells<'_>, mismatch: &Mismatch) -> MismatchObject {
         id: mismatch.id,
         i: row.indices[0],
         j: row.indices[1],
-        values: axes.zip(row.values).collect(),
+        values: swept.zip(cells.values(mismatch.id as usize)).collect(),
         differences: differences.collect(),
         kind: mismatch.kind.name(),
         replay: replay::command(cells, mismatch.id as usize),

@@ -100,10 +100,13 @@ pub fn sample(plan: &Plan, records: &[Record], size: usize, seed: u64) -> Sample
     Sample { seed, draws: draws.collect(), states }
 }
 
-/// Runs with a neighbour to the side, above or below of another class or period.
+/// Runs with a neighbour to the side, above or below of another class or period; in a list there are no neighbours.
 fn border(plan: &Plan, records: &[Record]) -> Vec<u32> {
+    if plan.is_list() {
+        return Vec::new();
+    }
     let classes: Vec<Class> = records.iter().map(classify).collect();
-    let [columns, rows] = plan.axes().each_ref().map(|axis| axis.count());
+    let [columns, rows] = plan.counts();
     let differs = |id: usize| {
         let [i, j] = plan.indices(id as u32);
         let neighbours = [

@@ -4,6 +4,7 @@
 mod common;
 
 mod audit;
+mod axes;
 mod models;
 mod runs;
 mod starts;

@@ -38,7 +38,7 @@ fn a_map_of_stops_has_the_impacts_of_the_closed_form() {
     let map = map::run(&scene, Processor::Cpu).unwrap();
     assert_eq!((map.counts(), map.cells().len()), ([4, 4], 16));
     for cell in map.cells() {
-        let [b, omega] = cell.values;
+        let (b, omega) = (cell.values[0], cell.values[1]);
         let model = map.model(&cell);
         assert_eq!(*model, Stops { b, omega, ..stops(1.0) });
         assert!(cell.record.valid & valid::IMPACTS != 0 && cell.class != Class::Failed, "{cell:?}");

@@ -1,10 +1,13 @@
 //! The figures are written, show what they should, and survive poor data.
 
 use std::f64::consts::TAU;
+use std::fs;
+use std::io::Read;
 use std::path::Path;
 
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, SectionPoint};
+use rattlemap::map::scene::Format;
 use rattlemap::output::{bifurcation_figure, orbit_figures};
 use rattlemap_dynamics::model::{GearPair, Side, State};
 use rattlemap_dynamics::orbit::{Class, Event, EventKind, Orbit, Sample, Status};
@@ -97,7 +100,8 @@ fn distinct_colors(picture: &RgbImage) -> usize {
 fn orbit_figures_show_motion_meshing_and_events() {
     let dir = tempfile::tempdir().unwrap();
     let (orbit, trace) = meshing_orbit();
-    let files = orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace).unwrap();
+    let files =
+        orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &[Format::Png]).unwrap();
     let names: Vec<_> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect();
     assert_eq!(names, ["phase_plane.png", "time_history.png", "gap.png"]);
     for file in &files {
@@ -136,9 +140,68 @@ fn motion_without_contact_without_data_or_without_numbers_is_drawn() {
         (&blown_up, Class::Failed),
     ] {
         let orbit = Orbit { class, lyapunov: f64::NAN, ..orbit(vec![]) };
-        let files = orbit_figures::write(dir.path(), &GearPair::paper(0.5), &orbit, trace).unwrap();
+        let files =
+            orbit_figures::write(dir.path(), &GearPair::paper(0.5), &orbit, trace, &[Format::Png]).unwrap();
         files.iter().for_each(|file| assert!(distinct_colors(&read(file)) > 10, "{}", file.display()));
     }
+}
+
+/// A stream of a PDF, by what stands before it.
+fn stream(pdf: &[u8], after: &str) -> Vec<u8> {
+    let find =
+        |from: usize, mark: &[u8]| from + pdf[from..].windows(mark.len()).position(|w| w == mark).unwrap();
+    let begin = find(find(0, after.as_bytes()), b"stream\n") + 7;
+    let mut bytes = Vec::new();
+    flate2::read::ZlibDecoder::new(&pdf[begin..]).read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn figures_in_svg_and_pdf_have_lines_and_text() {
+    let (orbit, trace) = meshing_orbit();
+    let written = || {
+        let dir = tempfile::tempdir().unwrap();
+        let formats = [Format::Svg, Format::Pdf];
+        let files =
+            orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &formats).unwrap();
+        files.iter().map(|file| fs::read(file).unwrap()).collect::<Vec<_>>()
+    };
+    let files = written();
+    assert_eq!((files.len(), &files), (6, &written()), "the same picture gives the same bytes");
+    for pair in files.chunks(2) {
+        let svg = std::str::from_utf8(&pair[0]).unwrap();
+        assert!(svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n") && !svg.contains("<image"));
+        let title = "Gear pair: e = 0.06, \u{3c9} = 5.6; all other parameters at their defaults";
+        for part in [&format!(">{title}</text>"), ">meshing starts</text>", "stroke=\"#262626\"", "<polyline"]
+        {
+            assert!(svg.contains(part), "{part}");
+        }
+        assert!(!svg.contains("omega") && !svg.contains("NaN") && !svg.contains("inf"));
+        let pdf = &pair[1];
+        assert!(pdf.starts_with(b"%PDF-1.") && pdf.ends_with(b"%%EOF"));
+        let text = String::from_utf8_lossy(pdf);
+        assert!(text.contains("+Ubuntu-Light") && text.contains("/FontFile2") && !text.contains("Date"));
+        // A reader finds the letters: the map from glyphs to characters has omega, 03C9.
+        let map = String::from_utf8(stream(pdf, "/Type/CMap")).unwrap();
+        assert!(map.to_uppercase().contains("<03C9>"), "{map}");
+    }
+    assert!(files[0].len() < 150_000, "a line of few pixels has few points: {}", files[0].len());
+}
+
+/// A title is anybody's text.
+#[test]
+fn titles_stay_text_in_svg() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("b.svg");
+    let title = "a < b && \"c\" </text><script>\u{7}\u{2028}10\u{207b}\u{b2}";
+    bifurcation_figure::write(&path, [title, "second\nthird"], "e", &columns(9, 3)).unwrap();
+    let svg = fs::read_to_string(path).unwrap();
+    let expected = "a &lt; b &amp;&amp; \"c\" &lt;/text&gt;&lt;script&gt; \u{2028}10<tspan dy=";
+    assert!(svg.contains(expected) && !svg.contains("<script"), "{svg:.600}");
+    assert!(
+        svg.contains(">\u{2212}2</tspan>") && svg.contains(">second</text>") && svg.contains(">third</text>")
+    );
+    assert_eq!(svg.matches("<image").count(), 2, "a cloud of points for each gear");
 }
 
 fn columns(count: u32, points: u32) -> Vec<Column> {
@@ -162,8 +225,13 @@ fn columns(count: u32, points: u32) -> Vec<Column> {
 fn bifurcation_figure_shows_both_walls() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("bifurcation.png");
-    bifurcation_figure::write(&path, "Bifurcation", "coefficient of restitution, e", &columns(1000, 200))
-        .unwrap();
+    bifurcation_figure::write(
+        &path,
+        ["Bifurcation", "from rest"],
+        "coefficient of restitution, e",
+        &columns(1000, 200),
+    )
+    .unwrap();
     let picture = read(&path);
     assert_eq!(picture.dimensions(), (1600, 1400));
     assert!(ink(&picture) > 5000, "{}", ink(&picture));
@@ -187,7 +255,7 @@ fn bifurcation_figure_survives_poor_data() {
         ("wild", &long, wild),
     ] {
         let path = dir.path().join(format!("{name}.png"));
-        bifurcation_figure::write(&path, title, "e", &columns).unwrap();
+        bifurcation_figure::write(&path, [title, ""], "e", &columns).unwrap();
         assert_eq!(read(&path).width(), 1600);
     }
 }
@@ -195,9 +263,10 @@ fn bifurcation_figure_survives_poor_data() {
 #[test]
 fn a_file_that_cannot_be_written_is_named() {
     let dir = tempfile::tempdir().unwrap().path().join("absent");
-    let error = bifurcation_figure::write(&dir.join("b.png"), "", "e", &[]).unwrap_err();
+    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], "e", &[]).unwrap_err();
     assert!(format!("{error:#}").contains("b.png"), "{error:#}");
     let (orbit, trace) = meshing_orbit();
-    let error = orbit_figures::write(&dir, &GearPair::paper(0.5), &orbit, &trace).unwrap_err();
+    let error =
+        orbit_figures::write(&dir, &GearPair::paper(0.5), &orbit, &trace, &[Format::Png]).unwrap_err();
     assert!(format!("{error:#}").contains("phase_plane.png"), "{error:#}");
 }

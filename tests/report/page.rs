@@ -67,7 +67,7 @@ function visit() {
   said.layers = [...document.querySelectorAll("#layers button")].map((button) => button.textContent);
   const [x, y] = pixel(6.5, 8.5);
   point("pointermove", x, y);
-  said.hovered = ["cell", "e", "omega", "class", "exponent", "word", "periods run"].map(fact);
+  said.hovered = ["cell", "e", "\u03c9", "class", "exponent", "word", "periods run"].map(fact);
   point("pointerdown", x, y);
   point("pointerup", x, y);
   said.command = text("command");
@@ -374,7 +374,7 @@ fn the_page_works_in_a_browser() {
         assert_eq!(said[fact], true, "{fact}: {said}");
     }
     assert_eq!((&said["stays"], &said["moved"]), (&json!("6, 8"), &json!("7, 8")));
-    assert_eq!(said["legend"], "largest Lyapunov exponent");
+    assert_eq!(said["legend"], "largest Lyapunov exponent, \u{3bb}");
     assert!(said["colors"].as_u64().unwrap() > 20, "{said}");
 }
 

@@ -3,12 +3,10 @@
 
 use std::path::Path;
 
-use plotters::style::RGBColor;
-
 use super::{EngineName, grazing, grid, long_runs, stiffness};
 use rattlemap::output::plot_style::axes::{Axis, Frame};
 use rattlemap::output::plot_style::legend::{Entry, Key, draw_head};
-use rattlemap::output::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
+use rattlemap::output::plot_style::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
 use rattlemap::output::{DrawError, FigureError};
 
 const SIZE: (u32, u32) = (1500, 1150);

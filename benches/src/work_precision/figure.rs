@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use plotters::style::RGBColor;
-
 use super::points::Point;
 use rattlemap::output::plot_style::axes::{Axis, Frame};
 use rattlemap::output::plot_style::labels::Labels;
 use rattlemap::output::plot_style::legend::{Entry, Key, draw_head};
-use rattlemap::output::plot_style::{Canvas, DARK, FAINT, Marker, Shape, save_figure};
+use rattlemap::output::plot_style::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
 use rattlemap::output::{DrawError, FigureError};
 
 const SIZE: (u32, u32) = (1500, 1280);

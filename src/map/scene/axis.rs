@@ -1,7 +1,9 @@
-//! Axes: which parameter is swept, from where to where, in how many values.
+//! Axes: which parameter is swept, and its values.
+
+use std::sync::Arc;
 
 use super::document::{Node, Value};
-use super::error::{Place, SceneError};
+use super::error::SceneError;
 use super::keys;
 use super::section::{Field, Section};
 use rattlemap_dynamics::model::{Model, Parameter};
@@ -9,9 +11,31 @@ use rattlemap_dynamics::model::{Model, Parameter};
 /// The most values that one axis may have.
 pub const MAX_COUNT: u32 = 1_000_000;
 
-const EXAMPLE: &str = "write [[axis]] with parameter, min, max and count";
+const EXAMPLE: &str = "write [[axis]] with parameter, min, max and count, or with parameter and values";
 
-/// An inclusive linear range of one parameter.
+/// How the values of an axis follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// By equal differences.
+    Linear,
+    /// By equal ratios.
+    Log,
+    /// As they were listed.
+    Values,
+}
+
+impl Scale {
+    /// The name in scenes and manifests.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scale::Linear => "linear",
+            Scale::Log => "log",
+            Scale::Values => "values",
+        }
+    }
+}
+
+/// The values of one parameter, strictly increasing.
 #[derive(Clone, Debug)]
 pub struct Axis {
     parameter: Parameter,
@@ -20,12 +44,20 @@ pub struct Axis {
     min: f64,
     max: f64,
     count: usize,
+    scale: Scale,
+    /// All values, computed once for all engines; none on a linear axis, which has a formula.
+    table: Arc<[f64]>,
 }
 
 impl Axis {
     /// The swept parameter.
     pub fn parameter(&self) -> &Parameter {
         &self.parameter
+    }
+
+    /// The parameter's place in the model's table.
+    pub(crate) fn index(&self) -> usize {
+        self.index
     }
 
     /// Gives a model the axis' value `i`.
@@ -49,22 +81,52 @@ impl Axis {
         self.count
     }
 
-    /// Value `i`, counted from 0: `min + (max - min) * i / (count - 1)`.
+    /// How the values follow each other.
+    pub fn scale(&self) -> Scale {
+        self.scale
+    }
+
+    /// Value `i`, counted from 0. With `n = count - 1` it is on a linear axis
     ///
-    /// The last one is `max` itself and none exceeds it, whatever the rounding, so that
+    /// ```text
+    /// min + (max - min) * i / n
+    /// ```
+    ///
+    /// and on a logarithmic one, with the functions of the crate `libm`, which are the same on every machine,
+    ///
+    /// ```text
+    /// exp10((log10(min) * (n - i) + log10(max) * i) / n)
+    /// ```
+    ///
+    /// The first one is `min`, the last one `max` itself, and none lies outside, whatever the rounding, so that
     /// no value leaves the parameter's range.
     pub fn value(&self, i: usize) -> f64 {
         let last = self.count - 1;
         if i >= last {
             return self.max;
         }
-        (self.min + (self.max - self.min) * i as f64 / last as f64).min(self.max)
+        match self.scale {
+            Scale::Linear => (self.min + (self.max - self.min) * i as f64 / last as f64).min(self.max),
+            Scale::Log | Scale::Values => self.table[i],
+        }
     }
 
     /// All values, ascending.
     pub fn values(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
         (0..self.count).map(|i| self.value(i))
     }
+}
+
+/// The values of a logarithmic axis, as [`Axis::value`] says.
+fn geometric(min: f64, max: f64, count: usize) -> Arc<[f64]> {
+    let last = count - 1;
+    let [from, to] = [min, max].map(libm::log10);
+    let value = |i: usize| match i {
+        0 => min,
+        i if i == last => max,
+        i => libm::exp10((from * (last - i) as f64 + to * i as f64) / last as f64).clamp(min, max),
+    };
+    (0..count).map(value).collect()
 }
 
 /// Reads `[[axis]]`, of which there must be `wanted`; `command` is who wants them.
@@ -105,88 +167,104 @@ fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axi
     if let Some(i) = before.iter().position(|axis| axis.index == index) {
         return Err(field.conflict(format!("axis {i} sweeps it already; name another parameter")));
     }
-    let requirement = parameter.range.requirement();
-    let end = |which: &str| {
-        let field = section.require(which, &format!("give a number, {requirement}"))?;
-        let value = field.number()?;
-        if parameter.range.contains(value) {
-            Ok((value, field))
-        } else {
-            Err(field.out_of_range(&format!("{requirement}, as `{name}` is")))
+    match told_values(&section)? {
+        Some(values) => read_values(&values, parameter, index),
+        None => read_range(&section, parameter, index),
+    }
+}
+
+/// `values`, if they are what tells the axis: an argument wins over the text, for them or for what they replace.
+fn told_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneError> {
+    let Some(values) = section.get("values") else { return Ok(None) };
+    let others = ["min", "max", "count", "scale"].map(|name| section.get(name));
+    let mut others = others.iter().flatten();
+    let is_argument = values.is_argument();
+    if let Some(other) = others.clone().find(|other| other.is_argument() == is_argument) {
+        return Err(values.conflict(format!(
+            "values stand in the place of min, max, count and scale, and `{}` is given, too; drop either",
+            other.path
+        )));
+    }
+    Ok((is_argument || others.next().is_none()).then_some(values))
+}
+
+fn read_values(field: &Field<'_>, parameter: Parameter, index: usize) -> Result<Axis, SceneError> {
+    let wanted = format!("a list of 2 to {MAX_COUNT} numbers, each greater than the one before it");
+    let items = field.list(&wanted)?;
+    if !(2..=MAX_COUNT as usize).contains(&items.len()) {
+        return Err(field.out_of_range(&wanted));
+    }
+    let mut table: Vec<f64> = Vec::with_capacity(items.len());
+    for item in &items {
+        let value = in_range(item, &parameter)?;
+        if let Some(before) = table.last().filter(|before| value <= **before) {
+            return Err(item.out_of_range(&format!("greater than the value before it, {before:?}")));
         }
+        table.push(value);
+    }
+    let (min, max, count) = (table[0], table[items.len() - 1], items.len());
+    Ok(Axis { parameter, index, min, max, count, scale: Scale::Values, table: table.into() })
+}
+
+fn read_range(section: &Section<'_>, parameter: Parameter, index: usize) -> Result<Axis, SceneError> {
+    let scale = match section.get("scale") {
+        Some(field) => field.choice(&[Scale::Linear, Scale::Log].map(|scale| (scale.name(), scale)))?,
+        None => Scale::Linear,
     };
-    let (min, _) = end("min")?;
+    let end = |which: &str| {
+        let remedy = format!("give a number, {}", parameter.range.requirement());
+        let field = section.require(which, &remedy)?;
+        in_range(&field, &parameter).map(|value| (value, field))
+    };
+    let (min, min_field) = end("min")?;
+    if scale == Scale::Log && min <= 0.0 {
+        return Err(
+            min_field.out_of_range("greater than 0 where `scale = \"log\"`; raise it, or drop the scale")
+        );
+    }
     let (max, max_field) = end("max")?;
     if min >= max {
-        return Err(max_field.out_of_range(&format!("greater than `{}.min = {min}`", table.path)));
+        return Err(max_field.out_of_range(&format!("greater than `{}.min = {min}`", section.path())));
     }
-    let count = section.require("count", "say how many values, 2 or more")?.whole(2..=MAX_COUNT)?;
-    if !((max - min) * f64::from(count)).is_finite() {
+    let count_field = section.require("count", "say how many values, 2 or more")?;
+    let count = count_field.whole(2..=MAX_COUNT)? as usize;
+    if scale == Scale::Linear && !((max - min) * count as f64).is_finite() {
         return Err(max_field.out_of_range("near enough to `min` for the difference to be a finite number"));
     }
-    Ok(Axis { parameter, index, min, max, count: count as usize })
-}
-
-/// Reads `[parameters]` beside the axes: the base from which every cell is made.
-///
-/// A parameter that is an axis must not be set as well, except that an axis named by a `--set`
-/// argument replaces the value in the scene's text: arguments win over the text.
-pub(super) fn read_parameters(
-    root: &Section<'_>,
-    model: &dyn Model,
-    axes: &[Axis],
-) -> Result<Box<dyn Model>, SceneError> {
-    let section = root.section_among("parameters", &names(model), &meanings(model))?;
-    let mut base = model.boxed();
-    for (index, parameter) in model.parameters().iter().enumerate() {
-        let name = &*parameter.name;
-        let swept = axes.iter().position(|axis| axis.index == index);
-        let value = match (section.get(name), swept) {
-            (Some(field), Some(i)) if is_argument(&field) || !is_argument(&named(root, i)?) => {
-                return Err(field.conflict(format!(
-                    "axis {i} sweeps `{name}`; set `axis.{i}.min` and `axis.{i}.max`, or drop one of the two"
-                )));
-            }
-            (Some(field), None) => given(&field, parameter)?,
-            (_, Some(i)) => axes[i].min,
-            (None, None) => parameter.default.ok_or_else(|| {
-                let remedy = format!(
-                    "{} has no default: set it under [parameters] or make it an axis",
-                    parameter.meaning
-                );
-                section.missing(name, &remedy)
-            })?,
-        };
-        // In range: checked above, or the table's own default.
-        base.assign(index, value);
+    let table = match scale {
+        Scale::Log => geometric(min, max, count),
+        _ => Arc::new([]),
+    };
+    if table.windows(2).any(|pair| pair[0] >= pair[1]) {
+        return Err(count_field.out_of_range("so small that no two values are the same number"));
     }
-    Ok(base)
+    Ok(Axis { parameter, index, min, max, count, scale, table })
 }
 
-fn names(model: &dyn Model) -> Vec<&str> {
-    model.parameters().iter().map(|parameter| &*parameter.name).collect()
-}
-
-/// The parameters with what they mean, as a list within a sentence.
-fn meanings(model: &dyn Model) -> String {
-    let of = |parameter: &Parameter| format!("{} ({})", parameter.name, parameter.meaning);
-    model.parameters().iter().map(of).collect::<Vec<_>>().join(", ")
+/// A number that the parameter may take.
+fn in_range(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError> {
+    let value = field.number()?;
+    match parameter.range.contains(value) {
+        true => Ok(value),
+        false => {
+            let requirement = parameter.range.requirement();
+            Err(field.out_of_range(&format!("{requirement}, as `{}` is", parameter.name)))
+        }
+    }
 }
 
 /// The name of axis `i`'s parameter.
-fn named<'a>(root: &Section<'a>, i: usize) -> Result<Field<'a>, SceneError> {
+pub(super) fn named<'a>(root: &Section<'a>, i: usize) -> Result<Field<'a>, SceneError> {
     let tables = root.require("axis", EXAMPLE)?.list("a list of tables, [[axis]]")?;
     Section::open(tables[i].node, &tables[i].path, &keys::names("axis"))?.require("parameter", EXAMPLE)
 }
 
-fn is_argument(field: &Field<'_>) -> bool {
-    matches!(field.node.place, Place::Set { .. })
+pub(super) fn names(model: &dyn Model) -> Vec<&str> {
+    model.parameters().iter().map(|parameter| &*parameter.name).collect()
 }
 
-fn given(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError> {
-    let value = field.number()?;
-    match parameter.range.contains(value) {
-        true => Ok(value),
-        false => Err(field.out_of_range(&parameter.range.requirement())),
-    }
+/// The parameters with what they mean, as a list within a sentence.
+pub(super) fn meanings(model: &dyn Model) -> String {
+    let of = |parameter: &Parameter| format!("{} ({})", parameter.name, parameter.meaning);
+    model.parameters().iter().map(of).collect::<Vec<_>>().join(", ")
 }

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 
 use super::document;
 use super::error::Place;
+use super::list::FileText;
 use super::settings::{Continuous, Format, Integration, Quantity, Refine, Steps};
 use super::{Draw, Purpose, Scene, SceneError, Start};
 use rattlemap_dynamics::model::Model;
@@ -31,7 +32,11 @@ pub struct SceneBuilder {
     model: Box<dyn Model>,
     title: Option<String>,
     parameters: Vec<(String, f64)>,
-    axes: Vec<(String, RangeInclusive<f64>, u32)>,
+    derived: Vec<(String, String)>,
+    /// Names of parameters, each with the other lines of its table.
+    axes: Vec<(String, String)>,
+    /// A table.
+    cells: Option<String>,
     integration: Option<Integration>,
     start: Start,
     draw: Option<Draw>,
@@ -47,7 +52,9 @@ impl SceneBuilder {
             model,
             title: None,
             parameters: Vec::new(),
+            derived: Vec::new(),
             axes: Vec::new(),
+            cells: None,
             integration: None,
             start: Start::Rest,
             draw: None,
@@ -69,9 +76,41 @@ impl SceneBuilder {
         self
     }
 
+    /// Has a parameter follow others: `derived("k2", "0.5*k1")`.
+    pub fn derived(mut self, name: &str, expression: &str) -> SceneBuilder {
+        // A later expression wins over an earlier one.
+        self.derived.retain(|(derived, _)| derived != name);
+        self.derived.push((name.to_owned(), expression.to_owned()));
+        self
+    }
+
     /// Sweeps a parameter over `count` values, both ends included. The first axis is along columns.
-    pub fn axis(mut self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
-        self.axes.push((parameter.to_owned(), range, count));
+    pub fn axis(self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
+        self.swept(parameter, range_lines(&range, count))
+    }
+
+    /// The same by equal ratios.
+    pub fn log_axis(self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
+        self.swept(parameter, range_lines(&range, count) + "\nscale = \"log\"")
+    }
+
+    /// Sweeps a parameter over these values, which increase.
+    pub fn values_axis(self, parameter: &str, values: &[f64]) -> SceneBuilder {
+        let values: Vec<String> = values.iter().map(|&value| number(value)).collect();
+        self.swept(parameter, format!("values = [{}]", values.join(", ")))
+    }
+
+    fn swept(mut self, parameter: &str, lines: String) -> SceneBuilder {
+        self.axes.push((parameter.to_owned(), lines));
+        self
+    }
+
+    /// Lists cells in the place of axes: values of these parameters, row by row.
+    pub fn cells<const N: usize>(mut self, parameters: [&str; N], rows: &[[f64; N]]) -> SceneBuilder {
+        let row = |row: &[f64; N]| row.map(number).join(",");
+        let rows = rows.iter().map(row);
+        let lines: Vec<String> = std::iter::once(parameters.join(",")).chain(rows).collect();
+        self.cells = Some(lines.join("\n"));
         self
     }
 
@@ -126,7 +165,9 @@ impl SceneBuilder {
     pub fn build_for(self, purpose: Purpose) -> Result<Scene, SceneError> {
         let text = self.text();
         let document = document::read(&text, "scene")?.placed(Place::Builder);
-        Scene::read(text, &document, &*self.model, purpose)
+        let cells = self.cells.clone().unwrap_or_default();
+        let find = |_: &str| Ok(FileText { name: "cells".to_owned(), text: cells.clone() });
+        Scene::read(text, &document, &*self.model, purpose, &find)
     }
 
     /// The scene in TOML.
@@ -143,7 +184,10 @@ impl SceneBuilder {
         for (index, parameter) in self.model.parameters().iter().enumerate() {
             let (name, value) = (&*parameter.name, self.model.value(index));
             let is_told = parameters.iter().any(|(told, _)| told == name)
-                || self.axes.iter().any(|(swept, ..)| swept == name);
+                || self.axes.iter().chain(&self.derived).any(|(set, _)| set == name)
+                || self.cells.as_ref().is_some_and(|table| {
+                    table.lines().next().is_some_and(|names| names.split(',').any(|column| column == name))
+                });
             if !is_told && parameter.default != Some(value) {
                 parameters.push((name.to_owned(), value));
             }
@@ -154,12 +198,17 @@ impl SceneBuilder {
                 line(format!("{} = {}", quoted(name), number(*value)));
             }
         }
-        for (name, range, count) in &self.axes {
-            let (min, max) = (number(*range.start()), number(*range.end()));
-            line(format!(
-                "\n[[axis]]\nparameter = {}\nmin = {min}\nmax = {max}\ncount = {count}",
-                quoted(name)
-            ));
+        if !self.derived.is_empty() {
+            line("\n[derived]".to_owned());
+        }
+        for (name, expression) in &self.derived {
+            line(format!("{} = {}", quoted(name), quoted(expression)));
+        }
+        for (name, lines) in &self.axes {
+            line(format!("\n[[axis]]\nparameter = {}\n{lines}", quoted(name)));
+        }
+        if self.cells.is_some() {
+            line("\n[cells]\nfile = \"cells.csv\"".to_owned());
         }
         self.integration.iter().for_each(|integration| line(integration_table(integration)));
         line(self.start_table());
@@ -193,6 +242,10 @@ impl SceneBuilder {
         let draw = self.draw.map(|Draw { count, seed }| format!("\ncount = {count}\nseed = {seed}"));
         format!("\n[start]\npolicy = {policy}{}", draw.unwrap_or_default())
     }
+}
+
+fn range_lines(range: &RangeInclusive<f64>, count: u32) -> String {
+    format!("min = {}\nmax = {}\ncount = {count}", number(*range.start()), number(*range.end()))
 }
 
 fn integration_table(integration: &Integration) -> String {

@@ -98,6 +98,32 @@ pub enum Problem {
         /// The nearest known name, and all of them.
         remedy: String,
     },
+    /// A name within a value that is not known.
+    #[error("`{field} = {value}` has an unknown name, {remedy}")]
+    UnknownWithin {
+        /// The field.
+        field: String,
+        /// Its value as written.
+        value: String,
+        /// The name, the nearest known one, and all of them.
+        remedy: String,
+    },
+    /// Text, or a file that a field names, that cannot be read as what it should be.
+    #[error("`{field} = {value}` {reason}")]
+    UnreadableValue {
+        /// The field.
+        field: String,
+        /// Its value as written.
+        value: String,
+        /// Why not, and what to write.
+        reason: String,
+    },
+    /// A table of cells that is none.
+    #[error("{message}")]
+    Table {
+        /// What is wrong there.
+        message: String,
+    },
     /// A value of the wrong type.
     #[error("`{field} = {value}` has the wrong type: it must be {expected}")]
     WrongType {

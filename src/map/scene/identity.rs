@@ -1,6 +1,9 @@
 //! What makes two scenes the same to a computer: everything that a cell's record depends on.
 
-use super::{DEFAULT_MODEL, Scene, Start, Steps};
+use super::{Axis, DEFAULT_MODEL, Scale, Scene, Start, Steps, list};
+
+/// Values that are told one by one.
+const SHOWN_VALUES: usize = 32;
 
 impl Scene {
     /// Names and values of all that records depend on, in a fixed order: axes, parameters,
@@ -14,9 +17,25 @@ impl Scene {
         }
         for (i, axis) in self.axes().iter().enumerate() {
             tell(format!("axis.{i}.parameter"), axis.parameter().name.to_string());
+            if axis.scale() == Scale::Values {
+                tell(format!("axis.{i}.values"), values(axis));
+                continue;
+            }
             tell(format!("axis.{i}.min"), format!("{:?}", axis.min()));
             tell(format!("axis.{i}.max"), format!("{:?}", axis.max()));
             tell(format!("axis.{i}.count"), axis.count().to_string());
+            if axis.scale() == Scale::Log {
+                tell(format!("axis.{i}.scale"), "log".to_owned());
+            }
+        }
+        if let Some(list) = self.list() {
+            let names: Vec<&str> = list.parameters().map(|parameter| &*parameter.name).collect();
+            tell("cells.columns".into(), names.join(" "));
+            tell("cells.rows".into(), list.len().to_string());
+            tell("cells.hash".into(), list.hash().to_owned());
+        }
+        for (parameter, expression) in self.derived() {
+            tell(format!("derived.{}", parameter.name), expression.to_owned());
         }
         for (name, value) in self.fixed() {
             tell(format!("parameters.{name}"), format!("{value:?}"));
@@ -55,4 +74,12 @@ impl Scene {
         tell("outputs.quantities".into(), format!("{quantities:?}").to_lowercase());
         list
     }
+}
+
+/// The values of an axis, or what stands for them where they are many.
+fn values(axis: &Axis) -> String {
+    if axis.count() > SHOWN_VALUES {
+        return format!("{} with the hash {}", axis.count(), list::hash(&[], axis.values()));
+    }
+    axis.values().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(" ")
 }

@@ -74,7 +74,10 @@ pub const KEYS: &[Key] = &[
     key("axis", "parameter", KeyDefault::None, Takes::Words("a parameter of the model"), "what the axis sweeps; the first axis runs along columns"),
     key("axis", "min", KeyDefault::None, END, "first value"),
     key("axis", "max", KeyDefault::None, END, "last value, greater than min"),
-    key("axis", "count", KeyDefault::None, Takes::Whole(2, MAX_COUNT), "values: min + (max - min) i / (count - 1)"),
+    key("axis", "count", KeyDefault::None, Takes::Whole(2, MAX_COUNT), "how many values, both ends included"),
+    key("axis", "scale", Value("\"linear\""), Takes::OneOf(&["linear", "log"]), "values by equal differences, or by equal ratios (min above 0)"),
+    key("axis", "values", KeyDefault::None, Takes::Words("2 to 1000000 numbers in the parameter's range, each greater than the one before"), "the values themselves, in the place of min, max, count and scale"),
+    key("cells", "file", KeyDefault::None, Takes::Words("path of a CSV table, from the scene's folder"), "cells in the place of axes: a column per parameter, a row per cell"),
     key("integration", "steps_per_period", Value("\"auto\""), Takes::WholeOrAuto(1, MOST_STEPS), "grid of the lanes; the reference has none"),
     key("integration", "transient_periods", Value("400"), Takes::Whole(1, MAX_PERIODS), "forcing periods before anything is read; an upper bound where cells may stop early"),
     key("integration", "observed_periods", Value("128"), Takes::Whole(2, MAX_PERIODS), "forcing periods after that, likewise"),
@@ -92,7 +95,7 @@ pub const KEYS: &[Key] = &[
     key("refine", "word", Value("false"), Takes::Flag, "a change of the word alone is a border"),
     key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts and mesh fraction of filled cells"),
     key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]), "what is not asked for is not computed"),
-    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "html"]), "what is written; `bifurcation` knows csv and png"),
+    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "what is written; png, svg and pdf are figures; `bifurcation` knows them and csv, a list of cells csv and npy"),
 ];
 
 /// The names in one table.

@@ -59,6 +59,17 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// The path that names the table.
+    pub(super) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// The fields that were given, in the order of their names.
+    pub(super) fn fields(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> {
+        let given = self.table.into_iter().flatten();
+        given.map(|(name, node)| (name.as_str(), Field { path: self.path_of(name), node }))
+    }
+
     /// Whether the table was written at all.
     pub(super) fn is_present(&self) -> bool {
         self.table.is_some()
@@ -102,6 +113,11 @@ pub(super) struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
+    /// Whether a `--set` argument says it: that wins over the text.
+    pub(super) fn is_argument(&self) -> bool {
+        matches!(self.node.place, Place::Set { .. })
+    }
+
     /// Any number, also NaN and infinities, which TOML can write: ranges are checked after.
     pub(super) fn number(&self) -> Result<f64, SceneError> {
         match self.node.value {
@@ -197,6 +213,24 @@ impl<'a> Field<'a> {
     pub(super) fn unknown_among(&self, name: &str, known: &[&str], all: &str) -> SceneError {
         let (field, value) = self.named();
         self.error(Problem::UnknownName { field, value, remedy: suggest(name, known, all) })
+    }
+
+    /// The error for a cell in which the field's value leaves no motion.
+    pub(super) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
+        self.error(Problem::NoMotion { cell: cell.to_owned(), reason: Box::new(reason.clone()) })
+    }
+
+    /// The error for text that cannot be read as what it should be; `reason` says why, and how to mend it.
+    pub(super) fn unreadable(&self, reason: &str) -> SceneError {
+        let (field, value) = self.named();
+        self.error(Problem::UnreadableValue { field, value, reason: reason.to_owned() })
+    }
+
+    /// The error for a name within text that is none of the known ones.
+    pub(super) fn unknown_in(&self, name: &str, known: &[&str], all: &str) -> SceneError {
+        let (field, value) = self.named();
+        let remedy = format!("`{}`: {}", shorten(name), suggest(name, known, all));
+        self.error(Problem::UnknownWithin { field, value, remedy })
     }
 
     fn named(&self) -> (String, String) {

@@ -145,8 +145,12 @@ pub enum Format {
     Csv,
     /// Structured array.
     Npy,
-    /// Figure.
+    /// Figures as pixels.
     Png,
+    /// Figures as lines and text; maps in them as pixels.
+    Svg,
+    /// The same.
+    Pdf,
     /// Interactive report.
     Html,
 }
@@ -168,8 +172,14 @@ const QUANTITIES: [(&str, Quantity); 6] = [
     ("symmetric", Quantity::Symmetric),
     ("word", Quantity::Word),
 ];
-const FORMATS: [(&str, Format); 4] =
-    [("csv", Format::Csv), ("npy", Format::Npy), ("png", Format::Png), ("html", Format::Html)];
+const FORMATS: [(&str, Format); 6] = [
+    ("csv", Format::Csv),
+    ("npy", Format::Npy),
+    ("png", Format::Png),
+    ("svg", Format::Svg),
+    ("pdf", Format::Pdf),
+    ("html", Format::Html),
+];
 
 impl Quantity {
     /// The name in scenes.
@@ -179,7 +189,10 @@ impl Quantity {
 }
 
 impl Format {
-    /// The name in scenes.
+    /// Those of figures.
+    pub const FIGURES: [Format; 3] = [Format::Png, Format::Svg, Format::Pdf];
+
+    /// The name in scenes; of figures also what their files' names end with.
     pub fn name(self) -> &'static str {
         name(&FORMATS, self)
     }
@@ -280,22 +293,35 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
     Ok(Some(Refine { minimum_grid, rounds, max_error, audit, word, continuous }))
 }
 
-pub(super) fn read_outputs(root: &Section<'_>, purpose: Purpose) -> Result<Outputs, SceneError> {
+pub(super) fn read_outputs(
+    root: &Section<'_>,
+    purpose: Purpose,
+    is_list: bool,
+) -> Result<Outputs, SceneError> {
     let section = root.section("outputs", &keys::names("outputs"))?;
     let quantities = match section.get("quantities") {
         Some(field) => field.choices(&QUANTITIES)?,
         None => vec![Quantity::Class, Quantity::Lyapunov],
     };
-    // A diagram's points have no fixed number per column, so there is no array of it.
-    let writable = match purpose {
-        Purpose::Map => vec![Format::Csv, Format::Npy, Format::Png, Format::Html],
-        Purpose::Bifurcation => vec![Format::Csv, Format::Png],
+    // A diagram's points have no fixed number per column, so there is no array of it; a list of cells has no picture.
+    let (usual, figures, remedy): (_, &[Format], _) = match (purpose, is_list) {
+        (Purpose::Map, true) => (
+            vec![Format::Csv, Format::Npy],
+            &[],
+            "a list of cells has no picture, it is written as csv and npy",
+        ),
+        (Purpose::Map, false) => {
+            (vec![Format::Csv, Format::Npy, Format::Png, Format::Html], &Format::FIGURES, "")
+        }
+        (Purpose::Bifurcation, _) => {
+            (vec![Format::Csv, Format::Png], &Format::FIGURES, "`bifurcation` writes csv, png, svg and pdf")
+        }
     };
-    let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: writable }) };
+    let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: usual }) };
     let files = field.choices(&FORMATS)?;
-    if let Some(i) = files.iter().position(|format| !writable.contains(format)) {
+    if let Some(i) = files.iter().position(|format| !figures.contains(format) && !usual.contains(format)) {
         let name = files[i].name();
-        return Err(field.conflict(format!("`bifurcation` writes csv and png; drop \"{name}\"")));
+        return Err(field.conflict(format!("{remedy}; drop \"{name}\"")));
     }
     Ok(Outputs { quantities, files })
 }

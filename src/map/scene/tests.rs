@@ -1,6 +1,9 @@
 //! Every kind of refusal, and what a good scene says.
 
+mod axes;
 mod built;
+mod cells;
+mod derived;
 mod keys;
 mod ranges;
 mod sets;
@@ -266,7 +269,7 @@ fn values_that_contradict_each_other() {
         (
             "[\"csv\"]",
             "[\"csv\", \"html\"]",
-            "s.toml:25:9: `outputs.files = [\"csv\", \"html\"]` does not fit: `bifurcation` writes csv and png; drop \"html\"",
+            "s.toml:25:9: `outputs.files = [\"csv\", \"html\"]` does not fit: `bifurcation` writes csv, png, svg and pdf; drop \"html\"",
         ),
     ];
     for (old, new, expected) in cases {

@@ -85,7 +85,7 @@ enum Stage {
 impl Adaptive {
     /// Nothing is known; `asks` gets the cells of the coarse grid, neighbours one after the other.
     pub(super) fn new(plan: &Plan, refine: Refine, asks: &mut Vec<u32>) -> Adaptive {
-        let counts = plan.axes().each_ref().map(|axis| axis.count());
+        let counts = plan.counts();
         let tiling = Tiling::new(counts, refine.minimum_grid as usize);
         let cells = plan.cell_count();
         let needs = Needs { word: plan.needs().word && refine.word, ..*plan.needs() };

@@ -18,7 +18,7 @@ pub(super) struct Follow {
 
 impl Follow {
     pub(super) fn new(plan: &Plan) -> Follow {
-        let [columns, rows] = plan.axes().each_ref().map(|axis| axis.count());
+        let [columns, rows] = plan.counts();
         let is_down = plan.policy() == Start::Down;
         Follow { columns, rows, is_down, done: 0, starts: vec![REST; columns] }
     }

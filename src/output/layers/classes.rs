@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::colors::{self, FAILED, NO_CONTACT, SYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, UNSYMMETRIC, chaos};
 use super::scale::nice_bound;
-use super::{Bar, Color, Entry, Layer, ids};
+use super::{Bar, Color, Entry, Layer, beyond, ids};
 use crate::map::scene::Quantity;
 use crate::output::cells::Cells;
 use crate::record::classify::classify;
@@ -23,8 +23,11 @@ const LISTED: usize = 17;
 
 pub(super) fn layer(cells: &Cells<'_>) -> Layer {
     let shows_chaos = cells.asks(Quantity::Lyapunov);
-    let exponents = cells.classes().enumerate().filter(|(_, class)| *class == Class::Chaotic);
-    let high = nice_bound(exponents.map(|(id, _)| cells.record(id).lyapunov));
+    let exponents = || {
+        let chaos = cells.classes().enumerate().filter(|(_, class)| *class == Class::Chaotic);
+        chaos.map(|(id, _)| cells.record(id).lyapunov)
+    };
+    let high = nice_bound(exponents());
     let place = |record: &Record| match classify(record) {
         Class::Periodic { period: 1 } => first_period(record, cells.asks(Quantity::Symmetric)),
         Class::Periodic { period } => FIRST_PERIOD + (period.min(64) - 2) as u8,
@@ -39,10 +42,11 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
     let indices: Vec<u8> = ids(cells).map(|id| place(cells.record(id))).collect();
     let palette = palette();
     let bar = Bar {
-        label: "chaos: largest Lyapunov exponent",
+        label: "chaos: largest Lyapunov exponent, \u{3bb}",
         colors: palette[FIRST_SHADE.into()..].to_vec(),
         low: 0.0,
         high,
+        beyond: beyond(exponents(), 0.0, high),
     };
     let entries = entries(&indices, &palette, shows_chaos);
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);

@@ -1,5 +1,8 @@
 //! Colours: one per period, greys for chaos, ramps for numbers.
 
+#[cfg(test)]
+mod seen;
+
 /// Red, green and blue.
 pub(in crate::output) type Color = [u8; 3];
 
@@ -8,33 +11,31 @@ const fn hex(rgb: u32) -> Color {
 }
 
 /// Period 1 without any contact, its own mirror image, and one of a pair of mirror images.
-pub(super) const NO_CONTACT: Color = hex(0xeef2f6);
-pub(super) const SYMMETRIC: Color = hex(0xc0d9ee);
-pub(super) const UNSYMMETRIC: Color = hex(0x7fb0da);
+pub(super) const NO_CONTACT: Color = hex(0xf7f6f3);
+pub(super) const SYMMETRIC: Color = hex(0xc9e5fc);
+pub(super) const UNSYMMETRIC: Color = hex(0x8bb3f5);
 /// Period 1 that is too slow an approach to tell.
-pub(super) const SYMMETRY_UNKNOWN: Color = hex(0x5b6f8c);
+pub(super) const SYMMETRY_UNKNOWN: Color = hex(0x546f90);
 
-/// Periods 2 to 12: Okabe and Ito's colour-blind safe set first, then colours that stand
-/// apart from it and from each other in lightness, too.
-const PERIODS: [Color; 11] = [
-    hex(0xe69f00),
-    hex(0x009e73),
-    hex(0xd55e00),
-    hex(0xf0e442),
-    hex(0x0072b2),
-    hex(0xcc79a7),
-    hex(0x8c510a),
-    hex(0x35d0c0),
-    hex(0x6a3d9a),
-    hex(0xa6d854),
-    hex(0xffb3c8),
+/// Colours of things in a row, the first the most common: periods from 2 on, words. Searched for (annealing, then greedily)
+/// so that those near each other in a legend differ for people who see no red or no green, too, which a test measures.
+#[rustfmt::skip]
+const DISTINCT: [Color; 63] = [
+    hex(0xe5b207), hex(0x059d76), hex(0xe87040), hex(0xf6fa17), hex(0x01569d), hex(0xba7db8), hex(0x8d5d31), hex(0x6fdcae),
+    hex(0x2f0692), hex(0xd3e98f), hex(0xf15a76), hex(0x9e2854), hex(0x2d16f6), hex(0xdb9cbe), hex(0xe1113f), hex(0xe8aa70),
+    hex(0x3b114d), hex(0x165470), hex(0x501425), hex(0xe67996), hex(0x238758), hex(0x1ab3a0), hex(0x276a61), hex(0x74c7dd),
+    hex(0x5a2119), hex(0xf0d555), hex(0x4326b1), hex(0x8ad1bb), hex(0x5e123b), hex(0x156268), hex(0x972a38), hex(0xc12a10),
+    hex(0xa8f4ba), hex(0x2c3a80), hex(0x3b8183), hex(0x6a41d0), hex(0x86203d), hex(0x2bbebc), hex(0xdb9f83), hex(0xde5b12),
+    hex(0xdf4671), hex(0x1c9987), hex(0xb364a9), hex(0xe9f676), hex(0x327b66), hex(0xd98b64), hex(0x0f554c), hex(0xb1d997),
+    hex(0x1e657c), hex(0x5d441f), hex(0xcf6f95), hex(0x141e6b), hex(0xa66654), hex(0xe98f2a), hex(0x5164a6), hex(0x56ce94),
+    hex(0x56d6f9), hex(0x751455), hex(0xf57faf), hex(0x32a550), hex(0x3a707c), hex(0x5b610f), hex(0xe8bf66),
 ];
 
 /// The least and the largest exponent of chaos.
 const CHAOS: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
 /// Meant to catch the eye: they are exceptions.
-pub(super) const UNDECIDED: Color = hex(0xff00d4);
-pub(super) const FAILED: Color = hex(0xff1010);
+pub(super) const UNDECIDED: Color = hex(0xce44fa);
+pub(super) const FAILED: Color = hex(0x8d130f);
 /// Cells without a value of a continuous layer.
 pub(super) const NO_VALUE: Color = hex(0x8f8f8f);
 
@@ -68,14 +69,15 @@ const DIVERGING: [Color; 11] = [
 
 /// The colour of a period of 2 or more.
 pub(super) fn period(period: u32) -> Color {
-    match PERIODS.get(period as usize - 2) {
-        Some(color) => *color,
-        None => distinct(period as usize),
-    }
+    distinct(period as usize - 1)
 }
 
-/// A colour for the `n`th of many things: hues a golden angle apart, in three lightnesses.
+/// A colour for the `n`th of many things, counted from 1. Beyond those that were searched for: hues a golden angle
+/// apart, in three lightnesses.
 pub(super) fn distinct(n: usize) -> Color {
+    if let Some(color) = n.checked_sub(1).and_then(|place| DISTINCT.get(place)) {
+        return *color;
+    }
     let hue = (n as f64 * 0.618_033_988_75).fract() * 6.0;
     let lightness = [0.42, 0.62, 0.78][n % 3];
     let chroma = 0.6 * (1.0 - (2.0f64 * lightness - 1.0).abs());
@@ -126,6 +128,36 @@ mod tests {
         colors.sort_unstable();
         colors.dedup();
         assert_eq!(colors.len(), count);
+    }
+
+    /// For all eyes, those without receptors for long (protanopes) or medium (deuteranopes) wavelengths included.
+    #[test]
+    fn neighbours_in_a_legend_can_be_told_apart() {
+        let least = |pairs: Vec<(Color, Color)>| {
+            pairs.into_iter().map(|(a, b)| (seen::least_difference(a, b), a, b)).for_each(
+                |(difference, a, b)| {
+                    assert!(difference >= 10.0, "{a:02x?} {b:02x?}: {difference}");
+                },
+            );
+        };
+        let kinds = [NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
+        let legend: Vec<Color> = kinds.into_iter().chain((2..=64).map(period)).collect();
+        // What is not on a map is not in its legend. Periods up to 12 may stand beside any other, of longer ones those
+        // that are four apart.
+        let usual = kinds.len() + 11;
+        let near = |i: usize, j: usize| i < j && (j < usual || j - i <= 4);
+        let all = |near: &dyn Fn(usize, usize) -> bool| {
+            let pairs = (0..legend.len()).flat_map(|i| (0..legend.len()).map(move |j| (i, j)));
+            pairs.filter(|(i, j)| near(*i, *j)).map(|(i, j)| (legend[i], legend[j])).collect::<Vec<_>>()
+        };
+        least(all(&near));
+        let greys = (0..=20).map(|step| chaos(f64::from(step) / 20.0));
+        least(legend.iter().copied().chain(greys).chain([FAILED]).map(|color| (color, UNDECIDED)).collect());
+        let exceptions =
+            legend[..usual].iter().copied().chain((0..=20).map(|step| chaos(f64::from(step) / 20.0)));
+        least(exceptions.map(|color| (color, FAILED)).collect());
+        // Chaos in legends has the middle of its scale; it follows the periods, at most seventeen of them.
+        least(legend[..kinds.len() + 17].iter().map(|color| (*color, chaos(0.5))).collect());
     }
 
     #[test]

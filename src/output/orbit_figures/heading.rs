@@ -1,5 +1,6 @@
 //! The words above an orbit's figures.
 
+use crate::output::caption;
 use crate::output::plot_style::superscript;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::{Class, Orbit};
@@ -7,16 +8,9 @@ use rattlemap_dynamics::orbit::{Class, Orbit};
 /// Symbols of a word that a heading has room for.
 const WORD_SYMBOLS: usize = 32;
 
-/// The parameters that tell this cell from the model's defaults, and the frequency.
+/// The oscillator: what it is, and what tells it from the model's defaults.
 pub(super) fn parameters(model: &dyn Model) -> String {
-    let all = || model.parameters().iter().enumerate().map(|(i, p)| (p, model.value(i)));
-    let mut listed: Vec<String> = Vec::new();
-    let chosen = all().filter(|(p, _)| p.default.is_none());
-    listed.extend(chosen.map(|(p, value)| format!("{} = {value}", p.name)));
-    listed.extend(model.get("omega").map(|omega| format!("\u{3c9} = {omega}")));
-    let others = all().filter(|(p, value)| p.name != "omega" && p.default.is_some_and(|d| d != *value));
-    listed.extend(others.map(|(p, value)| format!("{} = {value}", p.name)));
-    format!("{}: {}", model.title(), listed.join(", ")).replace('-', "\u{2212}")
+    format!("{}: {}", model.title(), caption::parameters(model, |_| false))
 }
 
 /// Class, word and Lyapunov exponent of the orbit.
@@ -67,7 +61,6 @@ fn shortened(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::model::GearPair;
 
     #[test]
     fn long_words_are_written_with_powers() {
@@ -75,11 +68,5 @@ mod tests {
         assert_eq!(shortened(&format!("1{}36", "2".repeat(130))), "12\u{b9}\u{b3}\u{2070}36");
         let long = shortened(&"36".repeat(40));
         assert_eq!((long.chars().count(), long.ends_with('\u{2026}')), (33, true));
-    }
-
-    #[test]
-    fn only_parameters_off_the_table_are_named() {
-        let pair = GearPair { k: 500.0, force: -50.0, ..GearPair::paper(0.5) };
-        assert_eq!(parameters(&pair), "Gear pair: e = 0.5, \u{3c9} = 5.6, k = 500, F = \u{2212}50");
     }
 }

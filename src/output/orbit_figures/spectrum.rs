@@ -6,8 +6,9 @@ use super::super::orbit_spectrum::Spectrum;
 use super::super::plot_style::axes::{Axis, Frame};
 use super::super::plot_style::legend::draw_head;
 use super::super::plot_style::{Canvas, DARK, GEAR_2, Marker, Rect, Shape, save_figure};
-use super::super::{DrawError, FigureError};
+use super::super::{DrawError, FigureError, OutputError};
 use super::{LEFT, LINE, WIDTH, heading};
+use crate::map::scene::Format;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::Orbit;
 
@@ -17,16 +18,28 @@ const FLOOR: f64 = 1e-5;
 /// Lines that can be told apart as such.
 const APART: usize = 200;
 
-/// Draws a spectrum.
+/// Every file that [`write_each`] may make.
+pub(crate) const NAMES: [&str; 3] = ["spectrum.png", "spectrum.svg", "spectrum.pdf"];
+
+/// Draws a spectrum in each of the `formats` of figures; `place` gets the name of each and what saves it at a path.
 ///
 /// # Errors
-/// [`FigureError`] if the file cannot be written.
-pub(crate) fn save(
-    path: &Path,
+/// As `place`.
+pub(crate) fn write_each(
     model: &dyn Model,
     orbit: &Orbit,
     spectrum: &Spectrum,
-) -> Result<(), FigureError> {
+    formats: &[Format],
+    mut place: impl FnMut(&'static str, &dyn Fn(&Path) -> Result<(), FigureError>) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
+    let is_asked = |name: &&str| formats.iter().any(|format| *name == format!("spectrum.{}", format.name()));
+    NAMES
+        .into_iter()
+        .filter(is_asked)
+        .try_for_each(|name| place(name, &|path| save(path, model, orbit, spectrum)))
+}
+
+fn save(path: &Path, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Result<(), FigureError> {
     let subtitle = format!("{}  \u{b7}  {}", heading::character(orbit), spectrum.method());
     save_figure(path, (WIDTH, 1050), |canvas| {
         let top = draw_head(canvas, &heading::parameters(model), &subtitle, &[])? + 14.0;

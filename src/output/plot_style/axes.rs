@@ -10,6 +10,9 @@ const PADDING: f64 = 0.06;
 const TICK: f64 = 7.0;
 /// The length of those without a label.
 const MINOR: f64 = 4.0;
+/// The smallest type of an axis' name, and what is left free beyond its ends.
+const SMALLEST: f64 = 16.0;
+const MARGIN: f64 = 12.0;
 /// Pixels between ticks at least: labels beside each other need more room than stacked ones.
 const APART: (f64, f64) = (90.0, 60.0);
 const APART_ON_BAR: f64 = 45.0;
@@ -34,6 +37,8 @@ pub struct Axis {
     pub high: f64,
     /// How values lie on it.
     pub scale: Scale,
+    /// Of an axis of listed values, which lie at 0, 1, 2 ...: how each is written.
+    pub listed: Vec<String>,
 }
 
 impl Axis {
@@ -42,7 +47,14 @@ impl Axis {
         let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 0.0) };
         let least = 1e-9 * low.abs().max(high.abs()).max(1e-6);
         let (low, high) = if high - low > least { (low, high) } else { (low - 0.5, low + 0.5) };
-        Axis { label: label.to_owned(), low, high, scale: Scale::Linear }
+        Axis { label: label.to_owned(), low, high, scale: Scale::Linear, listed: Vec::new() }
+    }
+
+    /// An axis of values that have as much room as each other, half of it on either side.
+    pub fn listed(label: &str, values: impl Iterator<Item = f64>) -> Axis {
+        let listed: Vec<String> = values.map(|value| value.to_string().replace('-', "\u{2212}")).collect();
+        let high = listed.len() as f64 - 0.5;
+        Axis { listed, ..Axis::exact(label, -0.5, high) }
     }
 
     /// A logarithmic axis from the value `low` to the value `high`, both positive; widened as [`Axis::exact`] where
@@ -85,6 +97,12 @@ impl Axis {
             Scale::Logarithmic => value.log10().clamp(self.low, self.high),
         }
     }
+}
+
+/// The name of an axis, in smaller type if it is too long.
+fn draw_name(canvas: &Canvas<'_>, name: &str, at: Point, room: f64, align: Align) -> Result<(), DrawError> {
+    let size = (MEDIUM * room / canvas.text_width(name, MEDIUM)?.max(1.0)).clamp(SMALLEST, MEDIUM);
+    canvas.text(&canvas.fitted(name, size, room + 1.0)?, at, size, align, DARK)
 }
 
 /// Of the mark beside a label, which a minor tick does not have.
@@ -161,7 +179,8 @@ impl Frame {
             widest = widest.max(canvas.text_width(&label, SMALL)?);
         }
         let y_label = (left - TICK - 6.0 - widest - 26.0, (top + bottom) / 2.0);
-        canvas.text(&self.y.label, y_label, MEDIUM, Align::Upwards, DARK)
+        let room = 2.0 * y_label.1.min(canvas.size().1 - y_label.1) - 2.0 * MARGIN;
+        draw_name(canvas, &self.y.label, y_label, room, Align::Upwards)
     }
 
     /// Draws the lower edge with its ticks, and labels if they are wanted.
@@ -177,7 +196,8 @@ impl Frame {
         }
         if labels {
             let middle = ((left + right) / 2.0, bottom + TICK + 54.0);
-            canvas.text(&self.x.label, middle, MEDIUM, Align::Center, DARK)?;
+            let room = 2.0 * middle.0.min(canvas.size().0 - middle.0) - 2.0 * MARGIN;
+            draw_name(canvas, &self.x.label, middle, room, Align::Center)?;
         }
         Ok(())
     }

@@ -1,17 +1,12 @@
 //! How much room a text takes, and how much of it there is room for.
 
-use plotters::style::{FontDesc, FontFamily, FontStyle};
-
-use super::{Canvas, FINE, FONT};
+use super::Canvas;
 use crate::output::DrawError;
 
 impl Canvas<'_> {
     /// Width of a text.
     pub fn text_width(&self, text: &str, size: f64) -> Result<f64, DrawError> {
-        let scale = f64::from(FINE);
-        let font = FontDesc::new(FontFamily::Name(FONT), size * scale, FontStyle::Normal);
-        let (width, _) = self.area.estimate_text_size(text, &font.into())?;
-        Ok(f64::from(width) / scale)
+        Ok(self.typeface.set(text, self.typeface.em(size)).1)
     }
 
     /// The beginning of a text that is not wider than `room`, with an ellipsis if that is not all.

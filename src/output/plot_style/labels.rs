@@ -1,8 +1,6 @@
 //! Labels of points: beside them, where they cover no marker, no other label and no edge.
 
-use plotters::style::RGBColor;
-
-use super::{Align, CAP_HEIGHT, Canvas, Point, Rect};
+use super::{Align, Canvas, Point, RGBColor, Rect};
 use crate::output::DrawError;
 
 /// Room around a label.
@@ -38,7 +36,10 @@ impl Labels {
         before: Option<Point>,
         color: RGBColor,
     ) -> Result<(), DrawError> {
-        let half = (canvas.text_width(&text, self.size)? / 2.0, CAP_HEIGHT * self.size / 2.0);
+        let half = (
+            canvas.text_width(&text, self.size)? / 2.0,
+            canvas.typeface.cap_height(canvas.typeface.em(self.size)) / 2.0,
+        );
         let place = |(x, y): Point| {
             let x_off = if y == 0.0 { OFF + half.0 } else { half.0 };
             around((at.0 + x * x_off, at.1 + y * (OFF + half.1)), half.0, half.1)

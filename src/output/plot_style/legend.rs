@@ -1,8 +1,6 @@
 //! The head of a figure: title, subtitle and a legend in rows.
 
-use plotters::style::RGBColor;
-
-use super::{Align, Canvas, DARK, LARGE, MEDIUM, Marker, Point, Rect, SMALL};
+use super::{Align, Canvas, DARK, LARGE, MEDIUM, Marker, Point, RGBColor, Rect, SMALL};
 use crate::output::DrawError;
 
 /// Width of a legend's key, and the room on either side of its text.
@@ -61,7 +59,7 @@ impl Entry {
     }
 }
 
-/// Draws title, subtitle (may be empty) and legend; returns where the panels may start.
+/// Draws title, subtitle (of several lines, or none) and legend; returns where the panels may start.
 pub fn draw_head(
     canvas: &Canvas<'_>,
     title: &str,
@@ -70,9 +68,9 @@ pub fn draw_head(
 ) -> Result<f64, DrawError> {
     let mut y = 40.0;
     draw_fitted(canvas, title, y, LARGE)?;
-    if !subtitle.is_empty() {
-        y += 40.0;
-        draw_fitted(canvas, subtitle, y, MEDIUM)?;
+    for (i, line) in subtitle.lines().enumerate() {
+        y += if i == 0 { 40.0 } else { 34.0 };
+        draw_fitted(canvas, line, y, MEDIUM)?;
     }
     y += 44.0;
     for row in rows(canvas, entries)?.into_iter().filter(|row| !row.is_empty()) {

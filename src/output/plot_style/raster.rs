@@ -1,40 +1,55 @@
-//! Grids of colours: maps and colour bars.
+//! Grids of colours: maps, colour bars, clouds of points.
 
-use plotters::prelude::*;
-
-use super::{Canvas, Rect};
+use super::{Canvas, Item, RGBColor, Rect};
 use crate::output::DrawError;
 
+/// Pixels, the uppermost row first.
+#[derive(Clone, Debug)]
+pub struct Bitmap {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Three bytes per pixel.
+    pub rgb: Vec<u8>,
+    /// How much each pixel covers, from 0 to 255; everything where there is none.
+    pub alpha: Option<Vec<u8>>,
+    /// Whether they blend into each other where they are scaled.
+    pub is_smooth: bool,
+}
+
 impl Canvas<'_> {
-    /// Fills a rectangle with a grid of colours, `[column, row]` counted from its lower left
-    /// corner; each canvas pixel shows the cell that its centre lies in.
+    /// Fills a rectangle with a grid of colours, `[column, row]` counted from its lower left corner.
     pub fn raster(
         &self,
         rect: Rect,
         [columns, rows]: [usize; 2],
         color: impl Fn([usize; 2]) -> [u8; 3],
     ) -> Result<(), DrawError> {
-        let (left, top, width, height) = Canvas::fine_rect(rect);
-        if width * height == 0 {
-            return Ok(());
+        let cells = (0..rows).rev().flat_map(|row| (0..columns).map(move |column| [column, row]));
+        let rgb = cells.flat_map(color).collect();
+        self.image(rect, Bitmap { size: [columns, rows], rgb, alpha: None, is_smooth: false })
+    }
+
+    /// Draws pixels into a rectangle.
+    pub fn image(&self, rect: Rect, bitmap: Bitmap) -> Result<(), DrawError> {
+        if rect.right > rect.left && rect.bottom > rect.top && !bitmap.rgb.is_empty() {
+            self.add(Item::Image { rect, bitmap });
         }
-        let mut pixels = Vec::with_capacity(3 * width * height);
-        let across: Vec<usize> = (0..width).map(|x| (2 * x + 1) * columns / (2 * width)).collect();
-        let mut shown = None;
-        for y in 0..height {
-            let row = rows - 1 - (2 * y + 1) * rows / (2 * height);
-            if shown == Some(row) {
-                // The same cells as one line above.
-                pixels.extend_from_within(pixels.len() - 3 * width..);
-                continue;
-            }
-            across.iter().for_each(|&column| pixels.extend(color([column, row])));
-            shown = Some(row);
-        }
-        let size = (width as u32, height as u32);
-        match BitMapElement::with_owned_buffer((left, top), size, pixels) {
-            Some(element) => self.area.draw(&element),
-            None => unreachable!("the buffer has three bytes per pixel"),
+        Ok(())
+    }
+}
+
+impl Bitmap {
+    /// Clear pixels.
+    pub fn clear(size: [usize; 2]) -> Bitmap {
+        let count = size[0] * size[1];
+        Bitmap { size, rgb: vec![0xff; 3 * count], alpha: Some(vec![0; count]), is_smooth: true }
+    }
+
+    /// Gives a pixel, counted row by row, its colour.
+    pub fn set(&mut self, pixel: usize, RGBColor(r, g, b): RGBColor, opacity: f64) {
+        self.rgb[3 * pixel..3 * pixel + 3].copy_from_slice(&[r, g, b]);
+        if let Some(alpha) = &mut self.alpha {
+            alpha[pixel] = (opacity * 255.0).round() as u8;
         }
     }
 }

@@ -14,9 +14,18 @@ pub(super) struct Tick {
 /// The ticks of an axis `length` pixels long, one to `apart` pixels at most where there is a choice.
 pub(super) fn ticks(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
     match axis.scale {
+        _ if !axis.listed.is_empty() => listed(axis, length, apart),
         Scale::Linear => linear(axis, length / apart),
         Scale::Logarithmic => logarithmic(axis, length, apart),
     }
+}
+
+/// Every so many listed values, the first among them.
+fn listed(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
+    let room = length / (axis.high - axis.low);
+    let step = (apart / room).ceil().max(1.0) as usize;
+    let each = axis.listed.iter().enumerate().step_by(step);
+    each.map(|(i, label)| Tick { at: i as f64, label: label.clone() }).collect()
 }
 
 /// At most `most` round values.
@@ -191,6 +200,15 @@ mod tests {
             );
             assert!(labelled.iter().all(|at| (axis.low - 1e-6..=axis.high + 1e-6).contains(at)), "{ticks:?}");
         }
+    }
+
+    #[test]
+    fn listed_values_are_written_as_they_are_and_left_out_where_there_is_no_room() {
+        let axis = Axis::listed("", [0.1, 0.25, 1.0, 40.0, 1e5].into_iter());
+        assert_eq!(labels(&axis, 500.0), ["0.1", "0.25", "1", "40", "100000"]);
+        let few: Vec<(f64, String)> =
+            ticks(&axis, 250.0, 90.0).into_iter().map(|tick| (tick.at, tick.label)).collect();
+        assert_eq!(few, [(0.0, "0.1".to_owned()), (2.0, "1".to_owned()), (4.0, "100000".to_owned())]);
     }
 
     #[test]

@@ -25,8 +25,11 @@ async function unpack({ data, type }) {
 
 // ---- axes and cells
 
-const axisValue = ({ min, max, count }, i) =>
-  i >= count - 1 ? max : Math.min(min + ((max - min) * i) / (count - 1), max);
+const axisValue = ({ min, max, count, values }, i) =>
+  values ? values[i] : i >= count - 1 ? max : Math.min(min + ((max - min) * i) / (count - 1), max);
+// Values of the derived parameters in a cell; each is stored along the axes on which it depends.
+const derivedValues = ({ i, j }) => map.derived.map(({ parameter, along, values: list }) =>
+  [parameter, list?.[(along[1] ? j : 0) * (along[0] ? columns : 1) + (along[0] ? i : 0)]]);
 const panel = () => {
   const { width, height } = canvas.getBoundingClientRect();
   return { x: MARGIN.left, y: MARGIN.top, width: width - MARGIN.left - MARGIN.right,
@@ -58,6 +61,41 @@ function ticks(low, high, most) {
     list.push([n * step, (n * step).toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "\u2212")]);
   }
   return list;
+}
+
+// Marks of an axis from one place to another, in cells: each with its own place. Cell i has its value at i + 0.5.
+function marks(axis, from, extent, most) {
+  const { min, max, count, scale, values } = axis;
+  if (scale === "linear") {
+    const step = (max - min) / (count - 1);
+    const value = (place) => min + (place - 0.5) * step;
+    return ticks(value(from), value(from + extent), most).map(([at, text]) => [(at - min) / step + 0.5, text]);
+  }
+  const written = (value) => String(Number(value.toPrecision(4))).replaceAll("-", "\u2212");
+  const list = [];
+  if (scale === "log") {
+    const step = Math.log10(max / min) / (count - 1);
+    const place = (value) => Math.log10(value / min) / step + 0.5;
+    const [low, high] = [from, from + extent].map((at) => Math.log10(min) + (at - 0.5) * step);
+    const parts = most / (high - low) > 4 ? [1, 2, 5] : [1];
+    const every = Math.ceil((high - low) / most);
+    for (let power = Math.floor(low); power <= Math.ceil(high); power++) {
+      if (power % every) continue;
+      for (const part of parts) {
+        const at = place(part * 10 ** power);
+        if (at >= from && at <= from + extent) list.push([at, written(part * 10 ** power)]);
+      }
+    }
+    if (list.length > 1) return list;
+  }
+  // Listed values, and a part of a logarithmic axis without round ones.
+  const every = Math.max(1, Math.ceil(extent / most));
+  const first = Math.max(0, Math.ceil(from - 0.5));
+  const named = [];
+  for (let i = Math.ceil(first / every) * every; i < count && i + 0.5 <= from + extent; i += every) {
+    named.push([i + 0.5, written(values[i])]);
+  }
+  return named;
 }
 
 // ---- drawing
@@ -125,34 +163,28 @@ function drawAxes(p) {
   pen.lineWidth = 1;
   pen.strokeRect(p.x + 0.5, p.y + 0.5, p.width - 1, p.height - 1);
   pen.font = "13px system-ui, sans-serif";
-  const ends = (axis, from, extent) => {
-    const step = (axis.max - axis.min) / (axis.count - 1);
-    return [axis.min + (from - 0.5) * step, axis.min + (from + extent - 0.5) * step];
-  };
-  const [xLow, xHigh] = ends(map.axes[0], view.left, view.width);
-  const [yLow, yHigh] = ends(map.axes[1], view.bottom, view.height);
   pen.textAlign = "center";
   pen.textBaseline = "top";
-  for (const [value, text] of ticks(xLow, xHigh, p.width / 90)) {
-    const x = p.x + ((value - xLow) / (xHigh - xLow)) * p.width;
+  for (const [place, text] of marks(map.axes[0], view.left, view.width, p.width / 90)) {
+    const [x] = pixel(place, 0);
     pen.fillRect(Math.round(x), p.y + p.height, 1, 6);
     pen.fillText(text, x, p.y + p.height + 9);
   }
   pen.textAlign = "right";
   pen.textBaseline = "middle";
-  for (const [value, text] of ticks(yLow, yHigh, p.height / 55)) {
-    const y = p.y + p.height - ((value - yLow) / (yHigh - yLow)) * p.height;
+  for (const [place, text] of marks(map.axes[1], view.bottom, view.height, p.height / 55)) {
+    const [, y] = pixel(0, place);
     pen.fillRect(p.x - 6, Math.round(y), 6, 1);
     pen.fillText(text, p.x - 9, y);
   }
   pen.font = "14px system-ui, sans-serif";
   pen.textAlign = "center";
-  const name = ({ meaning, parameter }) => `${meaning} ${parameter}`;
-  pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44);
+  const name = ({ meaning, symbol }) => `${meaning}, ${symbol}`;
+  pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
   pen.save();
   pen.translate(14, p.y + p.height / 2);
   pen.rotate(-Math.PI / 2);
-  pen.fillText(name(map.axes[1]), 0, 0);
+  pen.fillText(name(map.axes[1]), 0, 0, p.height + 40);
   pen.restore();
 }
 
@@ -182,7 +214,7 @@ function facts({ i, j }) {
   // Of a filled cell nothing was measured.
   const between = (text) => (text !== undefined && source === "filled" ? `${text}, interpolated` : text);
   return [
-    [map.axes[0].parameter, a], [map.axes[1].parameter, b],
+    [map.axes[0].symbol, a], [map.axes[1].symbol, b], ...derivedValues({ i, j }),
     ["class", kind === "periodic" ? `period ${at("period")}` : kind],
     ["exponent", between(error && exponent ? `${exponent} \u00b1 ${error}` : exponent)],
     ["impacts per period", between(number("impacts_per_period"))],
@@ -216,7 +248,8 @@ function choose(cell) {
     const [first, second] = map.axes.map((axis) => axis.parameter);
     const place = 4 * (cell.j * columns + cell.i);
     const start = starts ? ` --start ${[...starts.subarray(place, place + 4)].join(",")}` : "";
-    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${map.replay}${start}`.split(" --");
+    const derived = derivedValues(cell).map(([name, value]) => ` --set ${name}=${value}`).join("");
+    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${derived}${map.replay}${start}`.split(" --");
     // Lines break between arguments, never inside one.
     byId("command").replaceChildren(...words.flatMap((word, k) =>
       k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
@@ -236,13 +269,14 @@ function showLayer(index) {
     const ramp = element("div", undefined, "ramp");
     ramp.style.background = `linear-gradient(to right, ${shown.bar.colors.map((c) => `#${c}`).join(",")})`;
     const scale = element("div", undefined, "ticks");
-    const { low, high, label } = shown.bar;
+    const { low, high, label, left_out: leftOut } = shown.bar;
     for (const [value, text] of ticks(low, high, 6)) {
       const tick = element("span", text);
       tick.style.left = `${(100 * (value - low)) / (high - low)}%`;
       scale.append(tick);
     }
-    byId("bar").append(...(label === shown.title ? [] : [element("div", label)]), ramp, scale);
+    byId("bar").append(...(label === shown.title ? [] : [element("div", label)]), ramp, scale,
+      ...leftOut.map((text) => element("div", text, "beyond")));
   }
   byId("legend").replaceChildren(...shown.entries.map(({ color, text, cells }) => {
     const patch = element("span", undefined, "patch");
@@ -504,6 +538,7 @@ function tellValidation(found) {
 async function start() {
   byId("title").textContent = map.title;
   byId("subtitle").textContent = map.subtitle;
+  byId("fixed").textContent = (map.fixed ? `Fixed: ${map.fixed}. ` : "") + (map.source ? `Model: \u201c${map.source}\u201d.` : "");
   byId("layers").append(...map.layers.map(({ short }, k) => {
     const button = element("button", short);
     button.type = "button";
@@ -517,6 +552,7 @@ async function start() {
   const unpacked = await Promise.all(names.map((name) => unpack(map.values[name])));
   values = Object.fromEntries(names.map((name, k) => [name, unpacked[k]]));
   if (map.starts) starts = await unpack(map.starts);
+  for (const derived of map.derived) derived.values = await unpack(derived);
   await Promise.all(map.layers.map(async (shown) => { shown.indices = await unpack(shown); }));
   byId("wait").remove();
   // A link may name a cell and a layer.

@@ -18,13 +18,15 @@ fn printed(folder: &TempDir, arguments: &[&str]) -> serde_json::Value {
 fn json_says_what_a_map_came_to() {
     let folder = folder();
     let summary = printed(&folder, &[]);
-    let fields =
-        "cells classes device engine files folder periods precision refinement resumed runs seconds statuses";
+    let fields = "cells classes device engine files folder periods precision refinement resumed runs seconds statuses \
+         without_effect";
     assert_eq!(keys(&summary), fields);
     let manifest: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(folder.path().join("out/s/manifest.json")).unwrap())
             .unwrap();
-    for field in ["cells", "classes", "device", "engine", "periods", "precision", "statuses"] {
+    for field in
+        ["cells", "classes", "device", "engine", "periods", "precision", "statuses", "without_effect"]
+    {
         assert_eq!(summary[field], manifest[field], "{field}");
     }
     assert_eq!((&summary["folder"], &summary["runs"]), (&"out/s".into(), &12.into()));

@@ -1,9 +1,11 @@
 //! `rattlemap map` as scripts see it: files of the contract, refusals, resumption.
 
 mod adaptive;
+mod axes;
 mod check;
 mod dry_run;
 mod engines;
+mod figures;
 mod folders;
 mod interrupts;
 mod json;

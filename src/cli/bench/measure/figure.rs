@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use crate::output::{DrawError, FigureError};
-use plotters::style::RGBColor;
-
 use super::{Engine, Point, Run, Series, Times};
 use crate::gpu::Precision;
 use crate::output::plot_style::axes::{Axis, Frame};
 use crate::output::plot_style::legend::{Entry, Key, draw_head};
-use crate::output::plot_style::{Align, Canvas, DARK, Marker, Rect, SMALL, Shape, save_figure};
+use crate::output::plot_style::{Align, Canvas, DARK, Marker, RGBColor, Rect, SMALL, Shape, save_figure};
+use crate::output::{DrawError, FigureError};
 
 const SIZE: (u32, u32) = (1700, 1150);
 const LEFT: f64 = 190.0;

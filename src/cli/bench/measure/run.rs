@@ -214,6 +214,7 @@ impl<'a> Bench<'a> {
             resumed_cells: 0,
             lane_grid: None,
             refined: None,
+            without_effect: Vec::new(),
         };
         map::write(self.folder, &cells, &made)?;
         run.times.write = clock.elapsed().as_secs_f64();

@@ -49,6 +49,27 @@ fn a_built_scene_is_the_one_that_its_text_describes() {
     }
 }
 
+/// Axes of every kind, derived parameters, lists.
+#[test]
+fn what_else_cells_differ_in_can_be_built() {
+    let pair = GearPair { k2: 21.0, ..GearPair::paper(0.5) };
+    let scene = Scene::builder(pair)
+        .derived("k2", "k1")
+        .derived("k2", "0.5*k1")
+        .log_axis("k1", 10.0..=1000.0, 3)
+        .values_axis("F", &[1.0, 2.5, 40.0])
+        .build()
+        .unwrap();
+    assert_eq!(*scene.cell(&[1, 2]), GearPair { k1: 100.0, k2: 50.0, force: 40.0, ..pair });
+    let read = Scene::parse(scene.text(), "s.toml", &[], Purpose::Map).unwrap();
+    assert_eq!(read.identity(), scene.identity());
+    let scene = Scene::builder(pair).cells(["omega", "e"], &[[5.6, 0.5], [6.0, 0.25]]).build().unwrap();
+    assert_eq!(*scene.cell(&[1]), GearPair { omega: 6.0, e: 0.25, ..pair });
+    assert_eq!(scene.cell_count(), 2);
+    let wrong = Scene::builder(pair).cells(["omega"], &[[5.6], [-6.0]]);
+    assert_says(&refusal(wrong), &["cells:3:1: `omega = -6.0` is out of range"]);
+}
+
 /// The same rules as for files, with the remedy and without a place in a text that nobody wrote.
 #[test]
 fn what_is_wrong_with_a_built_scene_is_said() {

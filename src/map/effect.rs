@@ -1,0 +1,117 @@
+//! Which swept parameters changed nothing? Pure.
+//!
+//! A stiffness behind a wall that no motion reaches, say. What is compared is what tables show: class, period,
+//! exponent, impacts, meshing, symmetry and word, as far as they were measured.
+
+use crate::map::plan::Plan;
+use crate::record::classify::classify;
+use crate::record::{Record, valid};
+use rattlemap_dynamics::model::Parameter;
+
+/// Relative differences that rounding makes of a number, in an engine of single precision and of double.
+pub const ROUNDING: [f64; 2] = [1e-3, 1e-6];
+
+/// Parameters of the axes along which every cell is as the one before it, within `rounding`.
+///
+/// Cells that were filled say nothing. None is named where cells start from their neighbours, since then more than
+/// the parameter changes along an axis, nor in a list, which has no lines along one parameter.
+///
+/// # Panics
+/// If there are not as many records as runs.
+pub fn without_effect<'p>(plan: &'p Plan, records: &[Record], rounding: f64) -> Vec<&'p Parameter> {
+    assert_eq!(plan.run_count(), records.len(), "one record per run");
+    if plan.policy().follows() {
+        return Vec::new();
+    }
+    let counts = plan.counts();
+    let changes_nothing = |axis: usize| {
+        let mut compared = 0;
+        let [step, other_step] = if axis == 0 { [1, counts[0]] } else { [counts[0], 1] };
+        for map in records.chunks(plan.cell_count()) {
+            for line in 0..counts[1 - axis] {
+                let cells = map.iter().skip(line * other_step).step_by(step).take(counts[axis]);
+                let mut integrated = cells.filter(|record| record.valid & valid::FILLED == 0);
+                let Some(first) = integrated.next() else { continue };
+                for record in integrated {
+                    if !is_same(first, record, rounding) {
+                        return false;
+                    }
+                    compared += 1;
+                }
+            }
+        }
+        compared > 0
+    };
+    let axes = plan.axes().iter().enumerate();
+    axes.filter(|&(i, _)| changes_nothing(i)).map(|(_, axis)| axis.parameter()).collect()
+}
+
+fn is_same(a: &Record, b: &Record, rounding: f64) -> bool {
+    let near = |a: f64, b: f64| a == b || (a - b).abs() <= rounding * a.abs().max(b.abs());
+    let both = |bit: u32, same: bool| a.valid & bit == b.valid & bit && (a.valid & bit == 0 || same);
+    classify(a) == classify(b)
+        && both(valid::LYAPUNOV, near(a.lyapunov, b.lyapunov))
+        && both(valid::IMPACTS, near(a.impacts_per_period, b.impacts_per_period))
+        && both(valid::MESH, near(a.mesh_fraction, b.mesh_fraction))
+        && both(valid::SYMMETRIC, a.symmetric == b.symmetric)
+        && both(valid::WORD, a.spelling() == b.spelling())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::scene::{Purpose, Scene};
+
+    fn plan(more: &str) -> Plan {
+        let axis = |name: &str, count| {
+            format!("[[axis]]\nparameter = '{name}'\nmin = 0.25\nmax = 0.75\ncount = {count}\n")
+        };
+        let text = axis("e", 3) + &axis("k", 2) + more;
+        Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+    }
+
+    fn record(period: u32, lyapunov: f64) -> Record {
+        Record { period, lyapunov, valid: valid::PERIOD | valid::LYAPUNOV, ..Record::default() }
+    }
+
+    fn named(plan: &Plan, records: &[Record]) -> Vec<String> {
+        without_effect(plan, records, 1e-6).iter().map(|parameter| parameter.name.to_string()).collect()
+    }
+
+    #[test]
+    fn parameters_along_which_nothing_changes_are_named() {
+        let plan = plan("");
+        let by = |rule: fn(usize, usize) -> Record| -> Vec<Record> {
+            (0..6).map(|id| rule(id % 3, id / 3)).collect()
+        };
+        assert_eq!(named(&plan, &by(|i, _| record(1, -1.0 - i as f64))), ["k"]);
+        assert_eq!(named(&plan, &by(|_, j| record(1 + j as u32, -1.0))), ["e"]);
+        assert_eq!(named(&plan, &by(|_, _| record(1, -1.0))), ["e", "k"]);
+        assert!(named(&plan, &by(|i, j| record(1, -(((1 + i) * (1 + j)) as f64)))).is_empty());
+        // Rounding is no effect.
+        let rounded = by(|i, j| record(1, -1.0 - i as f64 - 1e-8 * j as f64));
+        assert_eq!(named(&plan, &rounded), ["k"]);
+        // One cell suffices, whatever of it differs.
+        for change in [
+            |record: &mut Record| record.period = 2,
+            |record: &mut Record| record.lyapunov *= 1.001,
+            |record: &mut Record| record.valid |= valid::MESH,
+            |record: &mut Record| record.valid &= !valid::LYAPUNOV,
+        ] {
+            let mut records = by(|i, _| record(1, -1.0 - i as f64));
+            change(&mut records[4]);
+            assert!(named(&plan, &records).is_empty());
+        }
+    }
+
+    #[test]
+    fn what_was_filled_or_follows_says_nothing() {
+        let same = vec![record(1, -1.0); 6];
+        let filled = Record { valid: valid::FILLED | record(1, -1.0).valid, ..record(1, -1.0) };
+        assert!(named(&plan("[refine]\n"), &[filled; 6]).is_empty());
+        let mut some = same.clone();
+        some[4] = Record { period: 2, ..filled };
+        assert_eq!(named(&plan("[refine]\n"), &some), ["e", "k"]);
+        assert!(named(&plan("[start]\npolicy = 'up'\n"), &same).is_empty());
+    }
+}

@@ -1,0 +1,295 @@
+//! Expressions in parameters, as scenes write them: `0.5*k1`, `F0*omega^2`. Pure.
+//!
+//! They are computed in f64, from left to right as they are written, with the functions of the crate `libm`: the same
+//! bits on every machine.
+
+mod grammar;
+
+use thiserror::Error;
+
+use grammar::Tree;
+
+/// Characters of an expression: enough for any formula, and few enough to go down its parentheses by recursion.
+pub const LONGEST: usize = 500;
+
+/// Characters that a message shows of what cannot be read.
+const SHOWN: usize = 20;
+
+/// What expressions are made of, for messages.
+pub const TAKES: &str = "numbers, parameters, pi, + - * / ^, parentheses, and sqrt exp log sin cos tan abs (of one), min max (of two)";
+
+type One = fn(f64) -> f64;
+type Two = fn(f64, f64) -> f64;
+
+/// Functions of one argument.
+const ONE: [(&str, One); 7] = [
+    ("sqrt", libm::sqrt),
+    ("exp", libm::exp),
+    ("log", libm::log),
+    ("sin", libm::sin),
+    ("cos", libm::cos),
+    ("tan", libm::tan),
+    ("abs", f64::abs),
+];
+
+/// Functions of two arguments.
+const TWO: [(&str, Two); 2] = [("min", smaller), ("max", larger)];
+
+/// Why a text is no expression.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum ExpressionError {
+    /// It does not follow the grammar.
+    #[error("cannot be read {}; an expression has {TAKES}", place(.rest))]
+    Syntax {
+        /// What follows the part that can be read.
+        rest: String,
+    },
+    /// A name that is no parameter.
+    #[error("unknown name `{name}`")]
+    Unknown {
+        /// The name.
+        name: String,
+    },
+    /// A function that there is not, or one without its arguments.
+    #[error("{name}")]
+    Call {
+        /// The sentence.
+        name: String,
+    },
+    /// More than [`LONGEST`] characters.
+    #[error("it has {count} characters, and may have {LONGEST}")]
+    TooLong {
+        /// How many there are.
+        count: usize,
+    },
+}
+
+fn place(rest: &str) -> String {
+    let shown: String = rest.chars().take(SHOWN).collect();
+    let more = if shown.len() < rest.len() { "..." } else { "" };
+    if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{shown}{more}` on") }
+}
+
+/// An expression in some names, ready to be computed.
+#[derive(Clone, Debug)]
+pub struct Expression {
+    text: String,
+    term: Term,
+    /// Places of the names that occur, ascending.
+    uses: Vec<usize>,
+}
+
+#[derive(Clone, Debug)]
+enum Term {
+    Number(f64),
+    /// A name by its place.
+    Name(usize),
+    Negative(Box<Term>),
+    One(One, Box<Term>),
+    Two(Two, Box<[Term; 2]>),
+}
+
+impl Expression {
+    /// Reads an expression in `names`. `-a^2` is `-(a^2)`, and `a^b^c` is `a^(b^c)`, as in mathematics.
+    ///
+    /// # Errors
+    /// [`ExpressionError`] for the first thing that is wrong.
+    pub fn parse(text: &str, names: &[&str]) -> Result<Expression, ExpressionError> {
+        let count = text.chars().count();
+        if count > LONGEST {
+            return Err(ExpressionError::TooLong { count });
+        }
+        let tree = grammar::parse(text).map_err(|rest| ExpressionError::Syntax { rest: rest.to_owned() })?;
+        let mut uses = Vec::new();
+        let term = resolved(tree, names, &mut uses)?;
+        uses.sort_unstable();
+        uses.dedup();
+        Ok(Expression { text: text.trim().to_owned(), term, uses })
+    }
+
+    /// As it was written.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Places of the names that occur in it, ascending.
+    pub fn uses(&self) -> &[usize] {
+        &self.uses
+    }
+
+    /// Its value where `value` tells those of the names by their places. It may be infinite or no number.
+    pub fn evaluate(&self, value: &dyn Fn(usize) -> f64) -> f64 {
+        self.term.evaluate(value)
+    }
+}
+
+impl Term {
+    fn evaluate(&self, value: &dyn Fn(usize) -> f64) -> f64 {
+        match self {
+            Term::Number(number) => *number,
+            Term::Name(place) => value(*place),
+            Term::Negative(of) => -of.evaluate(value),
+            Term::One(function, of) => function(of.evaluate(value)),
+            Term::Two(function, of) => function(of[0].evaluate(value), of[1].evaluate(value)),
+        }
+    }
+}
+
+/// The tree with its names and functions looked up.
+fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Term, ExpressionError> {
+    Ok(match tree {
+        Tree::Number(number) => Term::Number(number),
+        Tree::Name("pi") => Term::Number(std::f64::consts::PI),
+        Tree::Name(name) => match names.iter().position(|known| *known == name) {
+            Some(place) => {
+                uses.push(place);
+                Term::Name(place)
+            }
+            None if arity(name).is_some() => return Err(call(name, 0)),
+            None => return Err(ExpressionError::Unknown { name: name.to_owned() }),
+        },
+        Tree::Negative(of) => Term::Negative(Box::new(resolved(*of, names, uses)?)),
+        Tree::Binary(sign, of) => {
+            let [a, b] = *of;
+            let of = [resolved(a, names, uses)?, resolved(b, names, uses)?];
+            Term::Two(operator(sign), Box::new(of))
+        }
+        Tree::Call(name, arguments) => {
+            let given = arguments.len();
+            let mut terms = Vec::with_capacity(given);
+            for argument in arguments {
+                terms.push(resolved(argument, names, uses)?);
+            }
+            let one = ONE.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
+            let two = TWO.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
+            match (one, two, <[Term; 2]>::try_from(terms)) {
+                (_, Some(function), Ok(both)) => Term::Two(function, Box::new(both)),
+                (Some(function), _, Err(mut terms)) if given == 1 => {
+                    Term::One(function, Box::new(terms.remove(0)))
+                }
+                _ => return Err(call(name, given)),
+            }
+        }
+    })
+}
+
+fn arity(name: &str) -> Option<usize> {
+    let one = ONE.iter().any(|(known, _)| *known == name);
+    let two = TWO.iter().any(|(known, _)| *known == name);
+    if one { Some(1) } else { two.then_some(2) }
+}
+
+fn call(name: &str, given: usize) -> ExpressionError {
+    let name = match arity(name) {
+        Some(1) => format!("`{name}` takes one argument, as in {name}(x), and has {given}"),
+        Some(_) => format!("`{name}` takes two arguments, as in {name}(x, y), and has {given}"),
+        None => format!("there is no function `{name}`; an expression has {TAKES}"),
+    };
+    ExpressionError::Call { name }
+}
+
+fn operator(sign: char) -> Two {
+    match sign {
+        '+' => |a, b| a + b,
+        '-' => |a, b| a - b,
+        '*' => |a, b| a * b,
+        '/' => |a, b| a / b,
+        _ => libm::pow,
+    }
+}
+
+/// What is no number makes the result none.
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b || a.is_nan() { a } else { b }
+}
+
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: [&str; 3] = ["k1", "omega", "x"];
+
+    fn value(text: &str) -> f64 {
+        let expression = Expression::parse(text, &NAMES).unwrap_or_else(|error| panic!("{text}: {error}"));
+        expression.evaluate(&|place| [30.0, 5.6, 3.0][place])
+    }
+
+    #[test]
+    fn expressions_are_read_as_mathematics_writes_them() {
+        for (text, expected) in [
+            ("0.5*k1", 15.0),
+            ("-x^2", -9.0),
+            ("(-x)^2", 9.0),
+            ("2^3^2", 512.0),
+            ("2^-1", 0.5),
+            ("2^-x^2", 0.001953125),
+            ("1 - 2 - 3", -4.0),
+            ("6/2*3", 9.0),
+            ("6*x/9", 2.0),
+            ("1-2+3*2^2/4", 2.0),
+            ("--1", 1.0),
+            ("2*-x", -6.0),
+            ("+x", 3.0),
+            ("1e3 + 2.5E-1 + .5 + 1.", 1001.75),
+            ("min(x, 2)*max(x, k1)", 60.0),
+            ("sqrt(x*x)", 3.0),
+            ("abs(-2) + exp(0) + log(1) + cos(0)", 4.0),
+            ("  ( ( x ) )\t", 3.0),
+        ] {
+            assert_eq!(value(text), expected, "{text}");
+        }
+        // From left to right, whatever could be computed beforehand.
+        assert_eq!(value("0.1 + 0.2 + x"), 0.1 + 0.2 + 3.0);
+        assert_eq!(value("x*0.1*0.2"), 3.0 * 0.1 * 0.2);
+        assert_eq!(value("sin(pi/6)"), libm::sin(std::f64::consts::PI / 6.0));
+        assert_eq!(value("omega^1.7"), libm::pow(5.6, 1.7));
+        assert!(value("min(0/0, 1)").is_nan() && value("max(1, 0/0)").is_nan() && value("log(-1)").is_nan());
+    }
+
+    #[test]
+    fn what_occurs_in_it_is_known() {
+        let uses = |text| Expression::parse(text, &NAMES).unwrap().uses().to_vec();
+        assert_eq!(uses("x + k1*x"), [0, 2]);
+        assert!(uses("2*pi").is_empty());
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        for (text, expected) in [
+            ("", "cannot be read to its end"),
+            ("2*", "cannot be read to its end"),
+            ("2 x", "cannot be read from `x` on"),
+            ("2*(x+1", "cannot be read to its end"),
+            ("x)", "cannot be read from `)` on"),
+            ("x ** 2", "cannot be read from `* 2` on"),
+            ("x, 2", "cannot be read from `, 2` on"),
+            ("#", "cannot be read from `#` on"),
+            ("omgea*2", "unknown name `omgea`"),
+            ("sqrt", "`sqrt` takes one argument, as in sqrt(x), and has 0"),
+            ("sqrt(1, 2)", "`sqrt` takes one argument, as in sqrt(x), and has 2"),
+            ("min(1)", "`min` takes two arguments, as in min(x, y), and has 1"),
+            ("min(1, 2, 3)", "and has 3"),
+            ("ln(2)", "there is no function `ln`"),
+            ("x(2)", "there is no function `x`"),
+        ] {
+            let error = Expression::parse(text, &NAMES).expect_err(text).to_string();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+
+    /// However deep, on the stack of a thread.
+    #[test]
+    fn the_deepest_expressions_are_read() {
+        let nested = |count: usize| format!("{}x{}", "(".repeat(count), ")".repeat(count));
+        assert_eq!(value(&nested(LONGEST / 2 - 1)), 3.0);
+        assert_eq!(value(&("-".repeat(LONGEST - 2) + "x")), 3.0);
+        assert_eq!(value(&("1^".repeat(LONGEST / 2 - 1) + "x")), 1.0);
+        assert!(Expression::parse(&"abs(".repeat(LONGEST / 4), &NAMES).is_err());
+        let error = Expression::parse(&nested(LONGEST / 2), &NAMES).unwrap_err();
+        assert_eq!(error, ExpressionError::TooLong { count: LONGEST + 1 });
+    }
+}

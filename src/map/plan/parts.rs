@@ -1,0 +1,86 @@
+//! Which cells share a flow, or a contact law. Pure.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+use crate::map::scene::Points;
+use rattlemap_dynamics::model::Parameter;
+
+/// The distinct flows of all cells, or the distinct laws, numbered from 0.
+#[derive(Clone, Debug)]
+pub(crate) enum Parts {
+    /// One for each value of these axes.
+    Grid { counts: [usize; 2], along: [bool; 2] },
+    /// Of each cell of a list, and of each part the first cell that has it.
+    List { of: Arc<[u32]>, first: Arc<[u32]> },
+}
+
+impl Parts {
+    /// The flows: cells share one if they agree in all that shapes the oscillator.
+    pub(crate) fn flows(points: &Points) -> Parts {
+        Parts::new(points, |parameter| parameter.shapes.oscillator())
+    }
+
+    /// The contact laws, likewise.
+    pub(crate) fn laws(points: &Points) -> Parts {
+        Parts::new(points, |parameter| parameter.shapes.law())
+    }
+
+    fn new(points: &Points, is_shaped: fn(&Parameter) -> bool) -> Parts {
+        let shapes: Vec<bool> = points.swept_indices().map(|index| points.shapes(index, is_shaped)).collect();
+        let Some(list) = points.list() else {
+            let along = [0, 1].map(|i| shapes.get(i).copied().unwrap_or(false));
+            return Parts::Grid { counts: points.counts(), along };
+        };
+        let (mut of, mut first) = (Vec::with_capacity(list.len()), Vec::new());
+        let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
+        for cell in 0..list.len() {
+            let values = list.row(cell).iter().zip(&shapes).filter(|(_, shapes)| **shapes);
+            // Numbers that are equal and differ in bits may be told apart: they cost a part more.
+            of.push(match known.entry(values.map(|(value, _)| value.to_bits()).collect()) {
+                Entry::Occupied(part) => *part.get(),
+                Entry::Vacant(part) => {
+                    first.push(cell as u32);
+                    *part.insert(first.len() as u32 - 1)
+                }
+            });
+        }
+        Parts::List { of: of.into(), first: first.into() }
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        match self {
+            Parts::Grid { counts, along } => {
+                counts.iter().zip(along).map(|(&count, &along)| if along { count } else { 1 }).product()
+            }
+            Parts::List { first, .. } => first.len(),
+        }
+    }
+
+    /// The part of a cell.
+    pub(crate) fn of(&self, cell: usize) -> u32 {
+        match self {
+            Parts::Grid { counts: [columns, _], along } => match along {
+                [true, true] => cell as u32,
+                [true, false] => (cell % columns) as u32,
+                [false, true] => (cell / columns) as u32,
+                [false, false] => 0,
+            },
+            Parts::List { of, .. } => of[cell],
+        }
+    }
+
+    /// The first cell that has a part.
+    pub(crate) fn cell(&self, part: u32) -> usize {
+        let part = part as usize;
+        match self {
+            Parts::Grid { counts: [columns, _], along } => match along {
+                [true, _] => part,
+                [false, _] => part * columns,
+            },
+            Parts::List { first, .. } => first[part] as usize,
+        }
+    }
+}

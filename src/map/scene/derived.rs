@@ -1,0 +1,148 @@
+//! `[derived]`: parameters that follow others.
+
+use super::axis::{meanings, names};
+use super::document::Value;
+use super::error::SceneError;
+use super::section::{Field, Section};
+use crate::map::expression::{Expression, ExpressionError};
+use rattlemap_dynamics::model::{Model, Parameter};
+
+/// Parameters that follow others, in an order in which each comes after those that it follows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Derived(Vec<Rule>);
+
+/// One parameter and its expression.
+#[derive(Clone, Debug)]
+pub(crate) struct Rule {
+    parameter: Parameter,
+    /// Of the parameter in the model's table.
+    index: usize,
+    expression: Expression,
+    /// Parameters that are not derived, by index, on which it depends, through others or not.
+    roots: Vec<usize>,
+}
+
+impl Rule {
+    /// The parameter.
+    pub(crate) fn parameter(&self) -> &Parameter {
+        &self.parameter
+    }
+
+    /// Its place in the model's table.
+    pub(crate) fn index(&self) -> usize {
+        self.index
+    }
+
+    /// The expression as it was written.
+    pub(crate) fn text(&self) -> &str {
+        self.expression.text()
+    }
+
+    /// Whether it depends on a parameter, through others or not.
+    pub(crate) fn follows(&self, index: usize) -> bool {
+        self.roots.contains(&index)
+    }
+}
+
+impl Derived {
+    /// The rules, each after those that it follows.
+    pub(crate) fn rules(&self) -> &[Rule] {
+        &self.0
+    }
+
+    /// Whether the parameter of this index is derived.
+    pub(crate) fn has(&self, index: usize) -> bool {
+        self.0.iter().any(|rule| rule.index == index)
+    }
+
+    /// Computes the derived parameters of a model from its others. They may leave their ranges.
+    pub(crate) fn apply(&self, model: &mut dyn Model) {
+        for rule in &self.0 {
+            let value = rule.expression.evaluate(&|index| model.value(index));
+            model.assign(rule.index, value);
+        }
+    }
+}
+
+/// Reads `[derived]`. `is_swept` says whether an axis or a column sets a parameter, by index.
+pub(super) fn read(
+    root: &Section<'_>,
+    model: &dyn Model,
+    is_swept: impl Fn(usize) -> bool,
+) -> Result<Derived, SceneError> {
+    let names = names(model);
+    let section = root.section_among("derived", &names, &meanings(model))?;
+    let parameters = root.section_among("parameters", &names, &meanings(model))?;
+    let mut left = Vec::new();
+    for (name, field) in section.fields() {
+        let Some(index) = names.iter().position(|known| *known == name) else { continue };
+        if is_swept(index) {
+            return Err(field.conflict("it is swept, too; drop it here, or sweep another parameter".into()));
+        }
+        // An argument wins over the text, but for a value that the text derives: it would be lost unseen.
+        if let Some(value) = parameters.get(name)
+            && (value.is_argument() || !field.is_argument())
+        {
+            return Err(value.conflict(format!("`{}` derives it; drop either", field.path)));
+        }
+        let expression = read_expression(&field, &names, model)?;
+        let parameter = model.parameters()[index].clone();
+        left.push((field, Rule { parameter, index, expression, roots: Vec::new() }));
+    }
+    in_order(left)
+}
+
+fn read_expression(field: &Field<'_>, names: &[&str], model: &dyn Model) -> Result<Expression, SceneError> {
+    let text = match &field.node.value {
+        Value::Text(text) => text.clone(),
+        // A number is an expression, too.
+        Value::Integer(_) | Value::Float(_) => format!("{:?}", field.number()?),
+        _ => return Err(field.wrong_type("an expression in quotes, such as \"0.5*k1\"")),
+    };
+    Expression::parse(&text, names).map_err(|error| match &error {
+        ExpressionError::Unknown { name } => field.unknown_in(name, names, &meanings(model)),
+        _ => field.unreadable(&error.to_string()),
+    })
+}
+
+/// Puts rules in an order in which they can be computed, and finds what each depends on.
+fn in_order(mut left: Vec<(Field<'_>, Rule)>) -> Result<Derived, SceneError> {
+    let mut ordered: Vec<Rule> = Vec::new();
+    while !left.is_empty() {
+        let is_open = |index: &usize| left.iter().any(|(_, rule)| rule.index == *index);
+        let Some(next) = left.iter().position(|(_, rule)| !rule.expression.uses().iter().any(is_open)) else {
+            return Err(circle(&left));
+        };
+        let (_, mut rule) = left.remove(next);
+        for &index in rule.expression.uses() {
+            match ordered.iter().find(|before| before.index == index) {
+                Some(before) => rule.roots.extend(&before.roots),
+                None => rule.roots.push(index),
+            }
+        }
+        ordered.push(rule);
+    }
+    Ok(Derived(ordered))
+}
+
+/// The error for rules of which none can be computed first.
+fn circle(left: &[(Field<'_>, Rule)]) -> SceneError {
+    // Each follows another of them, so that going on leads round.
+    let next = |at: usize| {
+        let uses = left[at].1.expression.uses();
+        left.iter().position(|(_, rule)| uses.contains(&rule.index)).unwrap_or(at)
+    };
+    let mut path = vec![0];
+    let begin = loop {
+        let at = next(path[path.len() - 1]);
+        if let Some(begin) = path.iter().position(|&before| before == at) {
+            break begin;
+        }
+        path.push(at);
+    };
+    let round = path[begin..].iter().chain([&path[begin]]);
+    let named: Vec<&str> = round.map(|&at| &*left[at].1.parameter.name).collect();
+    left[path[begin]]
+        .0
+        .conflict(format!("it follows itself: {}; derive one of them from others", named.join(" <- ")))
+}

@@ -1,0 +1,240 @@
+//! `[cells]`: a table of cells in the place of axes.
+
+use std::fmt::Write;
+
+use sha2::{Digest, Sha256};
+
+use super::Purpose;
+use super::axis::{meanings, names};
+use super::document::shorten;
+use super::error::{Place, Problem, SceneError, suggest};
+use super::keys;
+use super::section::{Field, Section};
+use rattlemap_dynamics::model::{Model, Parameter};
+
+/// A file beside a scene, as whoever reads the scene has found it.
+#[derive(Clone, Debug)]
+pub struct FileText {
+    /// What messages call it.
+    pub name: String,
+    /// What it holds.
+    pub text: String,
+}
+
+/// Finds a file beside a scene, by its name in the scene; the error says why it cannot be read.
+pub type FindFile<'f> = &'f dyn Fn(&str) -> Result<FileText, String>;
+
+/// A list of cells: parameters, and a value of each per cell.
+#[derive(Clone, Debug)]
+pub struct List {
+    file: String,
+    columns: Vec<Column>,
+    /// Row by row.
+    values: Vec<f64>,
+    hash: String,
+}
+
+/// What one column of a list sets.
+#[derive(Clone, Debug)]
+struct Column {
+    parameter: Parameter,
+    /// Of the parameter in the model's table.
+    index: usize,
+}
+
+impl List {
+    /// The file's name in the scene.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The parameters of its columns, in their order.
+    pub fn parameters(&self) -> impl ExactSizeIterator<Item = &Parameter> {
+        self.columns.iter().map(|column| &column.parameter)
+    }
+
+    /// How many cells there are, at least one.
+    pub fn len(&self) -> usize {
+        self.values.len() / self.columns.len()
+    }
+
+    /// No list is.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// The values of a cell, in the order of the columns.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn row(&self, cell: usize) -> &[f64] {
+        let columns = self.columns.len();
+        &self.values[cell * columns..(cell + 1) * columns]
+    }
+
+    /// A hash of names and values, SHA-256: lists of the same hash are the same cells.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// The list as a table that reads back as the same: names, then numbers as shortest decimals.
+    pub fn to_csv(&self) -> String {
+        let names: Vec<&str> = self.parameters().map(|parameter| &*parameter.name).collect();
+        let mut text = names.join(",") + "\n";
+        for cell in 0..self.len() {
+            for (i, value) in self.row(cell).iter().enumerate() {
+                // Writing to a String cannot fail.
+                let _ = write!(text, "{}{value:?}", if i > 0 { "," } else { "" });
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    /// Places of the columns' parameters in the model's table.
+    pub(crate) fn indices(&self) -> impl ExactSizeIterator<Item = usize> {
+        self.columns.iter().map(|column| column.index)
+    }
+
+    /// Gives a model the values of a cell.
+    pub(crate) fn set(&self, model: &mut dyn Model, cell: usize) {
+        self.columns
+            .iter()
+            .zip(self.row(cell))
+            .for_each(|(column, &value)| model.assign(column.index, value));
+    }
+}
+
+/// Reads `[cells]` and the file that it names; none where the scene has no such table.
+pub(super) fn read(
+    root: &Section<'_>,
+    model: &dyn Model,
+    purpose: Purpose,
+    find: FindFile<'_>,
+) -> Result<Option<List>, SceneError> {
+    let section = root.section("cells", &keys::names("cells"))?;
+    let Some(cells) = root.get("cells") else { return Ok(None) };
+    if purpose == Purpose::Bifurcation {
+        return Err(cells.conflict("`bifurcation` takes an axis; a list of cells is for `map`".into()));
+    }
+    if let Some(axis) = root.get("axis") {
+        return Err(axis.conflict("[cells] says which cells there are; drop [[axis]] or [cells]".into()));
+    }
+    let field = section.require("file", "name a table, such as file = \"points.csv\"")?;
+    let file = field.text()?.to_owned();
+    let found = find(&file).map_err(|reason| field.unreadable(&reason))?;
+    let (columns, values) = table(&found, model)?;
+    let names: Vec<&str> = columns.iter().map(|column| &*column.parameter.name).collect();
+    let hash = hash(&names, values.iter().copied());
+    Ok(Some(List { file, columns, values, hash }))
+}
+
+/// SHA-256 of names and of the bits of numbers.
+pub(super) fn hash(names: &[&str], values: impl Iterator<Item = f64>) -> String {
+    let mut hasher = Sha256::new();
+    for name in names {
+        hasher.update(name.as_bytes());
+        hasher.update([0]);
+    }
+    values.for_each(|value| hasher.update(value.to_le_bytes()));
+    hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Columns and values of a table.
+fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<Column>, Vec<f64>), SceneError> {
+    // Spreadsheets begin a file with a mark of its byte order.
+    let text = file.text.strip_prefix('\u{feff}').unwrap_or(&file.text);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let damaged = |error: csv::Error| {
+        let line = error.position().map_or(1, csv::Position::line);
+        let message = match error.kind() {
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                format!("the line has {} and the first line {expected_len}", fields(*len))
+            }
+            _ => error.to_string(),
+        };
+        wrong(file, line, 1, Problem::Table { message })
+    };
+    let header = reader.headers().map_err(damaged)?.clone();
+    let columns = columns(file, &header, model)?;
+    let mut values = Vec::new();
+    let mut record = csv::StringRecord::new();
+    while reader.read_record(&mut record).map_err(damaged)? {
+        let line = record.position().map_or(0, csv::Position::line);
+        for (i, (column, text)) in columns.iter().zip(&record).enumerate() {
+            let (field, value) = (column.parameter.name.to_string(), shorten(text));
+            let at = |problem| wrong(file, line, i + 1, problem);
+            let number: f64 = text.parse().map_err(|_| {
+                at(Problem::WrongType {
+                    field: field.clone(),
+                    value: value.clone(),
+                    expected: "a number".into(),
+                })
+            })?;
+            if !column.parameter.range.contains(number) {
+                let requirement = column.parameter.range.requirement().into_owned();
+                return Err(at(Problem::OutOfRange { field, value, requirement }));
+            }
+            values.push(number);
+        }
+    }
+    if values.is_empty() {
+        let message = "it lists no cells; write a line of numbers for each".to_owned();
+        return Err(wrong(file, 1, 1, Problem::Table { message }));
+    }
+    Ok((columns, values))
+}
+
+fn columns(
+    file: &FileText,
+    header: &csv::StringRecord,
+    model: &dyn Model,
+) -> Result<Vec<Column>, SceneError> {
+    let mut columns: Vec<Column> = Vec::new();
+    for (i, name) in header.iter().enumerate() {
+        let (field, value) = (format!("column {}", i + 1), shorten(name));
+        let at = |problem| wrong(file, 1, i + 1, problem);
+        let Ok(index) = model.index(name) else {
+            let remedy = suggest(name, &names(model), &meanings(model));
+            return Err(at(Problem::UnknownName { field, value, remedy }));
+        };
+        if columns.iter().any(|before| before.index == index) {
+            let remedy = "another column sets it already; drop either".to_owned();
+            return Err(at(Problem::Conflict { field, value, remedy }));
+        }
+        columns.push(Column { parameter: model.parameters()[index].clone(), index });
+    }
+    match columns.is_empty() {
+        false => Ok(columns),
+        true => {
+            let message =
+                "it is empty; write a line with names of parameters, and a line of numbers for each cell";
+            Err(wrong(file, 1, 1, Problem::Table { message: message.to_owned() }))
+        }
+    }
+}
+
+fn fields(count: u64) -> String {
+    if count == 1 { "1 field".to_owned() } else { format!("{count} fields") }
+}
+
+/// An error in a table: its columns count fields, not characters.
+fn wrong(file: &FileText, line: u64, column: usize, problem: Problem) -> SceneError {
+    let place = Place::Text { file: file.name.as_str().into(), line: line as usize, column };
+    SceneError { place, problem }
+}
+
+/// Refuses what does not go with a list.
+pub(super) fn check(root: &Section<'_>, follows: bool) -> Result<(), SceneError> {
+    let conflict = |field: Field<'_>, remedy: &str| Err(field.conflict(remedy.to_owned()));
+    if let Some(refine) = root.get("refine") {
+        return conflict(refine, "cells of a list have no neighbours to be filled from; drop [refine]");
+    }
+    let policy = root.section("start", &keys::names("start"))?.get("policy");
+    match policy.filter(|_| follows) {
+        Some(policy) => {
+            conflict(policy, "cells of a list have no neighbours to start from; use \"rest\" or \"state\"")
+        }
+        None => Ok(()),
+    }
+}

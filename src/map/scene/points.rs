@@ -1,0 +1,101 @@
+//! The points of a sweep: which parameters the cells differ in, and the model of each.
+
+use std::sync::Arc;
+
+use super::axis::Axis;
+use super::derived::Derived;
+use super::list::List;
+use rattlemap_dynamics::model::{Model, Parameter};
+
+/// All cells of a scene, numbered from 0: along the first axis, then along the second; or in the order of a list.
+#[derive(Clone, Debug)]
+pub(crate) struct Points {
+    /// The model in the first cell.
+    base: Box<dyn Model>,
+    /// One or two; none where there is a list.
+    axes: Vec<Axis>,
+    list: Option<Arc<List>>,
+    derived: Derived,
+}
+
+impl Points {
+    /// From a model whose fixed parameters are set.
+    pub(super) fn new(base: Box<dyn Model>, axes: Vec<Axis>, list: Option<List>, derived: Derived) -> Points {
+        let mut points = Points { base, axes, list: list.map(Arc::new), derived };
+        points.base = points.model(0);
+        points
+    }
+
+    pub(crate) fn base(&self) -> &dyn Model {
+        &*self.base
+    }
+
+    pub(crate) fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    pub(crate) fn list(&self) -> Option<&List> {
+        self.list.as_deref()
+    }
+
+    pub(crate) fn derived(&self) -> &Derived {
+        &self.derived
+    }
+
+    /// Cells along the first axis and the second; a list is one row.
+    pub(crate) fn counts(&self) -> [usize; 2] {
+        match &self.list {
+            Some(list) => [list.len(), 1],
+            None => [0, 1].map(|i| self.axes.get(i).map_or(1, Axis::count)),
+        }
+    }
+
+    /// Places of a cell on the two axes.
+    pub(crate) fn indices(&self, cell: usize) -> [usize; 2] {
+        let [columns, _] = self.counts();
+        [cell % columns, cell / columns]
+    }
+
+    /// The model of a cell.
+    pub(crate) fn model(&self, cell: usize) -> Box<dyn Model> {
+        let mut model = self.base.clone();
+        match &self.list {
+            Some(list) => list.set(&mut *model, cell),
+            None => self.axes.iter().zip(self.indices(cell)).for_each(|(axis, i)| axis.set(&mut *model, i)),
+        }
+        self.derived.apply(&mut *model);
+        model
+    }
+
+    /// What cells differ in: the axes' parameters, or the list's.
+    pub(crate) fn swept(&self) -> impl Iterator<Item = &Parameter> {
+        let listed = self.list.iter().flat_map(|list| list.parameters());
+        self.axes.iter().map(Axis::parameter).chain(listed)
+    }
+
+    /// The same by their places in the model's table.
+    pub(crate) fn swept_indices(&self) -> impl Iterator<Item = usize> {
+        self.axes.iter().map(Axis::index).chain(self.list.iter().flat_map(|list| list.indices()))
+    }
+
+    /// Values of the swept parameters in a cell.
+    pub(crate) fn values(&self, cell: usize) -> Vec<f64> {
+        match &self.list {
+            Some(list) => list.row(cell).to_vec(),
+            None => self.axes.iter().zip(self.indices(cell)).map(|(axis, i)| axis.value(i)).collect(),
+        }
+    }
+
+    /// The same in words.
+    pub(crate) fn named(&self, cell: usize) -> String {
+        let named = self.swept().zip(self.values(cell)).map(|(p, value)| format!("{} = {value:?}", p.name));
+        named.collect::<Vec<_>>().join(", ")
+    }
+
+    /// Whether what `is_shaped` names depends on a swept parameter: directly, or by one that is derived from it.
+    pub(crate) fn shapes(&self, index: usize, is_shaped: impl Fn(&Parameter) -> bool) -> bool {
+        let rules = self.derived.rules().iter();
+        is_shaped(&self.base.parameters()[index])
+            || rules.filter(|rule| rule.follows(index)).any(|rule| is_shaped(rule.parameter()))
+    }
+}

@@ -1,0 +1,62 @@
+//! Figures in each format: written as asked, listed, mended, and replaced with the others.
+
+use super::*;
+
+const FEW: [&str; 5] = ["--quiet", "--set", "axis.0.count=4", "--set", "axis.1.count=3"];
+const LAYERS: [&str; 5] = ["impacts", "lyapunov", "map", "mesh", "word"];
+
+/// What a folder has beside tables and records.
+fn figures(out: &Path) -> Vec<String> {
+    let is_figure = |name: &String| [".png", ".svg", ".pdf"].iter().any(|end| name.ends_with(end));
+    names(out).into_iter().filter(is_figure).collect()
+}
+
+fn of_layers(ends: &[&str]) -> Vec<String> {
+    LAYERS.iter().flat_map(|layer| ends.iter().map(move |end| format!("{layer}.{end}"))).collect()
+}
+
+#[test]
+fn figures_of_a_map_come_in_each_format() {
+    let folder = folder();
+    map(&folder, &[&FEW[..], &["--format", "svg,pdf"]].concat()).success();
+    let out = folder.path().join("out/s");
+    assert_eq!(figures(&out), of_layers(&["pdf", "svg"]));
+    assert!(["cells.csv", "cells.npy", "report.html"].iter().all(|name| out.join(name).is_file()));
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["set"][2], r#"outputs.files=["csv","npy","html","svg","pdf"]"#);
+    let good = ["map.svg", "word.pdf"].map(|name| fs::read(out.join(name)).unwrap());
+    fs::remove_file(out.join("map.svg")).unwrap();
+    fs::write(out.join("word.pdf"), "%PDF").unwrap();
+    let check = |arguments: &[&str]| command(&folder, &[&["check", "out/s"], arguments].concat()).assert();
+    check(&["--quiet"]).code(1).stderr(says(&["map.svg is missing", "word.pdf is damaged"]));
+    check(&["--repair"]).success().stderr(says(&["map.svg is made anew", "word.pdf is made anew"]));
+    assert_eq!(["map.svg", "word.pdf"].map(|name| fs::read(out.join(name)).unwrap()), good);
+    // A finished map resumes to other figures of the same records; those before go.
+    map(&folder, &[&FEW[..], &["--format", "png", "--resume"]].concat()).success();
+    assert_eq!(figures(&out), of_layers(&["png"]));
+    map(&folder, &[&FEW[..], &["--set", r#"outputs.files=["svg"]"#, "--force"]].concat()).success();
+    assert_eq!(figures(&out), of_layers(&["svg"]));
+    assert!(!out.join("cells.csv").exists());
+}
+
+#[test]
+fn figures_of_diagrams_and_orbits_come_in_each_format() {
+    let folder = folder();
+    let line = "[[axis]]\nparameter = 'e'\nmin = 0.4\nmax = 0.5\ncount = 2\n";
+    fs::write(folder.path().join("line.toml"), line).unwrap();
+    let run = |arguments: &[&str]| command(&folder, arguments).assert();
+    run(&["bifurcation", "line.toml", "--out", "b", "--quiet", "--format", "pdf,png"]).success();
+    let b = folder.path().join("b");
+    assert_eq!(names(&b), ["bifurcation.csv", "bifurcation.pdf", "bifurcation.png", "manifest.json"]);
+    run(&["bifurcation", "line.toml", "--out", "b", "--quiet", "--format", "svg", "--force"]).success();
+    assert_eq!(names(&b), ["bifurcation.csv", "bifurcation.svg", "manifest.json"]);
+    run(&["orbit", "--out", "o", "--format", "svg"]).success();
+    let o = folder.path().join("o");
+    assert_eq!(figures(&o), ["gap.svg", "phase_plane.svg", "time_history.svg"]);
+    run(&["check", "o", "--quiet"]).success();
+    run(&["orbit", "--out", "o", "--force"]).success();
+    assert_eq!(figures(&o), ["gap.png", "phase_plane.png", "time_history.png"]);
+    run(&["orbit", "--format", "svg"]).code(2).stderr(says(&["--out"]));
+    run(&["map", "s.toml", "--format", "eps"]).code(2).stderr(says(&["eps", "png, svg, pdf"]));
+}
