@@ -168,8 +168,13 @@ pub(crate) struct Map {
     #[arg(long, conflicts_with = "force")]
     pub(crate) resume: bool,
 
+    /// Say what the map would take and write nothing: cells, engine, memory, disk, and the time that it would
+    /// take, from some of its cells that are computed and thrown away
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+
     /// Also print one JSON object on stdout when the map is done: folder, files, engine, device, classes, statuses,
-    /// seconds, and what was resumed
+    /// seconds, and what was resumed. With --dry-run, what is foreseen as one object
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -300,7 +305,8 @@ pub(crate) struct Orbit {
     #[arg(long)]
     pub(crate) json: bool,
 
-    /// Also write orbit.json, phase portraits and time histories to this folder
+    /// Also write to this folder: orbit.json, the motion as a table (trajectory.csv), its spectrum, phase portraits and
+    /// time histories
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 

@@ -9,6 +9,7 @@ mod compare;
 mod completions;
 mod devices;
 mod engine_choice;
+mod environment;
 mod error;
 mod finished_map;
 mod interrupt;
@@ -26,8 +27,9 @@ use std::process::ExitCode;
 use arguments::{Bench, Cli, Command};
 
 pub use arguments::parsed;
+pub use environment::missing_variable;
 pub use error::{Failure, fail_if};
-pub use processor::{cores, name as processor_name};
+pub use processor::{MISFIT, cores, is_fit, name as processor_name};
 pub use progress::Progress;
 pub use say::note;
 

@@ -3,6 +3,7 @@
 mod gap;
 mod heading;
 mod motion;
+pub(super) mod spectrum;
 mod symbols;
 
 use std::path::{Path, PathBuf};

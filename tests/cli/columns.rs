@@ -17,7 +17,7 @@ fn listed(heading: &str) -> Vec<&'static str> {
 
 fn run(folder: &Path, arguments: &[&str]) {
     let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments).assert().code(0);
+    command.current_dir(folder).args(arguments).assert().code(0);
 }
 
 fn header(path: &Path) -> Vec<String> {
@@ -53,5 +53,7 @@ fn columns_are_those_of_the_files() {
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));
     assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));
+    assert_eq!(header(&dir.join("out/orbit/trajectory.csv")), listed("trajectory.csv"));
+    assert_eq!(header(&dir.join("out/orbit/spectrum.csv")), listed("spectrum.csv"));
     assert_eq!(sorted(fields(&dir.join("out/plane/validation.json"))), sorted(listed("validation.json")));
 }

@@ -13,5 +13,7 @@ mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;
 mod models;
+mod orbit_tables;
+mod systems;
 mod text;
 mod your_gears;
