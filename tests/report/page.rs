@@ -91,7 +91,7 @@ function visit() {
   said.colors = new Set(new Uint32Array(drawn.buffer)).size;
   const result = document.createElement("pre");
   result.id = "said";
-  result.textContent = btoa(JSON.stringify(said));
+  result.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(said))));
   document.body.append(result);
 }
 visit();
