@@ -185,9 +185,9 @@ timed() {
     limited "$longest_run" "$binary" map "$scene" --engine gpu --precision "$precision" --out "$work/timed" --force "$@" \
         2>"$work/said" || code=$?
     wall="$(since "$began")"
-    # "N cells on gpu (f32) in S s: C cells/s, P lane-periods/s, K ns per lane-step; outputs O s"
+    # "N cells in S s on gpu (f32): C cells/s, P forcing periods/s, K ns per step; files written in O s"
     told="$(grep -E '^[0-9]+ cells.* on gpu' "$work/said" |
-        sed -E 's/^([0-9]+) cells.* in ([0-9.]+) s: ([0-9]+) cells\/s, ([0-9]+) lane-periods\/s, ([0-9.]+) ns per lane-step; outputs ([0-9.]+) s.*/\1,\2,\3,\4,\5,\6/' || true)"
+        sed -E 's/^([0-9]+) cells.* in ([0-9.]+) s on .*: ([0-9]+) cells\/s, ([0-9]+) forcing periods\/s, ([0-9.]+) ns per step; files written in ([0-9.]+) s.*/\1,\2,\3,\4,\5,\6/' || true)"
     case $code in
         0) [[ -n "$told" ]] || { failed "map: $what, $precision says no times" && told=",,,,,,says no times"; } ;;
         124 | 137)

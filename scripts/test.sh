@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Everything that must hold before a change is taken: formatting, lints, docs, dependencies, checks for WebAssembly, tests.
-# Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, and Rust's wasm32 target.
-# With --all the tests run, too, that take minutes each. Ends with the time of each phase and the ten slowest tests.
+# Everything that must hold before a change is taken: formatting, lints, docs, dependencies, checks for other systems, tests.
+# Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, and Rust's targets.
+# With --all the tests run, too, that take minutes each, and all of the program is checked for macOS. Ends with the time of
+# each phase and the ten slowest tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -11,18 +12,26 @@ fail() {
     exit 1
 }
 
+# Checked, not built: no linker and no C compiler is wanted for them.
 wasm=wasm32-unknown-unknown
+windows=x86_64-pc-windows-gnu
+macos=aarch64-apple-darwin
+
+add_target() {
+    # Rust without rustup may come with the target.
+    if [[ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ]]; then return; fi
+    command -v rustup >/dev/null ||
+        fail "Rust's target $1 is missing, and rustup, which would add it; install Rust from https://rustup.rs"
+    rustup target add "$1" || fail "rustup could not add the target $1; is the network there?"
+}
 
 require_tools() {
-    say "tools: cargo, rustfmt, clippy, $wasm"
+    say "tools: cargo, rustfmt, clippy, $wasm, $windows, $macos"
     command -v cargo >/dev/null || fail "cargo is missing; install Rust from https://rustup.rs"
     cargo fmt --version >/dev/null 2>&1 || fail "rustfmt is missing; run: rustup component add rustfmt"
     cargo clippy --version >/dev/null 2>&1 || fail "clippy is missing; run: rustup component add clippy"
-    # Rust without rustup may come with the target.
-    if [[ -d "$(rustc --print sysroot)/lib/rustlib/$wasm/lib" ]]; then return; fi
-    command -v rustup >/dev/null ||
-        fail "Rust's target $wasm is missing, and rustup, which would add it; install Rust from https://rustup.rs"
-    rustup target add "$wasm" || fail "rustup could not add the target $wasm; is the network there?"
+    local target
+    for target in "$wasm" "$windows" "$macos"; do add_target "$target"; done
 }
 
 # True if the Vulkan loader would find both itself and the description of a driver.
@@ -153,6 +162,12 @@ phase "docs, warnings denied" docs
 phase "dependencies" dependencies
 phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
 phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu --lib
+phase "the program on Windows" cargo check --target "$windows" -p rattlemap
+if [[ "${#ignored[@]}" -eq 0 ]]; then
+    phase "one motion on macOS" cargo check --target "$macos" -p rattlemap-dynamics
+else
+    phase "the program on macOS" cargo check --target "$macos" -p rattlemap
+fi
 phase "compilation of tests" cargo test --workspace --tests --benches --no-run
 phase "tests" timed_tests "${ignored[@]}"
 phase "examples in docs" cargo test --workspace --doc

@@ -1,7 +1,21 @@
 //! The program: see `rattlemap --help`.
 
+use std::io::{Write, stderr};
 use std::process::ExitCode;
 
+use rattlemap::cli;
+
 fn main() -> ExitCode {
-    rattlemap::cli::run()
+    if !cli::is_fit() {
+        let _ = stderr().write_all(cli::MISFIT.as_bytes());
+        return ExitCode::FAILURE;
+    }
+    if let Some((name, value)) = cli::missing_variable() {
+        #[allow(unsafe_code, reason = "nothing else can be told to a library of the system")]
+        // SAFETY: no thread has been started that could read the environment meanwhile.
+        unsafe {
+            std::env::set_var(name, value);
+        }
+    }
+    cli::run()
 }

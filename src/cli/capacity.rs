@@ -12,16 +12,19 @@ use crate::cli::error::Failure;
 use crate::cli::processor;
 
 /// What there is, in bytes; none where the system does not tell.
-struct Free {
-    memory: Option<u64>,
-    disk: Option<u64>,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Free {
+    pub(crate) memory: Option<u64>,
+    /// With what is replaced.
+    pub(crate) disk: Option<u64>,
 }
 
-/// Refuses a map that does not fit memory or disk, with figures. What the system does not
-/// tell is taken to be enough.
-pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<(), Failure> {
+/// What there is, for a map that fits it. Refuses one that does not fit memory or disk, with figures; what the system does
+/// not tell is taken to be enough.
+pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<Free, Failure> {
     let disk = free_disk(out).map(|free| free.saturating_add(replaced(out)));
-    judge(scene, engine, &Free { memory: free_memory(), disk })
+    let free = Free { memory: free_memory(), disk };
+    judge(scene, engine, &free).map(|()| free)
 }
 
 /// Refuses a finished map that this machine cannot read, before anything is allocated for it. It is read by the CPU,
@@ -106,7 +109,8 @@ fn free_disk(out: &Path) -> Option<u64> {
     fs4::available_space(existing).ok()
 }
 
-fn bytes(count: u64) -> String {
+/// A size in words.
+pub(crate) fn bytes(count: u64) -> String {
     let (unit, name) =
         [(1e9, "GB"), (1e6, "MB")].into_iter().find(|&(unit, _)| count as f64 >= unit).unwrap_or((1e3, "kB"));
     format!("{:.1} {name}", count as f64 / unit)

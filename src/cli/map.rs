@@ -1,10 +1,13 @@
 //! `rattlemap map`: a scene into a folder, resumable at every batch.
 
+mod dry_run;
+mod forecast;
 mod resume_command;
 mod stopped;
 mod summary;
 
 use std::error::Error;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::gpu::Precision;
@@ -33,19 +36,23 @@ use summary::summary;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
-    let ask = &Map { run: scene_file::with_figures(&ask.run, Purpose::Map)?, ..ask.clone() };
+    let ask = &Map { run: scene_file::with_figures(&ask.run, Purpose::Map, None)?, ..ask.clone() };
     let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
-    capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
+    let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
     let plan = Plan::new(&scene);
     plan.check()?;
+    if ask.dry_run {
+        return dry_run::run(ask, &scene, &plan, free);
+    }
     let interrupt = Interrupt::listen(ask.run.quiet)?;
-    interrupt.wait_for(Some("the engine is open"));
     let folder = open_folder(ask)?;
+    interrupt.ends_at_once(stopped::before_anything(ask, &plan), folder.leaver());
     let clock = Instant::now();
-    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, &folder))
+    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, folder.path()))
         .map_err(|failure| stopped::before_it_began(failure, ask, &folder, &plan))?;
     let opening = clock.elapsed();
+    interrupt.wait_for(None);
     if !ask.run.quiet && !why.is_empty() {
         say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
     }
@@ -62,7 +69,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         None => Progress::new(total, resumed_cells, unit(&plan), ask.run.quiet),
     };
     integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
-    interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.file.count()));
+    interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.file.count()), || {});
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
     let Kept { elapsed_before, clock, .. } = kept;
@@ -126,12 +133,12 @@ fn open_folder(ask: &Map) -> Result<Folder, Failure> {
 
 /// The engine that was asked for; where that is left open, an interrupted run goes on with
 /// its own.
-fn engine_of(ask: &Map, folder: &Folder) -> EngineOptions {
+fn engine_of(ask: &Map, folder: &Path) -> EngineOptions {
     let asked = ask.engine;
     if !ask.resume || asked.engine != EngineChoice::Auto || asked.precision.is_some() {
         return asked;
     }
-    match Identity::read(&folder.path().join(RECORDS)) {
+    match Identity::read(&folder.join(RECORDS)) {
         Ok(Some(identity)) if identity.engine() == "cpu" => {
             EngineOptions { engine: EngineChoice::Cpu, ..asked }
         }

@@ -5,9 +5,11 @@ pub mod bench;
 mod bifurcation;
 mod capacity;
 mod check;
+mod compare;
 mod completions;
 mod devices;
 mod engine_choice;
+mod environment;
 mod error;
 mod finished_map;
 mod interrupt;
@@ -25,8 +27,9 @@ use std::process::ExitCode;
 use arguments::{Bench, Cli, Command};
 
 pub use arguments::parsed;
+pub use environment::missing_variable;
 pub use error::{Failure, fail_if};
-pub use processor::{cores, name as processor_name};
+pub use processor::{MISFIT, cores, is_fit, name as processor_name};
 pub use progress::Progress;
 pub use say::note;
 
@@ -43,6 +46,7 @@ pub fn run() -> ExitCode {
         Command::Models(ask) => models::run(&ask),
         Command::Devices => devices::run(),
         Command::Validate(ask) => validate::run(&ask),
+        Command::Compare(ask) => compare::run(&ask),
         Command::Check(ask) => check::run(&ask),
         Command::Completions(ask) => completions::run(&ask),
         Command::Bench(Bench::Engines(ask)) => bench::run(&ask),

@@ -10,6 +10,7 @@ use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 use super::arguments::{DEFAULT_RESTITUTION, FigureFormat, Orbit};
 use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
+use super::say;
 use crate::map::scene;
 use crate::output::orbit::{Asked, Instant as At};
 use crate::output::{self, Folder};
@@ -35,7 +36,9 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     output::orbit::print(&*model, &orbit, &asked, ask.json)?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
-        output::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;
+        let files =
+            output::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;
+        say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
     }
     fail_if(failed, "the integration failed; `status` says why")
 }

@@ -45,19 +45,21 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     let sample = validate::sample(&plan, &records, ask.samples as usize, ask.seed);
     let count = sample.ids().len();
     let tell = |what: &str| (!ask.quiet).then(|| say::note(format_args!("{what}")));
-    tell(&format!("running the lanes of {count} cells again"));
+    tell(&format!("computing {count} cells of the map once more, on a graphics device if there is one"));
     let interrupted = |done: usize| {
         let path = dir.display();
         interrupt
             .failure(anyhow!("interrupted after {done} of {count} cells, and nothing was written to {path}"))
     };
-    interrupt.wait_for(Some("the engine is open"));
+    let path = dir.display();
+    let words = format!("none of {count} cells was replayed, and nothing was written to {path}");
+    interrupt.ends_at_once(words, folder.leaver());
     let again = run_again(&subject, &sample, &manifest.device, interrupt.raised());
     if !interrupt.wait_for(None) {
         return Err(interrupted(0));
     }
     let (lanes, note) = again?;
-    tell(&format!("replaying {count} cells"));
+    tell(&format!("replaying {count} cells without early stops: each may take its whole budget"));
     let progress = Progress::new(count, 0, "cells replayed", ask.quiet);
     let replayed = AtomicUsize::new(0);
     let report = |done| {

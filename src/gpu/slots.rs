@@ -6,7 +6,7 @@ use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
 use super::rounds::{bind, compacting, dispatch, row};
 use super::tables::Tables;
 use super::transfer::{buffer, from_reals, read, readback, upload};
-use super::{Gpu, GpuError, LaneSettings};
+use super::{Gpu, GpuError, LaneSettings, Precision};
 use crate::record::limits::LONGEST_CYCLE;
 
 /// Numbers of the queue before its lanes, and where they lie.
@@ -37,6 +37,14 @@ pub(super) struct Slots {
     count_readback: wgpu::Buffer,
     /// Workgroups in a row of the grid.
     row: u32,
+}
+
+/// Bytes of the device's memory that so many slots take.
+pub(super) fn bytes(slots: usize, precision: Precision) -> u64 {
+    let reals = size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>();
+    let reals = reals / size_of::<f64>() * precision.bytes();
+    let counts = size_of::<Finding>() + size_of::<Cell>() + size_of::<Tally>() + 3 * size_of::<u32>();
+    (slots * (reals + counts)) as u64
 }
 
 impl Slots {

@@ -41,6 +41,11 @@ impl Tables {
         self.constants[flow as usize].as_ref().map_or(0, |constants| constants.steps)
     }
 
+    /// Bytes of the device's memory.
+    pub(crate) fn bytes(&self) -> u64 {
+        [&self.flows, &self.shapes, &self.phasors, &self.laws].map(wgpu::Buffer::size).iter().sum()
+    }
+
     /// What each flow was derived to; none for a flow that lanes cannot carry.
     pub fn constants(&self) -> &[Option<Constants>] {
         &self.constants

@@ -97,6 +97,15 @@ impl Engine<'_> {
         }
     }
 
+    /// Bytes of a device's memory that the map takes at most; none where no device of its own is at work.
+    pub fn device_bytes(&self) -> Option<u64> {
+        match self {
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => Some(gpu.device_bytes()),
+            Engine::Cpu(_) | Engine::Fake(_) => None,
+        }
+    }
+
     /// The fewest cells that keep the engine busy: the size of the first batch.
     pub fn least_batch(&self) -> usize {
         match self {

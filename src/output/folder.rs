@@ -4,7 +4,7 @@
 mod lock;
 
 use std::borrow::Cow;
-use std::fs::{self, File};
+use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -62,9 +62,9 @@ pub enum FolderError {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    _lock: Lock,
+    lock: Lock,
     // Dropped after the lock, whose file lies in it.
-    _made: Made,
+    made: Made,
 }
 
 /// Folders that were made for a run, outermost first; those that hold nothing in the end go again.
@@ -109,9 +109,42 @@ impl Folder {
             Ok((Some(lock), made)) => match is_empty(&path) {
                 Err(reason) => Err(FolderError::NotWritable { path, reason }),
                 Ok(false) if !force => Err(FolderError::NotEmpty { path }),
-                Ok(_) => Ok(Folder { path, _lock: lock, _made: made }),
+                Ok(_) => Ok(Folder { path, lock, made }),
             },
         }
+    }
+
+    /// Looks whether a folder can be opened and the files `names` written there, and touches nothing: neither makes it
+    /// nor locks it.
+    ///
+    /// # Errors
+    /// As [`Folder::open`] and [`Folder::refuse_links`], as far as it can be seen.
+    pub fn check<'n>(
+        path: &Path,
+        force: bool,
+        names: impl IntoIterator<Item = &'n str>,
+    ) -> Result<(), FolderError> {
+        let own = || path.to_owned();
+        if path.exists() && !path.is_dir() {
+            return Err(FolderError::NotAFolder { path: own() });
+        }
+        let absolute = std::path::absolute(path).unwrap_or_else(|_| own());
+        let around = absolute.ancestors().find(|folder| folder.exists()).unwrap_or(path);
+        match fs::metadata(around) {
+            Ok(data) if data.is_dir() && !data.permissions().readonly() => {}
+            Ok(_) => {
+                let reason = io::Error::other(format!("{} cannot be written", around.display()));
+                return Err(FolderError::NotWritable { path: own(), reason });
+            }
+            Err(reason) => return Err(FolderError::NotWritable { path: own(), reason }),
+        }
+        if Lock::is_held(path) {
+            return Err(FolderError::InUse { path: own() });
+        }
+        if !force && path.is_dir() && !is_empty(path).unwrap_or(false) {
+            return Err(FolderError::NotEmpty { path: own() });
+        }
+        refuse_links_in(path, names)
     }
 
     /// Looks whether one of the files `names` is a symbolic link, before there is something to write to it.
@@ -119,12 +152,7 @@ impl Folder {
     /// # Errors
     /// [`FolderError::Link`] for the first one.
     pub fn refuse_links<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
-        let check = |name| {
-            let path = self.path.join(name);
-            refuse_link(&path).and_then(|()| refuse_link(&partial(&path)))
-        };
-        let checked = names.into_iter().try_for_each(check);
-        checked.map_err(|reason| FolderError::Link { path: self.path.clone(), reason })
+        refuse_links_in(&self.path, names)
     }
 
     /// Whether a folder has anything in it but what a run leaves that was killed before it kept anything.
@@ -132,6 +160,16 @@ impl Folder {
         let is_leftover =
             |entry: &fs::DirEntry| LEFTOVERS.into_iter().any(|leftover| entry.file_name() == leftover);
         fs::read_dir(path).is_ok_and(|entries| entries.flatten().any(|entry| !is_leftover(&entry)))
+    }
+
+    /// What leaves the folder as it was, as far as nothing was written to it, where the process is about to end without
+    /// dropping this.
+    pub fn leaver(&self) -> impl FnOnce() + Send + use<> {
+        let (lock, made) = (self.lock.path().to_owned(), Made(self.made.0.clone()));
+        move || {
+            let _ = fs::remove_file(lock);
+            drop(made);
+        }
     }
 
     /// Where it is, as the user named it.
@@ -156,7 +194,9 @@ impl Folder {
             return Err(OutputError::Write { path: target, reason: reason.into() });
         }
         // On the disk before it has its name, or a power cut leaves an empty file of that name.
-        let whole = || Ok(File::open(&partial)?.sync_all().and_then(|()| fs::rename(&partial, &target))?);
+        // Windows wants to see that whoever asks for it may write.
+        let synced = || OpenOptions::new().write(true).open(&partial)?.sync_all();
+        let whole = || Ok(synced().and_then(|()| fs::rename(&partial, &target))?);
         let written = write(&partial).and_then(|()| whole());
         if written.is_err() {
             // Best effort: the error that matters is the one already at hand.
@@ -189,6 +229,15 @@ impl Folder {
         }
         Ok(())
     }
+}
+
+fn refuse_links_in<'n>(folder: &Path, names: impl IntoIterator<Item = &'n str>) -> Result<(), FolderError> {
+    let check = |name| {
+        let path = folder.join(name);
+        refuse_link(&path).and_then(|()| refuse_link(&partial(&path)))
+    };
+    let checked = names.into_iter().try_for_each(check);
+    checked.map_err(|reason| FolderError::Link { path: folder.to_owned(), reason })
 }
 
 /// What a run that was killed at once may leave in a folder: nothing of value. Earlier versions left a probe.
@@ -263,6 +312,21 @@ mod tests {
         assert!(root.path().join("a/b/x").exists() && !inner.exists());
     }
 
+    /// As a process does that ends without dropping anything.
+    #[test]
+    fn a_folder_can_be_left_as_it_was() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = Folder::open(&root.path().join("a/b"), false).unwrap();
+        let leave = folder.leaver();
+        std::mem::forget(folder);
+        leave();
+        assert!(!root.path().join("a").exists());
+        fs::write(root.path().join("x"), "").unwrap();
+        let folder = Folder::open(root.path(), true).unwrap();
+        folder.leaver()();
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1, "what was there before stays");
+    }
+
     #[test]
     fn files_in_the_way_are_refused() {
         let root = tempfile::tempdir().unwrap();
@@ -299,6 +363,25 @@ mod tests {
         // What a killed process leaves is no lock.
         fs::write(root.path().join(LOCK), "").unwrap();
         Folder::open(root.path(), false).unwrap();
+    }
+
+    /// It says what opening says, and leaves no trace.
+    #[test]
+    fn a_folder_is_checked_without_being_touched() {
+        let root = tempfile::tempdir().unwrap();
+        let [new, file] = ["a/b", "file"].map(|name| root.path().join(name));
+        Folder::check(&new, false, ["x.txt"]).unwrap();
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
+        fs::write(&file, "").unwrap();
+        assert!(matches!(Folder::check(&file, true, []), Err(FolderError::NotAFolder { .. })));
+        assert!(matches!(Folder::check(&file.join("x"), true, []), Err(FolderError::NotWritable { .. })));
+        assert!(matches!(Folder::check(root.path(), false, []), Err(FolderError::NotEmpty { .. })));
+        Folder::check(root.path(), true, ["file"]).unwrap();
+        let folder = Folder::open(&new, false).unwrap();
+        assert!(matches!(Folder::check(&new, true, []), Err(FolderError::InUse { .. })));
+        drop(folder);
+        fs::create_dir_all(new.join("x.txt")).unwrap();
+        assert!(matches!(Folder::check(&new, true, ["x.txt"]), Err(FolderError::Link { .. })));
     }
 
     #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! One orbit on the terminal and in its folder: `orbit.json` and figures.
+//! One orbit on the terminal and in its folder: `orbit.json`, tables and figures.
 
 use std::fs;
 use std::time::{Duration, Instant as Clock};
@@ -8,16 +8,17 @@ use serde::Serialize;
 use super::inventory::{self, FileEntry};
 use super::manifest::{Head, MANIFEST, TimingsObject};
 use super::orbit_json::to_json;
+use super::orbit_spectrum::Spectrum;
 use super::orbit_summary::summary;
 use super::parameters::Parameters;
-use super::{Folder, OutputError, orbit_figures};
+use super::{Folder, OutputError, orbit_figures, orbit_tables};
 use crate::map::scene::Format;
 use rattlemap_dynamics::model::{Model, Oscillator, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
 /// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
 /// in meshing where that is more.
-fn samples_per_period(oscillator: &Oscillator) -> usize {
+pub(super) fn samples_per_period(oscillator: &Oscillator) -> usize {
     let Oscillator { masses: [m1, m2], gap: [g1, g2], free, meshing, omega, .. } = oscillator;
     // What a wall adds to the stiffness matrix is its own stiffness times g g'.
     let (i, square) = if *g2 == 0.0 { (0, g1 * g1) } else { (1, g1 * g2) };
@@ -27,6 +28,12 @@ fn samples_per_period(oscillator: &Oscillator) -> usize {
 }
 
 const JSON: &str = "orbit.json";
+const TRAJECTORY: &str = "trajectory.csv";
+const SPECTRUM: &str = "spectrum.csv";
+
+/// Samples in the table of the motion, and in a forcing period at least.
+const TABLED: usize = 2000;
+const LEAST_TABLED: usize = 50;
 
 /// What makes the folder again, and what is in it.
 #[derive(Serialize)]
@@ -67,7 +74,8 @@ pub struct Instant {
 
 /// Every file that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, JSON].into_iter().chain(orbit_figures::NAMES)
+    let figures = orbit_figures::NAMES.into_iter().chain(orbit_figures::spectrum::NAMES);
+    [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures)
 }
 
 /// Prints the orbit to stdout, as JSON or as a summary for the eye.
@@ -80,7 +88,8 @@ pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Res
     super::print(&text)
 }
 
-/// Writes the orbit and, unless it failed, its figures in these formats; the manifest last. Returns the number of files.
+/// Writes the orbit and, unless it failed, its tables, and its figures in these formats; the manifest last. Returns their
+/// names.
 ///
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
@@ -90,11 +99,10 @@ pub fn write(
     orbit: &Orbit,
     asked: &Asked,
     formats: &[Format],
-) -> Result<usize, OutputError> {
+) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
     // Figures of an earlier orbit must not stand beside this one.
-    folder.remove(&[MANIFEST, JSON])?;
-    folder.remove(&orbit_figures::NAMES)?;
+    folder.remove(&names().collect::<Vec<_>>())?;
     let json = to_json(model, orbit, asked.instant)?;
     folder.replace(JSON, |path| Ok(fs::write(path, json + "\n")?))?;
     let mut files = vec![JSON];
@@ -105,6 +113,16 @@ pub fn write(
             files.push(name);
             folder.replace(name, |path| Ok(save(path)?))
         })?;
+        write_trajectory(folder, model, orbit)?;
+        files.push(TRAJECTORY);
+        if let Some(spectrum) = Spectrum::of(model, orbit)? {
+            folder.replace(SPECTRUM, |path| orbit_tables::write_spectrum(path, &spectrum))?;
+            files.push(SPECTRUM);
+            orbit_figures::spectrum::write_each(model, orbit, &spectrum, formats, |name, save| {
+                files.push(name);
+                folder.replace(name, |path| Ok(save(path)?))
+            })?;
+        }
     }
     let listed = inventory::entries(folder, &files)?;
     let Settings { transient_periods, observed_periods, max_period } = asked.settings;
@@ -123,5 +141,15 @@ pub fn write(
         files: &listed,
     };
     inventory::write_manifest(folder, &manifest)?;
-    Ok(files.len() + 1)
+    files.push(MANIFEST);
+    Ok(files)
+}
+
+fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {
+    let (periods, oscillator) = (orbit.cycle_periods, model.oscillator()?);
+    let samples = TABLED.div_ceil(periods.max(1) as usize).max(LEAST_TABLED);
+    let trace = trace(model, orbit.strobe, orbit.strobe_meshing, periods, samples)?;
+    folder.replace(TRAJECTORY, |path| {
+        orbit_tables::write_trajectory(path, &model.state_names(), &oscillator, orbit, &trace, samples)
+    })
 }

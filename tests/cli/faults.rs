@@ -88,7 +88,7 @@ impl Bench {
     fn run(&self, arguments: &[&str], fault: Option<Fault<'_>>) -> Output {
         let path = self.folder.path();
         let mut command = Command::cargo_bin("rattlemap").unwrap();
-        command.current_dir(path).env("XDG_RUNTIME_DIR", path).args(arguments).timeout(LONGEST);
+        command.current_dir(path).args(arguments).timeout(LONGEST);
         command.env("VK_LAYER_PATH", path).env("VK_INSTANCE_LAYERS", "VK_LAYER_RATTLEMAP_faults");
         command.env("RATTLEMAP_CALLS", path.join("calls"));
         if let Some((call, from, result)) = fault {

@@ -1,8 +1,10 @@
 //! The program as scripts see it.
 
 mod bench;
+mod bifurcation;
 mod columns;
 mod commands;
+mod compare;
 #[cfg(unix)]
 mod faults;
 #[cfg(unix)]
@@ -11,5 +13,7 @@ mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;
 mod models;
+mod orbit_tables;
+mod systems;
 mod text;
 mod your_gears;

@@ -37,7 +37,7 @@ impl Folder {
     #[track_caller]
     fn says(&self, code: i32, environment: &[(&str, &str)], arguments: &[&str]) -> String {
         let mut command = Command::cargo_bin("rattlemap").unwrap();
-        command.env("XDG_RUNTIME_DIR", self.path()).envs(environment.iter().copied());
+        command.envs(environment.iter().copied());
         let run = command.current_dir(self.path()).args(arguments).assert().code(code);
         let output = run.get_output();
         let said = [&output.stdout[..], &output.stderr[..]].concat();

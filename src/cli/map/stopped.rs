@@ -16,6 +16,19 @@ pub(super) fn go_on(ask: &Map, plan: &Plan, done: usize) -> String {
     format!("{done} of {most}{total} {unit} are kept; go on with: {}", resume_command(ask))
 }
 
+/// The same while the engine is opened: nothing new is there to keep.
+pub(super) fn before_anything(ask: &Map, plan: &Plan) -> String {
+    match ask {
+        Map { resume: true, .. } => {
+            format!("what was kept before is kept; go on with: {}", resume_command(ask))
+        }
+        Map { run, .. } if run.force => {
+            format!("nothing in {} was touched; start again with: {}", run.out().display(), same_command(ask))
+        }
+        _ => go_on(ask, plan, 0),
+    }
+}
+
 /// Where the engine was left open: another can do it, but not go on with these records.
 pub(super) fn on_the_processor(ask: &Map) -> String {
     match ask.engine.engine {

@@ -20,15 +20,15 @@ pub(super) fn summary(
     let [periodic, chaotic, undecided, failed] = count_classes(cells.classes());
     let resumed = match run.resumed_cells {
         0 => String::new(),
-        cells => format!(", {cells} of them before"),
+        cells => format!(", {cells} of them kept before,"),
     };
     let per_step = lane_steps.filter(|&steps| steps > 0).map_or(String::new(), |steps| {
-        format!(", {} ns per lane-step", rounded(1e9 * integrating / steps as f64))
+        format!(", {} ns per step", rounded(1e9 * integrating / steps as f64))
     });
     let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
     format!(
-        "{integrated} {unit}{resumed} on {} ({}) in {integrating:.3} s: {:.0} {unit}/s, {:.0} lane-periods/s\
-         {per_step}; outputs {:.3} s\n{refined}\
+        "{integrated} {unit}{resumed} in {integrating:.3} s on {} ({}): {:.0} {unit}/s, {:.0} forcing periods/s\
+         {per_step}; files written in {:.3} s\n{refined}\
          {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
         run.engine,
         run.precision,

@@ -91,6 +91,12 @@ impl<'p> Gpu<'p> {
         if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
     }
 
+    /// Bytes of the device's memory that the plan takes at most, constants left out that are not kept.
+    pub(super) fn device_bytes(&self) -> u64 {
+        let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
+        self.device.bytes_of_lanes(self.plan.run_count()) + constants
+    }
+
     fn is_hardware(&self) -> bool {
         gpu::is_hardware(self.device.adapter())
     }

@@ -303,23 +303,24 @@ pub(super) fn read_outputs(
         Some(field) => field.choices(&QUANTITIES)?,
         None => vec![Quantity::Class, Quantity::Lyapunov],
     };
-    // A diagram's points have no fixed number per column, so there is no array of it.
-    let usual = match (purpose, is_list) {
-        (Purpose::Map, true) => vec![Format::Csv, Format::Npy],
-        (Purpose::Map, false) => vec![Format::Csv, Format::Npy, Format::Png, Format::Html],
-        (Purpose::Bifurcation, _) => vec![Format::Csv, Format::Png],
+    // A diagram's points have no fixed number per column, so there is no array of it; a list of cells has no picture.
+    let (usual, figures, remedy): (_, &[Format], _) = match (purpose, is_list) {
+        (Purpose::Map, true) => (
+            vec![Format::Csv, Format::Npy],
+            &[],
+            "a list of cells has no picture, it is written as csv and npy",
+        ),
+        (Purpose::Map, false) => {
+            (vec![Format::Csv, Format::Npy, Format::Png, Format::Html], &Format::FIGURES, "")
+        }
+        (Purpose::Bifurcation, _) => {
+            (vec![Format::Csv, Format::Png], &Format::FIGURES, "`bifurcation` writes csv, png, svg and pdf")
+        }
     };
     let Some(field) = section.get("files") else { return Ok(Outputs { quantities, files: usual }) };
     let files = field.choices(&FORMATS)?;
-    if let Some(i) = files
-        .iter()
-        .position(|format| !usual.contains(format) && (is_list || !Format::FIGURES.contains(format)))
-    {
+    if let Some(i) = files.iter().position(|format| !figures.contains(format) && !usual.contains(format)) {
         let name = files[i].name();
-        let remedy = match purpose {
-            Purpose::Map => "a list of cells has no picture, it is written as csv and npy",
-            Purpose::Bifurcation => "`bifurcation` writes csv, png, svg and pdf",
-        };
         return Err(field.conflict(format!("{remedy}; drop \"{name}\"")));
     }
     Ok(Outputs { quantities, files })

@@ -44,6 +44,19 @@ impl Lock {
     }
 }
 
+impl Lock {
+    /// Whether somebody holds the lock of a folder; takes none that lasts, and makes no file.
+    pub(super) fn is_held(folder: &Path) -> bool {
+        let file = OpenOptions::new().write(true).open(folder.join(LOCK));
+        file.is_ok_and(|file| matches!(FileExt::try_lock_exclusive(&file), Ok(false)))
+    }
+
+    /// Its file.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
 impl Drop for Lock {
     fn drop(&mut self) {
         // A file that stays is in nobody's way.

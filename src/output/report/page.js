@@ -4,7 +4,7 @@ const [columns, rows] = map.axes.map((axis) => axis.count);
 const byId = (id) => document.getElementById(id);
 const canvas = byId("canvas");
 const pen = canvas.getContext("2d");
-const MARGIN = { left: 78, right: 14, top: 10, bottom: 58 };
+const MARGIN = { left: 78, right: 28, top: 10, bottom: 58 };
 
 let values = {};
 // Four numbers per cell where cells follow their neighbours.

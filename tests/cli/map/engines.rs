@@ -11,9 +11,10 @@ fn lanes_give_the_same_files_and_classes() {
         let out = folder.path().join(precision);
         let run = map(&folder, &["--engine", "gpu", "--precision", precision, "--out", precision]);
         run.success().stdout("").stderr(says(&[
-            &format!("320 cells on gpu ({precision})"),
-            "lane-periods/s",
-            "ns per lane-step",
+            "320 cells in ",
+            &format!(" s on gpu ({precision}): "),
+            "forcing periods/s",
+            "ns per step",
         ]));
         assert_eq!(names(&out), names(&folder.path().join("cpu")));
         let (lanes_header, lanes) = rows(&out.join("cells.csv"));

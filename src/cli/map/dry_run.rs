@@ -1,0 +1,189 @@
+//! `rattlemap map --dry-run`: what a map would take. Nothing is written.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::anyhow;
+use serde_json::{Value, json};
+
+use super::forecast::Forecast;
+use super::{engine_of, order, unit};
+use crate::cli::arguments::Map;
+use crate::cli::capacity::{Free, bytes};
+use crate::cli::engine_choice::{self, Chosen};
+use crate::cli::error::Failure;
+use crate::cli::processor;
+use crate::map::engine::Engine;
+use crate::map::plan::Plan;
+use crate::map::scene::Scene;
+use crate::map::schedule::Schedule;
+use crate::map::size::Size;
+use crate::output::{self, Folder, Identity, RECORDS, RecordFile, RecordFileError};
+
+/// What is foreseen.
+struct Foreseen<'a> {
+    scene: &'a Scene,
+    plan: &'a Plan,
+    engine: &'a Engine<'a>,
+    why: String,
+    /// Runs that an interrupted run has kept.
+    kept: usize,
+    size: Size,
+    free: Free,
+    /// To open the engine.
+    opening: f64,
+    forecast: Forecast,
+}
+
+/// Checks what a run would check, times some cells and says what all of them take.
+pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(), Failure> {
+    let out = ask.run.out();
+    check_folder(ask, &out)?;
+    let clock = Instant::now();
+    let Chosen { mut engine, why } = engine_choice::open(plan, &engine_of(ask, &out))?;
+    let opening = clock.elapsed().as_secs_f64();
+    let kept = if ask.resume { kept(&out, scene, plan, &engine)? } else { 0 };
+    let left = plan.run_count().saturating_sub(kept);
+    let forecast = match left {
+        0 => Forecast { seconds: 0.0, interval: Some([0.0; 2]), sampled: 0 },
+        left => Forecast::of(plan, &mut engine, left).map_err(|error| Failure::Run(anyhow!("{error}")))?,
+    };
+    let size = Size::of(scene);
+    let foreseen = Foreseen { scene, plan, engine: &engine, why, kept, size, free, opening, forecast };
+    let text = if ask.json {
+        serde_json::to_string_pretty(&foreseen.object(&out)).map_err(output::OutputError::from)?
+    } else {
+        foreseen.text(&out)
+    };
+    Ok(output::print(&text)?)
+}
+
+/// Refuses a folder that a run would refuse, as far as that can be seen without making it.
+fn check_folder(ask: &Map, out: &Path) -> Result<(), Failure> {
+    if ask.resume && !out.join(RECORDS).is_file() && Folder::holds_results(out) {
+        return Err(RecordFileError::NothingToResume { folder: out.to_owned() }.into());
+    }
+    Ok(Folder::check(out, ask.run.force || ask.resume, output::map::names())?)
+}
+
+/// How many runs are kept of those that are asked for.
+fn kept(out: &Path, scene: &Scene, plan: &Plan, engine: &Engine<'_>) -> Result<usize, Failure> {
+    let path = out.join(RECORDS);
+    if !path.is_file() {
+        return Ok(0);
+    }
+    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
+    Ok(RecordFile::read(&path, &identity, order(&Schedule::new(plan)), |batch| plan.admits(batch))?.count)
+}
+
+impl Foreseen<'_> {
+    fn threads(&self) -> u64 {
+        processor::cores() as u64
+    }
+
+    fn is_gpu(&self) -> bool {
+        self.engine.device_bytes().is_some()
+    }
+
+    /// Bytes of the host's memory.
+    fn host(&self) -> u64 {
+        if self.is_gpu() { self.size.on_gpu() } else { self.size.on_cpu(self.threads()) }
+    }
+
+    /// Fewer cells of an adaptive map are integrated; nobody knows how many.
+    fn at_most(&self) -> &'static str {
+        if self.plan.refine().is_some() { "at most " } else { "" }
+    }
+
+    fn text(&self, out: &Path) -> String {
+        let Foreseen { scene, plan, engine, kept, size, free, forecast, .. } = self;
+        let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
+        let starts = match plan.start_count() {
+            1 => String::new(),
+            starts => format!(", {starts} starts each: {} runs", size.runs),
+        };
+        let kept =
+            if *kept > 0 { format!("; {kept} {} are kept already", unit(plan)) } else { String::new() };
+        let of = |free: Option<u64>| free.map_or(String::new(), |free| format!("; {} are free", bytes(free)));
+        let device = engine
+            .device_bytes()
+            .map_or(String::new(), |most| format!(", and up to {} on the device", bytes(most)));
+        let why = if self.why.is_empty() { String::new() } else { format!(": {}", self.why) };
+        let place = crate::cli::say::path(out);
+        [
+            format!("cells    {} = {}{starts}{kept}", counts.join(" x "), size.cells),
+            format!("engine   {} ({}) on {}{why}", engine.name(), engine.precision(), self.device()),
+            format!("memory   about {}{device}{}", bytes(self.host()), of(free.memory)),
+            format!("disk     about {}{} for {place}", bytes(size.disk), of(free.disk)),
+            format!("time     {}", self.time()),
+            format!("         from {} cells, computed and thrown away; {} more to open the engine, and tables and \
+                     figures come on top", forecast.sampled, in_words(self.opening)),
+            "nothing was written".to_owned(),
+        ]
+        .join("\n")
+    }
+
+    fn device(&self) -> String {
+        if self.is_gpu() { crate::cli::say::quoted(self.engine.device()) } else { processor::described() }
+    }
+
+    fn time(&self) -> String {
+        let Forecast { seconds, interval, .. } = self.forecast;
+        match interval {
+            None => format!("more than {}", in_words(seconds)),
+            Some([low, high]) if high > low => format!(
+                "{}about {} (95 %: {} to {})",
+                self.at_most(),
+                in_words(seconds),
+                in_words(low),
+                in_words(high)
+            ),
+            Some(_) => format!("{}about {}", self.at_most(), in_words(seconds)),
+        }
+    }
+
+    fn object(&self, out: &Path) -> Value {
+        let Foreseen { scene, plan, engine, size, free, forecast, .. } = self;
+        json!({
+            "folder": out.to_string_lossy(),
+            "cells": scene.cell_count(),
+            "runs": plan.run_count(),
+            "kept": self.kept,
+            "engine": engine.name(),
+            "precision": engine.precision(),
+            "device": engine.device(),
+            "why": self.why,
+            "memory_bytes": { "host": self.host(), "free": free.memory, "device": engine.device_bytes() },
+            "disk_bytes": { "needed": size.disk, "free": free.disk },
+            "seconds": {
+                "open": self.opening,
+                "integrate": forecast.seconds,
+                "interval": forecast.interval,
+            },
+            "is_upper_bound": self.plan.refine().is_some(),
+            "sampled": forecast.sampled,
+        })
+    }
+}
+
+/// A time in few digits.
+fn in_words(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.1} s"),
+        s if s < 600.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_units_that_fit() {
+        let told = [0.04, 9.4, 75.0, 600.0, 9000.0, 1e6].map(in_words);
+        assert_eq!(told, ["0.0 s", "9.4 s", "75 s", "10 min", "2.5 h", "11.6 days"]);
+    }
+}
