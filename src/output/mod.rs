@@ -33,6 +33,8 @@ pub mod plot_style;
 mod record_file;
 mod replay;
 mod report;
+#[cfg(test)]
+mod seen;
 mod stdout;
 mod symbols;
 pub mod unfinished;

@@ -38,7 +38,7 @@ const SCRIPT: &str = include_str!("report/page.js");
 struct Data<'a> {
     title: String,
     subtitle: String,
-    /// Every parameter that no axis sweeps, and what the model is taken from.
+    /// Every parameter that no axis sweeps, with its value or what it follows; and what the model is taken from.
     fixed: String,
     source: Option<&'static str>,
     axes: Vec<AxisData>,

@@ -551,7 +551,7 @@ function tellValidation(found) {
 async function start() {
   byId("title").textContent = map.title;
   byId("subtitle").textContent = map.subtitle;
-  byId("fixed").textContent = (map.fixed ? `Fixed: ${map.fixed}. ` : "") + (map.source ? `Model: \u201c${map.source}\u201d.` : "");
+  byId("fixed").textContent = (map.fixed ? `Other parameters: ${map.fixed}. ` : "") + (map.source ? `Model: \u201c${map.source}\u201d.` : "");
   byId("layers").append(...map.layers.map(({ short }, k) => {
     const button = element("button", short);
     button.type = "button";
