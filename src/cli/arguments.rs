@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use crate::cli::say;
 use crate::gpu::Precision;
 use crate::map::printable::is_printable;
-use crate::map::scene::Format;
+use crate::map::scene::{Along, Format};
 use crate::validate::DEFAULT_SAMPLES;
 use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -82,6 +82,7 @@ pub(crate) enum Command {
     /// a name) and WGPU_BACKEND (vulkan, metal, dx12) in the environment narrow the adapters down.
     Devices,
     Validate(Validate),
+    Compare(Compare),
     Check(Check),
     Completions(Completions),
     /// Measurements: how fast are maps on this machine's engines?
@@ -360,14 +361,48 @@ impl Orbit {
 /// Every contact and end of meshing against one parameter, as in the paper's Fig. 5
 ///
 /// Integrates each value of the scene's one axis on the event-driven reference and writes
-/// bifurcation.csv (one row per event), bifurcation.png and manifest.json. Each value is
+/// bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word,
+/// exponent and its error), bifurcation.png and manifest.json. Each value is
 /// integrated until it is decided; steps_per_period, early_stop and quantities are for maps.
+/// With start.policy=both the attractor is followed upwards and downwards, and where class or period differ is told.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
-    rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200")]
+    rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200\n\n\
+    And with hysteresis, up and down in one figure:\n  \
+    rattlemap bifurcation scenes/paper_fig5.toml --set start.policy=both\n\n\
+    One line of a map's plane:\n  \
+    rattlemap bifurcation scenes/e_omega.toml --along e --at omega=5.6")]
 pub(crate) struct Bifurcation {
     #[command(flatten)]
     pub(crate) run: SceneOptions,
+
+    /// The axis to run along, of a scene of two. What the scene asks of a map alone is left out ([refine],
+    /// start.count, html, npy). Writes to out/<scene's name>.NAME.OTHER=VALUE unless told
+    #[arg(long, value_name = "NAME")]
+    along: Option<String>,
+
+    /// Where the other axis stays: any value that the parameter may have, on the grid or not
+    #[arg(long, value_name = "NAME=VALUE", requires = "along", allow_hyphen_values = true)]
+    at: Vec<String>,
+}
+
+impl Bifurcation {
+    /// The line of a plane, if one was asked for.
+    pub(crate) fn along(&self) -> Option<Along> {
+        self.along.clone().map(|parameter| Along { parameter, at: self.at.clone() })
+    }
+
+    /// The folder to write to: a line of a map's scene has one beside the map's own.
+    pub(crate) fn out(&self) -> PathBuf {
+        let Some(along) = self.along.as_ref().filter(|_| self.run.out.is_none()) else {
+            return self.run.out();
+        };
+        let at: String =
+            self.at.iter().map(|at| format!(".{}", at.replace(char::is_whitespace, ""))).collect();
+        let mut name = self.run.scene.file_stem().unwrap_or_default().to_owned();
+        name.push(format!(".{along}{at}"));
+        Path::new("out").join(name)
+    }
 }
 
 /// What can be swept: the models, or one of them on a page
@@ -409,6 +444,51 @@ pub(crate) struct Validate {
     /// Decides which cells: the same seed, the same sample
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(crate) seed: u64,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Where two finished maps of one grid differ: by class, by period
+///
+/// For hysteresis (start.policy up against down), engine against engine, version against version. Other parameters may
+/// differ, and are named; the axes must have the same values. Writes compare.csv (one row per differing cell), compare.png
+/// and manifest.json. Of cells of one period it says in how many symmetry and words differ (an orbit and its mirror image
+/// have one word), and by how much exponents do at most. Filled cells count as any other.
+#[derive(Debug, Args)]
+#[command(after_help = "Example, the hysteresis of a plane:\n  \
+    rattlemap map scenes/e_omega.toml --set start.policy=up --out out/up\n  \
+    rattlemap map scenes/e_omega.toml --set start.policy=down --out out/down\n  \
+    rattlemap compare out/up out/down")]
+pub(crate) struct Compare {
+    /// The folder of a finished map
+    #[arg(value_name = "A")]
+    pub(crate) a: PathBuf,
+
+    /// The folder of another one
+    #[arg(value_name = "B")]
+    pub(crate) b: PathBuf,
+
+    /// Exit with code 1 if any cell differs
+    #[arg(long)]
+    pub(crate) fail: bool,
+
+    /// Where to write [default: out/compare/<A's name>-<B's name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Formats of the figure: some of png, svg, pdf
+    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',', default_value = "png")]
+    pub(crate) format: Vec<FigureFormat>,
+
+    /// Replace the files of an earlier comparison; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Also print one JSON object on stdout: who made the maps, what their scenes ask differently, and all counts
+    #[arg(long)]
+    pub(crate) json: bool,
 
     /// Say nothing unless something is wrong
     #[arg(long)]

@@ -11,34 +11,75 @@ use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress::Progress;
 use super::{say, scene_file};
+use crate::map::bifurcation::{Hysteresis, hysteresis};
 use crate::map::{bifurcation, plan, scene};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
-    let ask = &scene_file::with_figures(&ask.run, scene::Purpose::Bifurcation)?;
-    let scene = scene_file::load(&ask.scene, &ask.set, scene::Purpose::Bifurcation)?;
+    let (along, out) = (ask.along(), ask.out());
+    let (along, purpose) = (along.as_ref(), scene::Purpose::Bifurcation);
+    let ask = &scene_file::with_figures(&ask.run, purpose, along)?;
+    let scene = scene_file::load_along(&ask.scene, &ask.set, purpose, along)?;
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(ask.quiet)?;
-    let folder = Folder::open(&ask.out(), ask.force)?;
+    let folder = Folder::open(&out, ask.force)?;
     folder.refuse_links(output::bifurcation::NAMES)?;
     let cells = scene.line();
-    let progress = Progress::new(cells.len(), 0, "columns", ask.quiet);
+    let count = bifurcation::column_count(cells.len(), scene.start());
+    let progress = Progress::new(count, 0, "columns", ask.quiet);
     let clock = Instant::now();
     let ended = AtomicUsize::new(0);
     let report = |done| {
         ended.fetch_max(done, Ordering::Relaxed);
-        progress.report(done, cells.len());
+        progress.report(done, count);
     };
     let (start, settings, halt) = (scene.start(), scene.orbit_settings(), interrupt.raised());
     let Some(columns) = bifurcation::run_until(&cells, start, &settings, &report, halt)? else {
-        let (ended, all, path) = (ended.into_inner(), cells.len(), folder.path().display());
+        let (ended, all, path) = (ended.into_inner(), count, folder.path().display());
         let words = anyhow!(
             "interrupted after {ended} of {all} columns, and none is kept; nothing was written to {path}"
         );
         return Err(interrupt.failure(words));
     };
-    let files = output::bifurcation::write(&folder, &scene, &ask.set, &columns, clock.elapsed())?;
-    progress.finish(&format!("{}: {}", say::path(folder.path()), files.join(", ")));
+    let asked = output::bifurcation::Asked { sets: &ask.set, along };
+    let files = output::bifurcation::write(&folder, &scene, asked, &columns, clock.elapsed())?;
+    let name = &scene.axes()[0].parameter().name;
+    let differing = hysteresis(&columns).map(|found| format!("{}\n", told(&found, name)));
+    let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
+    progress.finish(&(differing.unwrap_or_default() + &files));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
     fail_if(all_failed, "every column failed; the status column says why")
+}
+
+/// Ranges that a message names; the manifest has all.
+const NAMED: usize = 6;
+
+/// Where the two passes disagree.
+fn told(found: &Hysteresis, name: &str) -> String {
+    let Hysteresis { columns, differing, ranges, by_word, word_ranges } = found;
+    let by_class = match differing {
+        0 => format!("up and down have the same class and period in all {columns} columns"),
+        _ => format!(
+            "up and down differ by class or period in {differing} of {columns} columns, at {name} = {}",
+            listed(ranges)
+        ),
+    };
+    match by_word {
+        0 => by_class,
+        _ => {
+            format!("{by_class}\nby word alone they differ in {by_word}, at {name} = {}", listed(word_ranges))
+        }
+    }
+}
+
+fn listed(ranges: &[[f64; 2]]) -> String {
+    let range = |[first, last]: &[f64; 2]| match first == last {
+        true => format!("{first:?}"),
+        false => format!("{first:?} to {last:?}"),
+    };
+    let mut list: Vec<String> = ranges.iter().take(NAMED).map(range).collect();
+    if ranges.len() > NAMED {
+        list.push(format!("{} more ranges", ranges.len() - NAMED));
+    }
+    list.join(", ")
 }

@@ -27,6 +27,8 @@ pub(crate) struct Manifest {
     pub(crate) engine: String,
     pub(crate) precision: String,
     pub(crate) device: String,
+    pub(crate) crate_version: String,
+    pub(crate) commit: String,
     sources: String,
     target: String,
     scene: String,
@@ -76,6 +78,21 @@ pub(crate) fn require_format(dir: &Path, manifest: &Value) -> anyhow::Result<()>
 impl Manifest {
     /// Reads the manifest of a map that this version made.
     pub(crate) fn read(dir: &Path) -> Result<Manifest, Failure> {
+        let manifest = Manifest::read_of_any_version(dir)?;
+        let own = env!("CARGO_PKG_VERSION");
+        if manifest.crate_version != own {
+            return Err(Failure::Usage(anyhow!(
+                "{}: the map was made by rattlemap {}, this is {own}; use that version, or make it again with \
+                 `rattlemap map --force`",
+                dir.join(MANIFEST).display(),
+                manifest.crate_version.escape_debug()
+            )));
+        }
+        Ok(manifest)
+    }
+
+    /// The same of a map that any version made which wrote this format: for those who compute nothing.
+    pub(crate) fn read_of_any_version(dir: &Path) -> Result<Manifest, Failure> {
         Manifest::of(dir).map_err(Failure::Usage)
     }
 
@@ -85,15 +102,6 @@ impl Manifest {
         if manifest["command"] != "map" {
             let made = manifest["command"].as_str().unwrap_or("something else").escape_debug();
             return Err(anyhow!("{}: this is not the manifest of a map, but of `{made}`", path.display()));
-        }
-        let (version, own) = (manifest["crate_version"].as_str().unwrap_or("?"), env!("CARGO_PKG_VERSION"));
-        if version != own {
-            return Err(anyhow!(
-                "{}: the map was made by rattlemap {}, this is {own}; use that version, or make it again with \
-                 `rattlemap map --force`",
-                path.display(),
-                version.escape_debug()
-            ));
         }
         require_format(dir, &manifest)?;
         serde_json::from_value(manifest)

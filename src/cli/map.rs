@@ -36,7 +36,7 @@ use summary::summary;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
-    let ask = &Map { run: scene_file::with_figures(&ask.run, Purpose::Map)?, ..ask.clone() };
+    let ask = &Map { run: scene_file::with_figures(&ask.run, Purpose::Map, None)?, ..ask.clone() };
     let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
     engine_choice::check(&ask.engine)?;
     let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;

@@ -5,6 +5,7 @@ pub mod bench;
 mod bifurcation;
 mod capacity;
 mod check;
+mod compare;
 mod completions;
 mod devices;
 mod engine_choice;
@@ -45,6 +46,7 @@ pub fn run() -> ExitCode {
         Command::Models(ask) => models::run(&ask),
         Command::Devices => devices::run(),
         Command::Validate(ask) => validate::run(&ask),
+        Command::Compare(ask) => compare::run(&ask),
         Command::Check(ask) => check::run(&ask),
         Command::Completions(ask) => completions::run(&ask),
         Command::Bench(Bench::Engines(ask)) => bench::run(&ask),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::arguments::{FigureFormat, SceneOptions};
-use crate::map::scene::{FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::map::scene::{Along, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 
 /// The `--set` that says what is written.
 const FILES: &str = "outputs.files=";
@@ -13,6 +13,19 @@ const FILES: &str = "outputs.files=";
 /// # Errors
 /// [`SceneError`] if the file cannot be read, or for the first thing wrong in it.
 pub(crate) fn load(path: &Path, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
+    load_along(path, sets, purpose, None)
+}
+
+/// The same where a diagram may run along one of several axes.
+///
+/// # Errors
+/// As [`load`].
+pub(crate) fn load_along(
+    path: &Path,
+    sets: &[String],
+    purpose: Purpose,
+    along: Option<&Along>,
+) -> Result<Scene, SceneError> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|error| SceneError {
         place: Place::File { file: name.as_str().into() },
@@ -22,7 +35,7 @@ pub(crate) fn load(path: &Path, sets: &[String], purpose: Purpose) -> Result<Sce
         let beside = path.parent().unwrap_or(Path::new("")).join(file);
         find(&beside)
     };
-    Scene::parse_beside(&text, &name, sets, purpose, &find)
+    Scene::parse_along(&text, &name, sets, purpose, along, &find)
 }
 
 /// Reads a table of cells.
@@ -39,14 +52,18 @@ pub(crate) fn find(path: &Path) -> Result<FileText, String> {
 /// The options with `--format` told as one more `--set`: that is what a manifest keeps and what resuming compares.
 ///
 /// # Errors
-/// As [`load`], where there is such an option.
-pub(crate) fn with_figures(options: &SceneOptions, purpose: Purpose) -> Result<SceneOptions, SceneError> {
+/// As [`load_along`], where there is such an option.
+pub(crate) fn with_figures(
+    options: &SceneOptions,
+    purpose: Purpose,
+    along: Option<&Along>,
+) -> Result<SceneOptions, SceneError> {
     let mut options = options.clone();
     let formats = FigureFormat::scene(&std::mem::take(&mut options.format));
     if formats.is_empty() {
         return Ok(options);
     }
-    let written = load(&options.scene, &options.set, purpose)?.outputs().files.clone();
+    let written = load_along(&options.scene, &options.set, purpose, along)?.outputs().files.clone();
     let others = written.into_iter().filter(|format| !Format::FIGURES.contains(format));
     let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
     options.set.retain(|set| !set.starts_with(FILES));

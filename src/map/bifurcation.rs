@@ -1,4 +1,8 @@
-//! Section points against one parameter, as in Fig. 5 of the paper.
+//! Section points and the motion's class against one parameter, as in Fig. 5 of the paper.
+
+mod hysteresis;
+
+pub use hysteresis::{Hysteresis, hysteresis};
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -7,19 +11,58 @@ use rayon::prelude::*;
 use crate::map::scene::Start;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, REST, Side, State};
-use rattlemap_dynamics::orbit::{self, Class, EventKind, Settings, Status};
+use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Settings, Status};
+use rattlemap_dynamics::word::Word;
 
-/// The attractor's section points at one value of the axis.
+/// The attractor at one value of the axis: what it is, and its section points.
 #[derive(Clone, Debug)]
 pub struct Column {
     /// Value of the axis parameter.
     pub value: f64,
+    /// Which way the attractor was followed, in a diagram that shows both; none in one of a single pass.
+    pub direction: Option<Direction>,
     /// What the motion is.
     pub class: Class,
     /// How the integration ended.
     pub status: Status,
+    /// Largest Lyapunov exponent per unit time; not a number where the integration failed.
+    pub lyapunov: f64,
+    /// Its standard error where it is an average; none for periodic motion.
+    pub lyapunov_error: Option<f64>,
+    /// Impacts per forcing period, starts of meshing not counted; not a number where the integration failed.
+    pub impacts_per_period: f64,
+    /// Fraction of the time spent meshing; not a number where the integration failed.
+    pub mesh_fraction: f64,
+    /// Whether a periodic orbit is its own mirror image.
+    pub symmetric: Option<bool>,
+    /// The word of a periodic orbit.
+    pub word: Option<Word>,
+    /// Forcing periods that the motion was followed for.
+    pub periods_run: u64,
     /// Every crossing of a wall: contacts and ends of meshing.
     pub points: Vec<SectionPoint>,
+}
+
+/// Which way the attractor was followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// From the first value to the last.
+    Up,
+    /// From the last value to the first.
+    Down,
+}
+
+impl Direction {
+    /// Both, in the order in which they are shown.
+    pub const BOTH: [Direction; 2] = [Direction::Up, Direction::Down];
+
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Direction::Up => "up",
+            Direction::Down => "down",
+        }
+    }
 }
 
 /// One event seen as a point of the section `|z| = b`.
@@ -37,10 +80,17 @@ pub struct SectionPoint {
     pub after: State,
 }
 
+/// How many columns a diagram of so many cells has.
+pub fn column_count(cells: usize, start: Start) -> usize {
+    if start == Start::Both { 2 * cells } else { cells }
+}
+
 /// Integrates every cell; `progress` is told how many columns are done so far.
 ///
 /// Columns that start from one state are independent and run in parallel; columns that
-/// follow the attractor run one after the other, the first of them from rest.
+/// follow the attractor run one after the other, the first of them from rest. With
+/// [`Start::Both`] there are two columns per cell, all those followed upwards first; the two
+/// passes run side by side. Columns are in the order of their cells.
 ///
 /// # Errors
 /// [`ModelError`] of a cell that has no motion, before any is integrated.
@@ -67,76 +117,120 @@ pub fn run_until(
     halt: &AtomicBool,
 ) -> Result<Option<Vec<Column>>, ModelError> {
     cells.iter().try_for_each(|(_, model)| Flow::validate(&**model).map(|_| ()))?;
+    let run = Run { cells, settings, progress, done: AtomicUsize::new(0), halt };
     match start {
-        Start::Rest => side_by_side(cells, REST, settings, progress, halt),
-        Start::State(state) => side_by_side(cells, state, settings, progress, halt),
-        Start::Up => follow(cells.iter(), settings, progress, halt),
-        Start::Down => {
-            let columns = follow(cells.iter().rev(), settings, progress, halt)?;
-            Ok(columns.map(|columns| columns.into_iter().rev().collect()))
+        Start::Rest => run.side_by_side(REST),
+        Start::State(state) => run.side_by_side(state),
+        Start::Up => run.follow(Direction::Up),
+        Start::Down => run.follow(Direction::Down),
+        Start::Both => {
+            let (up, down) = rayon::join(|| run.follow(Direction::Up), || run.follow(Direction::Down));
+            let marked = |columns: Vec<Column>, direction| {
+                columns.into_iter().map(move |column| Column { direction: Some(direction), ..column })
+            };
+            let both = up?.zip(down?);
+            Ok(both
+                .map(|(up, down)| marked(up, Direction::Up).chain(marked(down, Direction::Down)).collect()))
         }
     }
 }
 
-fn side_by_side(
-    cells: &[(f64, Box<dyn Model>)],
-    start: State,
-    settings: &Settings,
-    progress: &(dyn Fn(usize) + Sync),
-    halt: &AtomicBool,
-) -> Result<Option<Vec<Column>>, ModelError> {
-    let done = AtomicUsize::new(0);
-    cells
-        .par_iter()
-        .map(|(value, model)| {
-            let Some((column, _)) = column(*value, &**model, start, settings, halt)? else { return Ok(None) };
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-            Ok(Some(column))
-        })
-        .collect()
+/// What all columns share.
+struct Run<'a> {
+    cells: &'a [(f64, Box<dyn Model>)],
+    settings: &'a Settings,
+    progress: &'a (dyn Fn(usize) + Sync),
+    done: AtomicUsize,
+    halt: &'a AtomicBool,
 }
 
-fn follow<'a>(
-    cells: impl Iterator<Item = &'a (f64, Box<dyn Model>)>,
-    settings: &Settings,
-    progress: &(dyn Fn(usize) + Sync),
-    halt: &AtomicBool,
-) -> Result<Option<Vec<Column>>, ModelError> {
-    let mut start = REST;
-    cells
-        .enumerate()
-        .map(|(i, (value, model))| {
-            let Some((column, end)) = column(*value, &**model, start, settings, halt)? else {
-                return Ok(None);
-            };
+impl Run<'_> {
+    fn side_by_side(&self, start: State) -> Result<Option<Vec<Column>>, ModelError> {
+        let column = |(value, model): &(f64, Box<dyn Model>)| {
+            Ok(self.column(*value, &**model, start)?.map(|(column, _)| column))
+        };
+        self.cells.par_iter().map(column).collect()
+    }
+
+    fn follow(&self, direction: Direction) -> Result<Option<Vec<Column>>, ModelError> {
+        let cells: Box<dyn Iterator<Item = _>> = match direction {
+            Direction::Up => Box::new(self.cells.iter()),
+            Direction::Down => Box::new(self.cells.iter().rev()),
+        };
+        let mut start = REST;
+        let column = |(value, model): &(f64, Box<dyn Model>)| {
+            let Some((column, end)) = self.column(*value, &**model, start)? else { return Ok(None) };
             start = end;
-            progress(i + 1);
             Ok(Some(column))
-        })
-        .collect()
+        };
+        let mut columns = cells.map(column).collect::<Result<Option<Vec<Column>>, ModelError>>()?;
+        if let (Direction::Down, Some(columns)) = (direction, &mut columns) {
+            columns.reverse();
+        }
+        Ok(columns)
+    }
+
+    /// One column, and a state on its attractor to start the next one from; none once the flag is raised.
+    fn column(
+        &self,
+        value: f64,
+        model: &dyn Model,
+        start: State,
+    ) -> Result<Option<(Column, State)>, ModelError> {
+        let shown = self.settings.observed_periods;
+        let Some(orbit) = orbit::analyse_until(model, start, self.settings, shown, self.halt)? else {
+            return Ok(None);
+        };
+        let end = if orbit.class == Class::Failed { REST } else { orbit.strobe };
+        (self.progress)(self.done.fetch_add(1, Ordering::Relaxed) + 1);
+        Ok(Some((Column::of(value, orbit), end)))
+    }
 }
 
-/// One column, and a state on its attractor to start the next one from; none once the flag is raised.
-fn column(
-    value: f64,
-    model: &dyn Model,
-    start: State,
-    settings: &Settings,
-    halt: &AtomicBool,
-) -> Result<Option<(Column, State)>, ModelError> {
-    let shown = settings.observed_periods;
-    let Some(orbit) = orbit::analyse_until(model, start, settings, shown, halt)? else { return Ok(None) };
-    let end = if orbit.class == Class::Failed { REST } else { orbit.strobe };
-    let points = orbit
-        .events
-        .iter()
-        .map(|event| SectionPoint {
+#[cfg(test)]
+impl Column {
+    /// A column without points, of which only this is told.
+    pub(crate) fn plain(value: f64, class: Class) -> Column {
+        Column {
+            value,
+            direction: None,
+            class,
+            status: Status::Ok,
+            lyapunov: 0.0,
+            lyapunov_error: None,
+            impacts_per_period: 0.0,
+            mesh_fraction: 0.0,
+            symmetric: None,
+            word: None,
+            periods_run: 0,
+            points: Vec::new(),
+        }
+    }
+}
+
+impl Column {
+    fn of(value: f64, orbit: Orbit) -> Column {
+        let point = |event: &orbit::Event| SectionPoint {
             side: event.side,
             kind: event.kind,
             t_mod_period: event.t_mod_period,
             before: event.before,
             after: event.after,
-        })
-        .collect();
-    Ok(Some((Column { value, class: orbit.class, status: orbit.status, points }, end)))
+        };
+        let is_periodic = matches!(orbit.class, Class::Periodic { .. });
+        Column {
+            value,
+            direction: None,
+            class: orbit.class,
+            status: orbit.status,
+            lyapunov: orbit.lyapunov,
+            lyapunov_error: orbit.lyapunov_error,
+            impacts_per_period: orbit.impacts_per_period,
+            mesh_fraction: orbit.mesh_fraction,
+            symmetric: orbit.symmetric,
+            periods_run: orbit.periods_run,
+            points: orbit.events.iter().map(point).collect(),
+            word: is_periodic.then_some(orbit.word),
+        }
+    }
 }

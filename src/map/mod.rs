@@ -1,7 +1,8 @@
 //! Maps: many motions. A scene says what is asked ([`scene`]); its cells are numbered ([`plan`])
 //! and put in order ([`schedule`]); an engine takes them up and hands back records ([`engine`],
 //! [`sweep`]). Over one axis it is a bifurcation diagram ([`bifurcation`]); several starts per cell
-//! count attractors ([`coexistence`]); what changed nothing is named ([`effect`]). [`run`] does all of it at once.
+//! count attractors ([`coexistence`]); two maps of one grid are compared ([`compare`]); what changed nothing is named
+//! ([`effect`]). [`run`] does all of it at once.
 
 pub mod expression;
 pub mod printable;
@@ -19,6 +20,7 @@ pub mod sweep;
 
 pub mod bifurcation;
 pub mod coexistence;
+pub mod compare;
 pub mod effect;
 
 #[cfg(not(target_arch = "wasm32"))]

@@ -5,6 +5,7 @@
 //! later. `--set` arguments are applied before anything is checked, so a value is judged
 //! the same way wherever it came from.
 
+mod along;
 mod axis;
 mod builder;
 mod derived;
@@ -22,6 +23,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+pub use along::Along;
 pub use axis::{Axis, MAX_COUNT, Scale};
 pub use builder::SceneBuilder;
 pub(crate) use derived::Rule;
@@ -105,6 +107,22 @@ impl Scene {
         purpose: Purpose,
         find: FindFile<'_>,
     ) -> Result<Scene, SceneError> {
+        Scene::parse_along(text, name, sets, purpose, None, find)
+    }
+
+    /// The same where a bifurcation diagram may run along one of several axes. Of such a scene, what its text asks of a
+    /// map alone is left out: `[refine]`, further starts, files that diagrams have not.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first thing that is wrong, in the scene or in `along`.
+    pub fn parse_along(
+        text: &str,
+        name: &str,
+        sets: &[String],
+        purpose: Purpose,
+        along: Option<&Along>,
+        find: FindFile<'_>,
+    ) -> Result<Scene, SceneError> {
         let mut document = document::read(text, name)?;
         for set in sets {
             overrides::apply(&mut document, set)?;
@@ -112,7 +130,11 @@ impl Scene {
         if let Some(model) = Section::open(&document, "", &TOP_LEVEL)?.get("model") {
             model.choice(&[(DEFAULT_MODEL, ())])?;
         }
-        Scene::read(text.to_owned(), &document, &GearPair::paper(0.0), purpose, find)
+        let model = GearPair::paper(0.0);
+        if purpose == Purpose::Bifurcation {
+            along::take(&mut document, &model, along)?;
+        }
+        Scene::read(text.to_owned(), &document, &model, purpose, find)
     }
 
     /// A scene without a file: see [`SceneBuilder`].
@@ -149,7 +171,7 @@ impl Scene {
             text,
             title: title.unwrap_or_else(|| default_title(model, &points)),
             integration: settings::read_integration(&root)?,
-            start: start::read(&root, model)?,
+            start: start::read(&root, model, purpose)?,
             draw: start::read_draw(&root, purpose)?,
             refine: settings::read_refine(&root, purpose)?,
             outputs: settings::read_outputs(&root, purpose, is_list)?,

@@ -1,21 +1,34 @@
-//! The folder of a bifurcation diagram: table, figure and manifest.
+//! The folder of a bifurcation diagram: tables, figure and manifest.
 
 use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
-use super::symbols::axis_label;
-use super::{Folder, OutputError, bifurcation_csv, bifurcation_figure, caption, inventory};
+use super::plot_style::axes::Scale;
+use super::symbols::{axis_label, symbol};
+use super::{
+    Folder, OutputError, bifurcation_columns_csv, bifurcation_csv, bifurcation_figure, caption, inventory,
+};
 use crate::map::bifurcation::Column;
-use crate::map::scene::{Format, Scene};
+use crate::map::scene::{self, Along, Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
+const COLUMNS_CSV: &str = "bifurcation_columns.csv";
 /// The figure, by format.
 const FIGURES: [(Format, &str); 3] =
     [(Format::Png, "bifurcation.png"), (Format::Svg, "bifurcation.svg"), (Format::Pdf, "bifurcation.pdf")];
 
 /// Every file that a bifurcation diagram may write.
-pub const NAMES: [&str; 5] = [MANIFEST, CSV, FIGURES[0].1, FIGURES[1].1, FIGURES[2].1];
+pub const NAMES: [&str; 6] = [MANIFEST, CSV, COLUMNS_CSV, FIGURES[0].1, FIGURES[1].1, FIGURES[2].1];
+
+/// How a diagram was asked for, beside its scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    /// The `--set` arguments.
+    pub sets: &'a [String],
+    /// The line of a scene of several axes.
+    pub along: Option<&'a Along>,
+}
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one
 /// is complete. Returns the files' names.
@@ -25,7 +38,7 @@ pub const NAMES: [&str; 5] = [MANIFEST, CSV, FIGURES[0].1, FIGURES[1].1, FIGURES
 pub fn write(
     folder: &Folder,
     scene: &Scene,
-    sets: &[String],
+    asked: Asked<'_>,
     columns: &[Column],
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
@@ -39,19 +52,38 @@ pub fn write(
         folder.replace(CSV, |path| {
             bifurcation_csv::write(path, &parameter.name, &scene.base().state_names(), columns)
         })?;
-        files.push(CSV);
+        folder.replace(COLUMNS_CSV, |path| bifurcation_columns_csv::write(path, &parameter.name, columns))?;
+        files.extend([CSV, COLUMNS_CSV]);
     }
     for (_, name) in FIGURES.into_iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
-        let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
+        let subtitle =
+            format!("{}{}; {}", line(asked.along), scene.start().in_words(), caption::of_scene(scene));
+        let scale = match scene.axes()[0].scale() {
+            scene::Scale::Log => Scale::Logarithmic,
+            scene::Scale::Linear | scene::Scale::Values => Scale::Linear,
+        };
         folder.replace(name, |path| {
-            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], &label, columns)?)
+            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], (&label, scale), columns)?)
         })?;
         files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;
     let times = [elapsed, clock.elapsed()];
-    inventory::write_manifest(folder, &Manifest::new(scene, sets, columns, times, &listed))?;
+    inventory::write_manifest(folder, &Manifest::new(scene, asked, columns, times, &listed))?;
     files.push(MANIFEST);
     Ok(files)
+}
+
+/// Of a line of a plane, which one it is: the scene's title is that of a map.
+fn line(along: Option<&Along>) -> String {
+    let Some(Along { parameter, at }) = along.filter(|along| !along.at.is_empty()) else {
+        return String::new();
+    };
+    let at: Vec<String> = at
+        .iter()
+        .filter_map(|at| at.split_once('='))
+        .map(|(name, value)| format!("{} = {}", symbol(name.trim()), value.trim()))
+        .collect();
+    format!("along {} at {}, ", symbol(parameter), at.join(", "))
 }

@@ -21,7 +21,8 @@ pub(super) fn write(path: &Path, axis: &str, names: &[&str], columns: &[Column])
     let mut table = csv::Writer::from_path(path)?;
     let before: Vec<String> = names.iter().map(|name| format!("{name}_before")).collect();
     let states = before.iter().map(String::as_str).chain(names.iter().copied());
-    table.write_record([axis, "class", "period", "status"].into_iter().chain(POINT_FIELDS).chain(states))?;
+    let first = [axis].into_iter().chain(direction_field(columns)).chain(["class", "period", "status"]);
+    table.write_record(first.chain(POINT_FIELDS).chain(states))?;
     for column in columns {
         let head = head(column);
         for point in &column.points {
@@ -35,14 +36,20 @@ pub(super) fn write(path: &Path, axis: &str, names: &[&str], columns: &[Column])
     Ok(table.flush()?)
 }
 
-fn head(column: &Column) -> [String; 4] {
+/// The name of a field that only diagrams with both passes have.
+pub(super) fn direction_field(columns: &[Column]) -> Option<&'static str> {
+    columns.iter().any(|column| column.direction.is_some()).then_some("direction")
+}
+
+fn head(column: &Column) -> Vec<String> {
     let period = names::period(column.class).map(|period| period.to_string());
-    [
-        float(column.value),
+    let direction = column.direction.map(|direction| direction.name().to_owned());
+    let rest = [
         names::class(column.class).to_owned(),
         period.unwrap_or_default(),
         names::status(column.status).to_owned(),
-    ]
+    ];
+    [float(column.value)].into_iter().chain(direction).chain(rest).collect()
 }
 
 fn fields(point: &SectionPoint, components: usize) -> impl Iterator<Item = String> {
@@ -53,15 +60,16 @@ fn fields(point: &SectionPoint, components: usize) -> impl Iterator<Item = Strin
 }
 
 /// The shortest decimal that reads back as the same number; empty where there is none.
-fn float(x: f64) -> String {
+pub(super) fn float(x: f64) -> String {
     if x.is_finite() { format!("{x:?}") } else { String::new() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::bifurcation::Direction;
     use rattlemap_dynamics::model::Side;
-    use rattlemap_dynamics::orbit::{Class, EventKind, Status};
+    use rattlemap_dynamics::orbit::{Class, EventKind};
 
     #[test]
     fn one_row_per_point_and_one_for_none() {
@@ -72,7 +80,7 @@ mod tests {
             before: [1.0, -2.0, 1.5, 1e-7],
             after: [1.0, 0.1 + 0.2, 1.5, f64::NAN],
         };
-        let column = |value, class, points| Column { value, class, status: Status::Ok, points };
+        let column = |value, class, points| Column { points, ..Column::plain(value, class) };
         let columns = [
             column(0.25, Class::Periodic { period: 2 }, vec![point, point]),
             column(1.0, Class::Chaotic, vec![]),
@@ -85,6 +93,13 @@ mod tests {
             "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2\n\
              {row}\n{row}\n1.0,chaotic,,ok,,,,,,,,,,,\n"
         );
-        assert_eq!(std::fs::read_to_string(path).unwrap(), expected);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);
+        let up = Column { direction: Some(Direction::Up), ..columns[1].clone() };
+        write(&path, "e", &["x1", "v1"], &[up]).unwrap();
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(
+            text.starts_with("e,direction,class,") && text.ends_with("\n1.0,up,chaotic,,ok,,,,,,,\n"),
+            "{text}"
+        );
     }
 }

@@ -1,18 +1,23 @@
-//! Section points against one parameter, drawn like Fig. 5 of the paper.
+//! Section points against one parameter, drawn like Fig. 5 of the paper; below them the largest Lyapunov exponent.
+
+mod exponents;
 
 use std::path::Path;
 
-use super::plot_style::axes::{Axis, Frame};
+use super::plot_style::axes::{Axis, Frame, Scale};
 use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{Bitmap, Canvas, FAINT, Marker, RGBColor, Rect, Shape, save_figure, wall_color};
 use super::{DrawError, FigureError};
-use crate::map::bifurcation::Column;
+use crate::map::bifurcation::{Column, Direction, SectionPoint};
+use exponents::class_color;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
 
-const SIZE: (u32, u32) = (1600, 1400);
+const SIZE: (u32, u32) = (1600, 1750);
 const LEFT: f64 = 130.0;
 const BETWEEN: f64 = 30.0;
+/// Height of the panel of exponents, as a share of another one's.
+const LOWEST: f64 = 0.6;
 /// Height of the strip that holds the marks of columns without an attractor.
 const MARKS: f64 = 16.0;
 /// Opacity of a place that a single point falls on; more points add to it.
@@ -23,83 +28,159 @@ const DOT: (f64, f64) = (0.7, 2.2);
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
 
-/// Draws the displacement of both gears at every section point `|z| = b` in the format that the file's name
-/// tells.
+/// Draws the displacement of both gears at every section point `|z| = b`, and the largest Lyapunov exponent of each
+/// column, in the format that the file's name tells.
 ///
 /// One dot per point, coloured by wall; where dots pile up they darken with the
-/// logarithm of their number, so that the density of a chaotic band shows. Columns
+/// logarithm of their number, so that the density of a chaotic band shows. Of two passes the dots are
+/// coloured by the direction instead, and grey where both have been. Columns
 /// that are undecided or failed get a mark at the lower edge. No column, no point and
-/// values that are not finite are all accepted.
+/// values that are not finite are all accepted. `axis` is the parameter's label and how its values lie.
 ///
 /// # Errors
 /// A file that cannot be written, by name.
 pub fn write(
     path: &Path,
     [title, subtitle]: [&str; 2],
-    axis_label: &str,
+    axis: (&str, Scale),
     columns: &[Column],
 ) -> Result<(), FigureError> {
-    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis_label, columns))
+    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis, columns))
+}
+
+/// What colours tell apart.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Look {
+    /// The walls of one pass; its exponents by class.
+    Walls,
+    /// Two passes.
+    Directions,
+}
+
+impl Look {
+    fn of(columns: &[Column]) -> Look {
+        let has_directions = columns.iter().any(|column| column.direction.is_some());
+        if has_directions { Look::Directions } else { Look::Walls }
+    }
+
+    /// The passes, in the order in which they are drawn.
+    fn passes(self) -> &'static [Option<Direction>] {
+        match self {
+            Look::Walls => &[None],
+            Look::Directions => &[Some(Direction::Up), Some(Direction::Down)],
+        }
+    }
+
+    /// Whether classes are told by strips, since colours tell something else.
+    fn has_strips(self) -> bool {
+        self == Look::Directions
+    }
+
+    /// Which of the two colours of dots a point has.
+    fn place(self, column: &Column, point: &SectionPoint) -> usize {
+        match self {
+            Look::Walls => point.side as usize,
+            Look::Directions => usize::from(column.direction == Some(Direction::Down)),
+        }
+    }
+}
+
+/// The two colours of dots are the walls'; mixed half and half they are grey.
+fn direction_color(direction: Direction) -> RGBColor {
+    match direction {
+        Direction::Up => wall_color(Side::Right),
+        Direction::Down => wall_color(Side::Left),
+    }
 }
 
 fn draw(
     canvas: &Canvas<'_>,
     [title, subtitle]: [&str; 2],
-    axis_label: &str,
+    axis: (&str, Scale),
     columns: &[Column],
 ) -> Result<(), DrawError> {
     let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
-    let top = draw_head(canvas, title, subtitle, &legend(!left_out.is_empty()))? + 14.0;
+    let look = Look::of(columns);
+    let top = draw_head(canvas, title, subtitle, &legend(columns, look))? + 14.0;
     let whole = canvas.panel(LEFT, top);
-    let bottom = whole.bottom;
-    let middle = (top + bottom) / 2.0;
-    let panels = [
-        (0, "x\u{2081} at |z| = b", top, middle - BETWEEN / 2.0),
-        (2, "x\u{2082} at |z| = b", middle + BETWEEN / 2.0, bottom),
-    ];
-    for (component, label, top, bottom) in panels {
+    let height = (whole.bottom - top - 2.0 * BETWEEN) / (2.0 + LOWEST);
+    let x = value_axis(axis, columns);
+    for (component, label, top) in
+        [(0, "x\u{2081} at |z| = b", top), (2, "x\u{2082} at |z| = b", top + height + BETWEEN)]
+    {
         let values = columns.iter().flat_map(|c| &c.points).map(|p| p.before[component]);
-        let mut frame = Frame {
-            rect: Rect { top, bottom, ..whole },
-            x: value_axis(axis_label, columns),
-            y: Axis::around(label, values, 1e-6),
-        };
+        let bottom = top + height;
+        let y = Axis::around(label, values, 1e-6);
+        let mut frame = Frame { rect: Rect { top, bottom, ..whole }, x: x.clone(), y };
         // The marks must not lie on data.
-        frame.y.low -= (frame.y.high - frame.y.low) * MARKS / (bottom - top);
+        frame.y.low -= (frame.y.high - frame.y.low) * MARKS / height;
         frame.draw_grid(canvas)?;
-        draw_points(canvas, &frame, component, columns)?;
+        draw_points(canvas, &frame, component, columns, look)?;
         for value in left_out.iter().filter(|v| v.is_finite()) {
             let x = frame.at(*value, 0.0).0;
             canvas.stroke(&[(x, bottom - MARKS + 2.0), (x, bottom)], 1.2, FAINT)?;
         }
-        frame.draw_axes(canvas, component == 2)?;
+        frame.draw_axes(canvas, false)?;
     }
-    Ok(())
+    let rect = Rect { top: top + 2.0 * (height + BETWEEN), ..whole };
+    let strips = if look.has_strips() { look.passes().len() } else { 0 };
+    let y = exponents::axis(columns, strips, rect.bottom - rect.top);
+    let frame = Frame { rect, x, y };
+    frame.draw_grid(canvas)?;
+    exponents::draw(canvas, &frame, columns, look)?;
+    frame.draw_axes(canvas, true)
 }
 
 fn is_left_out(column: &Column) -> bool {
     matches!(column.class, Class::Undecided | Class::Failed)
 }
 
-fn legend(left_out: bool) -> Vec<Entry> {
-    let wall = |side, text| {
-        let marker = Marker { shape: Shape::Circle, color: wall_color(side), radius: 6.0, hollow: false };
+fn legend(columns: &[Column], look: Look) -> Vec<Entry> {
+    let dot = |color, text| {
+        let marker = Marker { shape: Shape::Circle, color, radius: 6.0, hollow: false };
         Entry::new(Key::Marker(marker), text)
     };
-    let mut entries =
-        vec![wall(Side::Right, "right wall, z = +b"), wall(Side::Left, "left wall, z = \u{2212}b")];
-    if left_out {
+    let patch = |color, opacity, text| Entry::new(Key::Patch { color, opacity }, text);
+    let has = |index: usize| columns.iter().any(|column| column.class.index() == index);
+    let is_periodic = has(Class::Periodic { period: 1 }.index());
+    let is_chaotic = has(Class::Chaotic.index());
+    let periodic = class_color(Class::Periodic { period: 1 });
+    let chaotic = class_color(Class::Chaotic);
+    let mut entries = Vec::new();
+    match look {
+        Look::Walls => {
+            entries.push(dot(wall_color(Side::Right), "right wall, z = +b"));
+            entries.push(dot(wall_color(Side::Left), "left wall, z = \u{2212}b"));
+            entries.extend(is_periodic.then(|| dot(periodic, "\u{3bb}: periodic")));
+            entries.extend(is_chaotic.then(|| dot(chaotic, "\u{3bb}: chaotic")));
+        }
+        Look::Directions => {
+            entries.push(dot(direction_color(Direction::Up), "followed upwards"));
+            entries.push(dot(direction_color(Direction::Down), "downwards"));
+            entries.push(dot(mixed(0.5), "both"));
+            entries.extend(is_periodic.then(|| patch(periodic, 1.0, "periodic")));
+            entries.extend(is_chaotic.then(|| patch(chaotic, 1.0, "chaotic")));
+        }
+    }
+    if columns.iter().any(|column| column.lyapunov_error.is_some()) {
+        entries.push(patch(chaotic, exponents::BAND, "\u{3bb}: standard error"));
+    }
+    if columns.iter().any(is_left_out) {
         entries.push(Entry::new(Key::Mark { color: FAINT }, "undecided or failed"));
     }
     entries
 }
 
 /// From the first column to the last, with room for their dots.
-fn value_axis(label: &str, columns: &[Column]) -> Axis {
-    let values = columns.iter().map(|c| c.value).filter(|v| v.is_finite());
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+fn value_axis((label, scale): (&str, Scale), columns: &[Column]) -> Axis {
+    let place = |value: f64| match scale {
+        Scale::Linear => value,
+        Scale::Logarithmic => value.log10(),
+    };
+    let places = columns.iter().map(|c| place(c.value)).filter(|place| place.is_finite());
+    let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let room = 0.006 * (high - low);
-    Axis::exact(label, low - room, high + room)
+    Axis { scale, ..Axis::exact(label, low - room, high + room) }
 }
 
 /// Pixels of the cloud of points to a pixel of the figure.
@@ -111,6 +192,7 @@ fn draw_points(
     frame: &Frame,
     component: usize,
     columns: &[Column],
+    look: Look,
 ) -> Result<(), DrawError> {
     let Rect { left, top, right, bottom } = frame.rect;
     let [width, height] = [right - left, bottom - top].map(|side| (FINE * side).round().max(0.0) as usize);
@@ -123,11 +205,12 @@ fn draw_points(
             if !(x.is_finite() && y.is_finite()) {
                 continue;
             }
+            let hue = look.place(column, point);
             let (x, y) = ((FINE * (x - left)).round() as i32, (FINE * (y - top)).round() as i32);
             for (dx, dy) in dot {
                 let (column, row) = (x.saturating_add(*dx), y.saturating_add(*dy));
                 if (0..width as i32).contains(&column) && (0..height as i32).contains(&row) {
-                    counts[row as usize * width + column as usize][point.side as usize] += 1;
+                    counts[row as usize * width + column as usize][hue] += 1;
                 }
             }
         }

@@ -5,11 +5,12 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::bifurcation::Asked;
 use super::inventory::FileEntry;
 use super::manifest::{AxisObject, DerivedObject, Head, StartObject, TimingsObject, derived, start};
 use super::names;
 use super::parameters::Parameters;
-use crate::map::bifurcation::Column;
+use crate::map::bifurcation::{Column, Hysteresis, hysteresis};
 use crate::map::plan::count_classes;
 use crate::map::scene::Scene;
 
@@ -22,16 +23,43 @@ pub(super) struct Manifest<'a> {
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
+    /// Of a line of a plane: the swept axis and where the other one stays, as the arguments say it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    along: Option<&'a str>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    at: &'a [String],
     axis: AxisObject,
     parameters: Parameters,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     derived: BTreeMap<String, DerivedObject>,
     start: StartObject,
     integration: IntegrationObject,
+    /// Columns by class, of both passes together where there are two.
     classes: BTreeMap<&'static str, usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hysteresis: Option<HysteresisObject>,
     elapsed_seconds: f64,
     timings: TimingsObject,
     files: &'a [FileEntry],
+}
+
+/// Values at which class or period depend on the direction.
+#[derive(Serialize)]
+struct HysteresisObject {
+    columns: usize,
+    differing: usize,
+    /// First and last value of each run of neighbours.
+    ranges: Vec<[f64; 2]>,
+    /// Values at which words alone differ.
+    by_word: usize,
+    word_ranges: Vec<[f64; 2]>,
+}
+
+impl From<Hysteresis> for HysteresisObject {
+    fn from(found: Hysteresis) -> Self {
+        let Hysteresis { columns, differing, ranges, by_word, word_ranges } = found;
+        HysteresisObject { columns, differing, ranges, by_word, word_ranges }
+    }
 }
 
 #[derive(Serialize)]
@@ -44,7 +72,7 @@ struct IntegrationObject {
 impl<'a> Manifest<'a> {
     pub(super) fn new(
         scene: &'a Scene,
-        sets: &'a [String],
+        asked: Asked<'a>,
         columns: &[Column],
         [elapsed, writing]: [Duration; 2],
         files: &'a [FileEntry],
@@ -57,7 +85,9 @@ impl<'a> Manifest<'a> {
             engine: "reference f64",
             title: scene.title(),
             scene: scene.text(),
-            set: sets,
+            set: asked.sets,
+            along: asked.along.map(|along| along.parameter.as_str()),
+            at: asked.along.map_or(&[], |along| &along.at),
             axis: axis.into(),
             parameters: Parameters::of_scene(scene),
             derived: derived(scene),
@@ -68,6 +98,7 @@ impl<'a> Manifest<'a> {
                 max_period: settings.max_period,
             },
             classes: names::CLASSES.into_iter().zip(classes).collect(),
+            hysteresis: hysteresis(columns).map(HysteresisObject::from),
             elapsed_seconds: elapsed.as_secs_f64(),
             timings: TimingsObject { integrate: elapsed.as_secs_f64(), write: writing.as_secs_f64() },
             files,

@@ -109,6 +109,7 @@ pub(super) fn start(scene: &Scene) -> StartObject {
         Start::State(state) => ("state", Some(state[..scene.base().state_names().len()].to_vec())),
         Start::Up => ("up", None),
         Start::Down => ("down", None),
+        Start::Both => ("both", None),
     };
     let (count, seed) = scene.draw().map(|draw| (draw.count, draw.seed)).unzip();
     StartObject { policy, state, count, seed }

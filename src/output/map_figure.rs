@@ -30,7 +30,7 @@ const BAR_HEIGHT: f64 = 260.0;
 /// Length of the arrow at an end beyond which there are values.
 const ARROW: f64 = 18.0;
 /// Room for a bar's name, and between it and the entries above.
-const BAR_HEAD: f64 = 44.0;
+const BAR_HEAD: f64 = 50.0;
 const ABOVE_BAR: f64 = 26.0;
 /// Height of a picture's inside at least.
 const LOWEST: f64 = 700.0;
@@ -63,7 +63,7 @@ fn bar_top(layer: &Layer) -> f64 {
 }
 
 /// Pixels for a number of cells.
-fn side(count: usize) -> f64 {
+pub(super) fn side(count: usize) -> f64 {
     let pixels = if count <= SIDE { count * (SIDE / count) } else { count.min(LONGEST_SIDE) };
     pixels as f64
 }
@@ -99,6 +99,7 @@ pub(super) fn subtitle(scene: &Scene) -> String {
         Start::State(state) => format!("from ({})", state.map(number).join(", ")),
         Start::Up => format!("from the attractor at the next lower {last}"),
         Start::Down => format!("from the attractor at the next higher {last}"),
+        Start::Both => format!("from the attractors at the next {last} on either side"),
     };
     let more_starts = match scene.draw() {
         Some(draw) => format!(", attractors counted with {} random states more", draw.count - 1),
@@ -121,7 +122,7 @@ pub(super) fn subtitle(scene: &Scene) -> String {
 
 /// An axis on which cells lie at their values, or in the order of these where they are listed: it reaches half a cell
 /// further.
-fn axis(axis: &scene::Axis) -> Axis {
+pub(super) fn axis(axis: &scene::Axis) -> Axis {
     let (min, max, steps) = (axis.min(), axis.max(), (axis.count() - 1) as f64);
     let label = axis_label(axis.parameter());
     match axis.scale() {

@@ -1,6 +1,7 @@
 //! Results, written down: files in a guarded folder, and text for the terminal.
 
 pub mod bifurcation;
+mod bifurcation_columns_csv;
 mod bifurcation_csv;
 pub mod bifurcation_figure;
 mod bifurcation_manifest;
@@ -8,6 +9,9 @@ pub mod caption;
 mod cells;
 mod cells_csv;
 mod cells_npy;
+pub mod compare;
+mod compare_csv;
+mod compare_figure;
 mod error;
 pub mod folder;
 pub mod inventory;

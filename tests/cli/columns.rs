@@ -45,10 +45,13 @@ fn columns_are_those_of_the_files() {
     fs::write(dir.join("plane.toml"), format!("{e}{omega}[start]\ncount = 2\n")).unwrap();
     run(dir, &["map", "plane.toml", "--engine", "cpu", "--quiet"]);
     run(dir, &["validate", "out/plane", "--quiet"]);
-    run(dir, &["bifurcation", "line.toml", "--quiet"]);
+    run(dir, &["bifurcation", "line.toml", "--quiet", "--set", "start.policy=both"]);
     run(dir, &["orbit", "--set", "e=0.3", "--out", "out/orbit"]);
+    run(dir, &["compare", "out/plane", "out/plane", "--quiet"]);
+    assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
+    assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));
     assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));
     assert_eq!(header(&dir.join("out/orbit/trajectory.csv")), listed("trajectory.csv"));
     assert_eq!(header(&dir.join("out/orbit/spectrum.csv")), listed("spectrum.csv"));

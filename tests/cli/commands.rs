@@ -306,9 +306,10 @@ fn bifurcation_writes_table_figure_and_manifest() {
     let run = rattlemap(&folder).args(["bifurcation", SMOKE, "--set", "omega=5.6"]).assert();
     run.success().stdout("").stderr(says(&["5 of 5 columns", "bifurcation.csv"]));
     let out = folder.path().join("out/smoke");
-    assert_eq!(file_names(&out), ["bifurcation.csv", "bifurcation.png", "manifest.json"]);
+    assert_eq!(file_names(&out), DIAGRAM);
     assert!(fs::read(out.join("bifurcation.png")).unwrap().starts_with(b"\x89PNG"));
     check_table(&out.join("bifurcation.csv"));
+    check_columns(&out.join("bifurcation_columns.csv"));
     let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
     assert!(!manifest.contains(env!("CARGO_MANIFEST_DIR")), "a path of this machine: {manifest}");
     let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
@@ -318,6 +319,39 @@ fn bifurcation_writes_table_figure_and_manifest() {
     assert_eq!(manifest["crate_version"], env!("CARGO_PKG_VERSION"));
     assert_eq!(manifest["start"]["policy"], "rest");
     assert!(manifest["elapsed_seconds"].as_f64().unwrap() > 0.0);
+}
+
+/// What a diagram's folder holds.
+const DIAGRAM: [&str; 4] = ["bifurcation.csv", "bifurcation.png", "bifurcation_columns.csv", "manifest.json"];
+
+/// One row per value, with what `orbit` says of it.
+fn check_columns(path: &Path) {
+    let mut table = csv::Reader::from_path(path).unwrap();
+    let header = "e,class,period,word,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
+                  periods_run";
+    assert_eq!(table.headers().unwrap().iter().collect::<Vec<_>>().join(","), header);
+    let rows: Vec<csv::StringRecord> = table.records().collect::<Result<_, _>>().unwrap();
+    assert_eq!(rows.len(), 5);
+    for row in &rows {
+        let settings = ["--transient", "200", "--periods", "64"];
+        let set = format!("e={}", &row[0]);
+        let run =
+            rattlemap(&folder()).args(["orbit", "--json", "--set", &set]).args(settings).assert().success();
+        let orbit: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        let is_periodic = &row[1] == "periodic";
+        assert_eq!(orbit["class"], row[1]);
+        assert_eq!(orbit["period"].as_u64(), row[2].parse().ok());
+        let word = format!("w{}", orbit["word"].as_str().unwrap());
+        assert_eq!(&row[3], if is_periodic { word.as_str() } else { "" });
+        for (field, name) in
+            [(4, "lyapunov"), (5, "lyapunov_error"), (6, "impacts_per_period"), (7, "mesh_fraction")]
+        {
+            assert_eq!(row[field].parse().ok(), orbit[name].as_f64(), "{name} at {set}");
+        }
+        assert_eq!(row[8].parse().ok(), orbit["symmetric"].as_bool());
+        assert_eq!(orbit["status"], row[9]);
+    }
+    assert!(rows.iter().any(|row| &row[1] == "periodic") && rows.iter().any(|row| &row[1] == "chaotic"));
 }
 
 fn check_table(path: &Path) {
@@ -350,7 +384,10 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
     fs::write(out.join("notes.txt"), "precious").unwrap();
     run(&[]).code(2).stderr(says(&["the folder is not empty"]));
     run(&["--force", "--set", "outputs.files=[\"csv\"]"]).success();
-    assert_eq!(file_names(&out), ["bifurcation.csv", "manifest.json", "notes.txt"]);
+    assert_eq!(
+        file_names(&out),
+        ["bifurcation.csv", "bifurcation_columns.csv", "manifest.json", "notes.txt"]
+    );
 }
 
 #[test]

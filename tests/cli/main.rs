@@ -1,8 +1,10 @@
 //! The program as scripts see it.
 
 mod bench;
+mod bifurcation;
 mod columns;
 mod commands;
+mod compare;
 #[cfg(unix)]
 mod faults;
 #[cfg(unix)]

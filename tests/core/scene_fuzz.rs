@@ -216,6 +216,7 @@ fn check_refusal(error: &SceneError, text: &str, sets: &[String]) -> Result<(), 
             prop_assert!(*column >= 1, "{}", said);
         }
         Place::Set { argument } => prop_assert!(sets.iter().any(|set| **set == **argument), "{}", said),
+        Place::Option { .. } => return Err(TestCaseError::fail(format!("no such option was given: {said}"))),
         Place::Builder => return Err(TestCaseError::fail(format!("nothing was built: {said}"))),
         Place::File { .. } => return Err(TestCaseError::fail(format!("no file was read: {said}"))),
     }

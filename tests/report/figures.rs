@@ -6,13 +6,16 @@ use std::io::Read;
 use std::path::Path;
 
 use image::RgbImage;
-use rattlemap::map::bifurcation::{Column, SectionPoint};
+use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::Format;
+use rattlemap::output::plot_style::axes::Scale;
 use rattlemap::output::{bifurcation_figure, orbit_figures};
 use rattlemap_dynamics::model::{GearPair, Side, State};
 use rattlemap_dynamics::orbit::{Class, Event, EventKind, Orbit, Sample, Status};
 use rattlemap_dynamics::word::Word;
 
+/// An axis, as figures take it.
+const E: (&str, Scale) = ("coefficient of restitution, e", Scale::Linear);
 const RIGHT: [u8; 3] = [0xd5, 0x5e, 0x00];
 const LEFT: [u8; 3] = [0x00, 0x72, 0xb2];
 const MESHING: [u8; 3] = [0x00, 0x9e, 0x73];
@@ -182,7 +185,7 @@ fn figures_in_svg_and_pdf_have_lines_and_text() {
         let text = String::from_utf8_lossy(pdf);
         assert!(text.contains("+Ubuntu-Light") && text.contains("/FontFile2") && !text.contains("Date"));
         // A reader finds the letters: the map from glyphs to characters has omega, 03C9.
-        let map = String::from_utf8(stream(pdf, "/Type/CMap")).unwrap();
+        let map = String::from_utf8(stream(pdf, "/Type /CMap")).unwrap();
         assert!(map.to_uppercase().contains("<03C9>"), "{map}");
     }
     assert!(files[0].len() < 150_000, "a line of few pixels has few points: {}", files[0].len());
@@ -194,7 +197,7 @@ fn titles_stay_text_in_svg() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.svg");
     let title = "a < b && \"c\" </text><script>\u{7}\u{2028}10\u{207b}\u{b2}";
-    bifurcation_figure::write(&path, [title, "second\nthird"], "e", &columns(9, 3)).unwrap();
+    bifurcation_figure::write(&path, [title, "second\nthird"], E, &columns(9, 3)).unwrap();
     let svg = fs::read_to_string(path).unwrap();
     let expected = "a &lt; b &amp;&amp; \"c\" &lt;/text&gt;&lt;script&gt; \u{2028}10<tspan dy=";
     assert!(svg.contains(expected) && !svg.contains("<script"), "{svg:.600}");
@@ -216,24 +219,37 @@ fn columns(count: u32, points: u32) -> Vec<Column> {
             SectionPoint { side, kind: EventKind::Impact, t_mod_period: 0.0, before: at, after: at }
         };
         let points = if class == Class::Chaotic { (0..points).map(point).collect() } else { vec![] };
-        Column { value, class, status: Status::Ok, points }
+        Column {
+            value,
+            direction: None,
+            class,
+            status: Status::Ok,
+            lyapunov: 0.3 * value,
+            lyapunov_error: Some(0.1),
+            impacts_per_period: 1.0,
+            mesh_fraction: 0.0,
+            symmetric: None,
+            word: None,
+            periods_run: 100,
+            points,
+        }
     };
     (0..count).map(column).collect()
+}
+
+/// The panel of exponents: the part of the picture below the section points.
+fn lower_panel(picture: &RgbImage) -> RgbImage {
+    let (w, h) = picture.dimensions();
+    image::imageops::crop_imm(picture, 140, h * 3 / 4, w - 210, h * 3 / 16).to_image()
 }
 
 #[test]
 fn bifurcation_figure_shows_both_walls() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("bifurcation.png");
-    bifurcation_figure::write(
-        &path,
-        ["Bifurcation", "from rest"],
-        "coefficient of restitution, e",
-        &columns(1000, 200),
-    )
-    .unwrap();
+    bifurcation_figure::write(&path, ["Bifurcation", "from rest"], E, &columns(1000, 200)).unwrap();
     let picture = read(&path);
-    assert_eq!(picture.dimensions(), (1600, 1400));
+    assert_eq!(picture.dimensions(), (1600, 1750));
     assert!(ink(&picture) > 5000, "{}", ink(&picture));
     // Single dots are not opaque, so hues are counted here and not exact colours.
     let warm = picture.pixels().filter(|p| p.0[0] > p.0[2].saturating_add(60)).count();
@@ -242,11 +258,68 @@ fn bifurcation_figure_shows_both_walls() {
 }
 
 #[test]
+fn the_panel_of_exponents_tells_chaos_from_cycles_and_has_a_band() {
+    const CHAOS: [u8; 3] = [0x26, 0x26, 0x26];
+    let drawn = |columns: &[Column]| {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("b.png");
+        bifurcation_figure::write(&path, [""; 2], E, columns).unwrap();
+        lower_panel(&read(&path))
+    };
+    let chaos = columns(40, 2);
+    let cycle = |column: &Column| Column {
+        class: Class::Periodic { period: 1 },
+        lyapunov: -0.2,
+        lyapunov_error: None,
+        ..column.clone()
+    };
+    let cycles: Vec<Column> = chaos.iter().map(cycle).collect();
+    let [chaotic, periodic] = [&chaos, &cycles].map(|columns| drawn(columns));
+    assert!(count(&chaotic, CHAOS) > 300 && count(&chaotic, MESHING) == 0, "{}", count(&chaotic, CHAOS));
+    assert!(count(&periodic, MESHING) > 300, "{}", count(&periodic, MESHING));
+    // Zero is a line, and the panel holds it whatever the exponents.
+    let lines = |picture: &RgbImage| {
+        let dark = |y| (0..picture.width()).filter(|&x| picture.get_pixel(x, y).0[0] < 0xb0).count();
+        (0..picture.height()).filter(|&y| dark(y) > picture.width() as usize * 9 / 10).count()
+    };
+    assert!(lines(&periodic) >= 1, "no line at zero");
+    let narrow: Vec<Column> =
+        chaos.iter().map(|column| Column { lyapunov_error: Some(0.0), ..column.clone() }).collect();
+    let pale =
+        |picture: &RgbImage| picture.pixels().filter(|pixel| (0xb0..0xd8).contains(&pixel.0[0])).count();
+    assert!(pale(&chaotic) > 20 * pale(&drawn(&narrow)).max(100), "no band of the standard error");
+}
+
+#[test]
+fn two_passes_are_told_apart_by_colour_and_grey_where_they_agree() {
+    let pass = |direction, lyapunov| {
+        let of = move |column: Column| Column { direction: Some(direction), lyapunov, ..column };
+        columns(40, 8).into_iter().map(of)
+    };
+    let drawn = |lyapunov| {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("b.png");
+        let both: Vec<Column> = pass(Direction::Up, 0.3).chain(pass(Direction::Down, lyapunov)).collect();
+        bifurcation_figure::write(&path, [""; 2], E, &both).unwrap();
+        read(&path)
+    };
+    let [apart, same] = [0.1, 0.3].map(drawn);
+    for hue in [RIGHT, LEFT] {
+        assert!(count(&lower_panel(&apart), hue) > 300, "{}", count(&lower_panel(&apart), hue));
+        assert_eq!(count(&lower_panel(&same), hue), 0);
+        // The legend alone: where both have been, no wall's colour is left.
+        assert!(count(&same, hue) < 200, "{}", count(&same, hue));
+    }
+}
+
+#[test]
 fn bifurcation_figure_survives_poor_data() {
     let dir = tempfile::tempdir().unwrap();
     let mut wild = columns(3, 4);
     wild[0].value = f64::NAN;
     wild[1].points[0].before = [f64::INFINITY, 0.0, f64::NAN, 0.0];
+    (wild[0].lyapunov, wild[1].lyapunov, wild[2].lyapunov_error) =
+        (f64::NAN, f64::NEG_INFINITY, Some(f64::INFINITY));
     let long = "a title that no figure has room for, ".repeat(12);
     for (name, title, columns) in [
         ("none", "", vec![]),
@@ -255,7 +328,7 @@ fn bifurcation_figure_survives_poor_data() {
         ("wild", &long, wild),
     ] {
         let path = dir.path().join(format!("{name}.png"));
-        bifurcation_figure::write(&path, [title, ""], "e", &columns).unwrap();
+        bifurcation_figure::write(&path, [title, ""], E, &columns).unwrap();
         assert_eq!(read(&path).width(), 1600);
     }
 }
@@ -263,7 +336,7 @@ fn bifurcation_figure_survives_poor_data() {
 #[test]
 fn a_file_that_cannot_be_written_is_named() {
     let dir = tempfile::tempdir().unwrap().path().join("absent");
-    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], "e", &[]).unwrap_err();
+    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], E, &[]).unwrap_err();
     assert!(format!("{error:#}").contains("b.png"), "{error:#}");
     let (orbit, trace) = meshing_orbit();
     let error =

@@ -91,7 +91,7 @@ function visit() {
   said.colors = new Set(new Uint32Array(drawn.buffer)).size;
   const result = document.createElement("pre");
   result.id = "said";
-  result.textContent = btoa(JSON.stringify(said));
+  result.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(said))));
   document.body.append(result);
 }
 visit();
@@ -133,8 +133,12 @@ struct Report {
 
 impl Report {
     fn new() -> Report {
+        Report::of(SCENE)
+    }
+
+    fn of(scene: &str) -> Report {
         let report = Report { folder: tempfile::tempdir().unwrap() };
-        fs::write(report.folder.path().join("s.toml"), SCENE).unwrap();
+        fs::write(report.folder.path().join("s.toml"), scene).unwrap();
         report.run(&["map", "s.toml", "--quiet", "--out", "o"]);
         report
     }
@@ -301,6 +305,48 @@ fn a_browser_refuses_foreign_scripts() {
     assert!(title != "run" && refused >= 2, "{title}, {refused} refused");
     let without = page.replacen("http-equiv=\"Content-Security-Policy\"", "name=\"none\"", 1);
     assert_eq!(opened(without.replace("</body>", intruders)).0, "run", "they would run without it");
+}
+
+/// Of axes whose values are not a formula's the page has the values, and of what follows them, too.
+#[test]
+fn axes_of_any_kind_are_marked_and_read_out_at_their_values() {
+    let forces: Vec<String> = (0..ROWS).map(|j| format!("{:.1}", 2.0 + (j * j) as f64)).collect();
+    let scene = format!(
+        "[parameters]\ne = 0.5\n[derived]\nk2 = \"2/3*k1\"\n\
+         [[axis]]\nparameter = \"k1\"\nmin = 10.0\nmax = 1000.0\ncount = {COLUMNS}\nscale = \"log\"\n\
+         [[axis]]\nparameter = \"F\"\nvalues = [{}]\n[outputs]\nfiles = [\"csv\", \"html\"]\n",
+        forces.join(", ")
+    );
+    let report = Report::of(&scene);
+    let (data, row) = (report.data(), report.row());
+    let k1 = &data["axes"][0];
+    assert_eq!((&k1["scale"], k1["values"][CELL[0]].to_string()), (&json!("log"), row[2].clone()));
+    assert_eq!(data["axes"][1]["values"][CELL[1]].to_string(), row[3]);
+    let derived = &data["derived"][0];
+    assert_eq!((&derived["parameter"], &derived["along"]), (&json!("k2"), &json!([true, false])));
+    let eight: [u8; 8] = unpacked(derived)[8 * CELL[0]..8 * CELL[0] + 8].try_into().unwrap();
+    let k2 = f64::from_le_bytes(eight);
+    assert_eq!(k2, 2.0 / 3.0 * row[2].parse::<f64>().unwrap());
+    let also = "said.marks = map.axes.map((axis) => marks(axis, 0, axis.count, 6)); \
+                said.zoomed = marks(map.axes[0], 4, 3, 6);";
+    let Some(said) = report.visited(also) else { return };
+    let force = row[3].trim_end_matches(".0");
+    assert_eq!(
+        said["command"],
+        format!("rattlemap orbit --set k1={} --set F={force} --set k2={k2} --set e=0.5", row[2])
+    );
+    let texts = |marks: &Value| -> Vec<String> {
+        marks.as_array().unwrap().iter().map(|mark| mark[1].as_str().unwrap().to_owned()).collect()
+    };
+    let place = |mark: &Value| mark[0].as_f64().unwrap();
+    assert_eq!(texts(&said["marks"][0]), ["10", "100", "1000"]);
+    let middle = place(&said["marks"][0][1]);
+    assert!((middle - COLUMNS as f64 / 2.0).abs() < 1e-9, "100 is at {middle}");
+    // Every fourth of the listed values, each in the middle of its cell.
+    assert_eq!(texts(&said["marks"][1]), ["2", "18", "66", "146", "258"]);
+    assert_eq!(place(&said["marks"][1][1]), 4.5);
+    // Where there is no round value, those of the cells.
+    assert_eq!(texts(&said["zoomed"]).len(), 3, "{}", said["zoomed"]);
 }
 
 #[test]

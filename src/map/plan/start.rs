@@ -39,7 +39,7 @@ impl Starts {
     pub(super) fn first(&self) -> State {
         match self.policy {
             Start::State(state) => state,
-            Start::Rest | Start::Up | Start::Down => REST,
+            Start::Rest | Start::Up | Start::Down | Start::Both => REST,
         }
     }
 

@@ -230,6 +230,7 @@ impl SceneBuilder {
             Start::Rest => "\"rest\"".to_owned(),
             Start::Up => "\"up\"".to_owned(),
             Start::Down => "\"down\"".to_owned(),
+            Start::Both => "\"both\"".to_owned(),
             Start::State(state) => {
                 // Components that the model has not are written only where somebody gave them, and then refused.
                 let count = self.model.state_names().len();

@@ -25,6 +25,13 @@ pub enum Place {
         /// `NAME=VALUE` as it was given.
         argument: Arc<str>,
     },
+    /// Another argument: `--along` or `--at`.
+    Option {
+        /// The option's name, dashes included.
+        option: &'static str,
+        /// What was given with it.
+        argument: Arc<str>,
+    },
     /// A file that could not be read at all.
     File {
         /// The file as it was named by the caller.
@@ -42,6 +49,7 @@ impl fmt::Display for Place {
         match self {
             Place::Text { file, line, column } => write!(f, "{file}:{line}:{column}"),
             Place::Set { argument } => write!(f, "--set {}", shorten(argument)),
+            Place::Option { option, argument } => write!(f, "{option} {}", shorten(argument)),
             Place::File { file } => write!(f, "{file}"),
             Place::Builder => write!(f, "scene"),
         }

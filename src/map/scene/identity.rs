@@ -56,6 +56,7 @@ impl Scene {
             Start::State(state) => format!("state {state:?}"),
             Start::Up => "up".to_owned(),
             Start::Down => "down".to_owned(),
+            Start::Both => "both".to_owned(),
         };
         tell("start".into(), start);
         if let Some(draw) = self.draw() {

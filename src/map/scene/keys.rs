@@ -84,7 +84,7 @@ pub const KEYS: &[Key] = &[
     key("integration", "early_stop", Value("true"), Takes::Flag, "cells stop once they are decided"),
     key("integration", "undecided_periods", Value("0"), Takes::Whole(0, MAX_PERIODS), "periods that undecided cells get beyond these, with early stops alone"),
     key("integration", "max_period", Value("64"), Takes::Whole(1, LONGEST_CYCLE), "longest cycle that is searched for; at most, and by default no more than, half of observed_periods"),
-    key("start", "policy", Value("\"rest\""), Takes::OneOf(&["rest", "state", "up", "down"]), "where cells start; up and down: where the neighbour along the last axis ended"),
+    key("start", "policy", Value("\"rest\""), Takes::OneOf(&["rest", "state", "up", "down", "both"]), "where cells start; up and down: where the neighbour along the last axis ended; both: up and down in one `bifurcation`"),
     key("start", "state", KeyDefault::None, Takes::Words("[x1, v1, x2, v2], finite"), "state at phase 0, with policy = \"state\" alone"),
     key("start", "count", Value("1"), Takes::Whole(1, MAX_STARTS), "starts per cell of a map, all but the first drawn at random"),
     key("start", "seed", Value("1"), Takes::Whole(0, u32::MAX), "decides the draw, with a count above 1 alone"),

@@ -22,6 +22,8 @@ pub enum Start {
     /// The last state of the cell after, along the last axis from `max` to `min`; the last one
     /// starts at rest.
     Down,
+    /// Both of these, one beside the other; for a bifurcation diagram alone.
+    Both,
 }
 
 impl Start {
@@ -32,12 +34,13 @@ impl Start {
             Start::State(_) => "from one given state",
             Start::Up => "attractor followed upwards",
             Start::Down => "attractor followed downwards",
+            Start::Both => "attractor followed upwards and downwards",
         }
     }
 
     /// Whether cells start from their neighbours.
     pub fn follows(&self) -> bool {
-        matches!(self, Start::Up | Start::Down)
+        matches!(self, Start::Up | Start::Down | Start::Both)
     }
 }
 
@@ -57,14 +60,27 @@ enum Policy {
     State,
     Up,
     Down,
+    Both,
 }
 
-const POLICIES: [(&str, Policy); 4] =
-    [("rest", Policy::Rest), ("state", Policy::State), ("up", Policy::Up), ("down", Policy::Down)];
+const POLICIES: [(&str, Policy); 5] = [
+    ("rest", Policy::Rest),
+    ("state", Policy::State),
+    ("up", Policy::Up),
+    ("down", Policy::Down),
+    ("both", Policy::Both),
+];
 
-pub(super) fn read(root: &Section<'_>, model: &dyn Model) -> Result<Start, SceneError> {
+pub(super) fn read(root: &Section<'_>, model: &dyn Model, purpose: Purpose) -> Result<Start, SceneError> {
     let section = root.section("start", &keys::names("start"))?;
     let policy = section.get("policy").map_or(Ok(Policy::Rest), |field| field.choice(&POLICIES))?;
+    if let (Policy::Both, Purpose::Map, Some(field)) = (policy, purpose, section.get("policy")) {
+        return Err(field.conflict(
+            "a map shows one attractor per cell; make two maps, with \"up\" and with \"down\", and let \
+             `rattlemap compare` show where they differ"
+                .to_owned(),
+        ));
+    }
     match (policy, section.get("state")) {
         (Policy::State, Some(field)) => read_state(&field, model).map(Start::State),
         (Policy::State, None) => {
@@ -77,6 +93,7 @@ pub(super) fn read(root: &Section<'_>, model: &dyn Model) -> Result<Start, Scene
         (Policy::Rest, None) => Ok(Start::Rest),
         (Policy::Up, None) => Ok(Start::Up),
         (Policy::Down, None) => Ok(Start::Down),
+        (Policy::Both, None) => Ok(Start::Both),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Every kind of refusal, and what a good scene says.
 
+mod along;
 mod axes;
 mod built;
 mod cells;

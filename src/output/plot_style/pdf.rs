@@ -11,8 +11,9 @@ use pdf_writer::types::{CidFontType, FontFlags, LineCapStyle, LineJoinStyle, Sys
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect as PdfRect, Ref, Str, TextStr};
 use subsetter::GlyphRemapper;
 
+use super::canvas::{Item, Shaped};
 use super::typeface::{Glyph, Typeface, beginning};
-use super::{Bitmap, Canvas, DASH, Item, PER_INCH, Point, RGBColor, Rect, Shaped};
+use super::{Bitmap, Canvas, DASH, PER_INCH, Point, RGBColor, Rect};
 use crate::output::DrawError;
 
 /// Points of PDF to a pixel.

@@ -9,8 +9,9 @@ use tiny_skia::{
 };
 use ttf_parser::{GlyphId, OutlineBuilder};
 
+use super::canvas::{Item, Shaped};
 use super::typeface::{Glyph, beginning};
-use super::{Bitmap, Canvas, DASH, Item, PER_INCH, Point, RGBColor, Rect, Shaped};
+use super::{Bitmap, Canvas, DASH, PER_INCH, Point, RGBColor, Rect};
 use crate::output::DrawError;
 
 /// The bytes of the file.

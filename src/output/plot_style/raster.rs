@@ -1,6 +1,7 @@
 //! Grids of colours: maps, colour bars, clouds of points.
 
-use super::{Canvas, Item, RGBColor, Rect};
+use super::canvas::Item;
+use super::{Canvas, RGBColor, Rect};
 use crate::output::DrawError;
 
 /// Pixels, the uppermost row first.

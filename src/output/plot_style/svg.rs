@@ -5,8 +5,9 @@ use std::fmt::{self, Write};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
+use super::canvas::{Item, Shaped};
 use super::typeface::runs;
-use super::{Align, Canvas, DASH, Item, PER_INCH, Point, RGBColor, Rect, Shaped, png};
+use super::{Align, Canvas, DASH, PER_INCH, Point, RGBColor, Rect, png};
 use crate::output::DrawError;
 
 /// The typeface that figures are laid out for, then common ones about as wide.

@@ -4,7 +4,7 @@ const [columns, rows] = map.axes.map((axis) => axis.count);
 const byId = (id) => document.getElementById(id);
 const canvas = byId("canvas");
 const pen = canvas.getContext("2d");
-const MARGIN = { left: 78, right: 14, top: 10, bottom: 58 };
+const MARGIN = { left: 78, right: 28, top: 10, bottom: 58 };
 
 let values = {};
 // Four numbers per cell where cells follow their neighbours.
@@ -168,7 +168,9 @@ function drawAxes(p) {
   for (const [place, text] of marks(map.axes[0], view.left, view.width, p.width / 90)) {
     const [x] = pixel(place, 0);
     pen.fillRect(Math.round(x), p.y + p.height, 1, 6);
-    pen.fillText(text, x, p.y + p.height + 9);
+    // The last one must not run over the edge.
+    const half = pen.measureText(text).width / 2;
+    pen.fillText(text, Math.min(x, p.x + p.width + MARGIN.right - half), p.y + p.height + 9);
   }
   pen.textAlign = "right";
   pen.textBaseline = "middle";

@@ -1,0 +1,244 @@
+//! In which cells do two maps of one grid differ? Pure.
+//!
+//! For up against down (hysteresis), engine against engine, version against version. Cells differ by class or by
+//! period. What says more of cells that agree in both is counted beside: symmetry, words, exponents.
+
+use crate::record::classify::classify;
+use crate::record::distance::apart;
+use crate::record::{Record, Spelling, valid};
+use rattlemap_dynamics::orbit::Class;
+use rattlemap_dynamics::word::Word;
+
+/// How two motions differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Their classes do.
+    Class,
+    /// Both are periodic, with other periods.
+    Period,
+}
+
+impl Kind {
+    /// Every kind, in the order in which they are counted.
+    pub const ALL: [Kind; 2] = [Kind::Class, Kind::Period];
+
+    /// How motions of these classes differ; none if they do not.
+    pub fn of(a: Class, b: Class) -> Option<Kind> {
+        match (a, b) {
+            _ if a == b => None,
+            (Class::Periodic { .. }, Class::Periodic { .. }) => Some(Kind::Period),
+            _ => Some(Kind::Class),
+        }
+    }
+
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Class => "class",
+            Kind::Period => "period",
+        }
+    }
+}
+
+/// Cells that have a property in both maps, and in how many of them it differs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Cells in which it can be compared.
+    pub compared: usize,
+    /// Those in which it differs.
+    pub differing: usize,
+}
+
+impl Tally {
+    fn take(&mut self, differs: Option<bool>) {
+        self.compared += usize::from(differs.is_some());
+        self.differing += usize::from(differs == Some(true));
+    }
+}
+
+/// The largest difference of the exponents of cells that are periodic in both maps, with one period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Largest {
+    /// The difference, 0 or more; infinite where an exponent is not finite.
+    pub difference: f64,
+    /// The cell, by id.
+    pub id: usize,
+}
+
+/// What became of two maps side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// How each cell differs, by id.
+    pub kinds: Vec<Option<Kind>>,
+    /// Symmetry of cells of one period.
+    pub symmetric: Tally,
+    /// Words of cells of one period. Those of an orbit and its mirror image are one: which of the two a start reaches
+    /// says nothing.
+    pub words: Tally,
+    /// The cells whose words differ, by id, ascending.
+    pub other_word: Vec<u32>,
+    /// Exponents of integrated cells of one period that were compared.
+    pub exponents: usize,
+    /// The largest of their differences; none where nothing was compared.
+    pub exponent: Option<Largest>,
+    /// Attractors, where both maps counted them.
+    pub attractors: Tally,
+}
+
+impl Comparison {
+    /// Cells that differ in this way.
+    pub fn count(&self, kind: Kind) -> usize {
+        self.kinds.iter().filter(|of| **of == Some(kind)).count()
+    }
+
+    /// Cells that differ.
+    pub fn differing(&self) -> usize {
+        self.kinds.iter().flatten().count()
+    }
+}
+
+/// One of two maps.
+#[derive(Clone, Copy, Debug)]
+pub struct Side<'a> {
+    /// The first run of every cell, by id.
+    pub records: &'a [Record],
+    /// Attractors per cell, if they were counted.
+    pub attractors: Option<&'a [u8]>,
+}
+
+/// Compares two maps cell by cell. Filled cells count as any other, but for their exponents, which nobody measured.
+///
+/// # Panics
+/// If the maps have not as many cells.
+pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
+    assert_eq!(a.records.len(), b.records.len(), "maps of one grid");
+    let mut found = Comparison {
+        kinds: Vec::with_capacity(a.records.len()),
+        symmetric: Tally::default(),
+        words: Tally::default(),
+        other_word: Vec::new(),
+        exponents: 0,
+        exponent: None,
+        attractors: Tally::default(),
+    };
+    for (id, (a, b)) in a.records.iter().zip(b.records).enumerate() {
+        let classes = [classify(a), classify(b)];
+        found.kinds.push(Kind::of(classes[0], classes[1]));
+        if classes[0] == classes[1] && matches!(classes[0], Class::Periodic { .. }) {
+            found.take_cycles(id, a, b);
+        }
+    }
+    if let (Some(a), Some(b)) = (a.attractors, b.attractors) {
+        a.iter().zip(b).for_each(|(a, b)| found.attractors.take(Some(a != b)));
+    }
+    found
+}
+
+impl Comparison {
+    /// Compares what two cycles of one period have beside it.
+    fn take_cycles(&mut self, id: usize, a: &Record, b: &Record) {
+        let have = |bit| a.valid & b.valid & bit != 0;
+        self.symmetric.take(have(valid::SYMMETRIC).then_some(a.symmetric != b.symmetric));
+        let has_other_word = a.spelling().zip(b.spelling()).and_then(|(a, b)| differ(&a, &b));
+        self.words.take(has_other_word);
+        self.other_word.extend((has_other_word == Some(true)).then_some(id as u32));
+        if have(valid::LYAPUNOV) && (a.valid | b.valid) & valid::FILLED == 0 {
+            self.exponents += 1;
+            // Minus infinity both, where multipliers are zero.
+            let difference = if a.lyapunov == b.lyapunov { 0.0 } else { apart(a.lyapunov, b.lyapunov) };
+            if self.exponent.is_none_or(|largest| difference > largest.difference) {
+                self.exponent = Some(Largest { difference, id });
+            }
+        }
+    }
+}
+
+/// Whether two words are neither one another nor the other's mirror image.
+pub(crate) fn words_differ(a: &Word, b: &Word) -> bool {
+    a != b && *a != b.mirrored()
+}
+
+/// The same of words as records have them; none where hashes do not tell.
+fn differ(a: &Spelling, b: &Spelling) -> Option<bool> {
+    match (a, b) {
+        (Spelling::Whole(a), Spelling::Whole(b)) => Some(words_differ(a, b)),
+        (Spelling::Hashed { length: a, .. }, Spelling::Hashed { length: b, .. }) if a != b => Some(true),
+        (Spelling::Hashed { .. }, Spelling::Hashed { .. }) => (a == b).then_some(false),
+        _ => Some(true),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cycle(period: u32, lyapunov: f64, word: &[u8]) -> Record {
+        let valid = valid::PERIOD | valid::LYAPUNOV | valid::SYMMETRIC;
+        let mut record = Record { period, lyapunov, valid, ..Record::default() };
+        record.set_word(&Word::cyclic(word));
+        record
+    }
+
+    fn chaos() -> Record {
+        Record {
+            lyapunov: 0.2,
+            lyapunov_error: 0.01,
+            valid: valid::PERIOD | valid::LYAPUNOV,
+            ..Record::default()
+        }
+    }
+
+    fn of(a: &[Record], b: &[Record]) -> Comparison {
+        let [a, b] = [a, b].map(|records| Side { records, attractors: None });
+        compare(a, b)
+    }
+
+    #[test]
+    fn class_comes_before_period_and_undecided_is_a_class() {
+        let undecided = Record { valid: valid::PERIOD, ..Record::default() };
+        let a = [cycle(1, -0.1, b"36"), cycle(2, -0.1, b"36"), chaos(), undecided];
+        let b = [cycle(1, -0.1, b"36"), cycle(4, -0.1, b"36"), cycle(1, -0.1, b"36"), chaos()];
+        let found = of(&a, &b);
+        assert_eq!(found.kinds, [None, Some(Kind::Period), Some(Kind::Class), Some(Kind::Class)]);
+        assert_eq!((found.differing(), Kind::ALL.map(|kind| found.count(kind))), (3, [2, 1]));
+        // What is said of cycles is said of those of one period.
+        assert_eq!((found.exponents, found.symmetric.compared, found.words.compared), (1, 1, 1));
+        let filled = b.map(|record| Record { valid: record.valid | valid::FILLED, ..record });
+        assert_eq!(of(&a, &filled).kinds, found.kinds, "filled cells are cells");
+    }
+
+    #[test]
+    fn cycles_of_one_period_are_compared_by_what_both_have() {
+        let a =
+            [cycle(1, -0.1, b"1355"), cycle(1, -0.1, b"36"), cycle(1, -0.25, b"36"), cycle(1, -0.1, b"36")];
+        let mut b =
+            [cycle(1, -0.1, b"4622"), cycle(1, -0.1, b"25"), cycle(1, 0.25, b"36"), cycle(1, -9.0, b"36")];
+        b[1].symmetric = 1;
+        b[2].valid &= !(valid::WORD | valid::SYMMETRIC);
+        b[3].valid |= valid::FILLED;
+        let found = of(&a, &b);
+        assert_eq!(found.differing(), 0);
+        assert_eq!(found.words, Tally { compared: 3, differing: 1 }, "a mirror image has the same word");
+        assert_eq!(found.other_word, [1]);
+        assert_eq!(found.symmetric, Tally { compared: 3, differing: 1 });
+        assert_eq!((found.exponents, found.exponent), (3, Some(Largest { difference: 0.5, id: 2 })));
+    }
+
+    #[test]
+    fn long_words_are_compared_as_far_as_hashes_tell() {
+        let hashed = |hash, length| Spelling::Hashed { hash, length };
+        assert_eq!(differ(&hashed(1, 80), &hashed(1, 80)), Some(false));
+        assert_eq!(differ(&hashed(1, 80), &hashed(2, 80)), None, "it may be the mirror image");
+        assert_eq!(differ(&hashed(1, 80), &hashed(1, 81)), Some(true));
+        assert_eq!(differ(&hashed(1, 80), &Spelling::Whole(Word::cyclic(b"36"))), Some(true));
+    }
+
+    #[test]
+    fn attractors_are_compared_where_both_maps_count_them() {
+        let records = [chaos(); 3];
+        let [a, b] = [&[1u8, 2, 3], &[1u8, 1, 3]];
+        let side = |attractors| Side { records: &records, attractors };
+        assert_eq!(compare(side(Some(a)), side(Some(b))).attractors, Tally { compared: 3, differing: 1 });
+        assert_eq!(compare(side(Some(a)), side(None)).attractors, Tally::default());
+    }
+}

@@ -1,0 +1,187 @@
+//! One line of a plane: a scene of two axes, read as a bifurcation diagram along one of them.
+//!
+//! The tree is rewritten before it is read: the other axis becomes a parameter, and what only maps have goes. So every
+//! rule of diagrams holds, and every error has its place.
+
+use std::sync::Arc;
+
+use super::axis::{self, Axis};
+use super::document::{Node, Table, Value, read_argument};
+use super::error::{Place, Problem, SceneError};
+use super::section::Section;
+use super::settings::Format;
+use super::{Purpose, TOP_LEVEL};
+use rattlemap_dynamics::model::Model;
+
+/// Which axis of a scene a diagram runs along, and where the others stay.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Along {
+    /// The swept parameter.
+    pub parameter: String,
+    /// `NAME=VALUE` for each other axis: any value in the parameter's range, on the grid or not.
+    pub at: Vec<String>,
+}
+
+/// Turns a scene of several axes into one of the axis that `along` names.
+///
+/// # Errors
+/// [`SceneError`] where the names do not fit the scene's axes, or there is more than one axis and no name.
+pub(super) fn take(document: &mut Node, model: &dyn Model, along: Option<&Along>) -> Result<(), SceneError> {
+    let (command, _) = Purpose::Bifurcation.needs();
+    let axes = {
+        let root = Section::open(document, "", &TOP_LEVEL)?;
+        let Some(field) = root.get("axis") else { return Ok(()) };
+        let tables = field.list("a list of tables, [[axis]]")?;
+        match (along, &tables[..]) {
+            (None, [_, second, ..]) => {
+                let axes = axis::read(&root, model, tables.len(), command)?;
+                return Err(unnamed(&second.node.name_place, &axes));
+            }
+            (None, _) | (Some(_), []) => return Ok(()),
+            (Some(_), _) => axis::read(&root, model, tables.len(), command)?,
+        }
+    };
+    let Some(along) = along else { return Ok(()) };
+    let held = held(&axes, along)?;
+    let Value::Table(root) = &mut document.value else { return Ok(()) };
+    keep(root, axes.iter().position(|axis| *axis.parameter().name == *along.parameter));
+    for (axis, value) in held {
+        hold(root, &axis.parameter().name, value)?;
+    }
+    drop_what_maps_have(root);
+    Ok(())
+}
+
+/// The error for a scene of several axes, which says how a line of it is asked for.
+fn unnamed(place: &Place, axes: &[Axis]) -> SceneError {
+    let names: Vec<&str> = axes.iter().map(|axis| &*axis.parameter().name).collect();
+    let at: String = names[1..].iter().map(|name| format!(" --at {name}=VALUE")).collect();
+    let problem = Problem::Conflict {
+        field: "axis".to_owned(),
+        value: format!("{} tables", axes.len()),
+        remedy: format!(
+            "`bifurcation` needs 1 axis; take one line of the plane with --along {}{at}, or remove [[axis]] tables",
+            names[0]
+        ),
+    };
+    SceneError { place: place.clone(), problem }
+}
+
+/// The axes that stay at a value, each with that value.
+fn held<'a>(axes: &'a [Axis], along: &Along) -> Result<Vec<(&'a Axis, Node)>, SceneError> {
+    let name = |axis: &Axis| axis.parameter().name.to_string();
+    let names = axes.iter().map(name).collect::<Vec<_>>().join(", ");
+    let place = |option, argument: &str| Place::Option { option, argument: argument.into() };
+    let along_place = || place("--along", &along.parameter);
+    if !axes.iter().any(|axis| *axis.parameter().name == *along.parameter) {
+        let problem = Problem::Conflict {
+            field: "along".to_owned(),
+            value: along.parameter.clone(),
+            remedy: format!("the scene does not sweep it; its axes: {names}"),
+        };
+        return Err(SceneError { place: along_place(), problem });
+    }
+    let mut held: Vec<(&Axis, Node)> = Vec::new();
+    for argument in &along.at {
+        let fail = |problem| SceneError { place: place("--at", argument), problem };
+        let assigned = argument.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
+        let Some((name, value)) = assigned.filter(|(name, value)| !name.is_empty() && !value.is_empty())
+        else {
+            return Err(fail(Problem::NotAnAssignment));
+        };
+        let conflict = |remedy: String| {
+            fail(Problem::Conflict { field: name.to_owned(), value: value.to_owned(), remedy })
+        };
+        if name == along.parameter {
+            return Err(conflict("--along sweeps it; --at is for the other axis".to_owned()));
+        }
+        let Some(axis) = axes.iter().find(|axis| *axis.parameter().name == *name) else {
+            return Err(conflict(format!(
+                "the scene does not sweep it, so there is no axis to hold; its axes: {names}; set a parameter with \
+                 --set {name}={value}"
+            )));
+        };
+        if held.iter().any(|(other, _)| other.index() == axis.index()) {
+            return Err(conflict("--at names it twice; drop one of the two".to_owned()));
+        }
+        let argument: Arc<str> = argument.as_str().into();
+        let node = read_argument(value, &argument).placed(place("--at", &argument));
+        held.push((axis, node));
+    }
+    let is_open = |axis: &&Axis| {
+        *axis.parameter().name != *along.parameter
+            && !held.iter().any(|(other, _)| other.index() == axis.index())
+    };
+    if let Some(axis) = axes.iter().find(is_open) {
+        let name = &axis.parameter().name;
+        let problem = Problem::Missing {
+            field: format!("--at {name}=VALUE"),
+            remedy: format!("the scene sweeps {names}: say at which {name} the line lies"),
+        };
+        return Err(SceneError { place: along_place(), problem });
+    }
+    Ok(held)
+}
+
+/// Keeps one of the axes.
+fn keep(root: &mut Table, place: Option<usize>) {
+    let Some(Node { value: Value::List(tables), .. }) = root.get_mut("axis") else { return };
+    if let Some(place) = place {
+        let kept = tables.swap_remove(place);
+        *tables = vec![kept];
+    }
+}
+
+/// Makes a parameter of what was an axis. A value that `--set` gives it would be lost in silence.
+fn hold(root: &mut Table, name: &str, value: Node) -> Result<(), SceneError> {
+    let place = value.place.clone();
+    let empty = || Node {
+        name_place: place.clone(),
+        place: place.clone(),
+        shown: "{ ... }".into(),
+        value: Value::Table(Table::new()),
+    };
+    let parameters = root.entry("parameters".to_owned()).or_insert_with(empty);
+    // What is no table is refused when it is read.
+    let Value::Table(table) = &mut parameters.value else { return Ok(()) };
+    match table.insert(name.to_owned(), value) {
+        Some(Node { place: place @ Place::Set { .. }, shown, .. }) => Err(SceneError {
+            place,
+            problem: Problem::Conflict {
+                field: format!("parameters.{name}"),
+                value: shown,
+                remedy: format!("--at gives `{name}` its value; drop one of the two"),
+            },
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Drops what the text asks of a map alone; what arguments ask is refused when it is read.
+fn drop_what_maps_have(root: &mut Table) {
+    root.retain(|name, node| name != "refine" || !is_from_text(node));
+    if let Some(Node { value: Value::Table(start), .. }) = root.get_mut("start") {
+        start.retain(|name, node| !["count", "seed"].contains(&name.as_str()) || !is_from_text(node));
+    }
+    let Some(Node { value: Value::Table(outputs), .. }) = root.get_mut("outputs") else { return };
+    let Some(Node { value: Value::List(files), .. }) = outputs.get_mut("files") else { return };
+    let is_of_maps = |node: &Node| match &node.value {
+        Value::Text(name) => [Format::Html, Format::Npy].iter().any(|format| format.name() == name),
+        _ => false,
+    };
+    files.retain(|node| !is_of_maps(node) || !is_from_text(node));
+    // A list of none would ask for nothing.
+    if files.is_empty() {
+        outputs.remove("files");
+    }
+}
+
+/// Whether no part of a value comes from an argument.
+fn is_from_text(node: &Node) -> bool {
+    let of_children = match &node.value {
+        Value::Table(table) => table.values().all(is_from_text),
+        Value::List(items) => items.iter().all(is_from_text),
+        _ => true,
+    };
+    of_children && !matches!(node.place, Place::Set { .. })
+}

@@ -1,0 +1,103 @@
+//! One axis out of two.
+
+use super::*;
+use crate::map::scene::Along;
+
+const PLANE: &str = "parameters = { F = 40.0 }
+[[axis]]
+parameter = \"e\"
+min = 0.1
+max = 0.9
+count = 5
+[[axis]]
+parameter = \"omega\"
+min = 1.0
+max = 12.0
+count = 3
+";
+
+fn along(text: &str, sets: &[&str], parameter: &str, at: &[&str]) -> Result<Scene, SceneError> {
+    let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+    let along = Along { parameter: parameter.to_owned(), at: at.iter().map(ToString::to_string).collect() };
+    let find: FindFile<'_> = &|file| Err(format!("{file} is not here"));
+    Scene::parse_along(text, "s.toml", &sets, Purpose::Bifurcation, Some(&along), find)
+}
+
+#[test]
+fn the_other_axis_stays_at_exactly_the_value_given() {
+    for (parameter, at, other, value) in
+        [("e", "omega = 5.6", "omega", 5.6), ("omega", "e=0.3333333333333333", "e", 0.3333333333333333)]
+    {
+        let scene = along(PLANE, &["axis.0.count=4"], parameter, &[at]).unwrap();
+        let [axis] = scene.axes() else { panic!("{} axes", scene.axes().len()) };
+        assert_eq!(
+            (&*axis.parameter().name, axis.count()),
+            (parameter, if parameter == "e" { 4 } else { 3 })
+        );
+        for (on_axis, model) in scene.line() {
+            assert_eq!([parameter, other, "F"].map(|name| model.get(name).unwrap()), [on_axis, value, 40.0]);
+        }
+    }
+    // One axis may be named, too; and a value may lie beyond the grid, as far as the parameter goes.
+    let one = PLANE.split("[[axis]]").take(2).collect::<Vec<_>>().join("[[axis]]");
+    assert_eq!(along(&one, &[], "e", &[]).unwrap().axes().len(), 1);
+    assert!(along(PLANE, &[], "e", &["omega=20"]).is_ok());
+}
+
+#[test]
+fn what_does_not_fit_the_axes_is_refused() {
+    for (parameter, at, parts) in [
+        ("F", &[][..], &["--along F: ", "the scene does not sweep it; its axes: e, omega"][..]),
+        ("e", &[], &["--along e: ", "`--at omega=VALUE` is missing", "at which omega the line lies"]),
+        ("e", &["k=800"], &["--at k=800: ", "no axis to hold; its axes: e, omega", "--set k=800"]),
+        ("e", &["e=0.5"], &["--at e=0.5: ", "--along sweeps it"]),
+        ("e", &["omega=5", "omega=6"], &["--at omega=6: ", "names it twice"]),
+        ("e", &["omega"], &["--at omega: ", "expected NAME=VALUE"]),
+        ("e", &["omega=fast"], &["--at omega=fast: ", "has the wrong type: it must be a number"]),
+        ("e", &["omega=-1"], &["--at omega=-1: `parameters.omega = -1` is out of range"]),
+        ("omega", &["e=nan"], &["--at e=nan: ", "between 0 and 1"]),
+    ] {
+        assert_says(&along(PLANE, &[], parameter, at).unwrap_err().to_string(), parts);
+    }
+    let said = along(PLANE, &["omega=6"], "e", &["omega=5"]).unwrap_err().to_string();
+    assert_says(&said, &["--set omega=6: ", "--at gives `omega` its value"]);
+    // An axis that stays is checked all the same.
+    let bad = PLANE.replace("max = 12.0", "max = 0.5");
+    assert_says(&along(&bad, &[], "e", &["omega=5"]).unwrap_err().to_string(), &["`axis.1.max = 0.5`"]);
+}
+
+#[test]
+fn a_plane_alone_says_how_a_line_is_asked_for() {
+    let said = Scene::parse(PLANE, "s.toml", &[], Purpose::Bifurcation).unwrap_err().to_string();
+    assert_says(&said, &["s.toml:7:1: ", "`axis = 2 tables`", "needs 1 axis", "--along e --at omega=VALUE"]);
+}
+
+#[test]
+fn what_only_maps_have_is_left_out_unless_an_argument_asks_for_it() {
+    let of_a_map = format!(
+        "{PLANE}[start]\npolicy = 'state'\nstate = [0.1, 0, 0, 0]\ncount = 8\nseed = 3\n[refine]\nmax_error = 0.01\n\
+         [outputs]\nfiles = ['npy', 'png', 'html']\nquantities = ['word']\n[integration]\ntransient_periods = 77\n"
+    );
+    let scene = along(&of_a_map, &[], "e", &["omega=5"]).unwrap();
+    assert_eq!(scene.outputs().files, [Format::Png]);
+    assert_eq!(
+        (scene.start(), scene.draw(), scene.refine()),
+        (Start::State([0.1, 0.0, 0.0, 0.0]), None, None)
+    );
+    assert_eq!(scene.integration().transient_periods, 77);
+    let none = of_a_map.replace("'npy', 'png', 'html'", "'html'");
+    assert_eq!(along(&none, &[], "e", &["omega=5"]).unwrap().outputs().files, [Format::Csv, Format::Png]);
+    for (set, part) in [
+        ("outputs.files=[\"html\"]", "drop \"html\""),
+        ("start.count=4", "follows one motion per column"),
+        ("refine.max_error=0.1", "drop [refine]"),
+    ] {
+        assert_says(&along(&of_a_map, &[set], "e", &["omega=5"]).unwrap_err().to_string(), &[part]);
+    }
+}
+
+#[test]
+fn an_axis_named_by_an_argument_replaces_the_texts_value_here_too() {
+    let scene = along(PLANE, &["axis.1.parameter=F"], "e", &["F=55"]).unwrap();
+    assert_eq!(scene.line()[0].1.get("F").unwrap(), 55.0);
+}

@@ -1,0 +1,222 @@
+//! `rattlemap compare`: which cells of two maps differ, and what is refused.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use rattlemap::output::{Identity, Order, RecordFile, inventory};
+use rattlemap::record::Record;
+use tempfile::TempDir;
+
+/// Around the fall of period 4, which comes later on the way up than on the way down.
+const SCENE: &str = "title = 'Around a fold'
+[[axis]]
+parameter = 'omega'
+min = 5.5
+max = 5.7
+count = 12
+[[axis]]
+parameter = 'e'
+min = 0.915
+max = 0.937
+count = 12
+[outputs]
+quantities = ['class', 'lyapunov', 'symmetric', 'word']
+files = ['csv']
+";
+
+/// A folder with finished maps: each has a name and what is set.
+fn maps(of: &[(&str, &[&str])]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    for (name, sets) in of {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let map = ["map", "s.toml", "--engine", "cpu", "--quiet", "--out", name];
+        run(&folder, &map.into_iter().chain(sets).collect::<Vec<_>>()).success();
+    }
+    folder
+}
+
+fn run(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("rattlemap").unwrap();
+    command.current_dir(folder.path()).env("XDG_RUNTIME_DIR", folder.path()).args(arguments).assert()
+}
+
+fn compare(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    run(folder, &[&["compare"], arguments].concat())
+}
+
+fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
+    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
+    predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
+}
+
+fn rows(path: &Path) -> (String, Vec<Vec<String>>) {
+    let mut table = csv::Reader::from_path(path).unwrap();
+    let header = table.headers().unwrap().iter().collect::<Vec<_>>().join(",");
+    (header, table.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect())
+}
+
+fn json(text: &[u8]) -> serde_json::Value {
+    serde_json::from_slice(text).unwrap()
+}
+
+#[test]
+fn up_against_down_is_what_their_tables_say() {
+    let folder = maps(&[("m/up", &["start.policy=up"]), ("m/down", &["start.policy=down"])]);
+    let [(_, up), (_, down)] =
+        ["up", "down"].map(|name| rows(&folder.path().join(format!("m/{name}/cells.csv"))));
+    // i, j, omega, e, class, period, lyapunov of both tables, side by side.
+    let differing: Vec<[String; 11]> = up
+        .iter()
+        .zip(&down)
+        .filter(|(a, b)| a[4..6] != b[4..6])
+        .map(|(a, b)| {
+            let kind = if a[4] == b[4] { "period" } else { "class" };
+            let place =
+                [&a[0], &a[1], &a[2], &a[3], &a[4], &a[5], &b[4], &b[5], &a[6], &b[6]].map(String::clone);
+            std::array::from_fn(|i| place.get(i).cloned().unwrap_or_else(|| kind.to_owned()))
+        })
+        .collect();
+    let kinds = ["class", "period"].map(|kind| differing.iter().filter(|row| row[10] == kind).count());
+    assert!(kinds.iter().all(|&count| count > 0), "{kinds:?}: nothing to see");
+    let done = compare(&folder, &["m/up", "m/down", "--json"]).success().stderr(says(&[
+        "start: up in A, down in B",
+        &format!("{} of 144 cells differ (", differing.len()),
+        &format!("): {} by class, {} by period", kinds[0], kinds[1]),
+        "of cycles of one period differ: ",
+        " in symmetry, ",
+        " by word, ",
+        "out/compare/up-down: compare.csv, compare.png, manifest.json",
+    ]));
+    let out = folder.path().join("out/compare/up-down");
+    let (header, found) = rows(&out.join("compare.csv"));
+    assert_eq!(header, "i,j,omega,e,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind");
+    assert_eq!(found, differing);
+    let manifest = json(&fs::read(out.join("manifest.json")).unwrap());
+    let printed = json(&done.get_output().stdout);
+    assert_eq!(
+        (&manifest["command"], &printed["folder"]),
+        (&"compare".into(), &"out/compare/up-down".into())
+    );
+    for told in [&manifest, &printed] {
+        assert_eq!((&told["cells"], &told["differing"]), (&144.into(), &differing.len().into()));
+        assert_eq!((&told["by_class"], &told["by_period"]), (&kinds[0].into(), &kinds[1].into()));
+        let sides =
+            ["a", "b"].map(|side| [&told[side]["folder"], &told[side]["engine"], &told[side]["precision"]]);
+        assert_eq!(sides, [["up", "cpu", "f64"], ["down", "cpu", "f64"]]);
+        assert_eq!(
+            told["scene_differences"],
+            serde_json::json!([{ "name": "start", "a": "up", "b": "down" }])
+        );
+        let moved: u64 =
+            told["transitions"].as_array().unwrap().iter().map(|pair| pair["cells"].as_u64().unwrap()).sum();
+        assert_eq!(moved, kinds[0] as u64);
+    }
+    check_picture(&out.join("compare.png"), &differing);
+    run(&folder, &["check", "out/compare/up-down"]).success();
+    // Again: the folder is guarded; with --fail the difference is the exit code, and the files are there.
+    compare(&folder, &["m/up", "m/down"]).code(2).stderr(says(&["the folder is not empty", "--force"]));
+    let failed = compare(&folder, &["m/down", "m/up", "--fail", "--quiet"]).code(1).stdout("");
+    failed.stderr(format!("error: {} of 144 cells differ\n", differing.len()));
+    assert!(folder.path().join("out/compare/down-up/manifest.json").is_file());
+}
+
+/// The colours of the kinds take as much of the picture as their cells of the map.
+fn check_picture(path: &Path, differing: &[[String; 11]]) {
+    let picture = image::open(path).unwrap().to_rgb8();
+    let cell = (1024 / 12 * 12 / 12) as usize * (1024 / 12) as usize;
+    let share = |color: [u8; 3]| {
+        let pixels = picture.pixels().filter(|pixel| pixel.0 == color).count();
+        // The patch of the legend is a hundredth of a cell.
+        (pixels as f64 / cell as f64).round() as usize
+    };
+    let of = |a: &str, b: &str| differing.iter().filter(|row| row[4] == a && row[6] == b).count();
+    assert_eq!(share([0xd5, 0x5e, 0x00]), of("periodic", "chaotic"));
+    assert_eq!(share([0x00, 0x72, 0xb2]), of("chaotic", "periodic"));
+    assert_eq!(share([0x00, 0x9e, 0x73]), of("periodic", "periodic"));
+}
+
+#[test]
+fn equal_maps_of_other_sources_and_engines_differ_nowhere() {
+    let few = ["axis.0.count=4", "axis.1.count=3"];
+    let folder = maps(&[("a", &few), ("b", &few)]);
+    of_other_sources(&folder.path().join("b"));
+    let done = compare(&folder, &["a", "b", "--fail", "--out", "c"]).success().stdout("");
+    done.stderr(says(&["no cell of 12 differs by class or period", "exponents of 12 by 0.0e0 at most"]));
+    let (_, found) = rows(&folder.path().join("c/compare.csv"));
+    assert!(found.is_empty(), "{found:?}");
+    let manifest = json(&fs::read(folder.path().join("c/manifest.json")).unwrap());
+    assert_eq!(
+        (&manifest["b"]["crate_version"], &manifest["b"]["commit"]),
+        (&"0.0.9".into(), &"feed".into())
+    );
+    assert_eq!(manifest["exponents"]["largest"], 0.0);
+    assert_eq!(manifest["attractors"], serde_json::Value::Null);
+    // A command that computes again does not take it.
+    run(&folder, &["validate", "b"]).code(2).stderr(says(&["made by rattlemap 0.0.9"]));
+}
+
+/// Makes a map's folder one that another version of other sources has written.
+fn of_other_sources(out: &Path) {
+    let (records, manifest) = (out.join("records.bin"), out.join("manifest.json"));
+    let mut told = json(&fs::read(&manifest).unwrap());
+    let foreign = Identity::read(&records).unwrap().unwrap().built_from("0123", "other processor");
+    let mut kept: Vec<(u32, Record)> = Vec::new();
+    let own = Identity::read(&records).unwrap().unwrap();
+    let take = |batch: &[(u32, Record)]| {
+        kept.extend_from_slice(batch);
+        true
+    };
+    RecordFile::read(&records, &own, Order::Any, take).unwrap();
+    RecordFile::create(&records, &foreign).unwrap().append(&kept).unwrap();
+    for (field, value) in
+        [("sources", "0123"), ("target", "other processor"), ("crate_version", "0.0.9"), ("commit", "feed")]
+    {
+        told[field] = value.into();
+    }
+    fs::write(manifest, inventory::sealed(told).unwrap()).unwrap();
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused_with_the_reason() {
+    let few = ["axis.0.count=3", "axis.1.count=2"];
+    let with = |set: &'static str| [few[0], few[1], set];
+    let folder = maps(&[
+        ("a", &few),
+        ("wider", &with("axis.0.max=5.8")),
+        ("finer", &with("axis.1.count=3")),
+        ("other", &with("axis.0.parameter=k1")),
+        ("classless", &with("outputs.quantities=[\"lyapunov\"]")),
+        ("unfinished", &few),
+    ]);
+    fs::remove_file(folder.path().join("unfinished/manifest.json")).unwrap();
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    for (b, parts) in [
+        (
+            "wider",
+            &[
+                "two grids",
+                "axis 0 of a is omega from 5.5 to 5.7 in 3 values, of wider omega from 5.5 to 5.8",
+            ][..],
+        ),
+        ("finer", &["axis 1 of a is e from 0.915 to 0.937 in 2 values, of finer e from 0.915 to 0.937 in 3"]),
+        ("other", &["axis 0 of a is omega ", ", of other k1 "]),
+        ("classless", &["classless: the map has no classes", "outputs.quantities"]),
+        ("unfinished", &["unfinished: there is no manifest.json; the run is unfinished", "--resume"]),
+        ("empty", &["empty: there is no manifest.json; it is not the folder of a map"]),
+        ("absent", &["absent: there is no such folder"]),
+    ] {
+        compare(&folder, &["a", b]).code(2).stdout("").stderr(says(parts));
+    }
+    assert!(!folder.path().join("out").exists(), "an output folder was made");
+    let run = compare(&folder, &["a", "a", "--out", "./a", "--force"]);
+    run.code(2).stderr(says(&["--out ./a: this is the folder of a, which is compared"]));
+    // Of another parameter that is not on an axis the maps may be.
+    let set = with("k=1010");
+    let sets: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
+    let map = ["map", "s.toml", "--engine", "cpu", "--quiet", "--out", "stiffer"];
+    self::run(&folder, &map.into_iter().chain(sets).collect::<Vec<_>>()).success();
+    compare(&folder, &["a", "stiffer"]).success().stderr(says(&["parameters.k: 1000.0 in A, 1010.0 in B"]));
+}
