@@ -206,7 +206,8 @@ mod tests {
             ..Record::default()
         };
         let records: Vec<Record> = (0..plan.run_count()).map(record).collect();
-        let layers = of(&Cells::new(&scene, &plan, &records), None);
+        let cells = Cells::new(&scene, &plan, &records);
+        let layers = of(&cells, &crate::output::words::read(&cells));
         layers.into_iter().find(|layer| layer.name == "lyapunov").unwrap()
     }
 
