@@ -3,7 +3,7 @@
 use super::*;
 
 const FEW: [&str; 5] = ["--quiet", "--set", "axis.0.count=4", "--set", "axis.1.count=3"];
-const LAYERS: [&str; 5] = ["impacts", "lyapunov", "map", "mesh", "word"];
+const LAYERS: [&str; 6] = ["impacts", "lyapunov", "map", "mesh", "pattern", "word"];
 
 /// What a folder has beside tables and records.
 fn figures(out: &Path) -> Vec<String> {
