@@ -114,7 +114,7 @@ fn a_list_gives_its_cells_in_its_order() {
     let folder = with_list();
     list(&folder, &[])
         .success()
-        .stderr(says(&["4 cells on cpu", "out/l: cells.csv, cells.npy, words.csv, list.csv"]));
+        .stderr(says(&["4 cells in ", " on cpu (f64)", "out/l: cells.csv, cells.npy, words.csv, list.csv"]));
     let out = folder.path().join("out/l");
     let (header, cells) = rows(&out.join("cells.csv"));
     assert!(header.starts_with("F,k1,class,period,"), "{header}");
