@@ -10,12 +10,12 @@ mod scale;
 mod words;
 
 pub(super) use colors::Color;
-pub(super) use words::{Words, read as read_words};
 
 use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
 use super::symbols::number;
+use super::words::Spelled;
 use crate::map::scene::Quantity;
 use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
@@ -80,15 +80,15 @@ pub(super) fn share(cells: usize, total: usize) -> String {
     }
 }
 
-/// The layers that the scene asks for, the first being the map itself. Words are read once,
-/// for the report needs them, too.
-pub(super) fn of(cells: &Cells<'_>, words: Option<&Words>) -> Vec<Layer> {
+/// The layers that the scene asks for, the first being the map itself, patterns before words.
+pub(super) fn of(cells: &Cells<'_>, spelled: &Spelled) -> Vec<Layer> {
     let mut layers = Vec::new();
     if cells.asks(Quantity::Class) {
         layers.push(classes::layer(cells));
     }
     layers.extend(SCALES.iter().filter(|scale| cells.asks(scale.quantity)).map(|scale| scale.layer(cells)));
-    layers.extend(words.map(words::layer));
+    layers.extend(spelled.patterns.as_ref().map(words::patterns));
+    layers.extend(spelled.words.as_ref().map(words::words));
     layers.extend(cells.attractors().map(attractors::layer));
     layers
 }
@@ -206,7 +206,8 @@ mod tests {
             ..Record::default()
         };
         let records: Vec<Record> = (0..plan.run_count()).map(record).collect();
-        let layers = of(&Cells::new(&scene, &plan, &records), None);
+        let cells = Cells::new(&scene, &plan, &records);
+        let layers = of(&cells, &crate::output::words::read(&cells));
         layers.into_iter().find(|layer| layer.name == "lyapunov").unwrap()
     }
 

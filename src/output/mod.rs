@@ -39,6 +39,8 @@ mod stdout;
 mod symbols;
 pub mod unfinished;
 mod validation_json;
+mod words;
+mod words_csv;
 
 pub use cells::Cells;
 pub use error::{DrawError, FigureError, OutputError, WriteError};
