@@ -117,8 +117,8 @@ fn a_line_of_such_a_plane_is_a_diagram() {
         let line = ["bifurcation", "s.toml", "--along", "k1", "--at", "F=12.5", "--quiet"];
         command(&folder, &[&line[..], more].concat()).assert()
     };
-    line(&["--set", "outputs.files=[\"csv\"]"]).success();
-    let manifest = json(&folder.path().join("out/s.k1/manifest.json"));
+    line(&["--set", "outputs.files=[\"csv\"]", "--out", "d"]).success();
+    let manifest = json(&folder.path().join("d/manifest.json"));
     assert_eq!(
         manifest["axis"],
         serde_json::json!(
@@ -132,7 +132,8 @@ fn a_line_of_such_a_plane_is_a_diagram() {
         "is out of range: it must be finite and at least 0",
     ]));
     assert!(!folder.path().join("x").exists());
-    let list = command(&with_list(), &["bifurcation", "l.toml", "--quiet"]).assert().code(2);
+    let list = with_list();
+    let list = command(&list, &["bifurcation", "l.toml", "--quiet"]).assert().code(2);
     list.stderr(says(&["l.toml:7:1: `cells = { ... }` does not fit: `bifurcation` takes an axis"]));
 }
 
@@ -141,7 +142,7 @@ fn a_list_gives_its_cells_in_its_order() {
     let folder = with_list();
     let dry = command(&folder, &["map", "l.toml", "--engine", "cpu", "--dry-run"]).assert().success();
     assert!(String::from_utf8_lossy(&dry.get_output().stdout).contains("cells    4\n"));
-    list(&folder, &[]).success().stderr(says(&["4 cells on cpu", "out/l: cells.csv, cells.npy, list.csv"]));
+    list(&folder, &[]).success().stderr(says(&["4 cells in ", "out/l: cells.csv, cells.npy, list.csv"]));
     let out = folder.path().join("out/l");
     let (header, cells) = rows(&out.join("cells.csv"));
     assert!(header.starts_with("F,k1,class,period,"), "{header}");
