@@ -257,6 +257,11 @@ struct Tally {
     itineraries: array<u32, TRAIL>,
     // The word's symbols, ten to a number.
     word: array<u32, 7>,
+    // The pattern so far, a symbol for every run of one; hashed as the word is.
+    pattern: array<u32, 7>,
+    pattern_length: u32,
+    pattern_hash: array<u32, 2>,
+    pattern_recent: u32,
 }
 
 // What travels back of a lane: the numbers.
@@ -288,6 +293,10 @@ struct Finding {
     hash_low: u32,
     hash_high: u32,
     word: array<u32, 7>,
+    // The same of its pattern.
+    pattern_length: u32,
+    pattern_hash: array<u32, 2>,
+    pattern: array<u32, 7>,
 }
 
 // Slots of lanes: first the active list, those under way in the order in which they were begun; from `slots` on those of

@@ -90,6 +90,9 @@ fn begin_counting() {
     if WORD {
         tallies[lane].word = array<u32, 7>();
     }
+    if PATTERN {
+        begin_pattern();
+    }
     noted.counted_from = tally.period;
 }
 

@@ -86,6 +86,9 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
         (*finding).valid |= VALID_LYAPUNOV;
         (*reading).growth = LN_2 * seen.cycle_growth / Real(noted.cycle);
     }
+    if PATTERN {
+        read_pattern(finding);
+    }
     if !WORD {
         return;
     }
@@ -96,6 +99,31 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
         close_hash();
         (*finding).hash_low = tally.hash_low;
         (*finding).hash_high = tally.hash_high;
+    }
+}
+
+fn read_pattern(finding: ptr<function, Finding>) {
+    var length = tallies[lane].pattern_length;
+    var recent = tallies[lane].pattern_recent;
+    var hash = vec2<u32>(tallies[lane].pattern_hash[0], tallies[lane].pattern_hash[1]);
+    let first = tallies[lane].pattern[0];
+    // The last run goes on as the first: one of them is counted.
+    if length > 1u && (recent & 7u) == (first & 7u) {
+        if length > 7u {
+            hash -= stretch(recent);
+        }
+        recent = recent >> 3u;
+        length -= 1u;
+    }
+    (*finding).valid |= VALID_PATTERN;
+    (*finding).pattern_length = length;
+    (*finding).pattern = tallies[lane].pattern;
+    if length > WORD_SYMBOLS {
+        for (var n = 0u; n < 7u; n++) {
+            recent = followed_by(recent, (first >> (3u * n)) & 7u);
+            hash += stretch(recent);
+        }
+        (*finding).pattern_hash = array<u32, 2>(hash.x, hash.y);
     }
 }
 

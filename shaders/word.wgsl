@@ -1,4 +1,4 @@
-// The word: a symbol for every flight, spelled and hashed.
+// The word: a symbol for every flight, spelled and hashed. Its pattern: a symbol for every run of one.
 
 // One flight ends on `side`: its symbol. The first flight of all comes from no wall.
 fn note_symbol(side: u32) {
@@ -17,20 +17,57 @@ fn note_symbol(side: u32) {
         tallies[lane].word[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
     }
     tally.word_length = n + 1u;
+    // Before the first symbol there is none.
+    if PATTERN && symbol != (tally.recent & 7u) {
+        note_run(symbol);
+    }
     take_symbol(symbol);
     if n >= 7u {
         add_stretch();
     }
 }
 
+fn begin_pattern() {
+    tallies[lane].pattern = array<u32, 7>();
+    tallies[lane].pattern_length = 0u;
+    tallies[lane].pattern_hash = array<u32, 2>();
+    tallies[lane].pattern_recent = 0u;
+}
+
+// Runs are fewer than flights: what they take stays in the buffer.
+fn note_run(symbol: u32) {
+    let n = tallies[lane].pattern_length;
+    if n < 7u * SYMBOLS_PER_NUMBER {
+        tallies[lane].pattern[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
+    }
+    let recent = followed_by(tallies[lane].pattern_recent, symbol);
+    tallies[lane].pattern_length = n + 1u;
+    tallies[lane].pattern_recent = recent;
+    if n >= 7u {
+        let hash = stretch(recent);
+        tallies[lane].pattern_hash[0] += hash.x;
+        tallies[lane].pattern_hash[1] += hash.y;
+    }
+}
+
 fn take_symbol(symbol: u32) {
-    tally.recent = ((tally.recent << 3u) | symbol) & 0xffffffu;
+    tally.recent = followed_by(tally.recent, symbol);
+}
+
+// The eight latest symbols, and one more.
+fn followed_by(recent: u32, symbol: u32) -> u32 {
+    return ((recent << 3u) | symbol) & 0xffffffu;
 }
 
 // Stretches of eight symbols, hashed and summed: no matter where the cycle starts.
 fn add_stretch() {
-    tally.hash_low += mix_bits(tally.recent);
-    tally.hash_high += mix_bits(tally.recent ^ 0x5bd1e995u);
+    let hash = stretch(tally.recent);
+    tally.hash_low += hash.x;
+    tally.hash_high += hash.y;
+}
+
+fn stretch(recent: u32) -> vec2<u32> {
+    return vec2<u32>(mix_bits(recent), mix_bits(recent ^ 0x5bd1e995u));
 }
 
 // A bijection of 32-bit numbers that scatters them.

@@ -91,7 +91,7 @@ fn count(plane: &Plane, size: &Size, precision: Precision, function: &str) -> f6
 /// What scenes ask for, and what is compiled for it.
 fn variants(precision: Precision) -> [(&'static str, Variant); 7] {
     let everything = Variant::of(precision);
-    let class = Variant { word: false, mesh: false, symmetry: false, ..everything };
+    let class = Variant { word: false, pattern: false, mesh: false, symmetry: false, ..everything };
     [
         ("everything", everything),
         ("everything, before the exponent", Variant { growth: false, ..everything }),

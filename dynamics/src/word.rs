@@ -37,6 +37,17 @@ impl Word {
         Word::cyclic(&self.0.iter().map(|s| (s - b'1' + 3) % 6 + b'1').collect::<Vec<_>>())
     }
 
+    /// The same cycle with each run of one symbol counted once: `13554622` gives `135462`.
+    ///
+    /// How often a contact bounces before it meshes depends on the leaving speed at which it may; the order of what
+    /// happens, hardly.
+    pub fn pattern(&self) -> Word {
+        let mut symbols = self.0.clone();
+        // In the smallest rotation no run goes on across the end, unless it is all there is.
+        symbols.dedup();
+        Word::cyclic(&symbols)
+    }
+
     /// The symbols in time order, such as `2356`.
     pub fn time_order(&self) -> String {
         self.0.iter().map(|&s| char::from(s)).collect()
@@ -117,6 +128,20 @@ mod tests {
             let smallest = rotations.clone().min().unwrap();
             for rotated in rotations {
                 assert_eq!(Word::cyclic(&rotated).symbols(), smallest);
+            }
+        }
+    }
+
+    /// However the cycle is cut, and wherever runs lie.
+    #[test]
+    fn a_pattern_has_each_run_once_around_the_cycle() {
+        let cases =
+            [("13554622", "135462"), ("11312", "1213"), ("12", "12"), ("222222", "2"), ("5", "5"), ("", "")];
+        for (symbols, pattern) in cases {
+            for cut in 0..symbols.len().max(1) {
+                let mut rotated = symbols.as_bytes().to_vec();
+                rotated.rotate_left(cut);
+                assert_eq!(Word::cyclic(&rotated).pattern().time_order(), pattern, "{symbols} from {cut} on");
             }
         }
     }

@@ -11,7 +11,9 @@ use crate::map::plan::Plan;
 use crate::output::inventory::Finding;
 use crate::output::map::{MANIFEST, Made, write_validation};
 use crate::output::{self, Cells, Folder};
-use crate::validate::{self, HORIZON, Judge, Kind, Lanes, Sample, StratumResult, Subject, Validation};
+use crate::validate::{
+    self, HORIZON, HalfMesh, Judge, Kind, Lanes, Sample, StratumResult, Subject, Validation,
+};
 use anyhow::{Context, anyhow};
 
 use crate::cli::arguments::Validate;
@@ -153,6 +155,19 @@ fn summary(validation: &Validation, device: Option<&str>) -> String {
         let (off, compared) = (states.off.len(), states.compared);
         let rate = states.rate().text();
         lines.push(format!("states after {HORIZON} periods: {off} of {compared} lanes are off ({rate})"));
+    }
+    if let Some(half) = &validation.half_mesh {
+        let HalfMesh { classes, periods, words, patterns } = half;
+        lines.push(format!(
+            "half the mesh_speed changes {} of {} classes in meshing {}, and of {} cycles {} periods, {} words, {} patterns",
+            classes.count,
+            classes.among,
+            validation.counted(),
+            periods.among,
+            periods.count,
+            words.count,
+            patterns.count
+        ));
     }
     if validation.filled > 0 {
         let (filled, runs) = (validation.filled, validation.runs);

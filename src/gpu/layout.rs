@@ -294,6 +294,14 @@ pub struct Tally {
     pub itineraries: [u32; TRAIL],
     /// Symbols of the cycle, ten to a number.
     pub word: [u32; 7],
+    /// Its pattern so far: a symbol for every run of one.
+    pub pattern: [u32; 7],
+    /// Symbols of the pattern.
+    pub pattern_length: u32,
+    /// Hash of the stretches of its symbols so far, low and high half.
+    pub pattern_hash: [u32; 2],
+    /// The latest symbols, three bits each.
+    pub pattern_recent: u32,
 }
 
 /// What travels back of a lane: the numbers.
@@ -338,4 +346,10 @@ pub struct Finding {
     pub hash_high: u32,
     /// Symbols of the cycle, ten to a number.
     pub word: [u32; 7],
+    /// Symbols of its pattern.
+    pub pattern_length: u32,
+    /// Hash of a pattern that is too long to be spelled out, low and high half.
+    pub pattern_hash: [u32; 2],
+    /// Symbols of the pattern, ten to a number.
+    pub pattern: [u32; 7],
 }

@@ -94,8 +94,10 @@ pub struct LaneSettings {
     pub undecided_periods: u32,
     /// Whether exponents are asked for.
     pub exponent: bool,
-    /// Whether words, time spent meshing and symmetry are asked for.
+    /// Whether words, their patterns, time spent meshing and symmetry are asked for.
     pub word: bool,
+    /// See `word`.
+    pub pattern: bool,
     /// See `word`.
     pub mesh: bool,
     /// See `word`.
@@ -137,6 +139,7 @@ impl Default for LaneSettings {
             undecided_periods: 0,
             exponent: true,
             word: true,
+            pattern: true,
             mesh: true,
             symmetry: true,
             chatter: true,
@@ -352,7 +355,7 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::WrongAnswer`] if the device computes something else, and what it refuses.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
-        let LaneSettings { workgroup, exponent, word, mesh, symmetry, chatter, .. } = *settings;
+        let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, chatter, .. } = *settings;
         let keep = self.policy.keep;
         // Until they need it, lanes go on without the tangent vector where that pays.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
@@ -361,8 +364,18 @@ impl Gpu {
             (true, false) => &[true],
         };
         let precision = self.precision;
-        let variant =
-            |growth| Variant { precision, workgroup, exponent, growth, word, mesh, symmetry, chatter, keep };
+        let variant = |growth| Variant {
+            precision,
+            workgroup,
+            exponent,
+            growth,
+            word,
+            pattern,
+            mesh,
+            symmetry,
+            chatter,
+            keep,
+        };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();
         let missing: Vec<Variant> =
             variants.iter().copied().filter(|variant| !self.pipelines.contains_key(variant)).collect();

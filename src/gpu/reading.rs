@@ -55,21 +55,31 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
         (record.lyapunov, record.lyapunov_error) = (reading.growth / period, reading.growth_error / period);
     }
     if is_valid(valid::WORD) {
-        set_word(&mut record, finding);
+        match spelled(finding.word, finding.word_length) {
+            Some(word) => record.set_word(&word),
+            None => {
+                record.word_length = finding.word_length;
+                record.word_hash = joined([finding.hash_low, finding.hash_high]);
+            }
+        }
+    }
+    if is_valid(valid::PATTERN) {
+        match spelled(finding.pattern, finding.pattern_length) {
+            Some(pattern) => record.set_pattern(&pattern),
+            None => {
+                record.pattern_length = finding.pattern_length;
+                record.pattern_hash = joined(finding.pattern_hash);
+            }
+        }
     }
     record
 }
 
-fn set_word(record: &mut Record, finding: &Finding) {
-    let length = finding.word_length as usize;
-    if length > WORD_SYMBOLS {
-        record.word_length = finding.word_length;
-        record.word_hash = joined([finding.hash_low, finding.hash_high]);
-        return;
-    }
-    let symbol = |i: usize| {
-        b'0' + ((finding.word[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8
-    };
+/// The word of these symbols; none where they are too many to be all there.
+fn spelled(symbols: [u32; 7], length: u32) -> Option<Word> {
+    let symbol =
+        |i: usize| b'0' + ((symbols[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8;
+    let length = Some(length as usize).filter(|&length| length <= WORD_SYMBOLS)?;
     let symbols: [u8; WORD_SYMBOLS] = std::array::from_fn(|i| if i < length { symbol(i) } else { 0 });
-    record.set_word(&Word::cyclic(&symbols[..length]));
+    Some(Word::cyclic(&symbols[..length]))
 }

@@ -50,6 +50,8 @@ pub struct Variant {
     pub growth: bool,
     /// Whether cycles get their word spelled out.
     pub word: bool,
+    /// Whether they get their word's pattern.
+    pub pattern: bool,
     /// Whether the time spent meshing is counted.
     pub mesh: bool,
     /// Whether cycles are compared with their mirror image.
@@ -96,6 +98,7 @@ impl Variant {
             exponent: true,
             growth: true,
             word: true,
+            pattern: true,
             mesh: true,
             symmetry: true,
             chatter: true,
@@ -109,7 +112,7 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let Variant { workgroup, exponent, growth, word, mesh, symmetry, chatter, keep, .. } = self;
+        let Variant { workgroup, exponent, growth, word, pattern, mesh, symmetry, chatter, keep, .. } = self;
         let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
         let body = unroll(BODY, &names);
         let valid = VALID.map(|(name, bits)| ("VALID", name.to_owned(), bits));
@@ -121,7 +124,7 @@ impl Variant {
         format!(
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
              const GROWTH: bool = {growth};\n\
-             const WORD: bool = {word};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
+             const WORD: bool = {word};\nconst PATTERN: bool = {pattern};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
              const CHATTER: bool = {chatter};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
              const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n\
              const SYMBOLS_PER_NUMBER: u32 = {SYMBOLS_PER_NUMBER}u;\nconst BLOCK: u32 = {BLOCK}u;\n{codes}{rules}{body}"
@@ -130,7 +133,7 @@ impl Variant {
 }
 
 /// The records' validity bits under their names in the shader.
-const VALID: [(&str, u32); 7] = [
+const VALID: [(&str, u32); 8] = [
     ("PERIOD", valid::PERIOD),
     ("LYAPUNOV", valid::LYAPUNOV),
     ("IMPACTS", valid::IMPACTS),
@@ -138,6 +141,7 @@ const VALID: [(&str, u32); 7] = [
     ("SYMMETRIC", valid::SYMMETRIC),
     ("WORD", valid::WORD),
     ("STROBE", valid::STROBE),
+    ("PATTERN", valid::PATTERN),
 ];
 
 /// A number that a precision's file declares.

@@ -1,7 +1,7 @@
 //! Which swept parameters changed nothing? Pure.
 //!
 //! A stiffness behind a wall that no motion reaches, say. What is compared is what tables show: class, period,
-//! exponent, impacts, meshing, symmetry and word, as far as they were measured.
+//! exponent, impacts, meshing, symmetry, word and pattern, as far as they were measured.
 
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
@@ -55,6 +55,7 @@ fn is_same(a: &Record, b: &Record, rounding: f64) -> bool {
         && both(valid::MESH, near(a.mesh_fraction, b.mesh_fraction))
         && both(valid::SYMMETRIC, a.symmetric == b.symmetric)
         && both(valid::WORD, a.spelling() == b.spelling())
+        && both(valid::PATTERN, a.pattern() == b.pattern())
 }
 
 #[cfg(test)]

@@ -62,12 +62,21 @@ pub struct Needs {
     pub symmetric: bool,
     /// The cycle's word.
     pub word: bool,
+    /// Its pattern.
+    pub pattern: bool,
 }
 
 impl Needs {
     /// All that a record can tell.
-    pub const EVERYTHING: Needs =
-        Needs { exponent: true, lyapunov: true, impacts: true, mesh: true, symmetric: true, word: true };
+    pub const EVERYTHING: Needs = Needs {
+        exponent: true,
+        lyapunov: true,
+        impacts: true,
+        mesh: true,
+        symmetric: true,
+        word: true,
+        pattern: true,
+    };
 }
 
 /// A cell in which the model has no motion.
@@ -346,6 +355,7 @@ fn needs(quantities: &[Quantity]) -> Needs {
         mesh: asked(Quantity::Mesh),
         symmetric: asked(Quantity::Symmetric),
         word: asked(Quantity::Word),
+        pattern: asked(Quantity::Pattern),
     }
 }
 

@@ -25,7 +25,10 @@ const WORD: u64 = 16;
 
 /// Bytes per cell on disk of each output.
 const CSV: u64 = 190;
-const NPY: u64 = 132;
+/// Less its quantities.
+const NPY: u64 = 33;
+/// Of a word or a pattern, with its share of `words.csv`.
+const NPY_ROW: u64 = 12;
 const HTML: u64 = 24;
 /// Of one figure.
 const PNG: u64 = 4;
@@ -58,7 +61,7 @@ impl Size {
         let record = size_of::<Record>() as u64;
         let per_file = |format: &Format| match format {
             Format::Csv => CSV,
-            Format::Npy => NPY,
+            Format::Npy => NPY + scene.outputs().quantities.iter().map(in_array).sum::<u64>(),
             Format::Html if scene.start().follows() => HTML + HTML_START,
             Format::Html => HTML,
             // One of each quantity, one of attractors.
@@ -97,9 +100,20 @@ impl Size {
     }
 }
 
+/// Bytes per cell of a quantity's columns in `cells.npy`.
+fn in_array(quantity: &Quantity) -> u64 {
+    match quantity {
+        Quantity::Class => 3,
+        Quantity::Lyapunov => 2 * NUMBER,
+        Quantity::Impacts | Quantity::Mesh => NUMBER,
+        Quantity::Symmetric => 1,
+        Quantity::Word | Quantity::Pattern => NPY_ROW,
+    }
+}
+
 fn record_on_disk(scene: &Scene) -> u64 {
     let quantity = |quantity: &Quantity| match quantity {
-        Quantity::Word => WORD,
+        Quantity::Word | Quantity::Pattern => WORD,
         Quantity::Lyapunov | Quantity::Impacts | Quantity::Mesh => NUMBER,
         Quantity::Class | Quantity::Symmetric => 1,
     };

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::bifurcation_csv::{direction_field, float};
 use super::{WriteError, names};
 use crate::map::bifurcation::Column;
-use crate::record::Record;
+use crate::record::Spelling;
 
 /// Fields after the axis' value and the direction.
 const FIELDS: [&str; 10] = [
@@ -51,14 +51,9 @@ fn fields(column: &Column) -> [String; 10] {
     ]
 }
 
-/// The word as a map's table has it, spelled out or hashed, behind a `w`: nothing takes it for a number.
+/// The word as a map's table has it.
 fn word(column: &Column) -> String {
-    let mut record = Record::default();
-    if let Some(word) = &column.word {
-        record.set_word(word);
-    }
-    let text = record.spelling().map_or(String::new(), |spelling| spelling.text());
-    if text.is_empty() { text } else { format!("w{text}") }
+    column.word.as_ref().map_or(String::new(), |word| Spelling::new(word).in_table())
 }
 
 #[cfg(test)]
@@ -122,6 +117,6 @@ mod tests {
         let long = Column { word: Some(Word::cyclic(&long)), ..column(0.5, Class::Periodic { period: 9 }) };
         assert!(word(&long).starts_with("w#") && word(&long).ends_with("/100"), "{}", word(&long));
         let silent = Column { word: Some(Word::default()), ..long };
-        assert_eq!(word(&silent), "", "no event, no word");
+        assert_eq!(word(&silent), "w", "a word without events is one");
     }
 }

@@ -20,7 +20,7 @@ pub(super) enum Source {
 /// Every source; its position is its code in tables.
 pub(super) const SOURCES: [Source; 2] = [Source::Integrated, Source::Filled];
 
-/// One row, less the word, which takes an allocation. What the scene does not ask for, and what the cell does not have, is absent.
+/// One row, less word and pattern, which take allocations. What the scene does not ask for, and what the cell does not have, is absent.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Row {
     pub(super) indices: [usize; 2],
@@ -151,6 +151,11 @@ impl<'a> Cells<'a> {
     /// The word of the cell `id`, if it was asked for and there is one.
     pub(super) fn word(&self, id: usize) -> Option<Spelling> {
         if self.asks(Quantity::Word) { self.records[id].spelling() } else { None }
+    }
+
+    /// The pattern of the cell `id`, likewise.
+    pub(super) fn pattern(&self, id: usize) -> Option<Spelling> {
+        if self.asks(Quantity::Pattern) { self.records[id].pattern() } else { None }
     }
 
     /// The row of the run `id`, less its word.

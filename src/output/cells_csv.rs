@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
 use super::{WriteError, names};
+use crate::map::scene::Quantity;
 use crate::record::Spelling;
 
 /// Cells whose rows are formatted at a time, all cores together.
@@ -19,7 +20,7 @@ const PART: usize = 1 << 12;
 pub(super) const ATTRACTORS: &str = "attractors";
 
 /// Fields after the indices and the axes.
-pub(super) const FIELDS: [&str; 11] = [
+const MEASURED: [&str; 8] = [
     "class",
     "period",
     "lyapunov",
@@ -28,10 +29,13 @@ pub(super) const FIELDS: [&str; 11] = [
     "mesh_fraction",
     "symmetric",
     "word",
-    "status",
-    "periods_run",
-    "source",
 ];
+
+/// After the word, where it is asked for.
+const PATTERN: &str = "pattern";
+
+/// Fields after these.
+const RUN: [&str; 3] = ["status", "periods_run", "source"];
 
 /// Writes the table to `path`.
 ///
@@ -41,7 +45,9 @@ pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
     let mut file = BufWriter::new(File::create(path)?);
     let mut header = csv::Writer::from_writer(Vec::new());
     let counted = cells.attractors().map(|_| ATTRACTORS);
-    header.write_record(places(cells).iter().copied().chain(swept(cells)).chain(FIELDS).chain(counted))?;
+    let pattern = cells.asks(Quantity::Pattern).then_some(PATTERN);
+    let fields = MEASURED.into_iter().chain(pattern).chain(RUN).chain(counted);
+    header.write_record(places(cells).iter().copied().chain(swept(cells)).chain(fields))?;
     file.write_all(&finished(header)?)?;
     let [columns, rows] = cells.counts();
     let count = columns * rows;
@@ -73,8 +79,10 @@ fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> Result<Vec<u8>, Write
         let row = cells.row(id);
         let places = row.indices[..places.len()].iter().map(|index| index.to_string());
         let values = cells.values(id).into_iter().map(|value| format!("{value:?}"));
+        let pattern = cells.asks(Quantity::Pattern).then(|| spelled(cells.pattern(id)));
         let counted = row.attractors.map(|count| count.to_string());
-        table.write_record(places.chain(values).chain(fields(&row, cells.word(id))).chain(counted))?;
+        let fields = measured(&row, spelled(cells.word(id))).into_iter().chain(pattern).chain(run(&row));
+        table.write_record(places.chain(values).chain(fields).chain(counted))?;
     }
     finished(table)
 }
@@ -83,7 +91,11 @@ fn finished(table: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, WriteError> {
     table.into_inner().map_err(|error| error.into_error().into())
 }
 
-fn fields(row: &Row, word: Option<Spelling>) -> [String; 11] {
+fn spelled(word: Option<Spelling>) -> String {
+    word.map_or(String::new(), |word| word.in_table())
+}
+
+fn measured(row: &Row, word: String) -> [String; 8] {
     let float = |value: Option<f64>| value.map_or(String::new(), |x| format!("{x:?}"));
     [
         row.class.map_or(String::new(), |class| names::class(class).to_owned()),
@@ -93,9 +105,11 @@ fn fields(row: &Row, word: Option<Spelling>) -> [String; 11] {
         float(row.impacts_per_period),
         float(row.mesh_fraction),
         row.symmetric.map_or(String::new(), |symmetric| symmetric.to_string()),
-        word.map_or(String::new(), |word| word.text()),
-        names::status(row.status).to_owned(),
-        row.periods_run.to_string(),
-        names::source(row.source).to_owned(),
+        word,
     ]
+}
+
+fn run(row: &Row) -> [String; 3] {
+    let [status, source] = [names::status(row.status), names::source(row.source)].map(str::to_owned);
+    [status, row.periods_run.to_string(), source]
 }

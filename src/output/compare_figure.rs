@@ -8,12 +8,15 @@ use super::map_figure::{axis, side};
 use super::plot_style::axes::Frame;
 use super::plot_style::legend::draw_head;
 use super::plot_style::{Align, BELOW, Canvas, DARK, RGBColor, Rect, SMALL, save_figure};
-use super::{DrawError, FigureError};
+use super::symbols::symbol;
+use super::{DrawError, FigureError, caption};
 use crate::map::compare::Kind;
 use rattlemap_dynamics::orbit::Class;
 
 const LEFT: f64 = 140.0;
-const TOP: f64 = 130.0;
+const TOP: f64 = 162.0;
+/// What names of a scene's parameters begin with.
+const PARAMETERS: &str = "parameters.";
 /// Room for the legend beside the map.
 const BESIDE: f64 = 560.0;
 const GAP: f64 = 36.0;
@@ -38,8 +41,8 @@ const fn entry(color: Color, text: &'static str, kind: Option<Kind>) -> Entry {
 const ENTRIES: [Entry; 8] = [
     entry([0xdc, 0xe9, 0xf4], "both periodic", None),
     entry([0xf6, 0xd9, 0x8b], "both periodic, other word", None),
-    entry([0xcd, 0xcd, 0xcd], "both chaotic", None),
-    entry([0xf5, 0xe3, 0xf1], "both undecided or failed", None),
+    entry([0xbc, 0xbc, 0xbc], "both chaotic", None),
+    entry([0xd9, 0xb0, 0xf8], "both undecided or failed", None),
     entry([0xd5, 0x5e, 0x00], "A periodic, B chaotic", Some(Kind::Class)),
     entry([0x00, 0x72, 0xb2], "A chaotic, B periodic", Some(Kind::Class)),
     entry([0xcc, 0x79, 0xa7], "undecided or failed in one", Some(Kind::Class)),
@@ -102,7 +105,10 @@ fn subtitle(compared: &Compared<'_>) -> String {
     let mut parts: Vec<String> = compared
         .scene_differences()
         .iter()
-        .map(|differing| format!("{}: {} in A, {} in B", differing.name, differing.a, differing.b))
+        .map(|differing| {
+            let name = symbol(differing.name.trim_start_matches(PARAMETERS));
+            format!("{name}: {} in A, {} in B", differing.a, differing.b)
+        })
         .collect();
     let engine = |side: super::compare::MapSide<'_>| format!("{} {}", side.made.engine, side.made.precision);
     if engine(a) != engine(b) {
@@ -114,7 +120,14 @@ fn subtitle(compared: &Compared<'_>) -> String {
             |side: super::compare::MapSide<'_>| format!("{} ({})", side.crate_version, short(side.commit));
         parts.push(format!("A by version {}, B by {}", version(a), version(b)));
     }
-    if parts.is_empty() { "scenes, engines and versions are the same".to_owned() } else { parts.join("; ") }
+    let told = if parts.is_empty() {
+        "scenes, engines and versions are the same".to_owned()
+    } else {
+        parts.join("; ")
+    };
+    // Where parameters differ it is those that tell the maps apart.
+    let is_one = !compared.scene_differences().iter().any(|differing| differing.name.starts_with(PARAMETERS));
+    if is_one { format!("{told}\n{}", caption::of_scene(a.cells.scene())) } else { told }
 }
 
 /// Draws what the colours mean, with numbers and shares of cells, below the sum of their kind.
@@ -147,4 +160,20 @@ fn draw_legend(canvas: &Canvas<'_>, places: &[usize], left: f64) -> Result<(), D
         y += ROW / 2.0;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ENTRIES;
+    use crate::output::seen::least_difference;
+
+    #[test]
+    fn colours_can_be_told_apart_by_all_eyes() {
+        for (i, a) in ENTRIES.iter().enumerate() {
+            for b in &ENTRIES[i + 1..] {
+                let difference = least_difference(a.color, b.color);
+                assert!(difference >= 10.0, "{}, {}: {difference}", a.text, b.text);
+            }
+        }
+    }
 }

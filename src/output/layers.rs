@@ -10,12 +10,12 @@ mod scale;
 mod words;
 
 pub(super) use colors::Color;
-pub(super) use words::{Words, read as read_words};
 
 use rayon::prelude::*;
 
 use super::cells::{Cells, Row};
 use super::symbols::number;
+use super::words::Spelled;
 use crate::map::scene::Quantity;
 use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
@@ -80,15 +80,15 @@ pub(super) fn share(cells: usize, total: usize) -> String {
     }
 }
 
-/// The layers that the scene asks for, the first being the map itself. Words are read once,
-/// for the report needs them, too.
-pub(super) fn of(cells: &Cells<'_>, words: Option<&Words>) -> Vec<Layer> {
+/// The layers that the scene asks for, the first being the map itself, patterns before words.
+pub(super) fn of(cells: &Cells<'_>, spelled: &Spelled) -> Vec<Layer> {
     let mut layers = Vec::new();
     if cells.asks(Quantity::Class) {
         layers.push(classes::layer(cells));
     }
     layers.extend(SCALES.iter().filter(|scale| cells.asks(scale.quantity)).map(|scale| scale.layer(cells)));
-    layers.extend(words.map(words::layer));
+    layers.extend(spelled.patterns.as_ref().map(words::patterns));
+    layers.extend(spelled.words.as_ref().map(words::words));
     layers.extend(cells.attractors().map(attractors::layer));
     layers
 }
@@ -138,7 +138,11 @@ impl Scale {
         let values: Vec<Option<f64>> = ids(cells).map(|id| (self.field)(&cells.row(id))).collect();
         let sizes =
             |sign: f64| values.iter().flatten().map(move |value| sign * value).filter(|size| *size > 0.0);
-        let high = nice_bound(sizes(1.0));
+        let is_negative = |value: &f64| *value < 0.0;
+        let high = match values.iter().flatten().all(is_negative) && sizes(-1.0).next().is_some() {
+            true => 0.0,
+            false => nice_bound(sizes(1.0)),
+        };
         let low = if sizes(-1.0).next().is_some() { -nice_bound(sizes(-1.0)) } else { 0.0 };
         let beyond = beyond(values.iter().flatten().copied(), low, high);
         let value_of = |share: f64| low + share * (high - low);
@@ -149,7 +153,11 @@ impl Scale {
         let color = |level: u8| {
             let value = value_of(f64::from(level) / f64::from(LEVELS - 1));
             // In units of its own side's end, so that both sides use all their colours.
-            (self.colors)(if value < 0.0 { value / -low } else { value / high })
+            (self.colors)(match value {
+                negative if negative < 0.0 => negative / -low,
+                positive if high > 0.0 => positive / high,
+                _ => 0.0,
+            })
         };
         let colors: Vec<Color> = (0..LEVELS).map(color).collect();
         let absent = values.iter().filter(|value| value.is_none()).count();
@@ -177,4 +185,50 @@ fn beyond(values: impl Iterator<Item = f64>, low: f64, high: f64) -> [usize; 2] 
 fn ids(cells: &Cells<'_>) -> rayon::range::Iter<usize> {
     let [columns, rows] = cells.counts();
     (0..columns * rows).into_par_iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::plan::Plan;
+    use crate::map::scene::{Purpose, Scene};
+    use crate::record::{Record, valid};
+
+    /// The exponents' layer of a map of 400 cells.
+    fn exponents(value: impl Fn(usize) -> f64) -> Layer {
+        let axis = |name: &str| format!("[[axis]]\nparameter = '{name}'\nmin = 0.1\nmax = 1.0\ncount = 20\n");
+        let scene = Scene::parse(&(axis("e") + &axis("omega")), "s", &[], Purpose::Map).unwrap();
+        let plan = Plan::new(&scene);
+        let record = |id| Record {
+            lyapunov: value(id),
+            period: 1,
+            valid: valid::LYAPUNOV | valid::PERIOD,
+            ..Record::default()
+        };
+        let records: Vec<Record> = (0..plan.run_count()).map(record).collect();
+        let cells = Cells::new(&scene, &plan, &records);
+        let layers = of(&cells, &crate::output::words::read(&cells));
+        layers.into_iter().find(|layer| layer.name == "lyapunov").unwrap()
+    }
+
+    /// A scale ends where values do: there is no red on a map without chaos.
+    #[test]
+    fn a_scale_has_the_sides_that_values_have() {
+        let ends = |layer: &Layer| layer.bar.as_ref().map(|bar| (bar.low, bar.high)).unwrap();
+        let negative = exponents(|id| -0.001 * (id + 1) as f64);
+        assert_eq!(ends(&negative), (-0.4, 0.0));
+        assert_eq!(negative.palette[254], diverging(0.0), "its upper end is white");
+        assert!(exponents(|_| -0.1).palette.contains(&diverging(-1.0)));
+        assert_eq!(ends(&exponents(|id| if id < 200 { -0.2 } else { 1.9 })), (-0.2, 2.0));
+        assert_eq!(ends(&exponents(|_| 0.0)), (0.0, 1.0));
+    }
+
+    /// A few extremes do not stretch it; how many there are is told.
+    #[test]
+    fn what_a_scale_leaves_out_is_counted() {
+        let layer = exponents(|id| if id < 2 { -5.0 } else { -0.2 });
+        let bar = layer.bar.unwrap();
+        assert_eq!((bar.low, bar.beyond), (-0.2, [2, 0]));
+        assert_eq!(bar.left_out(400), ["values below \u{2212}0.2: 0.5 %"]);
+    }
 }

@@ -11,6 +11,8 @@ use serde_json::Value;
 use super::folder::PARTIAL;
 use super::unfinished::UNFINISHED;
 use super::validation_json::ValidationObject;
+use super::words::{self, Spelled};
+use super::words_csv::Rows;
 use super::{
     Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, inventory, layers, map_figure,
     map_manifest, report, unfinished,
@@ -23,6 +25,7 @@ pub use super::map_manifest::{Made, Run};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
+const WORDS: &str = "words.csv";
 const HTML: &str = "report.html";
 /// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
 pub const LIST: &str = "list.csv";
@@ -30,11 +33,11 @@ pub const LIST: &str = "list.csv";
 pub const VALIDATION: &str = "validation.json";
 
 /// The layers of which there are figures, in every format of figures.
-const LAYERS: [&str; 6] = ["map", "lyapunov", "impacts", "mesh", "word", "attractors"];
+const LAYERS: [&str; 7] = ["map", "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
 
 /// Every file that a map may have beside its records.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let tables = [MANIFEST, LIST, CSV, NPY, HTML, VALIDATION].map(str::to_owned);
+    let tables = [MANIFEST, LIST, CSV, NPY, WORDS, HTML, VALIDATION].map(str::to_owned);
     let figures = LAYERS.into_iter().flat_map(|layer| Format::FIGURES.map(|format| figure(layer, format)));
     tables.into_iter().chain(figures).collect()
 });
@@ -138,10 +141,11 @@ fn write_files(
     validation: Option<&Value>,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
+    let spelled = words::read(cells);
     // Side by side, for each of them has parts that one core must do alone.
     let (tables, pictures) = rayon::join(
-        || write_tables(folder, cells, wanted),
-        || write_pictures(folder, cells, validation, wanted),
+        || write_tables(folder, cells, &spelled, wanted),
+        || write_pictures(folder, cells, &spelled, validation, wanted),
     );
     let mut files = tables?;
     files.extend(pictures?);
@@ -152,24 +156,35 @@ fn write_files(
     Ok(files)
 }
 
-fn write_tables(folder: &Folder, cells: &Cells<'_>, wanted: Wanted<'_>) -> Result<Vec<String>, OutputError> {
-    let write_if = |format, name: &str, write: fn(&Path, &Cells<'_>) -> Result<(), WriteError>| {
-        if cells.scene().outputs().files.contains(&format) && wanted(name) {
-            folder.replace(name, |path| write(path, cells)).map(|()| Some(name.to_owned()))
+fn write_tables(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    spelled: &Spelled,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    type Write<'w> = &'w (dyn Fn(&Path) -> Result<(), WriteError> + Sync);
+    let write_if = |is_asked: bool, name: &str, write: Write<'_>| {
+        if is_asked && wanted(name) {
+            folder.replace(name, write).map(|()| Some(name.to_owned()))
         } else {
             Ok(None)
         }
     };
+    let asks = |format| cells.scene().outputs().files.contains(&format);
+    let rows = Rows::new(spelled);
+    let has_words = spelled.words.is_some() || spelled.patterns.is_some();
     let (csv, npy) = rayon::join(
-        || write_if(Format::Csv, CSV, cells_csv::write),
-        || write_if(Format::Npy, NPY, cells_npy::write),
+        || write_if(asks(Format::Csv), CSV, &|path| cells_csv::write(path, cells)),
+        || write_if(asks(Format::Npy), NPY, &|path| cells_npy::write(path, cells, &rows)),
     );
-    Ok([csv?, npy?].into_iter().flatten().collect())
+    let words = write_if(asks(Format::Npy) && has_words, WORDS, &|path| rows.write(path));
+    Ok([csv?, npy?, words?].into_iter().flatten().collect())
 }
 
 fn write_pictures(
     folder: &Folder,
     cells: &Cells<'_>,
+    spelled: &Spelled,
     validation: Option<&Value>,
     wanted: Wanted<'_>,
 ) -> Result<Vec<String>, OutputError> {
@@ -182,8 +197,7 @@ fn write_pictures(
     if !wants_page && !wants_figures {
         return Ok(files);
     }
-    let words = layers::read_words(cells);
-    let layers = layers::of(cells, words.as_ref());
+    let layers = layers::of(cells, spelled);
     if wants_figures {
         let named = layers.iter().flat_map(|layer| names(layer.name).map(move |name| (layer, name)));
         let named: Vec<_> = named.filter(|(_, name)| wanted(name)).collect();
@@ -193,7 +207,7 @@ fn write_pictures(
         files.extend(named.into_iter().map(|(_, name)| name));
     }
     if wants_page {
-        folder.replace(HTML, |path| report::write(path, cells, &layers, words.as_ref(), validation))?;
+        folder.replace(HTML, |path| report::write(path, cells, &layers, spelled, validation))?;
         files.push(HTML.to_owned());
     }
     Ok(files)

@@ -157,7 +157,7 @@ pub(super) struct RefinementObject {
 
 /// `rate` is the fraction of filled cells that integration shows to be wrong, `interval` its
 /// 95 % interval (Wilson); `words` of the sampled cells had been filled with a word, of which
-/// `wrong_words` were not theirs.
+/// `wrong_words` were not theirs; `patterns` and `wrong_patterns` are the same of patterns.
 #[derive(Serialize)]
 struct AuditObject {
     filled: usize,
@@ -167,6 +167,8 @@ struct AuditObject {
     interval: [f64; 2],
     words: usize,
     wrong_words: usize,
+    patterns: usize,
+    wrong_patterns: usize,
     errors: ErrorsObject,
 }
 
@@ -225,6 +227,8 @@ impl From<&Refined> for RefinementObject {
             interval: audit.interval(),
             words: audit.words,
             wrong_words: audit.wrong_words,
+            patterns: audit.patterns,
+            wrong_patterns: audit.wrong_patterns,
             errors: ErrorsObject {
                 lyapunov: audit.errors.lyapunov.map(DeviationObject::of),
                 impacts_per_period: audit.errors.impacts.map(DeviationObject::of_counts),

@@ -33,10 +33,14 @@ pub mod plot_style;
 mod record_file;
 mod replay;
 mod report;
+#[cfg(test)]
+mod seen;
 mod stdout;
 mod symbols;
 pub mod unfinished;
 mod validation_json;
+mod words;
+mod words_csv;
 
 pub use cells::Cells;
 pub use error::{DrawError, FigureError, OutputError, WriteError};

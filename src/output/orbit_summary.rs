@@ -50,8 +50,12 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     facts.extend([
         ("word, in time", or_dash(orbit.word.time_order())),
         ("word, as printed", or_dash(orbit.word.paper_notation())),
-        ("Lyapunov exponent", exponent(orbit)),
     ]);
+    let pattern = orbit.word.pattern();
+    if pattern != orbit.word {
+        facts.push(("pattern", pattern.time_order()));
+    }
+    facts.push(("Lyapunov exponent", exponent(orbit)));
     if let Some(multipliers) = &orbit.floquet {
         let listed: Vec<String> = multipliers.iter().copied().map(complex).collect();
         facts.push(("Floquet multipliers", listed.join(", ")));

@@ -37,7 +37,7 @@ pub const WHITE: RGBColor = RGBColor(0xff, 0xff, 0xff);
 /// Text, axes and outlines.
 pub const DARK: RGBColor = RGBColor(0x26, 0x26, 0x26);
 /// Lines that should not draw the eye: velocity jumps, marks without data.
-pub const FAINT: RGBColor = RGBColor(0x96, 0x96, 0x96);
+pub const FAINT: RGBColor = RGBColor(0xa0, 0xa0, 0xa0);
 /// Grid lines.
 pub const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
 /// Trajectory while the teeth mesh.

@@ -75,6 +75,16 @@ pub enum RecordFileError {
         /// The file.
         path: PathBuf,
     },
+    /// Another version wrote it.
+    #[error(
+        "{} is another version's: its records have other fields; make the map anew with --force, or go on with the \
+         version that began it",
+        .path.display()
+    )]
+    OtherFields {
+        /// The file.
+        path: PathBuf,
+    },
     /// The operating system will not have it.
     #[error("{}: {reason}", .path.display())]
     Io {
@@ -121,22 +131,20 @@ impl RecordFile {
     ) -> Result<RecordFile, RecordFileError> {
         let io = |reason| RecordFileError::Io { path: path.to_owned(), reason };
         refuse_link(path).map_err(io)?;
-        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(io)?;
+        let file = OpenOptions::new().read(true).write(true).open(path).map_err(io)?;
         let Some(reader) = Reader::of(&file, path, identity)? else {
             return RecordFile::create(path, identity);
         };
         let Extent { count, damage, good, next_number } = reader.batches(order, take)?;
         let (begin_of_batches, is_whole) = (reader.begin, reader.is_whole);
         let mended = match &good[..] {
-            [] if is_whole => file.set_len(begin_of_batches).map(|()| None),
-            [one] if is_whole && one.start == begin_of_batches => file.set_len(one.end).map(|()| None),
+            [] if is_whole => file.set_len(begin_of_batches).map(|()| file),
+            [one] if is_whole && one.start == begin_of_batches => file.set_len(one.end).map(|()| file),
             _ => header::bytes(identity)
                 .map_err(io::Error::from)
-                .and_then(|header| begin(path, &header, Some((&file, &good))).map(Some)),
+                .and_then(|header| begin(path, &header, Some((file, &good)))),
         };
-        if let Some(mended) = mended.map_err(io)? {
-            file = mended;
-        }
+        let mut file = mended.map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
         Ok(RecordFile { file, path: path.to_owned(), count, next_number, damage })
     }
@@ -189,7 +197,7 @@ fn open(path: &Path) -> Result<File, RecordFileError> {
 }
 
 /// A file with a header and, of another file, these bytes. It has its name once all is on the disk.
-fn begin(path: &Path, header: &[u8], of: Option<(&File, &[Range<u64>])>) -> io::Result<File> {
+fn begin(path: &Path, header: &[u8], of: Option<(File, &[Range<u64>])>) -> io::Result<File> {
     refuse_link(path)?;
     let partial = partial(path);
     refuse_link(&partial)?;
@@ -200,10 +208,11 @@ fn begin(path: &Path, header: &[u8], of: Option<(&File, &[Range<u64>])>) -> io::
     let mut file = OpenOptions::new().read(true).write(true).create_new(true).open(&partial)?;
     let write = |file: &mut File| {
         file.write_all(header)?;
+        // It is closed then: Windows may put no other in the place of a file that is open.
         if let Some((mut from, ranges)) = of {
             for range in ranges {
                 from.seek(SeekFrom::Start(range.start))?;
-                io::copy(&mut from.take(range.end - range.start), file)?;
+                io::copy(&mut (&from).take(range.end - range.start), file)?;
             }
         }
         file.sync_all()?;

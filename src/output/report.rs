@@ -21,10 +21,11 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::cells::{Cells, Row, SOURCES};
-use super::layers::{Color, Layer, Words};
+use super::layers::{Color, Layer};
 use super::map_figure::subtitle;
 use super::map_manifest::RefinementObject;
 use super::symbols::symbol;
+use super::words::{Spelled, Words};
 use super::{WriteError, caption, names, replay};
 use crate::map::scene::{Quantity, Rule, Scale, Scene};
 use rattlemap_dynamics::orbit::Status;
@@ -37,7 +38,7 @@ const SCRIPT: &str = include_str!("report/page.js");
 struct Data<'a> {
     title: String,
     subtitle: String,
-    /// Every parameter that no axis sweeps, and what the model is taken from.
+    /// Every parameter that no axis sweeps, with its value or what it follows; and what the model is taken from.
     fixed: String,
     source: Option<&'static str>,
     axes: Vec<AxisData>,
@@ -53,6 +54,7 @@ struct Data<'a> {
     statuses: Vec<&'static str>,
     sources: Vec<&'static str>,
     words: Vec<String>,
+    patterns: Vec<String>,
     /// What became of an adaptive map.
     refinement: Option<RefinementObject>,
     validation: Option<&'a serde_json::Value>,
@@ -126,7 +128,7 @@ pub(super) fn write(
     path: &Path,
     cells: &Cells<'_>,
     layers: &[Layer],
-    words: Option<&Words>,
+    spelled: &Spelled,
     validation: Option<&serde_json::Value>,
 ) -> Result<(), WriteError> {
     let scene = cells.scene();
@@ -140,11 +142,12 @@ pub(super) fn write(
         replay: replay::arguments(scene),
         starts: starts(cells),
         layers: layers.par_iter().map(LayerData::from).collect(),
-        values: values(cells, words)?,
+        values: values(cells, spelled)?,
         classes: names::CLASSES,
         statuses: Status::ALL.iter().map(|&status| names::status(status)).collect(),
         sources: SOURCES.iter().map(|&source| names::source(source)).collect(),
-        words: words.map_or(Vec::new(), |words| words.list.iter().map(|(text, _)| text.clone()).collect()),
+        words: texts(spelled.words.as_ref()),
+        patterns: texts(spelled.patterns.as_ref()),
         refinement: cells.refinement().map(RefinementObject::from),
         validation,
     };
@@ -209,7 +212,7 @@ fn starts(cells: &Cells<'_>) -> Option<Packed> {
 /// What the page reads out for a cell, one array per quantity that the scene asks for.
 fn values(
     cells: &Cells<'_>,
-    words: Option<&Words>,
+    spelled: &Spelled,
 ) -> serde_json::Result<serde_json::Map<String, serde_json::Value>> {
     let [columns, rows] = cells.counts();
     let all = || (0..columns * rows).into_par_iter().map(|id| cells.row(id));
@@ -245,10 +248,14 @@ fn values(
     if let Some(counts) = cells.attractors() {
         list.push(("attractors", packed("u8", counts)));
     }
-    if let Some(words) = words {
-        list.push(("word", packed("u32", &words.numbers)));
+    for (name, words) in [("word", &spelled.words), ("pattern", &spelled.patterns)] {
+        list.extend(words.as_ref().map(|words| (name, packed("u32", &words.numbers))));
     }
     list.into_iter().map(|(name, values)| Ok((name.to_owned(), serde_json::to_value(values)?))).collect()
+}
+
+fn texts(words: Option<&Words>) -> Vec<String> {
+    words.map_or(Vec::new(), |words| words.list.iter().map(|(spelling, _)| spelling.text()).collect())
 }
 
 fn packed<T: NoUninit>(kind: &'static str, values: &[T]) -> Packed {

@@ -11,7 +11,8 @@ use super::manifest::Head;
 use super::map_manifest::Made;
 use super::replay;
 use crate::validate::{
-    ChaosTest, HORIZON, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation, Value,
+    ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation,
+    Value,
 };
 
 #[derive(Serialize)]
@@ -43,6 +44,8 @@ pub(super) struct ValidationObject {
     identical: usize,
     computed_again: usize,
     chaos: Vec<ChaosObject>,
+    /// What changes where cells of the uniform stratum mesh at half the speed; null where none meshes.
+    half_mesh_speed: Option<HalfMeshObject>,
     states: Option<StatesObject>,
     /// Runs of the whole map whose record holds a number that is not finite.
     not_finite: Vec<u32>,
@@ -80,6 +83,23 @@ struct ChaosObject {
     bar: Option<f64>,
     means: [f64; 2],
     fails: bool,
+}
+
+/// Periods, words and patterns of cycles, the latter two up to mirror image.
+#[derive(Serialize)]
+struct HalfMeshObject {
+    class: ChangedObject,
+    period: ChangedObject,
+    word: ChangedObject,
+    pattern: ChangedObject,
+}
+
+#[derive(Serialize)]
+struct ChangedObject {
+    compared: usize,
+    changed: usize,
+    interval: [f64; 2],
+    text: String,
 }
 
 #[derive(Serialize)]
@@ -156,6 +176,7 @@ impl ValidationObject {
             identical: validation.again[0],
             computed_again: validation.again[1],
             chaos: validation.chaos.iter().map(ChaosObject::from).collect(),
+            half_mesh_speed: validation.half_mesh.as_ref().map(HalfMeshObject::from),
             states: validation.states.as_ref().map(StatesObject::from),
             not_finite: validation.not_finite.clone(),
             mismatches: validation.mismatches.iter().map(|mismatch| mismatched(cells, mismatch)).collect(),
@@ -205,6 +226,28 @@ impl From<&ChaosTest> for ChaosObject {
     fn from(test: &ChaosTest) -> ChaosObject {
         let &ChaosTest { name, cells, distance, bar, means } = test;
         ChaosObject { name, cells, distance, bar, means, fails: test.fails() }
+    }
+}
+
+impl From<Rate> for ChangedObject {
+    fn from(rate: Rate) -> ChangedObject {
+        ChangedObject {
+            compared: rate.among,
+            changed: rate.count,
+            interval: rate.interval,
+            text: rate.text(),
+        }
+    }
+}
+
+impl From<&HalfMesh> for HalfMeshObject {
+    fn from(half: &HalfMesh) -> HalfMeshObject {
+        HalfMeshObject {
+            class: half.classes.into(),
+            period: half.periods.into(),
+            word: half.words.into(),
+            pattern: half.patterns.into(),
+        }
     }
 }
 

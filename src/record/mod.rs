@@ -12,9 +12,9 @@ pub use spelling::{Spelling, word_hash};
 use bytemuck::{Pod, Zeroable};
 
 /// Layout version of [`Record`]; files that hold records carry it.
-pub const RECORD_VERSION: u32 = 1;
+pub const RECORD_VERSION: u32 = 2;
 
-/// Longest word that a record spells out; longer ones are kept as hash and length.
+/// Longest word or pattern that a record spells out; longer ones are kept as hash and length.
 pub const WORD_SYMBOLS: usize = 64;
 
 /// Validity bits of a [`Record`]: fields whose bit is not set are zero and mean nothing.
@@ -35,11 +35,13 @@ pub mod valid {
     pub const STROBE: u32 = 1 << 6;
     /// Nothing was measured: the record was filled from its neighbours.
     pub const FILLED: u32 = 1 << 7;
+    /// `pattern`, `pattern_length` and `pattern_hash`.
+    pub const PATTERN: u32 = 1 << 8;
 }
 
 /// What one cell measured, in one fixed layout for all engines, precisions and variants.
 ///
-/// 160 bytes, no padding, little-endian in files.
+/// 176 bytes, no padding, little-endian in files.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Record {
@@ -70,8 +72,14 @@ pub struct Record {
     pub symmetric: u32,
     /// Which fields are valid: bits of [`valid`].
     pub valid: u32,
+    /// The word's pattern, each run of one symbol once, packed as the word is.
+    pub pattern: [u64; 4],
+    /// Rotation-invariant hash of the whole pattern.
+    pub pattern_hash: u64,
+    /// Symbols in the pattern.
+    pub pattern_length: u32,
     /// Reserved; zero.
-    pub reserved: [u32; 8],
+    pub reserved: u32,
 }
 
 impl Record {

@@ -1,4 +1,4 @@
-//! Words inside records: 64 symbols spelled out, longer ones as hash and length.
+//! Words and patterns inside records: 64 symbols spelled out, longer ones as hash and length.
 
 use super::{Record, WORD_SYMBOLS, valid};
 use rattlemap_dynamics::word::Word;
@@ -9,7 +9,7 @@ const PER_WORD: usize = 21;
 /// Consecutive symbols that the hash takes together.
 const HASH_WINDOW: usize = 8;
 
-/// A word as a record keeps it.
+/// A word or a pattern as a record keeps it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Spelling {
     /// All its symbols.
@@ -24,7 +24,12 @@ pub enum Spelling {
 }
 
 impl Spelling {
-    /// What tables show: the symbols in time order, or `#hash/length`. Never more than 64
+    /// As a record would keep it.
+    pub fn new(word: &Word) -> Spelling {
+        Spelling::unpacked(Spelling::packed(word))
+    }
+
+    /// What figures and JSON show: the symbols in time order, or `#hash/length`. Never more than 64
     /// characters.
     pub fn text(&self) -> String {
         match self {
@@ -32,6 +37,38 @@ impl Spelling {
             Spelling::Hashed { hash, length } => format!("#{hash:016x}/{length}"),
         }
     }
+
+    /// What tables show: the text behind a `w`, lest a reader take it for a number. A cycle without events is `w`.
+    pub fn in_table(&self) -> String {
+        format!("w{}", self.text())
+    }
+
+    fn packed(word: &Word) -> Packed {
+        let symbols = word.symbols();
+        let mut packed = Packed { symbols: [0; 4], hash: word_hash(symbols), length: symbols.len() as u32 };
+        if symbols.len() <= WORD_SYMBOLS {
+            for (i, symbol) in symbols.iter().enumerate() {
+                packed.symbols[i / PER_WORD] |= u64::from(symbol - b'0') << (3 * (i % PER_WORD));
+            }
+        }
+        packed
+    }
+
+    fn unpacked(Packed { symbols, hash, length }: Packed) -> Spelling {
+        if length as usize > WORD_SYMBOLS {
+            return Spelling::Hashed { hash, length };
+        }
+        let symbol = |i: usize| (symbols[i / PER_WORD] >> (3 * (i % PER_WORD)) & 7) as u8 + b'0';
+        // An engine need not know the canonical rotation; tables do.
+        Spelling::Whole(Word::cyclic(&(0..length as usize).map(symbol).collect::<Vec<_>>()))
+    }
+}
+
+/// Three fields of a record.
+struct Packed {
+    symbols: [u64; 4],
+    hash: u64,
+    length: u32,
 }
 
 /// A hash of a cyclic word that does not depend on where it starts.
@@ -69,16 +106,16 @@ fn mix(mut x: u32) -> u32 {
 impl Record {
     /// Packs a word and marks it valid.
     pub fn set_word(&mut self, word: &Word) {
-        let symbols = word.symbols();
         self.valid |= valid::WORD;
-        self.word_length = symbols.len() as u32;
-        self.word_hash = word_hash(symbols);
-        self.word = [0; 4];
-        if symbols.len() <= WORD_SYMBOLS {
-            for (i, symbol) in symbols.iter().enumerate() {
-                self.word[i / PER_WORD] |= u64::from(symbol - b'0') << (3 * (i % PER_WORD));
-            }
-        }
+        Packed { symbols: self.word, hash: self.word_hash, length: self.word_length } =
+            Spelling::packed(word);
+    }
+
+    /// Packs a pattern and marks it valid.
+    pub fn set_pattern(&mut self, pattern: &Word) {
+        self.valid |= valid::PATTERN;
+        Packed { symbols: self.pattern, hash: self.pattern_hash, length: self.pattern_length } =
+            Spelling::packed(pattern);
     }
 
     /// The word, if the record has one and spells it out.
@@ -91,16 +128,14 @@ impl Record {
 
     /// The word, spelled out or hashed, if the record has one.
     pub fn spelling(&self) -> Option<Spelling> {
-        if self.valid & valid::WORD == 0 {
-            return None;
-        }
-        let length = self.word_length as usize;
-        if length > WORD_SYMBOLS {
-            return Some(Spelling::Hashed { hash: self.word_hash, length: self.word_length });
-        }
-        let symbol = |i: usize| (self.word[i / PER_WORD] >> (3 * (i % PER_WORD)) & 7) as u8 + b'0';
-        // An engine need not know the canonical rotation; tables do.
-        Some(Spelling::Whole(Word::cyclic(&(0..length).map(symbol).collect::<Vec<_>>())))
+        let packed = Packed { symbols: self.word, hash: self.word_hash, length: self.word_length };
+        (self.valid & valid::WORD != 0).then(|| Spelling::unpacked(packed))
+    }
+
+    /// The word's pattern, spelled out or hashed, if the record has it.
+    pub fn pattern(&self) -> Option<Spelling> {
+        let packed = Packed { symbols: self.pattern, hash: self.pattern_hash, length: self.pattern_length };
+        (self.valid & valid::PATTERN != 0).then(|| Spelling::unpacked(packed))
     }
 }
 
@@ -115,6 +150,9 @@ mod tests {
             let word = Word::cyclic(symbols);
             let mut record = Record::default();
             record.set_word(&word);
+            assert_eq!((record.spelling(), record.pattern()), (Some(Spelling::Whole(word.clone())), None));
+            record.set_pattern(&word.mirrored());
+            assert_eq!(record.pattern(), Some(Spelling::Whole(word.mirrored())));
             assert_eq!(record.spelling(), Some(Spelling::Whole(word)));
         }
         assert_eq!(Record::default().spelling(), None);
@@ -132,5 +170,13 @@ mod tests {
         record.set_word(&Word::cyclic(&symbols));
         let text = record.spelling().unwrap().text();
         assert!(text.starts_with('#') && text.ends_with("/100") && text.len() <= 64, "{text}");
+    }
+
+    #[test]
+    fn no_table_has_a_word_that_is_a_number() {
+        for (symbols, text) in [("", "w"), ("36", "w36")] {
+            assert_eq!(Spelling::Whole(Word::cyclic(symbols.as_bytes())).in_table(), text);
+        }
+        assert_eq!(Spelling::Hashed { hash: 7, length: 80 }.in_table(), "w#0000000000000007/80");
     }
 }

@@ -143,6 +143,11 @@ impl<'a> Cell<'a> {
         }
     }
 
+    /// What its start reaches by another law.
+    pub(super) fn obeying(&self, law: Law) -> Answer {
+        self.reached(&self.flow, law, self.start)
+    }
+
     /// What another start of the same cell reaches.
     pub(super) fn starting_at(&self, start: State) -> Answer {
         self.reached(&self.flow, self.law, start)

@@ -19,6 +19,8 @@ pub enum Field {
     Period,
     /// The word, up to mirror image, where the period agrees.
     Word,
+    /// Its pattern, likewise.
+    Pattern,
     /// Whether the cycle is its own mirror image, where the period agrees.
     Symmetric,
     /// The exponent: by the largest multiplier of cycles, within wide bars otherwise.
@@ -39,10 +41,11 @@ pub enum Field {
 
 impl Field {
     /// Every field, in the order in which they are told.
-    pub const ALL: [Field; 11] = [
+    pub const ALL: [Field; 12] = [
         Field::Class,
         Field::Period,
         Field::Word,
+        Field::Pattern,
         Field::Symmetric,
         Field::Exponent,
         Field::Impacts,
@@ -59,6 +62,7 @@ impl Field {
             Field::Class => "class",
             Field::Period => "period",
             Field::Word => "word",
+            Field::Pattern => "pattern",
             Field::Symmetric => "symmetric",
             Field::Exponent => "lyapunov",
             Field::Impacts => "impacts_per_period",
@@ -103,32 +107,59 @@ pub(super) type Compared = (Field, Option<Difference>);
 #[derive(Clone, Debug)]
 pub(super) struct Answer {
     pub(super) record: Record,
-    /// The word's mirror image, as a record would keep it; of a long word no record tells it.
+    word: Either,
+    pattern: Either,
+}
+
+/// A word or a pattern, and its mirror image.
+#[derive(Clone, Debug)]
+struct Either {
+    own: Option<Spelling>,
+    /// Of a long word no record tells it.
     mirrored: Option<Spelling>,
 }
 
-impl Answer {
-    pub(super) fn new(record: Record, word: Option<&Word>) -> Answer {
-        let own = record.word();
-        let mirrored = word.or(own.as_ref()).map(|word| {
-            let mut other = Record::default();
-            other.set_word(&word.mirrored());
-            other.spelling().unwrap_or_else(|| Spelling::Whole(word.mirrored()))
-        });
-        Answer { record, mirrored }
+impl Either {
+    /// `word` is what the record spells, if it is known.
+    fn new(own: Option<Spelling>, word: Option<&Word>) -> Either {
+        let mirrored = match (word, &own) {
+            (Some(word), _) | (None, Some(Spelling::Whole(word))) => Some(Spelling::new(&word.mirrored())),
+            (None, _) => None,
+        };
+        Either { own, mirrored }
     }
 
     /// Whether a spelling is that of the word or of its mirror image.
-    fn spells(&self, ours: &Spelling) -> bool {
+    fn is(&self, ours: &Spelling) -> bool {
         let length = |spelling: &Spelling| match spelling {
             Spelling::Whole(word) => word.len() as u32,
             Spelling::Hashed { length, .. } => *length,
         };
-        match (self.record.spelling(), &self.mirrored) {
-            (Some(own), Some(mirrored)) => *ours == own || ours == mirrored,
-            (Some(own), None) => length(ours) == length(&own),
+        match (&self.own, &self.mirrored) {
+            (Some(own), Some(mirrored)) => ours == own || ours == mirrored,
+            (Some(own), None) => length(ours) == length(own),
             (None, _) => true,
         }
+    }
+
+    /// What differs, where both sides have it.
+    fn compare(&self, field: Field, ours: Option<&Spelling>) -> Option<Compared> {
+        let (ours, theirs) = (ours?, self.own.as_ref()?);
+        let shown = || (Value::Text(ours.text()), Value::Text(theirs.text()));
+        Some(compared(field, self.is(ours), shown))
+    }
+}
+
+impl Answer {
+    pub(super) fn new(record: Record, word: Option<&Word>) -> Answer {
+        let pattern = Either::new(record.pattern(), word.map(Word::pattern).as_ref());
+        Answer { record, word: Either::new(record.spelling(), word), pattern }
+    }
+
+    /// Whether another has the same word, and the same pattern, up to mirror image.
+    pub(super) fn is_spelled_as(&self, other: &Answer) -> [bool; 2] {
+        let is = |own: &Either, other: &Either| own.own.as_ref().is_none_or(|own| other.is(own));
+        [is(&self.word, &other.word), is(&self.pattern, &other.pattern)]
     }
 }
 
@@ -243,10 +274,8 @@ impl Bars {
     fn compare_cycle(&self, record: &Record, answer: &Answer, period: f64, list: &mut Vec<Compared>) {
         let judge = &answer.record;
         let both = record.valid & judge.valid;
-        if let (Some(ours), Some(theirs)) = (record.spelling(), judge.spelling()) {
-            let shown = || (Value::Text(ours.text()), Value::Text(theirs.text()));
-            list.push(compared(Field::Word, answer.spells(&ours), shown));
-        }
+        list.extend(answer.word.compare(Field::Word, record.spelling().as_ref()));
+        list.extend(answer.pattern.compare(Field::Pattern, record.pattern().as_ref()));
         if both & valid::SYMMETRIC != 0 {
             let flags = [record, judge].map(|side| side.symmetric != 0);
             let shown = || (Value::Flag(flags[0]), Value::Flag(flags[1]));

@@ -188,7 +188,9 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
         valid: valid::PERIOD | valid::IMPACTS | valid::MESH | valid::STROBE,
         ..Record::default()
     };
-    record.set_word(&Word::cyclic(&tally.symbols));
+    let word = Word::cyclic(&tally.symbols);
+    record.set_word(&word);
+    record.set_pattern(&word.pattern());
     if radius > LEAST_MULTIPLIER {
         record.valid |= valid::LYAPUNOV;
     }

@@ -3,7 +3,8 @@
 //! What a cell's start reaches is computed by the reference within the plan's whole budget, without early stops. A
 //! record that says something else is a mismatch, of one of five kinds ([`Kind`]); each kind but the last rests on a
 //! computation. Averages over chaos are compared as distributions over the class ([`ChaosTest`]), and states of many
-//! lanes a few periods after their start ([`StateCheck`]). What one reads first is a rate per kind with its 95 %
+//! lanes a few periods after their start ([`StateCheck`]). Cells that mesh are computed with half the meshing speed, too
+//! ([`HalfMesh`]). What one reads first is a rate per kind with its 95 %
 //! interval ([`Rate`]), of cells drawn uniformly.
 //!
 //! A map of the reference is judged by lanes in f64 as well, or where there are none by an adaptive ODE library
@@ -15,6 +16,7 @@ mod chaos;
 mod compare;
 mod explain;
 mod finite;
+mod half_mesh;
 #[cfg(feature = "independent")]
 pub mod independent;
 mod lanes;
@@ -28,6 +30,7 @@ use rayon::prelude::*;
 
 pub use chaos::ChaosTest;
 pub use compare::{Difference, Field, Value};
+pub use half_mesh::HalfMesh;
 pub use lanes::{Lanes, run_lanes};
 pub use rate::{Rate, TOLERATED};
 pub use sample::{Draw, Sample, Stratum, sample};
@@ -173,6 +176,8 @@ pub struct Validation {
     pub agreement: Vec<Agreement>,
     /// Averages over chaos, in the uniform stratum.
     pub chaos: Vec<ChaosTest>,
+    /// What hangs on the meshing speed, in the uniform stratum; none where no cell of it meshes.
+    pub half_mesh: Option<HalfMesh>,
     /// States of lanes; none where no lanes ran.
     pub states: Option<StateCheck>,
     /// Every cell that differs, by id.
@@ -230,6 +235,7 @@ struct Replayed {
     fields: Vec<Compared>,
     kind: Option<Kind>,
     chaos: Option<chaos::Differences>,
+    half_mesh: Option<half_mesh::Changes>,
 }
 
 /// Replays a sample. `lanes` are those that a device ran again, if there is one; `report` is told how many cells are
@@ -293,6 +299,7 @@ fn replay_whole(
         let agreeing = of_field().filter(|(_, differs)| differs.is_none()).count();
         Agreement { field, compared: of_field().count(), agreeing }
     });
+    let changes: Vec<half_mesh::Changes> = replayed.iter().filter_map(|cell| cell.half_mesh).collect();
     let chaos: Vec<chaos::Differences> = replayed.iter().filter_map(|cell| cell.chaos).collect();
     let mismatches: Vec<Mismatch> = replayed.into_iter().filter_map(mismatch).collect();
     let has_states = !lanes.states().is_empty();
@@ -307,6 +314,7 @@ fn replay_whole(
         again,
         agreement: agreement.to_vec(),
         chaos: chaos::tests(&chaos),
+        half_mesh: half_mesh::told(&changes),
         states: has_states.then(|| states::check(subject, lanes.states(), halt)),
         mismatches,
         not_finite: not_finite(subject),
@@ -386,6 +394,7 @@ fn replay_cell(
         fields,
         kind,
         chaos: is_uniform.then(|| chaos::differences(cell)).flatten(),
+        half_mesh: is_uniform.then(|| half_mesh::changes(cell, &truth)).flatten(),
     }
 }
 
@@ -431,8 +440,14 @@ mod tests {
     use super::*;
 
     fn replayed(again: &[bool]) -> Vec<Replayed> {
-        let cell =
-            |(id, &again)| Replayed { id, again: Some(again), fields: Vec::new(), kind: None, chaos: None };
+        let cell = |(id, &again)| Replayed {
+            id,
+            again: Some(again),
+            fields: Vec::new(),
+            kind: None,
+            chaos: None,
+            half_mesh: None,
+        };
         (0..).zip(again).map(cell).collect()
     }
 

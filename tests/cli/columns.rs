@@ -42,7 +42,9 @@ fn columns_are_those_of_the_files() {
         |name, min, max| format!("[[axis]]\nparameter = \"{name}\"\nmin = {min}\nmax = {max}\ncount = 3\n");
     let [e, omega] = [axis("e", 0.3, 0.5), axis("omega", 5.0, 6.0)];
     fs::write(dir.join("line.toml"), &e).unwrap();
-    fs::write(dir.join("plane.toml"), format!("{e}{omega}[start]\ncount = 2\n")).unwrap();
+    let everything =
+        "[outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word', 'pattern']\n";
+    fs::write(dir.join("plane.toml"), format!("{e}{omega}[start]\ncount = 2\n{everything}")).unwrap();
     run(dir, &["map", "plane.toml", "--engine", "cpu", "--quiet"]);
     run(dir, &["validate", "out/plane", "--quiet"]);
     run(dir, &["bifurcation", "line.toml", "--quiet", "--set", "start.policy=both"]);
@@ -50,6 +52,7 @@ fn columns_are_those_of_the_files() {
     run(dir, &["compare", "out/plane", "out/plane", "--quiet"]);
     assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
+    assert_eq!(header(&dir.join("out/plane/words.csv")), listed("words.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));
     assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));

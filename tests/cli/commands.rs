@@ -28,7 +28,7 @@ fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
 /// Asserts that a parsed `orbit --json` object has exactly the fields of the contract.
 fn assert_orbit_fields(orbit: &serde_json::Value) {
     let fields = "class e events floquet impacts_per_period lyapunov lyapunov_error mesh_fraction omega \
-                  parameters period periods_run status strobe symmetric word";
+                  parameters pattern period periods_run status strobe symmetric word";
     assert_eq!(keys(orbit), fields);
     for event in orbit["events"].as_array().expect("events is a list") {
         assert_eq!(keys(event), "after before kind side t t_mod_period");
@@ -240,7 +240,7 @@ fn orbit_json_has_the_fields_of_the_contract() {
     assert_eq!(orbit["parameters"]["F"], 50.0);
     assert_eq!(orbit["class"], "periodic");
     assert_eq!(orbit["period"], 1);
-    assert_eq!(orbit["word"], "36");
+    assert_eq!((&orbit["word"], &orbit["pattern"]), (&"36".into(), &"36".into()));
     assert_eq!(orbit["lyapunov_error"], serde_json::Value::Null);
     assert_eq!(orbit["events"].as_array().unwrap().len(), 2);
     // The transient, a turning tangent vector, one check.
@@ -256,6 +256,8 @@ fn orbit_summary_is_for_the_eye() {
         "mesh_start",
         "mesh_end",
         "Floquet",
+        "word, in time         13554622\n",
+        "pattern               135462\n",
     ]));
 }
 

@@ -143,10 +143,18 @@ fn equal_maps_of_other_sources_and_engines_differ_nowhere() {
     let few = ["axis.0.count=4", "axis.1.count=3"];
     let folder = maps(&[("a", &few), ("b", &few)]);
     of_other_sources(&folder.path().join("b"));
-    let done = compare(&folder, &["a", "b", "--fail", "--out", "c"]).success().stdout("");
+    let done =
+        compare(&folder, &["a", "b", "--fail", "--out", "c", "--format", "svg,pdf"]).success().stdout("");
     done.stderr(says(&["no cell of 12 differs by class or period", "exponents of 12 by 0.0e0 at most"]));
     let (_, found) = rows(&folder.path().join("c/compare.csv"));
     assert!(found.is_empty(), "{found:?}");
+    let svg = fs::read_to_string(folder.path().join("c/compare.svg")).unwrap();
+    assert!(
+        svg.contains(">class differs</text>")
+            && svg.contains(concat!("by version ", env!("CARGO_PKG_VERSION"), " (")),
+        "{svg:.400}"
+    );
+    assert!(fs::read(folder.path().join("c/compare.pdf")).unwrap().starts_with(b"%PDF"));
     let manifest = json(&fs::read(folder.path().join("c/manifest.json")).unwrap());
     assert_eq!(
         (&manifest["b"]["crate_version"], &manifest["b"]["commit"]),
@@ -177,6 +185,30 @@ fn of_other_sources(out: &Path) {
         told[field] = value.into();
     }
     fs::write(manifest, inventory::sealed(told).unwrap()).unwrap();
+}
+
+/// Without axes there is neither a place in a grid nor a picture.
+#[test]
+fn lists_of_cells_are_compared_row_by_row() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, points) in [("s", "e,omega\n0.4,5.6\n0.92,5.6\n"), ("t", "e,omega\n0.4,5.6\n0.92,5.7\n")] {
+        fs::write(folder.path().join(format!("{name}.csv")), points).unwrap();
+        fs::write(folder.path().join(format!("{name}.toml")), format!("cells.file = '{name}.csv'\n"))
+            .unwrap();
+        run(&folder, &["map", &format!("{name}.toml"), "--engine", "cpu", "--quiet"]).success();
+    }
+    let rattling = ["--set", "start.policy=state", "--set", "start.state=[0.5, 4, -0.5, 0]"];
+    run(&folder, &[&["map", "s.toml", "--engine", "cpu", "--quiet", "--out", "u"], &rattling[..]].concat())
+        .success();
+    compare(&folder, &["out/s", "u", "--quiet", "--out", "c"]).success();
+    let (header, _) = rows(&folder.path().join("c/compare.csv"));
+    assert_eq!(header, "e,omega,class_a,period_a,class_b,period_b,lyapunov_a,lyapunov_b,kind");
+    assert!(!folder.path().join("c/compare.png").exists());
+    compare(&folder, &["out/s", "out/t"]).code(2).stderr(says(&[
+        "maps of other cells",
+        "out/t",
+        "two lists",
+    ]));
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod map;
 mod measure_gpu;
 mod models;
 mod orbit_tables;
+mod python;
 mod systems;
 mod text;
 mod your_gears;

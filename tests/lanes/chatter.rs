@@ -5,8 +5,8 @@ use crate::common::gpu::{open, run_from_rest as run};
 use crate::common::{REST, apart, flow_of, paper};
 use rattlemap::cli::bench::measure::counting;
 use rattlemap::gpu::{LaneSettings, Precision, follows_chatter};
-use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
+use rattlemap::record::{Record, Spelling, WORD_SYMBOLS};
 use rattlemap_dynamics::model::{GearPair, Model, State};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
 use rattlemap_dynamics::reference::{Stop, Trajectory};
@@ -134,6 +134,7 @@ fn classes_words_and_exponents_agree() {
             Precision::F64 => 1e-9,
         };
         let records = run(&mut open(precision), &pairs, &LaneSettings::default());
+        let mut collapsed = 0;
         for ((record, orbit), cell) in records.iter().zip(&truth).zip(&cells) {
             let at = format!("{precision:?}, e, omega, mesh_speed = {cell:?}");
             assert_eq!(classify(record), orbit.class, "{at}");
@@ -148,7 +149,34 @@ fn classes_words_and_exponents_agree() {
             assert!((record.impacts_per_period - orbit.impacts_per_period).abs() < 1e-9, "{at}");
             let mut spelled = Record::default();
             spelled.set_word(&orbit.word);
+            spelled.set_pattern(&orbit.word.pattern());
             assert_eq!(record.spelling(), spelled.spelling(), "{at}");
+            assert_eq!(record.pattern(), spelled.pattern(), "{at}");
+            let is_long = |spelling: Option<Spelling>| matches!(spelling, Some(Spelling::Hashed { .. }));
+            collapsed += usize::from(is_long(record.spelling()) && !is_long(record.pattern()));
+        }
+        assert!(
+            collapsed > 3,
+            "{precision:?}: {collapsed} words too long to be spelled, with patterns that are not"
+        );
+    }
+}
+
+/// Patterns of more symbols than a record spells out: the lane's hash is that of the reference, wherever phase 0 cuts the
+/// cycle, in the midst of a run or between two.
+#[test]
+fn patterns_that_are_too_long_are_hashed_alike() {
+    let plane = [(114, 3), (94, 6), (109, 8), (45, 9), (111, 15), (72, 20), (101, 23), (77, 44), (52, 65)];
+    let on = |(i, j): (u32, u32)| paper(0.6 + 0.2 * f64::from(i) / 119.0, 1.0 + 0.4 * f64::from(j) / 79.0);
+    let pairs = plane.map(on).to_vec();
+    let truth: Vec<_> =
+        pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
+    for precision in Precision::ALL {
+        let records = run(&mut open(precision), &pairs, &LaneSettings::default());
+        for ((record, orbit), place) in records.iter().zip(&truth).zip(plane) {
+            let pattern = orbit.word.pattern();
+            assert!(pattern.len() > WORD_SYMBOLS && pattern.len() < orbit.word.len() / 3, "{place:?}");
+            assert_eq!(record.pattern(), Some(Spelling::new(&pattern)), "{precision:?}, {place:?}");
         }
     }
 }

@@ -55,9 +55,9 @@ macro_rules! same_layout {
 }
 
 /// Everything, the class alone, and what lies between.
-fn variants(precision: Precision) -> [Variant; 11] {
+fn variants(precision: Precision) -> [Variant; 12] {
     let everything = Variant::of(precision);
-    let class = Variant { word: false, mesh: false, symmetry: false, ..everything };
+    let class = Variant { word: false, pattern: false, mesh: false, symmetry: false, ..everything };
     [
         Variant { keep: true, ..everything },
         Variant { growth: false, ..everything },
@@ -70,6 +70,7 @@ fn variants(precision: Precision) -> [Variant; 11] {
         Variant { symmetry: true, ..class },
         Variant { mesh: true, keep: true, ..class },
         Variant { word: true, growth: false, ..class },
+        Variant { pattern: true, ..class },
     ]
 }
 
@@ -81,7 +82,7 @@ static MODULES: LazyLock<Vec<(usize, naga::Module)>> = LazyLock::new(|| {
 
 #[test]
 fn every_variant_is_valid() {
-    assert_eq!(MODULES.len(), 22);
+    assert_eq!(MODULES.len(), 24);
 }
 
 #[test]
@@ -230,7 +231,11 @@ fn what_a_lane_carries_lies_as_the_host_says() {
                 distances,
                 last_distances,
                 itineraries,
-                word
+                word,
+                pattern,
+                pattern_length,
+                pattern_hash,
+                pattern_recent
             ]
         );
     }
@@ -257,7 +262,10 @@ fn what_a_lane_hands_back_lies_as_the_host_says() {
                 word_length,
                 hash_low,
                 hash_high,
-                word
+                word,
+                pattern_length,
+                pattern_hash,
+                pattern
             ]
         );
     }

@@ -313,6 +313,24 @@ fn two_passes_are_told_apart_by_colour_and_grey_where_they_agree() {
 }
 
 #[test]
+fn a_logarithmic_axis_has_its_decades() {
+    let dir = tempfile::tempdir().unwrap();
+    let decades: Vec<Column> = columns(5, 2)
+        .into_iter()
+        .enumerate()
+        .map(|(i, column)| Column { value: 10f64.powi(i as i32), ..column })
+        .collect();
+    let ticks = |scale| {
+        let path = dir.path().join("b.svg");
+        bifurcation_figure::write(&path, [""; 2], ("k", scale), &decades).unwrap();
+        let svg = fs::read_to_string(path).unwrap();
+        ["1", "10", "100", "1000"].map(|label| svg.contains(&format!(">{label}</text>")))
+    };
+    assert_eq!(ticks(Scale::Logarithmic), [true; 4]);
+    assert_eq!(ticks(Scale::Linear), [false; 4]);
+}
+
+#[test]
 fn bifurcation_figure_survives_poor_data() {
     let dir = tempfile::tempdir().unwrap();
     let mut wild = columns(3, 4);

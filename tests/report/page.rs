@@ -22,7 +22,7 @@ const ROWS: usize = 19;
 /// The cell that a reader points at.
 const CELL: [usize; 2] = [6, 8];
 
-const LAYERS: [&str; 5] = ["period and chaos", "exponent", "impacts", "meshing", "word"];
+const LAYERS: [&str; 6] = ["period and chaos", "exponent", "impacts", "meshing", "pattern", "word"];
 
 const SCENE: &str = r#"title = "Evil </script><b>title</b> & more"
 
@@ -46,7 +46,7 @@ policy = "state"
 state = [0.1, 0, -0.25, 1]
 
 [outputs]
-quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]
+quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]
 files = ["csv", "html"]
 "#;
 
@@ -67,7 +67,7 @@ function visit() {
   said.layers = [...document.querySelectorAll("#layers button")].map((button) => button.textContent);
   const [x, y] = pixel(6.5, 8.5);
   point("pointermove", x, y);
-  said.hovered = ["cell", "e", "\u03c9", "class", "exponent", "word", "periods run"].map(fact);
+  said.hovered = ["cell", "e", "\u03c9", "class", "exponent", "word", "periods run", "pattern"].map(fact);
   point("pointerdown", x, y);
   point("pointerup", x, y);
   said.command = text("command");
@@ -367,14 +367,16 @@ fn the_report_holds_every_cell() {
     let words = |name: &str| -> Vec<[u8; 4]> {
         bytes(name).chunks_exact(4).map(|four| four.try_into().unwrap()).collect()
     };
-    let [periods, exponents, spelled] = ["periods_run", "lyapunov", "word"].map(words);
+    let [periods, exponents, spelled, patterns] = ["periods_run", "lyapunov", "word", "pattern"].map(words);
     for (id, row) in table.iter().enumerate() {
         assert_eq!(data["classes"][usize::from(bytes("class")[id])], row[4], "cell {id}");
-        assert_eq!(u32::from_le_bytes(periods[id]).to_string(), row[13], "cell {id}");
+        assert_eq!(u32::from_le_bytes(periods[id]).to_string(), row[14], "cell {id}");
         let exponent: f64 = row[6].parse().unwrap();
         assert_eq!(f32::from_le_bytes(exponents[id]), exponent as f32, "cell {id}");
-        let word = &data["words"][u32::from_le_bytes(spelled[id]) as usize];
-        assert_eq!(word.as_str().unwrap_or_default(), row[11], "cell {id}");
+        for (list, number, column) in [("words", spelled[id], 11), ("patterns", patterns[id], 12)] {
+            let text = data[list][u32::from_le_bytes(number) as usize].as_str();
+            assert_eq!(text.map_or(String::new(), |text| format!("w{text}")), row[column], "cell {id}");
+        }
     }
 }
 
@@ -387,7 +389,10 @@ fn the_command_of_a_cell_replays_it() {
     let arguments = command.split(' ').skip(1);
     let run = Cargo::cargo_bin("rattlemap").unwrap().args(arguments).arg("--json").assert();
     let orbit: Value = serde_json::from_slice(&run.success().get_output().stdout).unwrap();
-    assert_eq!((&orbit["class"], &orbit["word"]), (&json!(row[4]), &json!(row[11])));
+    assert_eq!(orbit["class"], json!(row[4]));
+    for (name, column) in [("word", 11), ("pattern", 12)] {
+        assert_eq!(format!("w{}", orbit[name].as_str().unwrap()), row[column], "{name}");
+    }
     assert_eq!(orbit["period"].to_string(), row[5]);
     assert!(command.ends_with(report.data()["replay"].as_str().unwrap()), "{command}");
 }
@@ -412,7 +417,9 @@ fn the_page_works_in_a_browser() {
     assert_eq!((&*row[0], &*row[1]), ("6", "8"));
     let hovered: Vec<&str> = said["hovered"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     assert_eq!(hovered[..3], ["6, 8", &row[2], row[3].trim_end_matches(".0")]);
-    assert_eq!((hovered[3], hovered[5], hovered[6]), (&*format!("period {}", row[5]), &*row[11], &*row[13]));
+    assert_eq!((hovered[3], hovered[6]), (&*format!("period {}", row[5]), &*row[14]));
+    // Bare, as the literature writes them.
+    assert_eq!([hovered[5], hovered[7]].map(|text| format!("w{text}")), [&*row[11], &*row[12]]);
     let (shown, exact): (f64, f64) = (hovered[4].parse().unwrap(), row[6].parse().unwrap());
     assert!((shown - exact).abs() < 1e-4 * exact.abs(), "{shown} {exact}");
     assert_eq!(said["command"], command(&row));
@@ -433,7 +440,9 @@ fn a_validated_page_works_in_a_browser() {
     let verdict = said["verdict"].as_str().unwrap();
     assert!(verdict.contains("cells differ; unexplained 0 of ") && verdict.contains("below"), "{verdict}");
     let section = said["validation"].as_str().unwrap();
-    for part in [verdict, "drawn at borders of classes", "judged by lanes in f64", "seed 1"] {
+    for part in
+        [verdict, "drawn at borders of classes", "judged by lanes in f64", "seed 1", "half the mesh_speed"]
+    {
         assert!(section.contains(part), "{part}: {section}");
     }
     assert_eq!((&said["stays"], &said["zoomed"]), (&json!("6, 8"), &json!(true)));
@@ -466,7 +475,7 @@ fn filled_cells_say_so() {
     report.run(&[&["map", "s.toml", "--quiet", "--out", "o", "--force"], &sets[..]].concat());
     let (data, table) = (report.data(), report.table());
     let sources = unpacked(&data["values"]["source"]);
-    assert!(sources.iter().zip(&table).all(|(&code, row)| data["sources"][usize::from(code)] == row[14]));
+    assert!(sources.iter().zip(&table).all(|(&code, row)| data["sources"][usize::from(code)] == row[15]));
     let Some(said) = report.visited(CHOOSE) else { return };
     let facts = |source: &str| -> [String; 5] { serde_json::from_value(said[source].clone()).unwrap() };
     let [filled, integrated] = ["filled", "integrated"].map(facts);

@@ -19,7 +19,7 @@ fn check_map(axes: [Axis<'_>; 2], sets: &[&str], precision: Precision) {
         format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = {count}\n")
     };
     let everything =
-        "[outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word']\n";
+        "[outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word', 'pattern']\n";
     // As in scenes/e_omega.toml.
     let integration = "[integration]\nundecided_periods = 1584\n";
     let text = axes.map(axis).concat() + integration + everything;

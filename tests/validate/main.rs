@@ -7,6 +7,7 @@ mod judged;
 mod short_cells;
 
 mod classes_agree;
+mod half_mesh;
 mod independent;
 mod not_finite;
 mod replay;

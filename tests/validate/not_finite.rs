@@ -28,7 +28,7 @@ count = 6
 transient_periods = 120
 
 [outputs]
-quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]
+quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]
 files = ["csv"]
 "#;
 

@@ -28,7 +28,7 @@ fn scene_text(columns: usize, rows: usize) -> String {
     format!(
         "[[axis]]\nparameter = \"e\"\nmin = 0.0\nmax = 1.0\ncount = {columns}\n\n\
          [[axis]]\nparameter = \"omega\"\nmin = 1.0\nmax = 12.0\ncount = {rows}\n\n\
-         [outputs]\nquantities = [\"class\", \"lyapunov\", \"impacts\", \"mesh\", \"symmetric\", \"word\"]\n\
+         [outputs]\nquantities = [\"class\", \"lyapunov\", \"impacts\", \"mesh\", \"symmetric\", \"word\", \"pattern\"]\n\
          files = [\"html\"]\n"
     )
 }
@@ -72,7 +72,7 @@ struct Planted {
     spoil: fn(&mut Record),
 }
 
-const PLANTED: [Planted; 19] = [
+const PLANTED: [Planted; 20] = [
     Planted { what: "period", fits: settled, spoil: |record| record.period += 1 },
     Planted {
         what: "class",
@@ -80,6 +80,7 @@ const PLANTED: [Planted; 19] = [
         spoil: |record| (record.period, record.lyapunov, record.lyapunov_error) = (0, 0.4, 0.01),
     },
     Planted { what: "word", fits: settled, spoil: |record| record.set_word(&Word::cyclic(b"1435")) },
+    Planted { what: "pattern", fits: settled, spoil: |record| record.set_pattern(&Word::cyclic(b"1435")) },
     Planted { what: "lyapunov", fits: settled, spoil: |record| record.lyapunov *= 1.3 },
     Planted { what: "lyapunov", fits: settled, spoil: |record| record.lyapunov = f64::NAN },
     Planted { what: "impacts_per_period", fits: settled, spoil: |record| record.impacts_per_period += 1.0 },

@@ -1,21 +1,24 @@
 //! How long will a map take? Some of its cells are computed in earnest, and thrown away.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::map::engine::{Engine, EngineError};
 use crate::map::plan::{Cell, Plan};
-use crate::record::Record;
 
 /// What the last sample takes at least, unless the map is smaller.
 const LONG_ENOUGH: Duration = Duration::from_millis(1500);
 
 /// A sample that is not done by then tells the least that the map takes.
-const LONGEST: Duration = Duration::from_secs(20);
+const LONGEST: Duration = Duration::from_secs(30);
 
 /// From one sample to the next.
 const GROWTH: usize = 4;
+
+/// Neighbours that are taken together: side by side in a processor's or a card's registers they run together, as in a map.
+const TILE: usize = 16;
 
 /// Most of the odd multiples of this fall far from each other: near the golden section of 2^32.
 const GOLDEN: u64 = 2_654_435_761;
@@ -51,7 +54,7 @@ impl Forecast {
         let mut count = runs.min(engine.least_batch());
         loop {
             let sample = Sample::take(plan, engine, count)?;
-            let is_last = sample.ended < count
+            let is_last = sample.ended() < count
                 || count == runs
                 || before.is_some() && sample.seconds >= LONG_ENOUGH.as_secs_f64()
                 || sample.seconds * GROWTH as f64 > 0.5 * LONGEST.as_secs_f64();
@@ -70,89 +73,91 @@ fn row_by_row(plan: &Plan, engine: &mut Engine<'_>, runs: usize) -> Result<Forec
     engine.heed(&halt);
     let row = plan.axes()[0].count();
     let clock = Instant::now();
-    let (mut sampled, mut periods) = (0, Vec::new());
-    while sampled == 0 || clock.elapsed() < LONG_ENOUGH && sampled < runs {
-        let cells = (sampled..sampled + row).map(|nth| spread(plan, nth)).collect();
-        let ended = finish(engine, cells, row)?;
-        let is_cut = ended.len() < row;
-        periods.extend(ended.iter().map(|record| f64::from(record.periods_run)));
-        sampled = periods.len();
-        if is_cut {
-            break;
-        }
+    let (mut asked, mut periods) = (0, Vec::new());
+    while periods.len() == asked && (asked == 0 || clock.elapsed() < LONG_ENOUGH && asked < runs) {
+        let cells: Vec<Cell> = (asked..asked + row).map(|nth| spread(plan, nth)).collect();
+        asked += row;
+        periods.extend(finish(engine, &cells, row)?);
     }
-    let sample = Sample { seconds: clock.elapsed().as_secs_f64(), ended: sampled, periods };
-    let asked = if halt.load(Ordering::Relaxed) { sampled + 1 } else { sampled };
+    let sample = Sample { seconds: clock.elapsed().as_secs_f64(), periods };
     Ok(sample.extended(None, runs, asked))
 }
 
 /// Cells that were computed.
 struct Sample {
     seconds: f64,
-    ended: usize,
-    /// That each of them took.
+    /// That each of them took, tile by tile if all have ended.
     periods: Vec<f64>,
 }
 
 impl Sample {
     /// Computes so many cells, as a map does: some under way, others begun as these end.
     fn take(plan: &Plan, engine: &mut Engine<'_>, count: usize) -> Result<Sample, EngineError> {
-        let cells = (0..count).map(|nth| spread(plan, nth)).collect();
+        let whole = count == plan.run_count();
+        let cell = |nth| if whole { plan.cell(plan.run_at(nth)) } else { spread(plan, nth) };
+        let cells: Vec<Cell> = (0..count).map(cell).collect();
         let clock = Instant::now();
-        let ended = finish(engine, cells, (count / 2).max(engine.least_batch()))?;
-        let seconds = clock.elapsed().as_secs_f64();
-        let periods = ended.iter().map(|record| f64::from(record.periods_run)).collect();
-        Ok(Sample { seconds, ended: ended.len(), periods })
+        let periods = finish(engine, &cells, (count / 2).max(engine.least_batch()))?;
+        Ok(Sample { seconds: clock.elapsed().as_secs_f64(), periods })
+    }
+
+    fn ended(&self) -> usize {
+        self.periods.len()
     }
 
     /// To so many runs, where `asked` were to be computed.
     fn extended(&self, before: Option<&Sample>, runs: usize, asked: usize) -> Forecast {
         let each = |seconds: f64, cells: usize| seconds / cells.max(1) as f64;
-        let plain = each(self.seconds, self.ended);
+        let plain = each(self.seconds, self.ended());
         // Noise may hide the difference; then all of it counts.
         let marginal = before
-            .map(|before| each(self.seconds - before.seconds, self.ended.saturating_sub(before.ended)))
+            .map(|before| each(self.seconds - before.seconds, self.ended().saturating_sub(before.ended())))
             .filter(|&marginal| marginal > 0.5 * plain && marginal < 1.5 * plain)
             .unwrap_or(plain);
-        let seconds = self.seconds + runs.saturating_sub(self.ended) as f64 * marginal;
+        let seconds = self.seconds + runs.saturating_sub(self.ended()) as f64 * marginal;
         let spread = QUANTILE * relative_error(&self.periods) * (seconds - self.seconds).max(0.0);
         let interval = [(seconds - spread).max(self.seconds), seconds + spread];
-        Forecast { seconds, interval: (self.ended >= asked).then_some(interval), sampled: self.ended }
+        Forecast { seconds, interval: (self.ended() >= asked).then_some(interval), sampled: self.ended() }
     }
 }
 
-/// Computes cells with so many under way; fewer come back if time is up.
-fn finish(engine: &mut Engine<'_>, cells: Vec<Cell>, most: usize) -> Result<Vec<Record>, EngineError> {
-    let (mut left, mut under_way, mut records) = (&cells[..], 0, Vec::with_capacity(cells.len()));
+/// Computes cells with so many under way: the periods of each, in their order, or of fewer if time is up.
+fn finish(engine: &mut Engine<'_>, cells: &[Cell], most: usize) -> Result<Vec<f64>, EngineError> {
+    let (mut left, mut under_way) = (cells, 0);
+    let mut ended = HashMap::with_capacity(cells.len());
     while under_way > 0 || !left.is_empty() {
         let (next, later) = left.split_at(left.len().min(most.saturating_sub(under_way)).min(engine.room()));
         pollster::block_on(engine.begin(next))?;
         left = later;
         under_way += next.len();
         let until = if left.is_empty() { 0 } else { under_way / 2 };
-        let ended = pollster::block_on(engine.advance(until))?;
-        if ended.is_empty() {
+        let records = pollster::block_on(engine.advance(until))?;
+        if records.is_empty() {
             break;
         }
-        under_way -= ended.len();
-        records.extend(ended.into_iter().map(|(_, record)| record));
+        under_way -= records.len();
+        ended.extend(records.into_iter().map(|(id, record)| (id, f64::from(record.periods_run))));
     }
-    Ok(records)
+    Ok(cells.iter().filter_map(|cell| ended.get(&cell.id).copied()).collect())
 }
 
-/// The standard error of a mean over the mean.
+/// The standard error of a mean over the mean, of values that are alike within a tile.
 fn relative_error(values: &[f64]) -> f64 {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let square = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (count - 1.0);
+    let tiles: Vec<f64> =
+        values.chunks(TILE).map(|tile| tile.iter().sum::<f64>() / tile.len() as f64).collect();
+    let count = tiles.len() as f64;
+    let mean = tiles.iter().sum::<f64>() / count;
+    let square = tiles.iter().map(|tile| (tile - mean) * (tile - mean)).sum::<f64>() / (count - 1.0);
     let error = (square / count).sqrt() / mean;
     if error.is_finite() { error } else { 0.0 }
 }
 
-/// Cells at places far from each other, the same ones for every engine.
+/// Cells of tiles at places far from each other, the same ones for every engine.
 fn spread(plan: &Plan, nth: usize) -> Cell {
-    let all = plan.run_count() as u64;
-    plan.cell(plan.run_at(((nth as u64 * GOLDEN % (1 << 32) * all) >> 32) as usize))
+    let all = plan.run_count();
+    let (tile, within, tiles) = (nth / TILE, nth % TILE, (all / TILE).max(1) as u64);
+    let place = ((tile as u64 * GOLDEN % (1 << 32) * tiles) >> 32) as usize * TILE + within;
+    plan.cell(plan.run_at(place % all))
 }
 
 fn halted_after(time: Duration) -> Arc<AtomicBool> {
@@ -170,6 +175,7 @@ mod tests {
     use super::*;
     use crate::map::engine::Fake;
     use crate::map::scene::{Purpose, Scene};
+    use crate::record::Record;
 
     fn plan(sets: &[&str]) -> Plan {
         let text = "[[axis]]\nparameter = 'e'\nmin = 0.0\nmax = 1.0\ncount = 40\n\
@@ -196,28 +202,28 @@ mod tests {
     fn a_sample_is_spread_over_the_map() {
         let plan = plan(&[]);
         let mut quarters = [0; 4];
-        for nth in 0..64 {
-            let [i, j] = plan.indices(spread(&plan, nth).id);
+        for tile in 0..64 {
+            let [i, j] = plan.indices(spread(&plan, TILE * tile).id);
             quarters[usize::from(i >= 20) + 2 * usize::from(j >= 15)] += 1;
         }
         assert!(quarters.iter().all(|count| (10..=22).contains(count)), "{quarters:?}");
+        // Neighbours.
+        let tile: Vec<[usize; 2]> = (0..TILE).map(|nth| plan.indices(spread(&plan, nth).id)).collect();
+        assert!(tile.iter().all(|[i, j]| i.abs_diff(tile[0][0]).max(j.abs_diff(tile[0][1])) < 8), "{tile:?}");
     }
 
     /// Ten seconds to begin and to end, one for each cell.
     #[test]
     fn what_begins_every_map_counts_once() {
-        let sample = |cells: usize| Sample {
-            seconds: 50.0 + cells as f64,
-            ended: cells,
-            periods: (0..cells).map(|i| (1 + i % 2) as f64).collect(),
-        };
+        // Tiles of one period a cell and of two.
+        let periods = |cells: usize| (0..cells).map(|i| (1 + i / TILE % 2) as f64).collect();
+        let sample = |cells: usize| Sample { seconds: 50.0 + cells as f64, periods: periods(cells) };
         let forecast = sample(400).extended(Some(&sample(100)), 10_000, 400);
         assert_eq!((forecast.seconds, forecast.sampled), (10_050.0, 400));
         let [low, high] = forecast.interval.unwrap();
-        assert!(
-            (high - 10_050.0 - 1.96 * 9600.0 / 3.0 / 20.0).abs() < 1.0
-                && (low + high - 20_100.0).abs() < 1e-6
-        );
+        let error = 9600.0 / 3.0 / 5.0;
+        assert!((high - 10_050.0 - 1.96 * error).abs() < 0.05 * error, "{high}");
+        assert!((low + high - 20_100.0).abs() < 1e-6);
         // Not all of them in time: no less than this.
         assert_eq!(sample(300).extended(Some(&sample(100)), 10_000, 400).interval, None);
     }

@@ -59,10 +59,12 @@ fn refinement(refined: &Refined, count: usize) -> String {
     let audit = refined.audits.last().map_or(String::new(), |audit| {
         let [low, high] = audit.interval().map(|rate| 100.0 * rate);
         let (wrong, sampled, rate) = (audit.wrong, audit.sampled, 100.0 * audit.rate());
-        let words = match (audit.wrong_words, audit.words) {
-            (_, 0) => String::new(),
-            (wrong, words) => format!(", and {wrong} of {words} filled words"),
+        let spelled = |wrong: usize, filled: usize, what: &str| match filled {
+            0 => String::new(),
+            _ => format!(", {wrong} of {filled} filled {what}"),
         };
+        let words = spelled(audit.wrong_words, audit.words, "words")
+            + &spelled(audit.wrong_patterns, audit.patterns, "patterns");
         let failed = if audit.rate() > refined.max_error {
             let allowed = 100.0 * refined.max_error;
             format!(", more than the {allowed:.2} % of refine.max_error, but refine.rounds lets no block be halved again")

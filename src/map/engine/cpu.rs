@@ -98,5 +98,8 @@ pub fn record(measured: &Measured, needs: &Needs) -> Record {
     if let (true, Some(word)) = (needs.word, &measured.word) {
         record.set_word(word);
     }
+    if let (true, Some(word)) = (needs.pattern, &measured.word) {
+        record.set_pattern(&word.pattern());
+    }
     record
 }

@@ -258,6 +258,7 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
         undecided_periods: budget.undecided_periods,
         exponent: budget.exponent,
         word: plan.needs().word,
+        pattern: plan.needs().pattern,
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
         chatter: follows_chatter(plan),
@@ -294,6 +295,7 @@ pub(crate) fn keep(record: &mut Record, needs: &Needs) {
     drop(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
     drop(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
     drop(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
+    drop(needs.pattern, valid::PATTERN, |r| (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0));
 }
 
 #[cfg(test)]
@@ -319,8 +321,11 @@ mod tests {
             word: [1; 4],
             word_hash: 1,
             word_length: 1,
+            pattern: [1; 4],
+            pattern_hash: 1,
+            pattern_length: 1,
             symmetric: 1,
-            valid: u32::MAX >> 25,
+            valid: !valid::FILLED & (u32::MAX >> 23),
             ..Record::default()
         };
         let whole = record;
@@ -335,6 +340,7 @@ mod tests {
                 mesh: false,
                 symmetric: false,
                 word: false,
+                pattern: false,
             },
         );
         assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });

@@ -92,9 +92,9 @@ pub const KEYS: &[Key] = &[
     key("refine", "rounds", Words("down to single cells"), Takes::Whole(0, 32), "how often a block is halved at most"),
     key("refine", "max_error", Value("0.003"), Takes::Fraction, "share of filled cells that may be wrong; above it the map is refined further"),
     key("refine", "audit", Words("2000, or a quarter of what is filled"), Takes::Whole(1, 10_000_000), "filled cells that an audit integrates at first"),
-    key("refine", "word", Value("false"), Takes::Flag, "a change of the word alone is a border"),
+    key("refine", "word", Value("false"), Takes::Flag, "a change of the word alone is a border; of the pattern alone, where patterns are asked for"),
     key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts and mesh fraction of filled cells"),
-    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]), "what is not asked for is not computed"),
+    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]), "what is not asked for is not computed"),
     key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "what is written; png, svg and pdf are figures; `bifurcation` knows them and csv, a list of cells csv and npy"),
 ];
 

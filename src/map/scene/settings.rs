@@ -77,8 +77,8 @@ pub struct Refine {
     /// Filled cells that one audit integrates at first, up to sixteen times as many where the result may be
     /// chance; none for [`AUDIT`], or a quarter of the filled ones if that is less.
     pub audit: Option<u32>,
-    /// Whether a change of the word alone is a border, where the scene asks for words. At low
-    /// frequencies words change from one cell to the next but few, while class, period and
+    /// Whether a change of the word alone is a border, where the scene asks for words; of the pattern alone, where it
+    /// asks for patterns. At low frequencies words change from one cell to the next but few, while class, period and
     /// symmetry stay.
     pub word: bool,
     /// What filled cells show of quantities that vary continuously.
@@ -136,6 +136,8 @@ pub enum Quantity {
     Symmetric,
     /// Mapping word.
     Word,
+    /// Mapping word with each run of one symbol counted once.
+    Pattern,
 }
 
 /// What can be written.
@@ -164,13 +166,14 @@ pub struct Outputs {
     pub files: Vec<Format>,
 }
 
-const QUANTITIES: [(&str, Quantity); 6] = [
+const QUANTITIES: [(&str, Quantity); 7] = [
     ("class", Quantity::Class),
     ("lyapunov", Quantity::Lyapunov),
     ("impacts", Quantity::Impacts),
     ("mesh", Quantity::Mesh),
     ("symmetric", Quantity::Symmetric),
     ("word", Quantity::Word),
+    ("pattern", Quantity::Pattern),
 ];
 const FORMATS: [(&str, Format); 6] = [
     ("csv", Format::Csv),

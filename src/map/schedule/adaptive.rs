@@ -88,7 +88,10 @@ impl Adaptive {
         let counts = plan.counts();
         let tiling = Tiling::new(counts, refine.minimum_grid as usize);
         let cells = plan.cell_count();
-        let needs = Needs { word: plan.needs().word && refine.word, ..*plan.needs() };
+        // Borders of words and none of patterns would be those of bounces before meshing.
+        let (word, pattern) = (plan.needs().word, plan.needs().pattern);
+        let needs =
+            Needs { word: refine.word && word && !pattern, pattern: refine.word && pattern, ..*plan.needs() };
         let mut adaptive = Adaptive {
             counts,
             refine,

@@ -10,12 +10,16 @@ pub struct Audit {
     /// Cells of them that were integrated, chosen at random.
     pub sampled: usize,
     /// Those among them that had been filled wrongly: class, period, symmetry where it is
-    /// asked for, and the word where it makes borders.
+    /// asked for, and the word or pattern where it makes borders.
     pub wrong: usize,
     /// Those that had been filled with a word.
     pub words: usize,
     /// Those that had been filled with another word than their own.
     pub wrong_words: usize,
+    /// Those that had been filled with a pattern.
+    pub patterns: usize,
+    /// Those that had been filled with another pattern than their own.
+    pub wrong_patterns: usize,
     /// By how much exponents, impacts and mesh fractions had been filled wrongly.
     pub errors: Errors,
 }

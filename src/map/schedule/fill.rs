@@ -2,7 +2,7 @@
 
 use super::blocks::Block;
 use super::errors::same_count;
-use super::label::word_of;
+use super::label::{pattern_of, word_of};
 use crate::record::classify::classify;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
@@ -22,9 +22,12 @@ impl<'r> Filling<'r> {
     pub(super) fn new(block: &Block, corners: [&'r Record; 4]) -> Filling<'r> {
         let common = corners.iter().fold(u32::MAX, |bits, corner| bits & corner.valid);
         let mut valid = common & !valid::STROBE | valid::FILLED;
-        let first = word_of(corners[0]);
-        if corners[1..].iter().any(|corner| word_of(corner) != first) {
+        let agree = |of: fn(&Record) -> u64| corners[1..].iter().all(|corner| of(corner) == of(corners[0]));
+        if !agree(word_of) {
             valid &= !valid::WORD;
+        }
+        if !agree(pattern_of) {
+            valid &= !valid::PATTERN;
         }
         let averages = corners.map(|nearest| {
             let class = classify(&Record { valid, ..*nearest });
@@ -36,7 +39,7 @@ impl<'r> Filling<'r> {
     }
 
     /// The record of a cell of the block: the nearest corner's, with bilinear averages of what
-    /// varies continuously inside a region. A word is filled where all corners have the same, and so are the
+    /// varies continuously inside a region. A word or a pattern is filled where all corners have the same, and so are the
     /// impacts of cycles: whole numbers over the period, which no average of others is.
     pub(super) fn record(&self, [i, j]: [usize; 2]) -> Record {
         let share = |at: usize, [from, to]: [usize; 2]| {
@@ -143,17 +146,25 @@ mod tests {
     }
 
     #[test]
-    fn words_are_filled_where_all_corners_agree() {
+    fn words_and_patterns_are_filled_where_all_corners_agree() {
         let block = Block { i: [0, 2], j: [0, 2] };
         let spelled = |symbols: &[u8]| {
             let mut record = corner(0.0);
-            record.set_word(&Word::cyclic(symbols));
+            let word = Word::cyclic(symbols);
+            record.set_word(&word);
+            record.set_pattern(&word.pattern());
             record
         };
-        let word = |corners: &[Record; 4]| Filling::new(&block, corners.each_ref()).record([1, 1]).word();
+        let filled = |corners: &[Record; 4]| {
+            let record = Filling::new(&block, corners.each_ref()).record([1, 1]);
+            (record.spelling(), record.pattern())
+        };
         let mut corners = [spelled(b"25"); 4];
-        assert_eq!(word(&corners), corners[0].word());
+        let [word, pattern] = [corners[0].spelling(), corners[0].pattern()];
+        assert_eq!(filled(&corners), (word, pattern.clone()));
         corners[2] = spelled(b"255");
-        assert_eq!(word(&corners), None);
+        assert_eq!(filled(&corners), (None, pattern));
+        corners[2] = spelled(b"26");
+        assert_eq!(filled(&corners), (None, None));
     }
 }

@@ -119,3 +119,18 @@ fn spans(frame: &Frame, pass: &[&Column]) -> Vec<[f64; 2]> {
     };
     (0..at.len()).map(span).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::seen::least_difference;
+
+    #[test]
+    fn classes_can_be_told_apart_by_all_eyes() {
+        let colors = [Class::Periodic { period: 1 }, Class::Chaotic, Class::Undecided].map(class_color);
+        let [periodic, chaotic, undecided] = colors.map(|RGBColor(r, g, b)| [r, g, b]);
+        for (a, b) in [(periodic, chaotic), (chaotic, undecided), (periodic, undecided)] {
+            assert!(least_difference(a, b) >= 10.0, "{a:?} {b:?}: {}", least_difference(a, b));
+        }
+    }
+}

@@ -1,8 +1,5 @@
 //! Colours: one per period, greys for chaos, ramps for numbers.
 
-#[cfg(test)]
-mod seen;
-
 /// Red, green and blue.
 pub(in crate::output) type Color = [u8; 3];
 
@@ -119,6 +116,7 @@ fn between(anchors: &[Color], share: f64) -> Color {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::seen;
 
     #[test]
     fn periods_have_colours_of_their_own() {

@@ -17,7 +17,7 @@ const ROW: usize = ID + size_of::<Record>();
 const ID: usize = size_of::<u32>();
 
 /// Names of the columns, in the order of their bits.
-pub(super) const NAMES: [&str; 14] = [
+pub(super) const NAMES: [&str; 17] = [
     "id",
     "lyapunov",
     "lyapunov_error",
@@ -32,10 +32,13 @@ pub(super) const NAMES: [&str; 14] = [
     "status",
     "symmetric",
     "valid",
+    "pattern",
+    "pattern_hash",
+    "pattern_length",
 ];
 
 /// Where each begins in a row, in their order there, and how many bytes its numbers have. What is reserved goes with the last.
-const PLACES: [(usize, usize); 14] = [
+const PLACES: [(usize, usize); 17] = [
     (0, 4),
     (ID + offset_of!(Record, lyapunov), 8),
     (ID + offset_of!(Record, lyapunov_error), 8),
@@ -50,6 +53,9 @@ const PLACES: [(usize, usize); 14] = [
     (ID + offset_of!(Record, status), 4),
     (ID + offset_of!(Record, symmetric), 4),
     (ID + offset_of!(Record, valid), 4),
+    (ID + offset_of!(Record, pattern), 8),
+    (ID + offset_of!(Record, pattern_hash), 8),
+    (ID + offset_of!(Record, pattern_length), 4),
 ];
 
 /// Places in a row of a column's bytes, the most significant of each number first.

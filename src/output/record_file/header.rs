@@ -42,6 +42,8 @@ pub(super) enum Found {
     Nothing,
     /// A file of format 1.
     OldFormat,
+    /// One of this format whose records have other fields.
+    OtherFields,
     /// What no run leaves.
     Damaged(&'static str),
 }
@@ -49,7 +51,11 @@ pub(super) enum Found {
 /// Both copies.
 pub(super) fn bytes(identity: &Identity) -> serde_json::Result<Vec<u8>> {
     let columns = NAMES.map(ToOwned::to_owned).to_vec();
-    let body = serde_json::to_vec(&Body { format: FORMAT, columns, identity: identity.clone() })?;
+    bytes_of(&Body { format: FORMAT, columns, identity: identity.clone() })
+}
+
+fn bytes_of(body: &Body) -> serde_json::Result<Vec<u8>> {
+    let body = serde_json::to_vec(body)?;
     let length = (body.len() as u32).to_le_bytes();
     Ok([&MAGIC[..], &length, &checksum(length, &body).to_le_bytes(), &body].concat().repeat(2))
 }
@@ -63,6 +69,7 @@ pub(super) fn find(bytes: &[u8], whole: bool) -> Found {
             Ok(Body { format: FORMAT, columns, identity }) if columns == NAMES => {
                 Found::Header { identity, end: end as u64, is_whole }
             }
+            Ok(Body { format: FORMAT, .. }) => Found::OtherFields,
             _ => Found::Damaged("its header is not one of this version"),
         };
     }
@@ -98,4 +105,22 @@ fn checksum(length: [u8; 4], body: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     [&MAGIC[..], &length, body].into_iter().for_each(|part| hasher.update(part));
     hasher.finalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As versions wrote them whose records had no patterns.
+    #[test]
+    fn a_file_of_other_fields_is_not_taken_for_a_damaged_one() {
+        let identity = Identity::new("cpu", "f64", "d", Vec::new());
+        let header = |columns: &[&str]| {
+            let columns = columns.iter().map(|&name| name.to_owned()).collect();
+            bytes_of(&Body { format: FORMAT, columns, identity: identity.clone() }).unwrap()
+        };
+        let own = find(&header(&NAMES), true);
+        assert!(matches!(own, Found::Header { is_whole: true, .. }));
+        assert!(matches!(find(&header(&NAMES[..14]), true), Found::OtherFields));
+    }
 }

@@ -105,6 +105,7 @@ impl<'a> Reader<'a> {
             }
             Found::Nothing => Ok(None),
             Found::OldFormat => Err(RecordFileError::OldFormat { path: path.to_owned() }),
+            Found::OtherFields => Err(RecordFileError::OtherFields { path: path.to_owned() }),
             Found::Damaged(what) => Err(RecordFileError::Damaged { path: path.to_owned(), at: 0, what }),
         }
     }

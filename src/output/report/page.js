@@ -211,7 +211,8 @@ function facts({ i, j }) {
   const error = number("lyapunov_error");
   const exponent = number("lyapunov");
   const symmetric = { 0: "no", 1: "yes" }[at("symmetric")];
-  const word = map.words?.[at("word")];
+  const [word, pattern] = [map.words?.[at("word")], map.patterns?.[at("pattern")]]
+    .map((text) => (text === "" ? "no events" : text));
   const source = map.sources[at("source")];
   // Of a filled cell nothing was measured.
   const between = (text) => (text !== undefined && source === "filled" ? `${text}, interpolated` : text);
@@ -222,7 +223,8 @@ function facts({ i, j }) {
     ["impacts per period", between(number("impacts_per_period"))],
     ["meshing", between(number("mesh_fraction"))],
     ["symmetric", symmetric],
-    ["word", word === "" ? "no events" : word],
+    ...(values.pattern ? [["pattern", pattern]] : []),
+    ["word", word],
     ...(values.attractors ? [["attractors found", at("attractors")]] : []),
     ["status", map.statuses[at("status")]],
     ...(values.source ? [["source", source]] : []),
@@ -413,6 +415,7 @@ function tellRefinement({ integrated, filled, rounds, audits }) {
     ? `Of ${count(last.sampled, "filled cell")}, drawn at random and integrated, ${last.wrong} turned out wrong: `
       + `${percent(last.rate)} (95 %: ${percent(last.interval[0])} to ${percent(last.interval[1])}).`
       + (last.words ? ` Of ${count(last.words, "filled word")} among them, ${last.wrong_words} turned out wrong.` : "")
+      + (last.patterns ? ` Of ${count(last.patterns, "filled pattern")}, ${last.wrong_patterns}.` : "")
     : "No audit was asked for.");
   if (last) byId("audit-errors").append(...Object.keys(FILLED).filter((name) => last.errors[name])
     .map((name) => element("li", tellError(FILLED[name], last.errors[name]))));
@@ -463,7 +466,8 @@ function table(caption, heads, lines, numbers = []) {
 }
 
 const STRATA = { uniform: "drawn from all that were integrated", border: "drawn at borders of classes", status: "drawn by status" };
-const FIELDS = { class: "class", period: "period", word: "word, up to mirror image", symmetric: "symmetry",
+const FIELDS = { class: "class", period: "period", word: "word, up to mirror image",
+  pattern: "pattern, up to mirror image", symmetric: "symmetry",
   lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing", status: "status",
   periods_run: "periods integrated", finite: "numbers are finite", again: "the same record again" };
 const JUDGES = { reference: "the event-driven reference, without early stops",
@@ -527,6 +531,13 @@ function tellValidation(found) {
     section.append(element("p", `Computed again by the same engine${found.same_device ? "" : ` on ${found.again_on}, not on the map's own device`}: `
       + `${found.identical} of ${found.computed_again} are the same to the bit.`));
   }
+  if (found.half_mesh_speed) {
+    const { class: kinds, period, word, pattern } = found.half_mesh_speed;
+    const changed = ({ changed, compared, text }) => (compared ? `${changed} of ${compared} (${text})` : "none compared");
+    section.append(element("p", `With half the mesh_speed, cells that mesh change in class: ${changed(kinds)}; cycles among them in period: `
+      + `${changed(period)}, in word: ${changed(word)}, in pattern: ${changed(pattern)}. What changes is a matter of where bouncing is `
+      + "taken to end, not of the motion."));
+  }
   if (found.states) {
     section.append(element("p", `States of ${found.states.compared} lanes ${found.states.horizon_periods} periods after their start: `
       + `${rateText(found.states.off, found.states.compared)} are off by more than rounding may lead.`));
@@ -540,7 +551,7 @@ function tellValidation(found) {
 async function start() {
   byId("title").textContent = map.title;
   byId("subtitle").textContent = map.subtitle;
-  byId("fixed").textContent = (map.fixed ? `Fixed: ${map.fixed}. ` : "") + (map.source ? `Model: \u201c${map.source}\u201d.` : "");
+  byId("fixed").textContent = (map.fixed ? `Other parameters: ${map.fixed}. ` : "") + (map.source ? `Model: \u201c${map.source}\u201d.` : "");
   byId("layers").append(...map.layers.map(({ short }, k) => {
     const button = element("button", short);
     button.type = "button";

@@ -25,7 +25,7 @@ fn filled_cells_have_no_error_of_what_nobody_measured() {
     let out = folder.path().join("out/s");
     let (_, rows) = rows(&out.join("cells.csv"));
     let of =
-        |source: &str| rows.iter().filter(|row| row[14] == source && row[4] == "chaotic").collect::<Vec<_>>();
+        |source: &str| rows.iter().filter(|row| row[15] == source && row[4] == "chaotic").collect::<Vec<_>>();
     let [filled, integrated] = ["filled", "integrated"].map(of);
     assert!(filled.len() > 20 && integrated.len() > 20, "{} {}", filled.len(), integrated.len());
     assert!(filled.iter().all(|row| !row[6].is_empty() && row[7].is_empty()));

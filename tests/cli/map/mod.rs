@@ -13,12 +13,14 @@ mod records;
 mod streams;
 mod torture;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::{Command as Process, Stdio};
 
 use assert_cmd::Command;
 use predicates::prelude::*;
+use rattlemap_dynamics::word::Word;
 use tempfile::TempDir;
 
 const SCENE: &str = r#"title = "A <small> map"
@@ -36,17 +38,19 @@ max = 12.0
 count = 16
 
 [outputs]
-quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]
+quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]
 "#;
 
 /// Files that a resumed run must give byte for byte.
-const SAME: [&str; 8] = [
+const SAME: [&str; 10] = [
     "cells.csv",
     "cells.npy",
+    "words.csv",
     "map.png",
     "lyapunov.png",
     "impacts.png",
     "mesh.png",
+    "pattern.png",
     "word.png",
     "report.html",
 ];
@@ -100,18 +104,20 @@ fn a_map_writes_the_files_of_the_contract() {
         "cells/s",
         "periods/s",
         "periodic",
-        "out/s: cells.csv, cells.npy, map.png, lyapunov.png, impacts.png, mesh.png, word.png, report.html",
+        "out/s: cells.csv, cells.npy, words.csv, map.png, lyapunov.png, impacts.png, mesh.png, pattern.png, word.png, \
+         report.html",
     ]));
     let out = folder.path().join("out/s");
     let (header, rows) = rows(&out.join("cells.csv"));
     assert_eq!(
         header,
         "i,j,e,omega,class,period,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,word,\
-         status,periods_run,source"
+         pattern,status,periods_run,source"
     );
     assert_eq!(rows.len(), 320);
     rows.iter().enumerate().for_each(|(id, row)| check_row(id, row));
-    check_npy(&fs::read(out.join("cells.npy")).unwrap(), &rows);
+    let texts = check_words(&out.join("words.csv"), &rows);
+    check_npy(&fs::read(out.join("cells.npy")).unwrap(), &rows, &texts);
     check_manifest(&out, &rows);
     for name in SAME.iter().filter(|name| name.ends_with("png")) {
         let picture = image::open(out.join(name)).unwrap().to_rgb8();
@@ -137,24 +143,46 @@ fn check_row(id: usize, row: &[String]) {
     assert!(impacts >= 0.0 && (0.0..=1.0).contains(&mesh), "{row:?}");
     // Lanes on a slow approach do not know the symmetry yet.
     let is_known = row[10] == "true" || row[10] == "false";
-    assert!(is_known == is_periodic || row[12] != "ok" && row[10].is_empty(), "{row:?}");
-    let is_word = row[11].starts_with('#') || row[11].chars().all(|c| ('1'..='6').contains(&c));
-    assert!(is_word && (is_periodic || row[11].is_empty()), "{row:?}");
-    assert!(["ok", "slow", "near_grazing", "strobe_on_event"].contains(&row[12].as_str()), "{row:?}");
-    assert!((1..=528).contains(&row[13].parse::<u32>().unwrap()), "{row:?}");
-    assert_eq!(row[14], "integrated");
+    assert!(is_known == is_periodic || row[13] != "ok" && row[10].is_empty(), "{row:?}");
+    assert_eq!([11, 12].map(|field| row[field].is_empty()), [!is_periodic; 2], "{row:?}");
+    if let (Some(word), Some(pattern)) = (row[11].strip_prefix('w'), row[12].strip_prefix('w')) {
+        let is_spelled = |text: &str| text.chars().all(|c| ('1'..='6').contains(&c));
+        assert!(is_spelled(pattern), "{row:?}");
+        if is_spelled(word) {
+            assert_eq!(Word::cyclic(word.as_bytes()).pattern().time_order(), pattern, "{row:?}");
+        } else {
+            assert!(word.starts_with('#') && word.rsplit('/').next().unwrap().parse::<usize>().unwrap() > 64);
+        }
+    } else {
+        assert!(!is_periodic, "{row:?}");
+    }
+    assert!(["ok", "slow", "near_grazing", "strobe_on_event"].contains(&row[13].as_str()), "{row:?}");
+    assert!((1..=528).contains(&row[14].parse::<u32>().unwrap()), "{row:?}");
+    assert_eq!(row[15], "integrated");
+}
+
+/// The texts of `words.csv` by row: those of the cells, each once.
+fn check_words(path: &Path, cells: &[Vec<String>]) -> Vec<String> {
+    let (header, rows) = rows(path);
+    assert_eq!((&*header, &rows[0][..]), ("row,text", &["0".to_owned(), String::new()][..]));
+    assert!(rows.iter().enumerate().all(|(n, row)| row[0] == n.to_string()), "{rows:?}");
+    let texts: Vec<String> = rows.into_iter().map(|row| row[1].clone()).collect();
+    let listed: BTreeSet<&String> = texts.iter().collect();
+    assert_eq!(listed.len(), texts.len(), "a text has two rows");
+    assert_eq!(listed, cells.iter().flat_map(|row| &row[11..13]).collect());
+    texts
 }
 
 /// The array's bytes against the table's rows.
-fn check_npy(bytes: &[u8], rows: &[Vec<String>]) {
+fn check_npy(bytes: &[u8], rows: &[Vec<String>], texts: &[String]) {
     assert!(bytes.starts_with(b"\x93NUMPY"));
     let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     let header = String::from_utf8_lossy(&bytes[10..header_end]);
-    for part in ["('omega', '<f8')", "('class', '|i1')", "('word', '|S64')", "(320, )"] {
+    for part in ["('omega', '<f8')", "('class', '|i1')", "('word', '<u4')", "('pattern', '<u4')", "(320, )"] {
         assert!(header.contains(part), "{header}");
     }
     let size = (bytes.len() - header_end) / rows.len();
-    assert_eq!(size, 4 + 4 + 8 + 8 + 1 + 2 + 4 * 8 + 1 + 64 + 1 + 4 + 1);
+    assert_eq!(size, 4 + 4 + 8 + 8 + 1 + 2 + 4 * 8 + 1 + 4 + 4 + 1 + 4 + 1);
     for (row, packed) in rows.iter().zip(bytes[header_end..].chunks(size)) {
         let float = |at: usize| f64::from_le_bytes(packed[at..at + 8].try_into().unwrap());
         assert_eq!(format!("{:?}", float(8)), row[2]);
@@ -175,9 +203,9 @@ fn check_npy(bytes: &[u8], rows: &[Vec<String>]) {
                 _ => -1,
             }
         );
-        let word = String::from_utf8_lossy(&packed[60..124]);
-        assert_eq!(word.trim_end_matches('\0'), row[11]);
-        assert_eq!(u32::from_le_bytes(packed[125..129].try_into().unwrap()), row[13].parse::<u32>().unwrap());
+        let number = |at: usize| u32::from_le_bytes(packed[at..at + 4].try_into().unwrap());
+        assert_eq!([60, 64].map(|at| &texts[number(at) as usize]), [&row[11], &row[12]]);
+        assert_eq!(number(69), row[14].parse::<u32>().unwrap());
     }
 }
 
@@ -225,6 +253,33 @@ fn what_is_not_asked_for_is_empty_and_not_written() {
         assert!([4, 5, 6, 7, 8, 10, 11].iter().all(|&field| row[field].is_empty()), "{row:?}");
         assert!(!row[9].is_empty() && row[14] == "integrated", "{row:?}");
     }
+    // The array has no column of it, and no table of words stands beside it.
+    map(&folder, &[&few[..], &sets[..2], &["--set", "outputs.files=[\"npy\"]", "--force"]].concat())
+        .success();
+    assert_eq!(names(&out), ["cells.npy", "manifest.json", "records.bin"]);
+    let array = fs::read(out.join("cells.npy")).unwrap();
+    let header =
+        String::from_utf8_lossy(&array[10..10 + usize::from(u16::from_le_bytes([array[8], array[9]]))]);
+    let names: Vec<&str> = header.split("('").skip(1).map(|part| part.split('\'').next().unwrap()).collect();
+    assert_eq!(names, ["i", "j", "e", "omega", "mesh_fraction", "status", "periods_run", "source"]);
+}
+
+/// Patterns alone: no word is computed for their sake.
+#[test]
+fn patterns_need_no_words() {
+    let folder = folder();
+    let few = ["--set", "axis.0.count=4", "--set", "axis.1.count=3", "--quiet"];
+    let sets =
+        ["--set", "outputs.quantities=[\"pattern\"]", "--set", "outputs.files=[\"csv\",\"npy\",\"png\"]"];
+    let out = folder.path().join("out/s");
+    for engine in ["cpu", "gpu"] {
+        map(&folder, &[&few[..], &sets, &["--engine", engine, "--force"]].concat()).success();
+        let files = ["cells.csv", "cells.npy", "manifest.json", "pattern.png", "records.bin", "words.csv"];
+        assert_eq!(names(&out), files);
+        let rows = rows(&out.join("cells.csv")).1;
+        assert!(rows.iter().all(|row| row[11].is_empty()), "{rows:?}");
+        assert!(rows.iter().filter(|row| row[12].starts_with('w')).count() > 6, "{rows:?}");
+    }
 }
 
 #[test]
@@ -253,7 +308,11 @@ fn maps_that_do_not_fit_are_refused_with_figures() {
     run.code(2).stdout("").stderr(says(&["1000000 x 1000000 = 1000000000000 cells is too large"]));
     let [a, b] = count("65000");
     let run = map(&folder, &["--set", &a, "--set", &b]);
-    run.code(2).stdout("").stderr(says(&["4225000000 cells needs about 9", "GB of memory, and", "are free"]));
+    run.code(2).stdout("").stderr(says(&[
+        "4225000000 cells needs about 10",
+        "GB of memory, and",
+        "are free",
+    ]));
     assert!(!folder.path().join("out").exists(), "an output folder was made");
 }
 

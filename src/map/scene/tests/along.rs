@@ -101,3 +101,12 @@ fn an_axis_named_by_an_argument_replaces_the_texts_value_here_too() {
     let scene = along(PLANE, &["axis.1.parameter=F"], "e", &["F=55"]).unwrap();
     assert_eq!(scene.line()[0].1.get("F").unwrap(), 55.0);
 }
+
+#[test]
+fn a_logarithmic_axis_stays_one_and_what_follows_the_other_axis_follows_its_value() {
+    let text =
+        PLANE.replace("min = 1.0", "scale = 'log'\nmin = 1.0") + "[derived]\nmesh_speed = \"1e-3 * e\"\n";
+    let scene = along(&text, &[], "omega", &["e=0.25"]).unwrap();
+    assert_eq!(scene.axes()[0].scale(), crate::map::scene::Scale::Log);
+    assert!(scene.line().iter().all(|(_, model)| model.get("mesh_speed").unwrap() == 0.25e-3));
+}

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::super::audit::Audit;
 use super::super::errors::Errors;
 use super::super::fill::Filling;
-use super::super::label::{Label, word_of};
+use super::super::label::{Label, pattern_of, word_of};
 use super::super::tiling::Tile;
 use super::{Adaptive, Stage};
 use crate::map::scene::Continuous;
@@ -97,6 +97,10 @@ impl Adaptive {
             if fill.valid & valid::WORD != 0 {
                 audit.words += 1;
                 audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id as usize]));
+            }
+            if fill.valid & valid::PATTERN != 0 {
+                audit.patterns += 1;
+                audit.wrong_patterns += usize::from(pattern_of(&fill) != pattern_of(&records[id as usize]));
             }
             pairs.push((fill, &records[id as usize]));
         }

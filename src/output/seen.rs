@@ -3,7 +3,7 @@
 //! Differences are CIEDE2000 (Sharma, Wu, Dalal 2005). What people see who lack one kind of receptor is simulated after
 //! Machado, Oliveira and Fernandes 2009, at full severity, in linear light.
 
-use super::Color;
+use super::layers::Color;
 
 type Triple = [f64; 3];
 type Matrix = [Triple; 3];
