@@ -87,7 +87,8 @@ fn up_against_down_is_what_their_tables_say() {
         &format!("): {} by class, {} by period", kinds[0], kinds[1]),
         "of cycles of one period differ: ",
         " in symmetry, ",
-        " by word, ", " by pattern, ",
+        " by word, ",
+        " by pattern, ",
         "out/compare/up-down: compare.csv, compare.png, manifest.json",
     ]));
     let out = folder.path().join("out/compare/up-down");
