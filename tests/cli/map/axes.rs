@@ -112,9 +112,11 @@ fn a_map_names_what_changed_nothing() {
 #[test]
 fn a_list_gives_its_cells_in_its_order() {
     let folder = with_list();
-    list(&folder, &[])
-        .success()
-        .stderr(says(&["4 cells in ", " on cpu (f64)", "out/l: cells.csv, cells.npy, words.csv, list.csv"]));
+    list(&folder, &[]).success().stderr(says(&[
+        "4 cells in ",
+        " on cpu (f64)",
+        "out/l: cells.csv, cells.npy, words.csv, list.csv",
+    ]));
     let out = folder.path().join("out/l");
     let (header, cells) = rows(&out.join("cells.csv"));
     assert!(header.starts_with("F,k1,class,period,"), "{header}");
