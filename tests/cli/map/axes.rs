@@ -142,7 +142,9 @@ fn a_list_gives_its_cells_in_its_order() {
     let folder = with_list();
     let dry = command(&folder, &["map", "l.toml", "--engine", "cpu", "--dry-run"]).assert().success();
     assert!(String::from_utf8_lossy(&dry.get_output().stdout).contains("cells    4\n"));
-    list(&folder, &[]).success().stderr(says(&["4 cells in ", "out/l: cells.csv, cells.npy, words.csv, list.csv"]));
+    list(&folder, &[])
+        .success()
+        .stderr(says(&["4 cells in ", "out/l: cells.csv, cells.npy, words.csv, list.csv"]));
     let out = folder.path().join("out/l");
     let (header, cells) = rows(&out.join("cells.csv"));
     assert!(header.starts_with("F,k1,class,period,"), "{header}");
