@@ -454,8 +454,8 @@ pub(crate) struct Validate {
 ///
 /// For hysteresis (start.policy up against down), engine against engine, version against version. Other parameters may
 /// differ, and are named; the axes must have the same values. Writes compare.csv (one row per differing cell), compare.png
-/// and manifest.json. Of cells of one period it says in how many symmetry and words differ (an orbit and its mirror image
-/// have one word), and by how much exponents do at most. Filled cells count as any other.
+/// and manifest.json. Of cells of one period it says in how many symmetry, words and patterns differ (an orbit and its mirror
+/// image have one word), and by how much exponents do at most. Filled cells count as any other.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the hysteresis of a plane:\n  \
     rattlemap map scenes/e_omega.toml --set start.policy=up --out out/up\n  \

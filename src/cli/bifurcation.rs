@@ -42,11 +42,18 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
         return Err(interrupt.failure(words));
     };
     let asked = output::bifurcation::Asked { sets: &ask.set, along };
-    let files = output::bifurcation::write(&folder, &scene, asked, &columns, clock.elapsed())?;
+    let elapsed = clock.elapsed();
+    let files = output::bifurcation::write(&folder, &scene, asked, &columns, elapsed)?;
+    let [periodic, chaotic, undecided, failed] =
+        plan::count_classes(columns.iter().map(|column| column.class));
+    let classes = format!(
+        "{count} columns in {:.3} s: {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
+        elapsed.as_secs_f64()
+    );
     let name = &scene.axes()[0].parameter().name;
     let differing = hysteresis(&columns).map(|found| format!("{}\n", told(&found, name)));
     let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
-    progress.finish(&(differing.unwrap_or_default() + &files));
+    progress.finish(&format!("{classes}\n{}{files}", differing.unwrap_or_default()));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
     fail_if(all_failed, "every column failed; the status column says why")
 }

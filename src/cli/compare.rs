@@ -202,7 +202,12 @@ fn beside(comparison: &Comparison, scene: &Scene) -> Option<String> {
         let place = scene.points().named(largest.id);
         format!("exponents of {} by {:.1e} at most, at {place}", comparison.exponents, largest.difference)
     });
-    let parts = [tally("in symmetry", comparison.symmetric), tally("by word", comparison.words), exponents];
+    let parts = [
+        tally("in symmetry", comparison.symmetric),
+        tally("by word", comparison.words),
+        tally("by pattern", comparison.patterns),
+        exponents,
+    ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     let cycles = (!parts.is_empty()).then(|| format!("of cycles of one period differ: {}", parts.join(", ")));
     let attractors = tally("cells differ in the number of attractors", comparison.attractors);

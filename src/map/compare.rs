@@ -75,7 +75,9 @@ pub struct Comparison {
     /// Words of cells of one period. Those of an orbit and its mirror image are one: which of the two a start reaches
     /// says nothing.
     pub words: Tally,
-    /// The cells whose words differ, by id, ascending.
+    /// Patterns likewise.
+    pub patterns: Tally,
+    /// The cells whose patterns differ, or where those are not known their words, by id, ascending.
     pub other_word: Vec<u32>,
     /// Exponents of integrated cells of one period that were compared.
     pub exponents: usize,
@@ -116,6 +118,7 @@ pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
         kinds: Vec::with_capacity(a.records.len()),
         symmetric: Tally::default(),
         words: Tally::default(),
+        patterns: Tally::default(),
         other_word: Vec::new(),
         exponents: 0,
         exponent: None,
@@ -139,9 +142,12 @@ impl Comparison {
     fn take_cycles(&mut self, id: usize, a: &Record, b: &Record) {
         let have = |bit| a.valid & b.valid & bit != 0;
         self.symmetric.take(have(valid::SYMMETRIC).then_some(a.symmetric != b.symmetric));
-        let has_other_word = a.spelling().zip(b.spelling()).and_then(|(a, b)| differ(&a, &b));
-        self.words.take(has_other_word);
-        self.other_word.extend((has_other_word == Some(true)).then_some(id as u32));
+        let has_other = |a: Option<Spelling>, b: Option<Spelling>| a.zip(b).and_then(|(a, b)| differ(&a, &b));
+        let [word, pattern] = [has_other(a.spelling(), b.spelling()), has_other(a.pattern(), b.pattern())];
+        self.words.take(word);
+        self.patterns.take(pattern);
+        // Words count bounces before meshing, patterns do not.
+        self.other_word.extend((pattern.or(word) == Some(true)).then_some(id as u32));
         if have(valid::LYAPUNOV) && (a.valid | b.valid) & valid::FILLED == 0 {
             self.exponents += 1;
             // Minus infinity both, where multipliers are zero.
@@ -222,6 +228,22 @@ mod tests {
         assert_eq!(found.other_word, [1]);
         assert_eq!(found.symmetric, Tally { compared: 3, differing: 1 });
         assert_eq!((found.exponents, found.exponent), (3, Some(Largest { difference: 0.5, id: 2 })));
+    }
+
+    /// As many bounces more or less make no other pattern.
+    #[test]
+    fn patterns_decide_where_both_maps_have_them() {
+        let with = |word: &[u8], pattern: &[u8]| {
+            let mut record = cycle(1, -0.1, word);
+            record.set_pattern(&Word::cyclic(pattern));
+            record
+        };
+        let a = [with(b"1355546", b"13546"), with(b"36", b"36"), with(b"36", b"36")];
+        let b = [with(b"13555546", b"13546"), with(b"14", b"14"), cycle(1, -0.1, b"14")];
+        let found = of(&a, &b);
+        assert_eq!(found.words, Tally { compared: 3, differing: 3 });
+        assert_eq!(found.patterns, Tally { compared: 2, differing: 1 });
+        assert_eq!(found.other_word, [1, 2], "a word tells where there is no pattern");
     }
 
     #[test]

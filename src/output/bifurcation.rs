@@ -61,7 +61,8 @@ pub fn write(
             format!("{}{}; {}", line(asked.along), scene.start().in_words(), caption::of_scene(scene));
         let scale = match scene.axes()[0].scale() {
             scene::Scale::Log => Scale::Logarithmic,
-            scene::Scale::Linear | scene::Scale::Values => Scale::Linear,
+            scene::Scale::Linear => Scale::Linear,
+            scene::Scale::Values => Scale::Listed,
         };
         folder.replace(name, |path| {
             Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], (&label, scale), columns)?)

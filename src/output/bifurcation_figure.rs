@@ -173,8 +173,16 @@ fn legend(columns: &[Column], look: Look) -> Vec<Entry> {
 
 /// From the first column to the last, with room for their dots.
 fn value_axis((label, scale): (&str, Scale), columns: &[Column]) -> Axis {
+    if scale == Scale::Listed {
+        let mut values: Vec<f64> =
+            columns.iter().map(|c| c.value).filter(|value| value.is_finite()).collect();
+        values.sort_by(f64::total_cmp);
+        // Of two passes each has every value.
+        values.dedup();
+        return Axis::listed(label, values.into_iter());
+    }
     let place = |value: f64| match scale {
-        Scale::Linear => value,
+        Scale::Linear | Scale::Listed => value,
         Scale::Logarithmic => value.log10(),
     };
     let places = columns.iter().map(|c| place(c.value)).filter(|place| place.is_finite());

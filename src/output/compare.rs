@@ -143,6 +143,7 @@ struct Object<'a> {
     /// Of cells of one period; null where a map does not have it.
     symmetric: Option<TallyObject>,
     words: Option<TallyObject>,
+    patterns: Option<TallyObject>,
     exponents: ExponentsObject,
     attractors: Option<TallyObject>,
 }
@@ -198,6 +199,7 @@ impl<'a> Object<'a> {
             transitions: compared.transitions(),
             symmetric: tally(comparison.symmetric),
             words: tally(comparison.words),
+            patterns: tally(comparison.patterns),
             exponents: ExponentsObject {
                 compared: comparison.exponents,
                 largest: comparison.exponent.map(|largest| largest.difference).filter(|x| x.is_finite()),

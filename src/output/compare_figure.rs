@@ -40,7 +40,7 @@ const fn entry(color: Color, text: &'static str, kind: Option<Kind>) -> Entry {
 /// Every colour, by its place; differing ones are from Okabe and Ito's colour-blind safe set.
 const ENTRIES: [Entry; 8] = [
     entry([0xdc, 0xe9, 0xf4], "both periodic", None),
-    entry([0xf6, 0xd9, 0x8b], "both periodic, other word", None),
+    entry([0xf6, 0xd9, 0x8b], "both periodic, other pattern", None),
     entry([0xbc, 0xbc, 0xbc], "both chaotic", None),
     entry([0xd9, 0xb0, 0xf8], "both undecided or failed", None),
     entry([0xd5, 0x5e, 0x00], "A periodic, B chaotic", Some(Kind::Class)),
@@ -49,7 +49,7 @@ const ENTRIES: [Entry; 8] = [
     entry([0x00, 0x9e, 0x73], "both periodic", Some(Kind::Period)),
 ];
 
-/// Cycles of one period whose words differ: what tells motion without contact from rattling.
+/// Cycles of one period whose patterns differ, or words where there are no patterns: what tells motion without contact from rattling.
 const OTHER_WORD: usize = 1;
 
 /// The colour of a cell of these classes, words left aside.
@@ -96,7 +96,8 @@ fn draw(
     canvas.raster(rect, counts, |[i, j]| ENTRIES[places[j * counts[0] + i]].color)?;
     let [x, y] = [0, 1].map(|i| axis(&a.cells.scene().axes()[i]));
     Frame { rect, x, y }.draw_axes(canvas, true)?;
-    draw_legend(canvas, places, rect.right + GAP)
+    let has_patterns = compared.comparison.patterns.compared > 0;
+    draw_legend(canvas, places, has_patterns, rect.right + GAP)
 }
 
 /// What differs between the runs: scenes, engines, versions.
@@ -131,7 +132,12 @@ fn subtitle(compared: &Compared<'_>) -> String {
 }
 
 /// Draws what the colours mean, with numbers and shares of cells, below the sum of their kind.
-fn draw_legend(canvas: &Canvas<'_>, places: &[usize], left: f64) -> Result<(), DrawError> {
+fn draw_legend(
+    canvas: &Canvas<'_>,
+    places: &[usize],
+    has_patterns: bool,
+    left: f64,
+) -> Result<(), DrawError> {
     let mut counts = [0usize; ENTRIES.len()];
     places.iter().for_each(|&place| counts[place] += 1);
     let right = left + BESIDE - GAP - 20.0;
@@ -153,7 +159,9 @@ fn draw_legend(canvas: &Canvas<'_>, places: &[usize], left: f64) -> Result<(), D
             let patch = Rect { left, top, right: left + PATCH.0, bottom };
             canvas.fill(patch, RGBColor(r, g, b), 1.0)?;
             canvas.outline(patch, 1.0)?;
-            canvas.text(entry.text, (left + PATCH.0 + 14.0, y), SMALL, Align::Left, DARK)?;
+            let is_word = entry.color == ENTRIES[OTHER_WORD].color && !has_patterns;
+            let text = if is_word { "both periodic, other word" } else { entry.text };
+            canvas.text(text, (left + PATCH.0 + 14.0, y), SMALL, Align::Left, DARK)?;
             canvas.text(&count(cells), (right, y), SMALL, Align::Right, DARK)?;
             y += ROW;
         }

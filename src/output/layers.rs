@@ -226,9 +226,10 @@ mod tests {
     /// A few extremes do not stretch it; how many there are is told.
     #[test]
     fn what_a_scale_leaves_out_is_counted() {
-        let layer = exponents(|id| if id < 2 { -5.0 } else { -0.2 });
+        let layer = exponents(|id| if id == 7 { -5.0 } else { -0.2 });
         let bar = layer.bar.unwrap();
-        assert_eq!((bar.low, bar.beyond), (-0.2, [2, 0]));
-        assert_eq!(bar.left_out(400), ["values below \u{2212}0.2: 0.5 %"]);
+        assert_eq!((bar.low, bar.beyond), (-0.2, [1, 0]));
+        assert_eq!(bar.left_out(2000), ["values below \u{2212}0.2: 1 cell"]);
+        assert_eq!(bar.left_out(100), ["values below \u{2212}0.2: 1.0 %"]);
     }
 }

@@ -385,7 +385,11 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
     let out = folder.path().join("out/smoke");
     fs::write(out.join("notes.txt"), "precious").unwrap();
     run(&[]).code(2).stderr(says(&["the folder is not empty"]));
-    run(&["--force", "--set", "outputs.files=[\"csv\"]"]).success();
+    let said = run(&["--force", "--set", "outputs.files=[\"csv\"]"]).success();
+    said.stderr(says(&[
+        "2 columns in ",
+        " s: 2 periodic, 0 chaotic, 0 undecided, 0 failed\nout/smoke: bifurcation.csv, ",
+    ]));
     assert_eq!(
         file_names(&out),
         ["bifurcation.csv", "bifurcation_columns.csv", "manifest.json", "notes.txt"]

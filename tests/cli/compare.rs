@@ -22,7 +22,7 @@ min = 0.915
 max = 0.937
 count = 12
 [outputs]
-quantities = ['class', 'lyapunov', 'symmetric', 'word']
+quantities = ['class', 'lyapunov', 'symmetric', 'word', 'pattern']
 files = ['csv']
 ";
 
@@ -88,6 +88,7 @@ fn up_against_down_is_what_their_tables_say() {
         "of cycles of one period differ: ",
         " in symmetry, ",
         " by word, ",
+        " by pattern, ",
         "out/compare/up-down: compare.csv, compare.png, manifest.json",
     ]));
     let out = folder.path().join("out/compare/up-down");

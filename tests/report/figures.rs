@@ -315,7 +315,7 @@ fn two_passes_are_told_apart_by_colour_and_grey_where_they_agree() {
 #[test]
 fn a_logarithmic_axis_has_its_decades() {
     let dir = tempfile::tempdir().unwrap();
-    let decades: Vec<Column> = columns(5, 2)
+    let decades: Vec<Column> = columns(4, 2)
         .into_iter()
         .enumerate()
         .map(|(i, column)| Column { value: 10f64.powi(i as i32), ..column })
@@ -324,10 +324,10 @@ fn a_logarithmic_axis_has_its_decades() {
         let path = dir.path().join("b.svg");
         bifurcation_figure::write(&path, [""; 2], ("k", scale), &decades).unwrap();
         let svg = fs::read_to_string(path).unwrap();
-        ["1", "10", "100", "1000"].map(|label| svg.contains(&format!(">{label}</text>")))
+        ["1", "10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
     };
-    assert_eq!(ticks(Scale::Logarithmic), [true; 4]);
-    assert_eq!(ticks(Scale::Linear), [false; 4]);
+    assert_eq!(ticks(Scale::Logarithmic), [true; 3]);
+    assert_eq!(ticks(Scale::Linear), [false; 3]);
 }
 
 #[test]

@@ -98,6 +98,7 @@ impl Foreseen<'_> {
     fn text(&self, out: &Path) -> String {
         let Foreseen { scene, plan, engine, kept, size, free, forecast, .. } = self;
         let counts: Vec<String> = scene.axes().iter().map(|axis| axis.count().to_string()).collect();
+        let grid = if plan.is_list() { String::new() } else { format!("{} = ", counts.join(" x ")) };
         let starts = match plan.start_count() {
             1 => String::new(),
             starts => format!(", {starts} starts each: {} runs", size.runs),
@@ -111,7 +112,7 @@ impl Foreseen<'_> {
         let why = if self.why.is_empty() { String::new() } else { format!(": {}", self.why) };
         let place = crate::cli::say::path(out);
         [
-            format!("cells    {} = {}{starts}{kept}", counts.join(" x "), size.cells),
+            format!("cells    {grid}{}{starts}{kept}", size.cells),
             format!("engine   {} ({}) on {}{why}", engine.name(), engine.precision(), self.device()),
             format!("memory   about {}{device}{}", bytes(self.host()), of(free.memory)),
             format!("disk     about {}{} for {place}", bytes(size.disk), of(free.disk)),

@@ -1,6 +1,6 @@
 //! Words or patterns as a layer: a colour for each of the most frequent ones.
 
-use super::colors::{NO_VALUE, distinct};
+use super::colors::distinct;
 use super::{Color, Entry, Layer};
 use crate::output::words::{APERIODIC, UNKNOWN, Words};
 
@@ -18,7 +18,9 @@ const FIRST_WORD: u8 = 3;
 const WITHOUT_EVENTS: Color = [0xf2, 0xf2, 0xf2];
 const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
 const RARE: Color = [0x5a, 0x5a, 0x5a];
-const NOT_KNOWN: Color = [0xcf, 0xcf, 0xcf];
+const NOT_KNOWN: Color = [0xc4, 0xc4, 0xc4];
+/// As dark as chaos, which most of it is.
+const NOT_PERIODIC: Color = [0x2a, 0x2a, 0x2a];
 
 /// What a layer of words is called.
 struct Named {
@@ -56,7 +58,7 @@ fn layer(words: &Words, named: &Named) -> Layer {
         UNKNOWN => UNFILLED,
         _ => places[number as usize],
     };
-    let mut palette = vec![WITHOUT_EVENTS, NO_VALUE, NOT_KNOWN];
+    let mut palette = vec![WITHOUT_EVENTS, NOT_PERIODIC, NOT_KNOWN];
     // The word that covers most of the map should not shout.
     palette.push(COMMONEST);
     palette.extend((1..COLORED).map(distinct));
@@ -86,7 +88,28 @@ fn entries(words: &Words, named: &Named, texts: &[String], places: &[u8], palett
     }
     let count = |number: u32| words.numbers.iter().filter(|&&other| other == number).count();
     list.push(Entry { color: NOT_KNOWN, text: format!("{} not known", named.name), cells: count(UNKNOWN) });
-    list.push(Entry { color: NO_VALUE, text: "not periodic".to_owned(), cells: count(APERIODIC) });
+    list.push(Entry { color: NOT_PERIODIC, text: "not periodic".to_owned(), cells: count(APERIODIC) });
     list.retain(|entry| entry.cells > 0);
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::seen::least_difference;
+
+    #[test]
+    fn neighbours_in_a_legend_can_be_told_apart_by_all_eyes() {
+        let named: Vec<Color> = [COMMONEST].into_iter().chain((1..NAMED).map(distinct)).collect();
+        // One of them may have no events, and its own colour.
+        let near = |apart: usize| (0..NAMED - apart).map(move |i| (i, i + apart));
+        let among = near(1).chain(near(2)).map(|(i, j)| (named[i], named[j]));
+        let any = named.iter().flat_map(|&color| [(color, WITHOUT_EVENTS), (color, NOT_PERIODIC)]);
+        let last = named[NAMED - 2..].iter().map(|&color| (color, RARE));
+        let ends = [RARE, NOT_KNOWN, NOT_PERIODIC, WITHOUT_EVENTS];
+        let ends = (0..4).flat_map(|i| (0..i).map(move |j| (ends[i], ends[j])));
+        for (a, b) in among.chain(any).chain(last).chain(ends) {
+            assert!(least_difference(a, b) >= 10.0, "{a:02x?} {b:02x?}: {}", least_difference(a, b));
+        }
+    }
 }

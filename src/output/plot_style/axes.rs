@@ -24,6 +24,8 @@ pub enum Scale {
     Linear,
     /// By decimal logarithms.
     Logarithmic,
+    /// In the order of a list, each as far from the next: at 0, 1, 2 ...
+    Listed,
 }
 
 /// One axis: what it shows and from where to where.
@@ -37,8 +39,8 @@ pub struct Axis {
     pub high: f64,
     /// How values lie on it.
     pub scale: Scale,
-    /// Of an axis of listed values, which lie at 0, 1, 2 ...: how each is written.
-    pub listed: Vec<String>,
+    /// The values of a list, ascending; none on other axes.
+    pub listed: Vec<f64>,
 }
 
 impl Axis {
@@ -50,11 +52,11 @@ impl Axis {
         Axis { label: label.to_owned(), low, high, scale: Scale::Linear, listed: Vec::new() }
     }
 
-    /// An axis of values that have as much room as each other, half of it on either side.
+    /// An axis of ascending values that have as much room as each other, half of it on either side.
     pub fn listed(label: &str, values: impl Iterator<Item = f64>) -> Axis {
-        let listed: Vec<String> = values.map(|value| value.to_string().replace('-', "\u{2212}")).collect();
+        let listed: Vec<f64> = values.collect();
         let high = listed.len() as f64 - 0.5;
-        Axis { listed, ..Axis::exact(label, -0.5, high) }
+        Axis { listed, scale: Scale::Listed, ..Axis::exact(label, -0.5, high) }
     }
 
     /// A logarithmic axis from the value `low` to the value `high`, both positive; widened as [`Axis::exact`] where
@@ -90,11 +92,13 @@ impl Axis {
         Axis { scale: Scale::Logarithmic, ..axis }
     }
 
-    /// Where a value lies in the scale; on a logarithmic axis what is beyond an end lies on it.
+    /// Where a value lies in the scale; on a logarithmic axis what is beyond an end lies on it, in a list what is
+    /// between two values on the upper one.
     fn place(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => value,
             Scale::Logarithmic => value.log10().clamp(self.low, self.high),
+            Scale::Listed => self.listed.partition_point(|listed| *listed < value) as f64,
         }
     }
 }

@@ -14,9 +14,9 @@ pub(super) struct Tick {
 /// The ticks of an axis `length` pixels long, one to `apart` pixels at most where there is a choice.
 pub(super) fn ticks(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
     match axis.scale {
-        _ if !axis.listed.is_empty() => listed(axis, length, apart),
         Scale::Linear => linear(axis, length / apart),
         Scale::Logarithmic => logarithmic(axis, length, apart),
+        Scale::Listed => listed(axis, length, apart),
     }
 }
 
@@ -25,7 +25,8 @@ fn listed(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
     let room = length / (axis.high - axis.low);
     let step = (apart / room).ceil().max(1.0) as usize;
     let each = axis.listed.iter().enumerate().step_by(step);
-    each.map(|(i, label)| Tick { at: i as f64, label: label.clone() }).collect()
+    let written = |value: &f64| value.to_string().replace('-', "\u{2212}");
+    each.map(|(i, value)| Tick { at: i as f64, label: written(value) }).collect()
 }
 
 /// At most `most` round values.

@@ -109,14 +109,42 @@ fn a_map_names_what_changed_nothing() {
     assert_eq!(json(&folder.path().join("out/s/manifest.json"))["without_effect"], summary["without_effect"]);
 }
 
+/// Along a logarithmic axis of the same scene, with what follows others; a value out of range is named by its column.
+#[test]
+fn a_line_of_such_a_plane_is_a_diagram() {
+    let folder = with(COUPLED);
+    let line = |more: &[&str]| {
+        let line = ["bifurcation", "s.toml", "--along", "k1", "--at", "F=12.5", "--quiet"];
+        command(&folder, &[&line[..], more].concat()).assert()
+    };
+    line(&["--set", "outputs.files=[\"csv\"]", "--out", "d"]).success();
+    let manifest = json(&folder.path().join("d/manifest.json"));
+    assert_eq!(
+        manifest["axis"],
+        serde_json::json!(
+            { "parameter": "k1", "min": 10.0, "max": 90.0, "count": 4, "scale": "log" }
+        )
+    );
+    assert_eq!(manifest["derived"]["k2"]["max"], 60.0);
+    line(&["--set", "derived.k2=(k1-20)*(k1-50)", "--out", "x"]).code(2).stderr(says(&[
+        "error: at k1 = ",
+        ": `k2 = -",
+        "is out of range: it must be finite and at least 0",
+    ]));
+    assert!(!folder.path().join("x").exists());
+    let list = with_list();
+    let list = command(&list, &["bifurcation", "l.toml", "--quiet"]).assert().code(2);
+    list.stderr(says(&["l.toml:7:1: `cells = { ... }` does not fit: `bifurcation` takes an axis"]));
+}
+
 #[test]
 fn a_list_gives_its_cells_in_its_order() {
     let folder = with_list();
-    list(&folder, &[]).success().stderr(says(&[
-        "4 cells in ",
-        " on cpu (f64)",
-        "out/l: cells.csv, cells.npy, words.csv, list.csv",
-    ]));
+    let dry = command(&folder, &["map", "l.toml", "--engine", "cpu", "--dry-run"]).assert().success();
+    assert!(String::from_utf8_lossy(&dry.get_output().stdout).contains("cells    4\n"));
+    list(&folder, &[])
+        .success()
+        .stderr(says(&["4 cells in ", "out/l: cells.csv, cells.npy, words.csv, list.csv"]));
     let out = folder.path().join("out/l");
     let (header, cells) = rows(&out.join("cells.csv"));
     assert!(header.starts_with("F,k1,class,period,"), "{header}");

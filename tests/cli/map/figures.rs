@@ -54,10 +54,10 @@ fn figures_of_diagrams_and_orbits_come_in_each_format() {
     assert!(["bifurcation.csv", "bifurcation_columns.csv"].iter().all(|name| b.join(name).is_file()));
     run(&["orbit", "--out", "o", "--format", "svg"]).success();
     let o = folder.path().join("o");
-    assert_eq!(figures(&o), ["gap.svg", "phase_plane.svg", "time_history.svg"]);
+    assert_eq!(figures(&o), ["gap.svg", "phase_plane.svg", "spectrum.svg", "time_history.svg"]);
     run(&["check", "o", "--quiet"]).success();
     run(&["orbit", "--out", "o", "--force"]).success();
-    assert_eq!(figures(&o), ["gap.png", "phase_plane.png", "time_history.png"]);
+    assert_eq!(figures(&o), ["gap.png", "phase_plane.png", "spectrum.png", "time_history.png"]);
     run(&["orbit", "--format", "svg"]).code(2).stderr(says(&["--out"]));
     run(&["map", "s.toml", "--format", "eps"]).code(2).stderr(says(&["eps", "png, svg, pdf"]));
 }
