@@ -65,7 +65,8 @@ fn logarithmic(axis: &Axis, length: f64, apart: f64) -> Vec<Tick> {
     let named: &[u32] = if decade * 2f64.log10() >= apart { &[1, 2, 5] } else { &[1] };
     // Every so many decades.
     let step = (apart / decade).ceil().max(1.0) as i32;
-    let is_plain = low >= PLAIN.0 - 1e-9 && high <= PLAIN.1 + 1e-9;
+    // By the outermost decades that are named: an axis reaches a little beyond its values.
+    let is_plain = (low - 1e-9).ceil() >= PLAIN.0 && (high + 1e-9).floor() <= PLAIN.1;
     let is_named = move |part: u32, power: i32| named.contains(&part) && power.rem_euclid(step) == 0;
     let is_shown = move |part: u32| match part {
         1 => true,
