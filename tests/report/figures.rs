@@ -324,10 +324,10 @@ fn a_logarithmic_axis_has_its_decades() {
         let path = dir.path().join("b.svg");
         bifurcation_figure::write(&path, [""; 2], ("k", scale), &decades).unwrap();
         let svg = fs::read_to_string(path).unwrap();
-        ["1", "10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
+        ["1", "10"].map(|label| svg.contains(&format!(">{label}</text>")))
     };
-    assert_eq!(ticks(Scale::Logarithmic), [true; 3]);
-    assert_eq!(ticks(Scale::Linear), [false; 3]);
+    assert_eq!(ticks(Scale::Logarithmic), [true; 2]);
+    assert_eq!(ticks(Scale::Linear), [false; 2]);
 }
 
 #[test]
