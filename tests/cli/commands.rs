@@ -388,7 +388,7 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
     let said = run(&["--force", "--set", "outputs.files=[\"csv\"]"]).success();
     said.stderr(says(&[
         "2 columns in ",
-        " s: 2 periodic, 0 chaotic, 0 undecided, 0 failed\nout/smoke: bifurcation.csv, ",
+        " s: 1 periodic, 1 chaotic, 0 undecided, 0 failed\nout/smoke: bifurcation.csv, ",
     ]));
     assert_eq!(
         file_names(&out),
