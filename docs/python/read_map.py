@@ -21,13 +21,18 @@ from matplotlib.colors import ListedColormap, TwoSlopeNorm
 
 
 def read_table(folder: Path) -> pd.DataFrame:
-    """`cells.csv`, a row per cell. Words and patterns begin with `w`, so they stay text; what is absent is missing."""
-    return pd.read_csv(folder / "cells.csv")
+    """`cells.csv`, a row per cell. Words and patterns begin with `w`, so they stay text; what is absent is missing.
+
+    Numbers are those that the program had, to the last bit: what pandas 2 does by itself rounds a second time.
+    """
+    return pd.read_csv(folder / "cells.csv", float_precision="round_trip")
 
 
 def read_dataset(folder: Path) -> xr.Dataset:
     """`cells.npy` over its axes, with codes and rows of words as text."""
     manifest = json.loads((folder / "manifest.json").read_text())
+    if len(manifest.get("axes", [])) != 2:
+        sys.exit(f"{folder} has no two axes; read the table of a list of cells as it is, with read_table")
     cells = np.load(folder / "cells.npy")
     first, second = (axis["parameter"] for axis in manifest["axes"])
     columns, rows = (axis["count"] for axis in manifest["axes"])
@@ -79,13 +84,17 @@ def main() -> None:
     if len(sys.argv) != 3:
         sys.exit("usage: read_map.py FOLDER PICTURE")
     folder, picture = map(Path, sys.argv[1:])
-    table, dataset = read_table(folder), read_dataset(folder)
+    dataset, table = read_dataset(folder), read_table(folder)
+    missing = {"lyapunov", "word", "pattern"} - set(dataset)
+    if missing:
+        sys.exit(f"{folder} has no {', '.join(sorted(missing))}; add it to the scene's outputs.quantities")
     print(table.groupby("class").size().to_string())
     for name in ("word", "pattern"):
         texts = table[name].dropna()
         assert texts.map(type).eq(str).all(), f"{name}: not text"
         assert (table[name].fillna("") == dataset[name].values.ravel()).all(), f"{name}: table and array differ"
-        print(f"{name}: {texts.nunique()} of them, {texts.value_counts().index[0]} most often")
+        most = f", {texts.value_counts().index[0]} most often" if len(texts) else ""
+        print(f"{name}: {texts.nunique()} of them{most}")
     assert np.array_equal(table["lyapunov"], dataset["lyapunov"].values.ravel(), equal_nan=True)
     draw(dataset, picture)
 
