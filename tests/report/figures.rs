@@ -324,10 +324,11 @@ fn a_logarithmic_axis_has_its_decades() {
         let path = dir.path().join("b.svg");
         bifurcation_figure::write(&path, [""; 2], ("k", scale), &decades).unwrap();
         let svg = fs::read_to_string(path).unwrap();
-        ["1", "10", "100", "1000"].map(|label| svg.contains(&format!(">{label}</text>")))
+        // A linear axis to 10,000 has a tick at 1000, too.
+        ["10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
     };
-    assert_eq!(ticks(Scale::Logarithmic), [true; 4]);
-    assert_eq!(ticks(Scale::Linear), [false; 4]);
+    assert_eq!(ticks(Scale::Logarithmic), [true; 2]);
+    assert_eq!(ticks(Scale::Linear), [false; 2]);
 }
 
 #[test]
