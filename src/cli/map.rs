@@ -189,7 +189,7 @@ fn open_records<'f>(
     } else {
         unfinished::keep_elapsed(folder, elapsed_before)?;
     }
-    output::map::clear(folder)?;
+    output::map::begin(folder, scene)?;
     Ok(Kept { file, folder, elapsed_before, clock: Instant::now() })
 }
 
