@@ -102,8 +102,9 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let written = Instant::now();
     let files = output::map::write(&folder, &cells, &run)?;
     let writing = written.elapsed();
+    let every = if plan.refine().is_some() { "every cell that was integrated" } else { "every cell" };
     let idle = run.without_effect.iter().map(|name| {
-        format!("\n{name} changed nothing that was measured: along it every cell is like the others")
+        format!("\n{name} changed nothing that was measured: along it {every} is like the others")
     });
     let idle: String = idle.collect();
     progress.finish(&format!(
