@@ -15,9 +15,10 @@ use crate::map::coexistence;
 use crate::map::effect;
 use crate::map::engine::Engine;
 use crate::map::plan::Plan;
-use crate::map::scene::{Purpose, Scene, Steps};
+use crate::map::scene::{Scene, Steps};
 use crate::map::schedule::Schedule;
 use crate::map::sweep::{self, SweepError};
+use crate::output::map::LIST;
 use crate::output::{self, Cells, Folder, Identity, Order, RECORDS, RecordFile, RecordFileError, unfinished};
 use crate::record::Record;
 use crate::record::classify::status;
@@ -36,8 +37,10 @@ use summary::summary;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
-    let ask = &Map { run: scene_file::with_figures(&ask.run, Purpose::Map, None)?, ..ask.clone() };
-    let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
+    let kept = ask.resume.then(|| ask.run.out().join(LIST));
+    let run = scene_file::map_with_figures(&ask.run, kept.as_deref())?;
+    let ask = &Map { run, ..ask.clone() };
+    let scene = scene_file::load(&ask.run.scene, &ask.run.set, kept.as_deref())?;
     engine_choice::check(&ask.engine)?;
     let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
     let plan = Plan::new(&scene);
