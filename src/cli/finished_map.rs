@@ -20,6 +20,7 @@ use crate::cli::capacity;
 use crate::cli::error::Failure;
 use crate::cli::map::{order, quoted, unit};
 use crate::cli::say;
+use crate::cli::scene_file::{MOST_OF_COPY, read_table};
 
 /// What a map's manifest has to say.
 #[derive(Deserialize)]
@@ -114,7 +115,7 @@ impl Manifest {
         // The folder's own copy: the file that the scene names may be elsewhere by now, or another.
         let find = |_: &str| {
             let path = dir.join(LIST);
-            let text = fs::read_to_string(&path).map_err(|error| {
+            let text = read_table(&path, MOST_OF_COPY).map_err(|error| {
                 format!(
                     "was copied to {}, which cannot be read ({error}); make the map again with --force",
                     path.display()

@@ -15,9 +15,10 @@ use crate::map::coexistence;
 use crate::map::effect;
 use crate::map::engine::Engine;
 use crate::map::plan::Plan;
-use crate::map::scene::{Purpose, Scene, Steps};
+use crate::map::scene::{Scene, Steps};
 use crate::map::schedule::Schedule;
 use crate::map::sweep::{self, SweepError};
+use crate::output::map::LIST;
 use crate::output::{self, Cells, Folder, Identity, Order, RECORDS, RecordFile, RecordFileError, unfinished};
 use crate::record::Record;
 use crate::record::classify::status;
@@ -36,8 +37,10 @@ use summary::summary;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
-    let ask = &Map { run: scene_file::with_figures(&ask.run, Purpose::Map, None)?, ..ask.clone() };
-    let scene = scene_file::load(&ask.run.scene, &ask.run.set, Purpose::Map)?;
+    let kept = ask.resume.then(|| ask.run.out().join(LIST));
+    let run = scene_file::map_with_figures(&ask.run, kept.as_deref())?;
+    let ask = &Map { run, ..ask.clone() };
+    let scene = scene_file::load(&ask.run.scene, &ask.run.set, kept.as_deref())?;
     engine_choice::check(&ask.engine)?;
     let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
     let plan = Plan::new(&scene);
@@ -102,8 +105,9 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let written = Instant::now();
     let files = output::map::write(&folder, &cells, &run)?;
     let writing = written.elapsed();
+    let every = if plan.refine().is_some() { "every cell that was integrated" } else { "every cell" };
     let idle = run.without_effect.iter().map(|name| {
-        format!("\n{name} changed nothing that was measured: along it every cell is like the others")
+        format!("\n{name} changed nothing that was measured: along it {every} is like the others")
     });
     let idle: String = idle.collect();
     progress.finish(&format!(
@@ -189,7 +193,7 @@ fn open_records<'f>(
     } else {
         unfinished::keep_elapsed(folder, elapsed_before)?;
     }
-    output::map::clear(folder)?;
+    output::map::begin(folder, scene)?;
     Ok(Kept { file, folder, elapsed_before, clock: Instant::now() })
 }
 

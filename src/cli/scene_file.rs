@@ -1,22 +1,32 @@
 //! A scene from its file.
 
+use std::fs;
+use std::io;
 use std::path::Path;
 
 use super::arguments::{FigureFormat, SceneOptions};
+use super::capacity::bytes;
 use crate::map::scene::{Along, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+
+/// The most bytes that a table of cells may have.
+const MOST: u64 = 256_000_000;
+
+/// Of the folder's own copy, whose numbers are written out: 1e15 has 18 characters there.
+pub(crate) const MOST_OF_COPY: u64 = 4 * MOST;
 
 /// The `--set` that says what is written.
 const FILES: &str = "outputs.files=";
 
-/// Reads and parses the scene file at `path`; messages call it by that path.
+/// Reads and parses a map's scene, the file at `path`; messages call it by that path. Where the table that it names is
+/// gone, `kept` may be the copy in the folder of the run that goes on: one of other values does not go on.
 ///
 /// # Errors
 /// [`SceneError`] if the file cannot be read, or for the first thing wrong in it.
-pub(crate) fn load(path: &Path, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
-    load_along(path, sets, purpose, None)
+pub(crate) fn load(path: &Path, sets: &[String], kept: Option<&Path>) -> Result<Scene, SceneError> {
+    load_from(path, sets, Purpose::Map, None, kept)
 }
 
-/// The same where a diagram may run along one of several axes.
+/// The same of any purpose, where a diagram may run along one of several axes.
 ///
 /// # Errors
 /// As [`load`].
@@ -26,27 +36,58 @@ pub(crate) fn load_along(
     purpose: Purpose,
     along: Option<&Along>,
 ) -> Result<Scene, SceneError> {
+    load_from(path, sets, purpose, along, None)
+}
+
+fn load_from(
+    path: &Path,
+    sets: &[String],
+    purpose: Purpose,
+    along: Option<&Along>,
+    kept: Option<&Path>,
+) -> Result<Scene, SceneError> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| SceneError {
+    let text = fs::read_to_string(path).map_err(|error| SceneError {
         place: Place::File { file: name.as_str().into() },
         problem: Problem::Unreadable { reason: error.to_string() },
     })?;
     let find = |file: &str| {
         let beside = path.parent().unwrap_or(Path::new("")).join(file);
-        find(&beside)
+        match kept.filter(|kept| !beside.exists() && kept.exists()) {
+            Some(kept) => find(kept, MOST_OF_COPY),
+            None => find(&beside, MOST),
+        }
     };
     Scene::parse_along(&text, &name, sets, purpose, along, &find)
 }
 
 /// Reads a table of cells.
-pub(crate) fn find(path: &Path) -> Result<FileText, String> {
+fn find(path: &Path, most: u64) -> Result<FileText, String> {
     let name = path.display().to_string();
-    match std::fs::read_to_string(path) {
+    match read_table(path, most) {
         Ok(text) => Ok(FileText { name, text }),
         Err(error) => Err(format!(
             "cannot be read at {name} ({error}); give the path of a CSV table, relative to the scene's folder"
         )),
     }
+}
+
+/// The text of a table of cells that has `most` bytes at most. A pipe would be waited for, and a device may never end.
+///
+/// # Errors
+/// If it is no regular file, is larger, or cannot be read.
+pub(crate) fn read_table(path: &Path, most: u64) -> io::Result<String> {
+    let data = fs::metadata(path)?;
+    if !data.is_file() {
+        return Err(io::Error::other("it is no regular file"));
+    }
+    if data.len() > most {
+        let (size, most) = (bytes(data.len()), bytes(most));
+        return Err(io::Error::other(format!(
+            "it has {size}, and at most {most} are read: list fewer cells"
+        )));
+    }
+    fs::read_to_string(path)
 }
 
 /// The options with `--format` told as one more `--set`: that is what a manifest keeps and what resuming compares.
@@ -58,12 +99,32 @@ pub(crate) fn with_figures(
     purpose: Purpose,
     along: Option<&Along>,
 ) -> Result<SceneOptions, SceneError> {
+    figures_from(options, purpose, along, None)
+}
+
+/// The same of a map's scene, as [`load`] reads it.
+///
+/// # Errors
+/// As [`load`], where there is such an option.
+pub(crate) fn map_with_figures(
+    options: &SceneOptions,
+    kept: Option<&Path>,
+) -> Result<SceneOptions, SceneError> {
+    figures_from(options, Purpose::Map, None, kept)
+}
+
+fn figures_from(
+    options: &SceneOptions,
+    purpose: Purpose,
+    along: Option<&Along>,
+    kept: Option<&Path>,
+) -> Result<SceneOptions, SceneError> {
     let mut options = options.clone();
     let formats = FigureFormat::scene(&std::mem::take(&mut options.format));
     if formats.is_empty() {
         return Ok(options);
     }
-    let written = load_along(&options.scene, &options.set, purpose, along)?.outputs().files.clone();
+    let written = load_from(&options.scene, &options.set, purpose, along, kept)?.outputs().files.clone();
     let others = written.into_iter().filter(|format| !Format::FIGURES.contains(format));
     let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
     options.set.retain(|set| !set.starts_with(FILES));
@@ -77,7 +138,7 @@ mod tests {
 
     #[test]
     fn a_file_that_cannot_be_read_is_named_with_an_example_of_one_that_can() {
-        let message = load(Path::new("no/such.toml"), &[], Purpose::Map).unwrap_err().to_string();
+        let message = load(Path::new("no/such.toml"), &[], None).unwrap_err().to_string();
         assert!(message.starts_with("no/such.toml: cannot read the scene ("), "{message}");
         assert!(message.contains("scenes/smoke.toml"), "{message}");
     }

@@ -11,7 +11,7 @@ use rattlemap_dynamics::model::Parameter;
 /// Relative differences that rounding makes of a number, in an engine of single precision and of double.
 pub const ROUNDING: [f64; 2] = [1e-3, 1e-6];
 
-/// Parameters of the axes along which every cell is as the one before it, within `rounding`.
+/// Parameters of the axes along which every cell that was integrated is as the others, within `rounding`.
 ///
 /// Cells that were filled say nothing. None is named where cells start from their neighbours, since then more than
 /// the parameter changes along an axis, nor in a list, which has no lines along one parameter.

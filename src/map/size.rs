@@ -9,6 +9,9 @@ use crate::record::Record;
 /// make of it.
 const MEMORY_BESIDE: u64 = 64;
 
+/// The same of a cell of a list: its values, their text, and which flow and law it has.
+const LIST_ROW: u64 = 200;
+
 /// Bytes per period of one cell under way: strobe state and growth of a tangent vector.
 const PER_PERIOD: u64 = 40;
 
@@ -73,10 +76,11 @@ impl Size {
         let one_cell = periods * PER_PERIOD;
         let parts = Parts::flows(scene.points());
         let flow_count = parts.count() as u64;
+        let rows = scene.list().map_or(0, |list| list.len() as u64);
         Size {
             cells,
             runs,
-            memory: runs.saturating_mul(record + MEMORY_BESIDE),
+            memory: runs.saturating_mul(record + MEMORY_BESIDE).saturating_add(rows * LIST_ROW),
             memory_per_thread: one_cell,
             flows: if keeps_flows(flow_count, runs) { flow_count * FLOW } else { 0 },
             lane_tables: lane_tables(scene, &parts, runs),
@@ -150,7 +154,7 @@ mod tests {
     use super::*;
     use crate::gpu::Constants;
     use crate::map::plan::Plan;
-    use crate::map::scene::Purpose;
+    use crate::map::scene::{FileText, Purpose};
     use rattlemap_dynamics::flow::Flow;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2]) -> Scene {
@@ -184,6 +188,15 @@ mod tests {
             let copies = size.lane_tables as f64 / one_copy as f64;
             assert!((4.5..5.5).contains(&copies), "{second}: {copies} copies");
         }
+    }
+
+    #[test]
+    fn rows_of_a_list_take_room_beside_their_records() {
+        let text = "e,omega\n".to_owned() + &"0.5,5.6\n".repeat(100);
+        let find = |_: &str| Ok(FileText { name: "l.csv".to_owned(), text: text.clone() });
+        let list = Scene::parse_beside("[cells]\nfile = 'l.csv'\n", "s", &[], Purpose::Map, &find).unwrap();
+        let [list, grid] = [list, scene("omega", 1.0, 12.0, [10, 10])].map(|scene| Size::of(&scene).memory);
+        assert_eq!(list - grid, 100 * LIST_ROW);
     }
 
     #[test]

@@ -99,6 +99,15 @@ pub fn entries<N: AsRef<str> + Sync>(folder: &Folder, names: &[N]) -> Result<Vec
     names.par_iter().map(of).collect()
 }
 
+/// Whether a folder has a manifest that lists a file.
+pub(super) fn lists(folder: &Folder, name: &str) -> bool {
+    let text = fs::read_to_string(folder.path().join(MANIFEST)).unwrap_or_default();
+    let mut manifest: Value = serde_json::from_str(&text).unwrap_or_default();
+    let listed = manifest.get_mut("files").map(Value::take).unwrap_or_default();
+    let listed: Vec<FileEntry> = serde_json::from_value(listed).unwrap_or_default();
+    listed.iter().any(|entry| entry.name == name)
+}
+
 /// Compares a folder's files with the list in its manifest: what is wrong, the manifest and listed files first.
 ///
 /// # Errors

@@ -17,7 +17,7 @@ use super::{
     Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, inventory, layers, map_figure,
     map_manifest, report, unfinished,
 };
-use crate::map::scene::Format;
+use crate::map::scene::{Format, List, Scene};
 use crate::validate::Validation;
 
 pub use super::manifest::MANIFEST;
@@ -35,9 +35,9 @@ pub const VALIDATION: &str = "validation.json";
 /// The layers of which there are figures, in every format of figures.
 const LAYERS: [&str; 7] = ["map", "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
 
-/// Every file that a map may have beside its records.
+/// Every file that a map may have beside its records, but for its list, which is not made of them.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let tables = [MANIFEST, LIST, CSV, NPY, WORDS, HTML, VALIDATION].map(str::to_owned);
+    let tables = [MANIFEST, CSV, NPY, WORDS, HTML, VALIDATION].map(str::to_owned);
     let figures = LAYERS.into_iter().flat_map(|layer| Format::FIGURES.map(|format| figure(layer, format)));
     tables.into_iter().chain(figures).collect()
 });
@@ -49,17 +49,46 @@ fn figure(layer: &str, format: Format) -> String {
 
 /// Every file that a map may write, records included.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    ALL.iter().map(String::as_str).chain([RECORDS, UNFINISHED])
+    ALL.iter().map(String::as_str).chain([LIST, RECORDS, UNFINISHED])
 }
 
 /// Removes what an earlier run left, but for its records: files must not stand beside a
-/// manifest that does not know them.
+/// manifest that does not know them. A list goes if a manifest has it; any other one may be the user's own.
 ///
 /// # Errors
 /// If a file cannot be removed.
 pub fn clear(folder: &Folder) -> Result<(), OutputError> {
+    if inventory::lists(folder, LIST) {
+        folder.remove(&[LIST])?;
+    }
+    clear_made(folder)
+}
+
+/// The same without the list.
+fn clear_made(folder: &Folder) -> Result<(), OutputError> {
     folder.remove(&ALL)?;
-    folder.remove(&ALL.iter().map(|name| format!("{PARTIAL}{name}")).collect::<Vec<_>>())
+    let names = ALL.iter().map(String::as_str).chain([LIST]);
+    folder.remove(&names.map(|name| format!("{PARTIAL}{name}")).collect::<Vec<_>>())
+}
+
+/// Clears the folder for a run that has its records there, and writes the list of its cells, if it has one: an
+/// interrupted run can be gone on with without the scene's own table, which may be this very file.
+///
+/// # Errors
+/// If a file cannot be removed or written.
+pub fn begin(folder: &Folder, scene: &Scene) -> Result<(), OutputError> {
+    match scene.list() {
+        // First, lest there be a moment without either.
+        Some(list) => {
+            write_list(folder, list)?;
+            clear_made(folder)
+        }
+        None => clear(folder),
+    }
+}
+
+fn write_list(folder: &Folder, list: &List) -> Result<(), OutputError> {
+    folder.replace(LIST, |path| Ok(fs::write(path, list.to_csv())?))
 }
 
 /// Writes the files that the scene asks for, and the manifest last: a folder that has one is
@@ -150,7 +179,7 @@ fn write_files(
     let mut files = tables?;
     files.extend(pictures?);
     if let Some(list) = cells.scene().list().filter(|_| wanted(LIST)) {
-        folder.replace(LIST, |path| Ok(fs::write(path, list.to_csv())?))?;
+        write_list(folder, list)?;
         files.push(LIST.to_owned());
     }
     Ok(files)

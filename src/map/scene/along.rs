@@ -28,25 +28,30 @@ pub struct Along {
 /// [`SceneError`] where the names do not fit the scene's axes, or there is more than one axis and no name.
 pub(super) fn take(document: &mut Node, model: &dyn Model, along: Option<&Along>) -> Result<(), SceneError> {
     let (command, _) = Purpose::Bifurcation.needs();
-    let axes = {
+    let (axes, are_arguments) = {
         let root = Section::open(document, "", &TOP_LEVEL)?;
         let Some(field) = root.get("axis") else { return Ok(()) };
         let tables = field.list("a list of tables, [[axis]]")?;
-        match (along, &tables[..]) {
+        let axes = match (along, &tables[..]) {
             (None, [_, second, ..]) => {
                 let axes = axis::read(&root, model, tables.len(), command)?;
                 return Err(unnamed(&second.node.name_place, &axes));
             }
             (None, _) | (Some(_), []) => return Ok(()),
             (Some(_), _) => axis::read(&root, model, tables.len(), command)?,
-        }
+        };
+        let is_argument = |i| axis::named(&root, i).map(|field| field.is_argument());
+        let are_arguments = (0..axes.len()).map(is_argument).collect::<Result<Vec<bool>, _>>()?;
+        (axes, are_arguments)
     };
     let Some(along) = along else { return Ok(()) };
     let held = held(&axes, along)?;
     let Value::Table(root) = &mut document.value else { return Ok(()) };
     keep(root, axes.iter().position(|axis| *axis.parameter().name == *along.parameter));
     for (axis, value) in held {
-        hold(root, &axis.parameter().name, value)?;
+        let place = axes.iter().position(|other| other.index() == axis.index());
+        let is_argument = place.is_some_and(|i| are_arguments[i]);
+        hold(root, &axis.parameter().name, value, is_argument)?;
     }
     drop_what_maps_have(root);
     Ok(())
@@ -132,8 +137,9 @@ fn keep(root: &mut Table, place: Option<usize>) {
     }
 }
 
-/// Makes a parameter of what was an axis. A value that `--set` gives it would be lost in silence.
-fn hold(root: &mut Table, name: &str, value: Node) -> Result<(), SceneError> {
+/// Makes a parameter of what was an axis. Another value of it would be lost in silence; only an axis that an argument
+/// names replaces the text's value, as it does in a map.
+fn hold(root: &mut Table, name: &str, value: Node, is_argument: bool) -> Result<(), SceneError> {
     let place = value.place.clone();
     let empty = || Node {
         name_place: place.clone(),
@@ -145,11 +151,11 @@ fn hold(root: &mut Table, name: &str, value: Node) -> Result<(), SceneError> {
     // What is no table is refused when it is read.
     let Value::Table(table) = &mut parameters.value else { return Ok(()) };
     match table.insert(name.to_owned(), value) {
-        Some(Node { place: place @ Place::Set { .. }, shown, .. }) => Err(SceneError {
-            place,
+        Some(other) if !is_argument || !is_from_text(&other) => Err(SceneError {
+            place: other.place,
             problem: Problem::Conflict {
                 field: format!("parameters.{name}"),
-                value: shown,
+                value: other.shown,
                 remedy: format!("--at gives `{name}` its value; drop one of the two"),
             },
         }),

@@ -235,10 +235,11 @@ fn read_range(section: &Section<'_>, parameter: Parameter, index: usize) -> Resu
         Scale::Log => geometric(min, max, count),
         _ => Arc::new([]),
     };
-    if table.windows(2).any(|pair| pair[0] >= pair[1]) {
+    let axis = Axis { parameter, index, min, max, count, scale, table };
+    if axis.values().zip(axis.values().skip(1)).any(|(value, next)| value >= next) {
         return Err(count_field.out_of_range("so small that no two values are the same number"));
     }
-    Ok(Axis { parameter, index, min, max, count, scale, table })
+    Ok(axis)
 }
 
 /// A number that the parameter may take.

@@ -107,6 +107,11 @@ fn a_map_names_what_changed_nothing() {
     assert_eq!(summary["without_effect"], serde_json::json!(["k", "F"]));
     run.stderr(says(&["k changed nothing that was measured: along it every cell is like the others"]));
     assert_eq!(json(&folder.path().join("out/s/manifest.json"))["without_effect"], summary["without_effect"]);
+    // What was filled was not measured.
+    let adaptive = [&few[..], &["--force", "--set", "refine.minimum_grid=1"]].concat();
+    map(&folder, &adaptive)
+        .success()
+        .stderr(says(&["along it every cell that was integrated is like the others"]));
 }
 
 /// Along a logarithmic axis of the same scene, with what follows others; a value out of range is named by its column.
@@ -182,7 +187,11 @@ fn the_folder_of_a_list_can_be_resumed_checked_and_judged() {
     let text = fs::read_to_string(&table).unwrap();
     fs::write(&table, text.replace("41,20", "41,21")).unwrap();
     list(&folder, &["--quiet", "--resume"]).code(2).stderr(says(&["`cells.hash` was"]));
+    // The folder's own copy stands in for a table that is gone.
     fs::remove_file(&table).unwrap();
+    list(&folder, &["--quiet", "--resume", "--format", "png"]).code(2).stderr(says(&["drop \"png\""]));
+    list(&folder, &["--quiet", "--resume"]).success();
+    assert_eq!(fs::read(out.join("cells.csv")).unwrap(), good);
     list(&folder, &["--quiet", "--force"]).code(2).stderr(says(&[
         "l.toml:8:8: `cells.file = \"tables/points.csv\"` cannot be read at tables/points.csv",
     ]));
@@ -201,4 +210,68 @@ fn the_folder_of_a_list_can_be_resumed_checked_and_judged() {
         "list.csv is damaged",
         "with the scene's own table `rattlemap map SCENE --out out/l --resume`",
     ]));
+}
+
+/// A scene may name the copy itself: whoever is killed finds it again.
+#[test]
+fn the_list_of_a_run_under_way_is_in_its_folder() {
+    let folder = with(COUPLED);
+    let out = folder.path().join("out/l");
+    fs::create_dir_all(&out).unwrap();
+    let slow = "cells = { file = 'out/l/list.csv' }\n\
+                integration = { transient_periods = 2_000_000, early_stop = false }\n";
+    fs::write(folder.path().join("l.toml"), slow).unwrap();
+    let table = "e,omega\n".to_owned() + &"0.6,5.6\n".repeat(40);
+    fs::write(out.join("list.csv"), &table).unwrap();
+    fs::write(out.join("cells.csv"), "of an earlier run").unwrap();
+    let mut run = std::process::Command::new(assert_cmd::cargo::cargo_bin("rattlemap"))
+        .current_dir(folder.path())
+        .args(["map", "l.toml", "--engine", "cpu", "--quiet", "--force"])
+        .spawn()
+        .unwrap();
+    let clock = std::time::Instant::now();
+    while out.join("cells.csv").exists() {
+        assert!(clock.elapsed().as_secs() < 20 && run.try_wait().unwrap().is_none(), "it did not begin");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    run.kill().unwrap();
+    run.wait().unwrap();
+    assert_eq!(fs::read_to_string(out.join("list.csv")).unwrap(), table);
+    assert!(!out.join("manifest.json").exists());
+}
+
+/// A map over axes has no list: one that no map wrote is somebody's own.
+#[test]
+fn a_list_goes_with_its_map_alone() {
+    let folder = with_list();
+    let own = folder.path().join("out/s/list.csv");
+    fs::write(&own, "mine").unwrap();
+    map(&folder, &["--quiet", "--resume"]).success();
+    map(&folder, &["--quiet", "--force"]).success();
+    assert_eq!(fs::read_to_string(&own).unwrap(), "mine");
+    list(&folder, &["--quiet"]).success();
+    map(&folder, &["--quiet", "--force", "--out", "out/l"]).success();
+    assert!(!folder.path().join("out/l/list.csv").exists());
+}
+
+#[test]
+fn tables_that_cannot_be_read_whole_are_refused() {
+    let folder = with_list();
+    let large = fs::File::create(folder.path().join("large.csv")).unwrap();
+    large.set_len(300_000_000).unwrap();
+    let mut refused =
+        vec![("large.csv", "(it has 300.0 MB, and at most 256.0 MB are read: list fewer cells)")];
+    if cfg!(unix) {
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(pipe).status().unwrap().success());
+        refused.extend([("pipe", "(it is no regular file)"), ("/dev/zero", "(it is no regular file)")]);
+    }
+    for (file, why) in refused {
+        let said = format!("cannot be read at {file} {why}");
+        list(&folder, &["--set", &format!("cells.file={file}")]).code(2).stderr(says(&[&said]));
+    }
+    large.set_len(1_100_000_000).unwrap();
+    list(&folder, &["--quiet"]).success();
+    fs::rename(folder.path().join("large.csv"), folder.path().join("out/l/list.csv")).unwrap();
+    command(&folder, &["validate", "out/l", "--quiet"]).assert().code(2).stderr(says(&["it has 1.1 GB"]));
 }

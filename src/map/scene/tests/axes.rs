@@ -51,6 +51,14 @@ fn what_a_logarithmic_axis_cannot_be_is_said() {
         &refused(&close),
         &["`axis.0.count = 50` is out of range: it must be so small that no two values"],
     );
+    // A linear one likewise: there is one number between the ends.
+    let ends = ["axis.0.parameter=F", "axis.0.min=1", "axis.0.max=1.0000000000000004"];
+    let few = |count| [&ends[..], &[count]].concat();
+    assert_says(
+        &refused(&few("axis.0.count=4")),
+        &["`axis.0.count = 4` is out of range: it must be so small"],
+    );
+    assert!(parse(GOOD, &few("axis.0.count=3")).is_ok());
 }
 
 #[test]
