@@ -1,11 +1,22 @@
 //! The names that outputs use: part of the contract with scripts.
 
 use super::cells::Source;
+use crate::map::scene::Format;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::{Class, EventKind, Status};
 
 /// Every class name, in the order in which they are counted.
 pub(super) const CLASSES: [&str; 4] = Class::NAMES;
+
+/// The name of a figure's file.
+pub(super) fn figure(what: &str, format: Format) -> String {
+    format!("{what}.{}", format.name())
+}
+
+/// A figure's files, by format.
+pub(super) fn figures(what: &str) -> [(Format, String); 3] {
+    Format::FIGURES.map(|format| (format, figure(what, format)))
+}
 
 pub(super) fn class(class: Class) -> &'static str {
     class.name()
