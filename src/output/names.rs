@@ -61,3 +61,22 @@ pub(super) fn source(source: Source) -> &'static str {
         Source::Filled => "filled",
     }
 }
+
+/// A number in a table: the shortest decimal that reads back as the same; empty where there is none or it is not finite.
+pub(super) fn float(x: impl Into<Option<f64>>) -> String {
+    x.into().filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_have_finite_numbers_or_nothing() {
+        assert_eq!(
+            [0.1 + 0.2, -0.0, f64::NAN, f64::INFINITY].map(float),
+            ["0.30000000000000004", "-0.0", "", ""]
+        );
+        assert_eq!([Some(1.0), Some(f64::NEG_INFINITY), None].map(float), ["1.0", "", ""]);
+    }
+}
