@@ -23,7 +23,7 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(ask.quiet)?;
     let folder = Folder::open(&out, ask.force)?;
-    folder.refuse_links(output::bifurcation::NAMES)?;
+    folder.refuse_links(output::bifurcation::names())?;
     let cells = scene.line();
     let count = bifurcation::column_count(cells.len(), scene.start());
     let progress = Progress::new(count, 0, "columns", ask.quiet);

@@ -35,7 +35,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
     let out = ask.out(&names);
     refuse_own_folder(&out, dirs)?;
     let folder = Folder::open(&out, ask.force)?;
-    folder.refuse_links(output::compare::NAMES)?;
+    folder.refuse_links(output::compare::names())?;
     let plans = [finished[0].plan()?, finished[1].plan()?];
     interrupt.wait_for(Some("the maps are read"));
     let [(a, refined_a), (b, refined_b)] = [finished[0].records(&plans[0])?, finished[1].records(&plans[1])?];

@@ -1,5 +1,6 @@
 //! The folder of a bifurcation diagram: tables, figure and manifest.
 
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use super::bifurcation_manifest::Manifest;
@@ -8,6 +9,7 @@ use super::plot_style::axes::Scale;
 use super::symbols::{axis_label, symbol};
 use super::{
     Folder, OutputError, bifurcation_columns_csv, bifurcation_csv, bifurcation_figure, caption, inventory,
+    names,
 };
 use crate::map::bifurcation::Column;
 use crate::map::scene::{self, Along, Format, Scene};
@@ -15,11 +17,12 @@ use crate::map::scene::{self, Along, Format, Scene};
 const CSV: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
 /// The figure, by format.
-const FIGURES: [(Format, &str); 3] =
-    [(Format::Png, "bifurcation.png"), (Format::Svg, "bifurcation.svg"), (Format::Pdf, "bifurcation.pdf")];
+static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("bifurcation"));
 
 /// Every file that a bifurcation diagram may write.
-pub const NAMES: [&str; 6] = [MANIFEST, CSV, COLUMNS_CSV, FIGURES[0].1, FIGURES[1].1, FIGURES[2].1];
+pub fn names() -> impl Iterator<Item = &'static str> {
+    [MANIFEST, CSV, COLUMNS_CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+}
 
 /// How a diagram was asked for, beside its scene.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +47,7 @@ pub fn write(
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
     // Files of an earlier run must not stand beside a manifest that does not know them.
-    folder.remove(&NAMES)?;
+    folder.remove(&names().collect::<Vec<_>>())?;
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();
@@ -55,7 +58,7 @@ pub fn write(
         folder.replace(COLUMNS_CSV, |path| bifurcation_columns_csv::write(path, &parameter.name, columns))?;
         files.extend([CSV, COLUMNS_CSV]);
     }
-    for (_, name) in FIGURES.into_iter().filter(|(format, _)| wanted.contains(format)) {
+    for (_, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
         let subtitle =
             format!("{}{}; {}", line(asked.along), scene.start().in_words(), caption::of_scene(scene));

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::bifurcation_csv::{direction_field, float};
-use super::{WriteError, names};
+use super::WriteError;
+use super::bifurcation_csv::direction_field;
+use super::names::{self, float};
 use crate::map::bifurcation::Column;
 use crate::record::Spelling;
 
@@ -36,13 +37,12 @@ pub(super) fn write(path: &Path, axis: &str, columns: &[Column]) -> Result<(), W
 }
 
 fn fields(column: &Column) -> [String; 10] {
-    let optional = |x: Option<f64>| x.map_or(String::new(), float);
     [
         names::class(column.class).to_owned(),
         names::period(column.class).map_or(String::new(), |period| period.to_string()),
         word(column),
         float(column.lyapunov),
-        optional(column.lyapunov_error),
+        float(column.lyapunov_error),
         float(column.impacts_per_period),
         float(column.mesh_fraction),
         column.symmetric.map_or(String::new(), |symmetric| symmetric.to_string()),

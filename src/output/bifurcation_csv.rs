@@ -49,19 +49,17 @@ fn head(column: &Column) -> Vec<String> {
         period.unwrap_or_default(),
         names::status(column.status).to_owned(),
     ];
-    [float(column.value)].into_iter().chain(direction).chain(rest).collect()
+    [names::float(column.value)].into_iter().chain(direction).chain(rest).collect()
 }
 
 fn fields(point: &SectionPoint, components: usize) -> impl Iterator<Item = String> {
-    let head =
-        [names::side(point.side).to_string(), names::kind(point.kind).to_owned(), float(point.t_mod_period)];
-    let state = move |state: State| state.into_iter().take(components).map(float);
+    let head = [
+        names::side(point.side).to_string(),
+        names::kind(point.kind).to_owned(),
+        names::float(point.t_mod_period),
+    ];
+    let state = move |state: State| state.into_iter().take(components).map(names::float);
     head.into_iter().chain(state(point.before)).chain(state(point.after))
-}
-
-/// The shortest decimal that reads back as the same number; empty where there is none.
-pub(super) fn float(x: f64) -> String {
-    if x.is_finite() { format!("{x:?}") } else { String::new() }
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::WriteError;
 use super::cells::{Cells, Row};
-use super::{WriteError, names};
+use super::names::{self, float};
 use crate::map::scene::Quantity;
 use crate::record::Spelling;
 
@@ -96,7 +97,6 @@ fn spelled(word: Option<Spelling>) -> String {
 }
 
 fn measured(row: &Row, word: String) -> [String; 8] {
-    let float = |value: Option<f64>| value.map_or(String::new(), |x| format!("{x:?}"));
     [
         row.class.map_or(String::new(), |class| names::class(class).to_owned()),
         row.period.map_or(String::new(), |period| period.to_string()),

@@ -1,6 +1,7 @@
 //! The folder of a comparison of two maps: table, figure and manifest.
 
 use std::path::Path;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -15,11 +16,12 @@ use rattlemap_dynamics::orbit::Class;
 
 const CSV: &str = "compare.csv";
 /// The figure, by format.
-const FIGURES: [(Format, &str); 3] =
-    [(Format::Png, "compare.png"), (Format::Svg, "compare.svg"), (Format::Pdf, "compare.pdf")];
+static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("compare"));
 
 /// Every file that a comparison may write.
-pub const NAMES: [&str; 5] = [MANIFEST, CSV, FIGURES[0].1, FIGURES[1].1, FIGURES[2].1];
+pub fn names() -> impl Iterator<Item = &'static str> {
+    [MANIFEST, CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+}
 
 /// One of two maps.
 #[derive(Clone, Copy, Debug)]
@@ -223,11 +225,11 @@ pub fn write(
     reading: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
-    folder.remove(&NAMES)?;
+    folder.remove(&names().collect::<Vec<_>>())?;
     folder.replace(CSV, |path| compare_csv::write(path, compared))?;
     let mut files = vec![CSV];
     let has_figure = compared.sides[0].cells.scene().list().is_none();
-    for (_, name) in FIGURES.into_iter().filter(|(format, _)| has_figure && formats.contains(format)) {
+    for (_, name) in FIGURES.iter().filter(|(format, _)| has_figure && formats.contains(format)) {
         folder.replace(name, |path| Ok(compare_figure::write(path, compared)?))?;
         files.push(name);
     }

@@ -21,7 +21,6 @@ pub(super) fn write(path: &Path, compared: &Compared<'_>) -> Result<(), WriteErr
     for (id, kind) in differing.filter_map(|(id, kind)| Some((id, (*kind)?))) {
         let values = a.values(id).into_iter().map(|value| format!("{value:?}"));
         let [a, b] = [a, b].map(|cells| cells.row(id));
-        let float = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:?}"));
         let [class_a, class_b] = [&a, &b].map(|row| row.class.map_or("", names::class).to_owned());
         let [period_a, period_b] = [&a, &b].map(|row| row.period.map_or(String::new(), |p| p.to_string()));
         let indices = a.indices[..places.len()].iter().map(ToString::to_string);
@@ -30,8 +29,8 @@ pub(super) fn write(path: &Path, compared: &Compared<'_>) -> Result<(), WriteErr
             period_a,
             class_b,
             period_b,
-            float(a.lyapunov),
-            float(b.lyapunov),
+            names::float(a.lyapunov),
+            names::float(b.lyapunov),
             kind.name().to_owned(),
         ]))?;
     }

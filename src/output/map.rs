@@ -15,7 +15,7 @@ use super::words::{self, Spelled};
 use super::words_csv::Rows;
 use super::{
     Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, inventory, layers, map_figure,
-    map_manifest, report, unfinished,
+    map_manifest, names, report, unfinished,
 };
 use crate::map::scene::{Format, List, Scene};
 use crate::validate::Validation;
@@ -38,14 +38,9 @@ const LAYERS: [&str; 7] = ["map", "lyapunov", "impacts", "mesh", "pattern", "wor
 /// Every file that a map may have beside its records, but for its list, which is not made of them.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
     let tables = [MANIFEST, CSV, NPY, WORDS, HTML, VALIDATION].map(str::to_owned);
-    let figures = LAYERS.into_iter().flat_map(|layer| Format::FIGURES.map(|format| figure(layer, format)));
+    let figures = LAYERS.into_iter().flat_map(|layer| names::figures(layer).map(|(_, name)| name));
     tables.into_iter().chain(figures).collect()
 });
-
-/// The name of a figure's file.
-fn figure(layer: &str, format: Format) -> String {
-    format!("{layer}.{}", format.name())
-}
 
 /// Every file that a map may write, records included.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -221,7 +216,7 @@ fn write_pictures(
     let mut files = Vec::new();
     let wants_page = asks(Format::Html) && wanted(HTML);
     let formats: Vec<Format> = Format::FIGURES.into_iter().filter(|&format| asks(format)).collect();
-    let names = |layer| formats.iter().map(move |&format| figure(layer, format));
+    let names = |layer| formats.iter().map(move |&format| names::figure(layer, format));
     let wants_figures = LAYERS.iter().any(|layer| names(*layer).any(|name| wanted(&name)));
     if !wants_page && !wants_figures {
         return Ok(files);

@@ -1,11 +1,22 @@
 //! The names that outputs use: part of the contract with scripts.
 
 use super::cells::Source;
+use crate::map::scene::Format;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::{Class, EventKind, Status};
 
 /// Every class name, in the order in which they are counted.
 pub(super) const CLASSES: [&str; 4] = Class::NAMES;
+
+/// The name of a figure's file.
+pub(super) fn figure(what: &str, format: Format) -> String {
+    format!("{what}.{}", format.name())
+}
+
+/// A figure's files, by format.
+pub(super) fn figures(what: &str) -> [(Format, String); 3] {
+    Format::FIGURES.map(|format| (format, figure(what, format)))
+}
 
 pub(super) fn class(class: Class) -> &'static str {
     class.name()
@@ -48,5 +59,24 @@ pub(super) fn source(source: Source) -> &'static str {
     match source {
         Source::Integrated => "integrated",
         Source::Filled => "filled",
+    }
+}
+
+/// A number in a table: the shortest decimal that reads back as the same; empty where there is none or it is not finite.
+pub(super) fn float(x: impl Into<Option<f64>>) -> String {
+    x.into().filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_have_finite_numbers_or_nothing() {
+        assert_eq!(
+            [0.1 + 0.2, -0.0, f64::NAN, f64::INFINITY].map(float),
+            ["0.30000000000000004", "-0.0", "", ""]
+        );
+        assert_eq!([Some(1.0), Some(f64::NEG_INFINITY), None].map(float), ["1.0", "", ""]);
     }
 }

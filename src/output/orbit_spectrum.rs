@@ -3,7 +3,7 @@
 //!
 //! A cycle is transformed over exactly one cycle: its lines are all there is, at multiples of the forcing frequency over
 //! the cycle's periods, and none leaks into another. Any other motion is seen through Hann windows that overlap by half,
-//! and their squares are averaged (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70).
+//! and their squares are averaged, without the mean (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70).
 
 use std::f64::consts::TAU;
 
@@ -76,7 +76,7 @@ impl Spectrum {
                 .map(|(frequency, z)| Line { frequency, amplitudes: [z, z * frequency * oscillator.omega] })
                 .collect(),
             None => frequencies
-                .zip(amplitudes(&windows(&z), hann).into_iter().zip(amplitudes(&windows(&w), hann)))
+                .zip(through_windows(&z).into_iter().zip(through_windows(&w)))
                 .map(|(frequency, (z, w))| Line { frequency, amplitudes: [z, w] })
                 .collect(),
         };
@@ -101,6 +101,16 @@ impl Spectrum {
 pub(super) fn gap(oscillator: &Oscillator, state: &State, velocity: usize) -> f64 {
     let [g1, g2] = oscillator.gap;
     g1 * state[velocity] + g2 * state[2 + velocity]
+}
+
+/// Amplitudes as those of windows; at frequency 0 the size of the mean, by itself: under a window it would spread into
+/// the next line, half as high and then doubled.
+fn through_windows(signal: &[f64]) -> Vec<f64> {
+    let mean = signal.iter().sum::<f64>() / signal.len() as f64;
+    let swings: Vec<f64> = signal.iter().map(|value| value - mean).collect();
+    let mut lines = amplitudes(&windows(&swings), hann);
+    lines[0] = mean.abs();
+    lines
 }
 
 /// Windows that overlap by half.
@@ -186,9 +196,10 @@ mod tests {
     fn a_line_has_its_amplitude_under_windows_too() {
         let signal: Vec<f64> =
             (0..4096).map(|i| 3.0 + 0.7 * (TAU * 10.0 * f64::from(i) / 1024.0).sin()).collect();
-        let lines = amplitudes(&windows(&signal), hann);
+        let lines = through_windows(&signal);
         assert!((lines[0] - 3.0).abs() < 1e-12 && (lines[10] - 0.7).abs() < 1e-12, "{:?}", &lines[..12]);
-        assert!(lines[13..].iter().all(|a| *a < 1e-12));
+        // The line's own neighbours are half as high; those of the mean are none.
+        assert!(lines[1..9].iter().chain(&lines[12..]).all(|a| *a < 1e-12), "{:?}", &lines[..14]);
     }
 
     /// As samples of the velocity say, which place its jumps to within their distance.
@@ -213,6 +224,8 @@ mod tests {
         let (orbit, spectrum) = spectrum(&GearPair::paper(0.65));
         assert_eq!((orbit.class, spectrum.cycle), (Class::Chaotic, None));
         assert_eq!(spectrum.lines[1].frequency, 1.0 / 128.0);
+        let [mean, next] = [0, 1].map(|k| spectrum.lines[k].amplitudes[0]);
+        assert!(next < 0.1 * mean, "no mean beside frequency 0: {mean} {next}");
         assert!(spectrum.lines[64..128].iter().all(|line| line.amplitudes[0] > 1e-4));
     }
 }

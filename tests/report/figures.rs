@@ -207,6 +207,16 @@ fn titles_stay_text_in_svg() {
     assert_eq!(svg.matches("<image").count(), 2, "a cloud of points for each gear");
 }
 
+/// All of these have one glyph.
+#[test]
+fn characters_that_the_typeface_lacks_are_no_others_in_pdf() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("b.pdf");
+    bifurcation_figure::write(&path, ["\u{65e5}\u{672c}", "second"], E, &columns(9, 3)).unwrap();
+    let map = String::from_utf8(stream(&fs::read(path).unwrap(), "/Type /CMap")).unwrap().to_uppercase();
+    assert!(map.contains("<0073>") && !map.contains("<65E5>") && !map.contains("<672C>"), "{map}");
+}
+
 fn columns(count: u32, points: u32) -> Vec<Column> {
     let column = |i: u32| {
         let value = f64::from(i) / f64::from(count);

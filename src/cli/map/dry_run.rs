@@ -91,8 +91,8 @@ impl Foreseen<'_> {
     }
 
     /// Fewer cells of an adaptive map are integrated; nobody knows how many.
-    fn at_most(&self) -> &'static str {
-        if self.plan.refine().is_some() { "at most " } else { "" }
+    fn is_adaptive(&self) -> bool {
+        self.plan.refine().is_some()
     }
 
     fn text(&self, out: &Path) -> String {
@@ -116,7 +116,7 @@ impl Foreseen<'_> {
             format!("engine   {} ({}) on {}{why}", engine.name(), engine.precision(), self.device()),
             format!("memory   about {}{device}{}", bytes(self.host()), of(free.memory)),
             format!("disk     about {}{} for {place}", bytes(size.disk), of(free.disk)),
-            format!("time     {}", self.time()),
+            format!("time     {}", time(&self.forecast, self.is_adaptive())),
             format!("         from {} cells, computed and thrown away; {} more to open the engine, and tables and \
                      figures come on top", forecast.sampled, in_words(self.opening)),
             "nothing was written".to_owned(),
@@ -126,21 +126,6 @@ impl Foreseen<'_> {
 
     fn device(&self) -> String {
         if self.is_gpu() { crate::cli::say::quoted(self.engine.device()) } else { processor::described() }
-    }
-
-    fn time(&self) -> String {
-        let Forecast { seconds, interval, .. } = self.forecast;
-        match interval {
-            None => format!("more than {}", in_words(seconds)),
-            Some([low, high]) if high > low => format!(
-                "{}about {} (95 %: {} to {})",
-                self.at_most(),
-                in_words(seconds),
-                in_words(low),
-                in_words(high)
-            ),
-            Some(_) => format!("{}about {}", self.at_most(), in_words(seconds)),
-        }
     }
 
     fn object(&self, out: &Path) -> Value {
@@ -161,9 +146,29 @@ impl Foreseen<'_> {
                 "integrate": forecast.seconds,
                 "interval": forecast.interval,
             },
-            "is_upper_bound": self.plan.refine().is_some(),
+            "is_upper_bound": is_upper_bound(forecast, self.is_adaptive()),
             "sampled": forecast.sampled,
         })
+    }
+}
+
+/// Whether a map takes no longer than foreseen: as long only if every cell is integrated, and all of the sample ended.
+fn is_upper_bound(forecast: &Forecast, is_adaptive: bool) -> bool {
+    is_adaptive && forecast.interval.is_some()
+}
+
+/// How long a map takes.
+fn time(forecast: &Forecast, is_adaptive: bool) -> String {
+    let seconds = in_words(forecast.seconds);
+    let at_most = if is_upper_bound(forecast, is_adaptive) { "at most " } else { "" };
+    match forecast.interval {
+        // Fewer cells may take less than that.
+        None if is_adaptive => format!("if every cell were integrated, more than {seconds}"),
+        None => format!("more than {seconds}"),
+        Some([low, high]) if high > low => {
+            format!("{at_most}about {seconds} (95 %: {} to {})", in_words(low), in_words(high))
+        }
+        Some(_) => format!("{at_most}about {seconds}"),
     }
 }
 
@@ -186,5 +191,20 @@ mod tests {
     fn times_have_units_that_fit() {
         let told = [0.04, 9.4, 75.0, 600.0, 9000.0, 1e6].map(in_words);
         assert_eq!(told, ["0.0 s", "9.4 s", "75 s", "10 min", "2.5 h", "11.6 days"]);
+    }
+
+    #[test]
+    fn a_sample_that_did_not_end_bounds_no_adaptive_map() {
+        let ended = Forecast { seconds: 75.0, interval: Some([60.0, 90.0]), sampled: 16 };
+        let cut = Forecast { interval: None, ..ended };
+        assert_eq!(time(&ended, false), "about 75 s (95 %: 60 s to 90 s)");
+        assert_eq!(time(&ended, true), "at most about 75 s (95 %: 60 s to 90 s)");
+        assert_eq!(time(&cut, false), "more than 75 s");
+        assert_eq!(time(&cut, true), "if every cell were integrated, more than 75 s");
+        let bounds = [(&ended, false), (&ended, true), (&cut, false), (&cut, true)];
+        assert_eq!(
+            bounds.map(|(forecast, adaptive)| is_upper_bound(forecast, adaptive)),
+            [false, true, false, false]
+        );
     }
 }

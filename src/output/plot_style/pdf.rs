@@ -276,7 +276,8 @@ fn write_font(
     let data = compressed(&subset);
     pdf.stream(file, &data).filter(Filter::FlateDecode);
     let mut map = UnicodeCmap::new(Name(b"Characters"), IDENTITY);
-    signs.iter().for_each(|(glyph, (sign, _))| map.pair(*glyph, *sign));
+    // One glyph, number 0, stands for all characters that the typeface lacks: it is none of them.
+    signs.iter().filter(|(glyph, _)| **glyph != 0).for_each(|(glyph, (sign, _))| map.pair(*glyph, *sign));
     let data = compressed(&map.finish());
     pdf.cmap(unicode, &data).filter(Filter::FlateDecode);
     Ok(())
