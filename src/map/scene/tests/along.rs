@@ -64,7 +64,7 @@ fn what_does_not_fit_the_axes_is_refused() {
     // As a map refuses it, which has the axis besides.
     let both = PLANE.replace("F = 40.0", "F = 40.0, omega = 6.0");
     let said = along(&both, &[], "e", &["omega=5"]).unwrap_err().to_string();
-    assert_says(&said, &["s.toml:1:35: `parameters.omega = 6.0`", "--at gives `omega` its value"]);
+    assert_says(&said, &["s.toml:1:34: `parameters.omega = 6.0`", "--at gives `omega` its value"]);
     // An axis that stays is checked all the same.
     let bad = PLANE.replace("max = 12.0", "max = 0.5");
     assert_says(&along(&bad, &[], "e", &["omega=5"]).unwrap_err().to_string(), &["`axis.1.max = 0.5`"]);
