@@ -453,10 +453,11 @@ pub(crate) struct Validate {
 /// Where two finished maps of one grid differ: by class, by period, by pattern
 ///
 /// For hysteresis (start.policy up against down), engine against engine, version against version. Other parameters may
-/// differ, and are named; the axes must have the same values. Writes compare.csv (one row per differing cell), compare.png
-/// and manifest.json. Cells differ by class or by period; those that agree in both and differ by pattern (by word where a
-/// map has no patterns) are listed and drawn, too, and counted apart. Of cells of one period it says in how many symmetry, words and patterns differ (an orbit and its mirror
-/// image have one word), and by how much exponents do at most. Filled cells count as any other.
+/// differ, and are named; the axes must have the same values. Writes compare.csv (one row per differing cell),
+/// compare.png and manifest.json. Cells differ by class or by period; those that agree in both and differ by pattern
+/// (by word where a map has no patterns) are listed and drawn, too, and counted apart. Of cells of one period it says
+/// in how many symmetry, words and patterns differ (an orbit and its mirror image have one word), and by how much
+/// exponents do at most. Filled cells count as any other.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the hysteresis of a plane:\n  \
     rattlemap map scenes/e_omega.toml --set start.policy=up --out out/up\n  \
