@@ -361,10 +361,11 @@ impl Orbit {
 /// Every contact and end of meshing against one parameter, as in the paper's Fig. 5
 ///
 /// Integrates each value of the scene's one axis on the event-driven reference and writes
-/// bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word,
+/// bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word, pattern,
 /// exponent and its error), bifurcation.png and manifest.json. Each value is
 /// integrated until it is decided; steps_per_period, early_stop and quantities are for maps.
-/// With start.policy=both the attractor is followed upwards and downwards, and where class or period differ is told.
+/// With start.policy=both the attractor is followed upwards and downwards, and where class, period or
+/// pattern differ is told.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
     rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200\n\n\
