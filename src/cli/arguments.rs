@@ -361,10 +361,11 @@ impl Orbit {
 /// Every contact and end of meshing against one parameter, as in the paper's Fig. 5
 ///
 /// Integrates each value of the scene's one axis on the event-driven reference and writes
-/// bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word,
+/// bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word, pattern,
 /// exponent and its error), bifurcation.png and manifest.json. Each value is
 /// integrated until it is decided; steps_per_period, early_stop and quantities are for maps.
-/// With start.policy=both the attractor is followed upwards and downwards, and where class or period differ is told.
+/// With start.policy=both the attractor is followed upwards and downwards, and where class, period or
+/// pattern differ is told.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the paper's Fig. 5 with fewer columns:\n  \
     rattlemap bifurcation scenes/paper_fig5.toml --set axis.0.count=200\n\n\
@@ -450,12 +451,14 @@ pub(crate) struct Validate {
     pub(crate) quiet: bool,
 }
 
-/// Where two finished maps of one grid differ: by class, by period
+/// Where two finished maps of one grid differ: by class, by period, by pattern
 ///
 /// For hysteresis (start.policy up against down), engine against engine, version against version. Other parameters may
-/// differ, and are named; the axes must have the same values. Writes compare.csv (one row per differing cell), compare.png
-/// and manifest.json. Of cells of one period it says in how many symmetry, words and patterns differ (an orbit and its mirror
-/// image have one word), and by how much exponents do at most. Filled cells count as any other.
+/// differ, and are named; the axes must have the same values. Writes compare.csv (one row per differing cell),
+/// compare.png and manifest.json. Cells differ by class or by period; those that agree in both and differ by pattern
+/// (by word where a map has no patterns) are listed and drawn, too, and counted apart. Of cells of one period it says
+/// in how many symmetry, words and patterns differ (an orbit and its mirror image have one word), and by how much
+/// exponents do at most. Filled cells count as any other.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the hysteresis of a plane:\n  \
     rattlemap map scenes/e_omega.toml --set start.policy=up --out out/up\n  \
@@ -470,7 +473,7 @@ pub(crate) struct Compare {
     #[arg(value_name = "B")]
     pub(crate) b: PathBuf,
 
-    /// Exit with code 1 if any cell differs
+    /// Exit with code 1 if any cell differs by class or period; other patterns, words and exponents do not count
     #[arg(long)]
     pub(crate) fail: bool,
 

@@ -34,7 +34,9 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
         progress.report(done, count);
     };
     let (start, settings, halt) = (scene.start(), scene.orbit_settings(), interrupt.raised());
-    let Some(columns) = bifurcation::run_until(&cells, start, &settings, &report, halt)? else {
+    let columns = bifurcation::run_until(&cells, start, &settings, &report, halt)?;
+    // A signal may come with the last column.
+    let Some(columns) = columns.filter(|_| !interrupt.is_raised()) else {
         let (ended, all, path) = (ended.into_inner(), count, folder.path().display());
         let words = anyhow!(
             "interrupted after {ended} of {all} columns, and none is kept; nothing was written to {path}"
@@ -63,7 +65,7 @@ const NAMED: usize = 6;
 
 /// Where the two passes disagree.
 fn told(found: &Hysteresis, name: &str) -> String {
-    let Hysteresis { columns, differing, ranges, by_word, word_ranges } = found;
+    let Hysteresis { columns, differing, ranges, by_pattern, pattern_ranges } = found;
     let by_class = match differing {
         0 => format!("up and down have the same class and period in all {columns} columns"),
         _ => format!(
@@ -71,10 +73,13 @@ fn told(found: &Hysteresis, name: &str) -> String {
             listed(ranges)
         ),
     };
-    match by_word {
+    match by_pattern {
         0 => by_class,
         _ => {
-            format!("{by_class}\nby word alone they differ in {by_word}, at {name} = {}", listed(word_ranges))
+            format!(
+                "{by_class}\nby pattern alone they differ in {by_pattern}, at {name} = {}",
+                listed(pattern_ranges)
+            )
         }
     }
 }

@@ -44,16 +44,16 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
     let attractors =
         |plan: &Plan, records| if counted { coexistence::attractors(plan, records) } else { None };
     let attractors = [attractors(&plans[0], &a), attractors(&plans[1], &b)];
+    let stopped = || interrupt.failure(anyhow!("interrupted, and nothing was written to {}", out.display()));
     if !interrupt.wait_for(None) {
-        let words = anyhow!("interrupted, and nothing was written to {}", out.display());
-        return Err(interrupt.failure(words));
+        return Err(stopped());
     }
-    let [of_a, of_b] = [(&a, &attractors[0], &plans[0]), (&b, &attractors[1], &plans[1])].map(
-        |(records, attractors, plan)| Side {
-            records: &records[..plan.cell_count()],
-            attractors: attractors.as_deref(),
-        },
-    );
+    let records = [&a, &b];
+    let [of_a, of_b] = [0, 1].map(|i| Side {
+        records: &records[i][..plans[i].cell_count()],
+        attractors: attractors[i].as_deref(),
+        has_exponents: scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
+    });
     let comparison = compare(of_a, of_b);
     let cells = [
         Cells::new(scenes[0], &plans[0], &a).refined(refined_a.as_ref()),
@@ -70,6 +70,9 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         }
     };
     let compared = Compared { sides: [side(0), side(1)], comparison: &comparison };
+    if interrupt.is_raised() {
+        return Err(stopped());
+    }
     let files = output::compare::write(&folder, &compared, &formats, clock.elapsed())?;
     if !ask.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
@@ -79,9 +82,10 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         output::compare::print(folder.path(), &files, &compared)?;
     }
     match comparison.differing() {
-        differing if ask.fail && differing > 0 => {
-            Err(Failure::Run(anyhow!("{differing} of {} cells differ", comparison.kinds.len())))
-        }
+        differing if ask.fail && differing > 0 => Err(Failure::Run(anyhow!(
+            "{differing} of {} cells differ by class or period",
+            comparison.kinds.len()
+        ))),
         _ => Ok(()),
     }
 }

@@ -43,6 +43,13 @@ pub struct Column {
     pub points: Vec<SectionPoint>,
 }
 
+impl Column {
+    /// The pattern of a periodic orbit's word.
+    pub fn pattern(&self) -> Option<Word> {
+        self.word.as_ref().map(Word::pattern)
+    }
+}
+
 /// Which way the attractor was followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {

@@ -1,7 +1,8 @@
 //! In which cells do two maps of one grid differ? Pure.
 //!
 //! For up against down (hysteresis), engine against engine, version against version. Cells differ by class or by
-//! period. What says more of cells that agree in both is counted beside: symmetry, words, exponents.
+//! period; those that agree in both may still differ by pattern. What else cycles of one period have is counted beside:
+//! symmetry, words, exponents.
 
 use crate::record::classify::classify;
 use crate::record::distance::apart;
@@ -16,11 +17,15 @@ pub enum Kind {
     Class,
     /// Both are periodic, with other periods.
     Period,
+    /// Both are cycles of one period, with other patterns.
+    Pattern,
+    /// The same with other words, where patterns are not known.
+    Word,
 }
 
 impl Kind {
     /// Every kind, in the order in which they are counted.
-    pub const ALL: [Kind; 2] = [Kind::Class, Kind::Period];
+    pub const ALL: [Kind; 4] = [Kind::Class, Kind::Period, Kind::Pattern, Kind::Word];
 
     /// How motions of these classes differ; none if they do not.
     pub fn of(a: Class, b: Class) -> Option<Kind> {
@@ -31,11 +36,18 @@ impl Kind {
         }
     }
 
+    /// Whether class or period differ: cells of other kinds count apart.
+    pub fn is_decisive(self) -> bool {
+        matches!(self, Kind::Class | Kind::Period)
+    }
+
     /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Class => "class",
             Kind::Period => "period",
+            Kind::Pattern => "pattern",
+            Kind::Word => "word",
         }
     }
 }
@@ -77,9 +89,7 @@ pub struct Comparison {
     pub words: Tally,
     /// Patterns likewise.
     pub patterns: Tally,
-    /// The cells whose patterns differ, or where those are not known their words, by id, ascending.
-    pub other_word: Vec<u32>,
-    /// Exponents of integrated cells of one period that were compared.
+    /// Exponents of integrated cells of one period that were compared; none unless both scenes ask for them.
     pub exponents: usize,
     /// The largest of their differences; none where nothing was compared.
     pub exponent: Option<Largest>,
@@ -93,9 +103,9 @@ impl Comparison {
         self.kinds.iter().filter(|of| **of == Some(kind)).count()
     }
 
-    /// Cells that differ.
+    /// Cells that differ by class or period.
     pub fn differing(&self) -> usize {
-        self.kinds.iter().flatten().count()
+        self.kinds.iter().flatten().filter(|kind| kind.is_decisive()).count()
     }
 }
 
@@ -106,6 +116,8 @@ pub struct Side<'a> {
     pub records: &'a [Record],
     /// Attractors per cell, if they were counted.
     pub attractors: Option<&'a [u8]>,
+    /// Whether its scene asks for exponents.
+    pub has_exponents: bool,
 }
 
 /// Compares two maps cell by cell. Filled cells count as any other, but for their exponents, which nobody measured.
@@ -119,17 +131,21 @@ pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
         symmetric: Tally::default(),
         words: Tally::default(),
         patterns: Tally::default(),
-        other_word: Vec::new(),
         exponents: 0,
         exponent: None,
         attractors: Tally::default(),
     };
+    let has_exponents = a.has_exponents && b.has_exponents;
     for (id, (a, b)) in a.records.iter().zip(b.records).enumerate() {
         let classes = [classify(a), classify(b)];
-        found.kinds.push(Kind::of(classes[0], classes[1]));
+        let mut kind = Kind::of(classes[0], classes[1]);
         if classes[0] == classes[1] && matches!(classes[0], Class::Periodic { .. }) {
-            found.take_cycles(id, a, b);
+            kind = found.take_cycles(a, b);
+            if has_exponents {
+                found.take_exponents(id, a, b);
+            }
         }
+        found.kinds.push(kind);
     }
     if let (Some(a), Some(b)) = (a.attractors, b.attractors) {
         a.iter().zip(b).for_each(|(a, b)| found.attractors.take(Some(a != b)));
@@ -139,7 +155,7 @@ pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
 
 impl Comparison {
     /// Compares what two cycles of one period have beside it.
-    fn take_cycles(&mut self, id: usize, a: &Record, b: &Record) {
+    fn take_cycles(&mut self, a: &Record, b: &Record) -> Option<Kind> {
         let have = |bit| a.valid & b.valid & bit != 0;
         self.symmetric.take(have(valid::SYMMETRIC).then_some(a.symmetric != b.symmetric));
         let has_other = |a: Option<Spelling>, b: Option<Spelling>| a.zip(b).and_then(|(a, b)| differ(&a, &b));
@@ -147,8 +163,15 @@ impl Comparison {
         self.words.take(word);
         self.patterns.take(pattern);
         // Words count bounces before meshing, patterns do not.
-        self.other_word.extend((pattern.or(word) == Some(true)).then_some(id as u32));
-        if have(valid::LYAPUNOV) && (a.valid | b.valid) & valid::FILLED == 0 {
+        match (pattern, word) {
+            (Some(differs), _) => differs.then_some(Kind::Pattern),
+            (None, word) => (word == Some(true)).then_some(Kind::Word),
+        }
+    }
+
+    /// Compares the exponents of two cycles of one period.
+    fn take_exponents(&mut self, id: usize, a: &Record, b: &Record) {
+        if a.valid & b.valid & valid::LYAPUNOV != 0 && (a.valid | b.valid) & valid::FILLED == 0 {
             self.exponents += 1;
             // Minus infinity both, where multipliers are zero.
             let difference = if a.lyapunov == b.lyapunov { 0.0 } else { apart(a.lyapunov, b.lyapunov) };
@@ -195,7 +218,7 @@ mod tests {
     }
 
     fn of(a: &[Record], b: &[Record]) -> Comparison {
-        let [a, b] = [a, b].map(|records| Side { records, attractors: None });
+        let [a, b] = [a, b].map(|records| Side { records, attractors: None, has_exponents: true });
         compare(a, b)
     }
 
@@ -206,7 +229,7 @@ mod tests {
         let b = [cycle(1, -0.1, b"36"), cycle(4, -0.1, b"36"), cycle(1, -0.1, b"36"), chaos()];
         let found = of(&a, &b);
         assert_eq!(found.kinds, [None, Some(Kind::Period), Some(Kind::Class), Some(Kind::Class)]);
-        assert_eq!((found.differing(), Kind::ALL.map(|kind| found.count(kind))), (3, [2, 1]));
+        assert_eq!((found.differing(), Kind::ALL.map(|kind| found.count(kind))), (3, [2, 1, 0, 0]));
         // What is said of cycles is said of those of one period.
         assert_eq!((found.exponents, found.symmetric.compared, found.words.compared), (1, 1, 1));
         let filled = b.map(|record| Record { valid: record.valid | valid::FILLED, ..record });
@@ -225,9 +248,17 @@ mod tests {
         let found = of(&a, &b);
         assert_eq!(found.differing(), 0);
         assert_eq!(found.words, Tally { compared: 3, differing: 1 }, "a mirror image has the same word");
-        assert_eq!(found.other_word, [1]);
+        assert_eq!(found.kinds, [None, Some(Kind::Word), None, None]);
         assert_eq!(found.symmetric, Tally { compared: 3, differing: 1 });
         assert_eq!((found.exponents, found.exponent), (3, Some(Largest { difference: 0.5, id: 2 })));
+        // Classes are told by exponents: records have them whether a scene asks or not.
+        let [a, b] = [(&a, true), (&b, false)].map(|(records, has_exponents)| Side {
+            records,
+            attractors: None,
+            has_exponents,
+        });
+        let unasked = compare(a, b);
+        assert_eq!((unasked.exponents, unasked.exponent), (0, None));
     }
 
     /// As many bounces more or less make no other pattern.
@@ -243,7 +274,9 @@ mod tests {
         let found = of(&a, &b);
         assert_eq!(found.words, Tally { compared: 3, differing: 3 });
         assert_eq!(found.patterns, Tally { compared: 2, differing: 1 });
-        assert_eq!(found.other_word, [1, 2], "a word tells where there is no pattern");
+        let expected = [None, Some(Kind::Pattern), Some(Kind::Word)];
+        assert_eq!(found.kinds, expected, "a word tells where there is no pattern");
+        assert_eq!(found.differing(), 0, "class and period are the same");
     }
 
     #[test]
@@ -259,7 +292,7 @@ mod tests {
     fn attractors_are_compared_where_both_maps_count_them() {
         let records = [chaos(); 3];
         let [a, b] = [&[1u8, 2, 3], &[1u8, 1, 3]];
-        let side = |attractors| Side { records: &records, attractors };
+        let side = |attractors| Side { records: &records, attractors, has_exponents: true };
         assert_eq!(compare(side(Some(a)), side(Some(b))).attractors, Tally { compared: 3, differing: 1 });
         assert_eq!(compare(side(Some(a)), side(None)).attractors, Tally::default());
     }

@@ -7,12 +7,14 @@ use super::bifurcation_csv::direction_field;
 use super::names::{self, float};
 use crate::map::bifurcation::Column;
 use crate::record::Spelling;
+use rattlemap_dynamics::word::Word;
 
 /// Fields after the axis' value and the direction.
-const FIELDS: [&str; 10] = [
+const FIELDS: [&str; 11] = [
     "class",
     "period",
     "word",
+    "pattern",
     "lyapunov",
     "lyapunov_error",
     "impacts_per_period",
@@ -36,11 +38,12 @@ pub(super) fn write(path: &Path, axis: &str, columns: &[Column]) -> Result<(), W
     Ok(table.flush()?)
 }
 
-fn fields(column: &Column) -> [String; 10] {
+fn fields(column: &Column) -> [String; 11] {
     [
         names::class(column.class).to_owned(),
         names::period(column.class).map_or(String::new(), |period| period.to_string()),
-        word(column),
+        spelled(column.word.as_ref()),
+        spelled(column.pattern().as_ref()),
         float(column.lyapunov),
         float(column.lyapunov_error),
         float(column.impacts_per_period),
@@ -51,9 +54,9 @@ fn fields(column: &Column) -> [String; 10] {
     ]
 }
 
-/// The word as a map's table has it.
-fn word(column: &Column) -> String {
-    column.word.as_ref().map_or(String::new(), |word| Spelling::new(word).in_table())
+/// The word or pattern as a map's table has it.
+fn spelled(word: Option<&Word>) -> String {
+    word.map_or(String::new(), |word| Spelling::new(word).in_table())
 }
 
 #[cfg(test)]
@@ -61,7 +64,6 @@ mod tests {
     use super::*;
     use crate::map::bifurcation::Direction;
     use rattlemap_dynamics::orbit::{Class, Status};
-    use rattlemap_dynamics::word::Word;
 
     fn column(value: f64, class: Class) -> Column {
         let is_periodic = matches!(class, Class::Periodic { .. });
@@ -71,7 +73,7 @@ mod tests {
             impacts_per_period: 2.0,
             mesh_fraction: 0.125,
             symmetric: is_periodic.then_some(true),
-            word: is_periodic.then(|| Word::cyclic(b"63")),
+            word: is_periodic.then(|| Word::cyclic(b"6333")),
             periods_run: 578,
             ..Column::plain(value, class)
         }
@@ -95,13 +97,13 @@ mod tests {
             ..column(1.0, Class::Failed)
         };
         let columns = [column(0.25, Class::Periodic { period: 2 }), column(0.5, Class::Chaotic), failed];
-        let fields = "class,period,word,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
+        let fields = "class,period,word,pattern,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
                       periods_run";
         assert_eq!(
             written(&columns),
             format!(
-                "e,{fields}\n0.25,periodic,2,w36,0.25,,2.0,0.125,true,ok,578\n\
-                 0.5,chaotic,,,0.25,0.30000000000000004,2.0,0.125,,ok,578\n1.0,failed,,,,,,,,too_stiff,578\n"
+                "e,{fields}\n0.25,periodic,2,w3336,w36,0.25,,2.0,0.125,true,ok,578\n\
+                 0.5,chaotic,,,,0.25,0.30000000000000004,2.0,0.125,,ok,578\n1.0,failed,,,,,,,,,too_stiff,578\n"
             )
         );
         let both = Direction::BOTH
@@ -115,8 +117,8 @@ mod tests {
     fn long_words_are_hashed_as_in_the_tables_of_maps() {
         let long: Vec<u8> = (0..100).map(|i| b'1' + (i * i % 6) as u8).collect();
         let long = Column { word: Some(Word::cyclic(&long)), ..column(0.5, Class::Periodic { period: 9 }) };
-        assert!(word(&long).starts_with("w#") && word(&long).ends_with("/100"), "{}", word(&long));
-        let silent = Column { word: Some(Word::default()), ..long };
-        assert_eq!(word(&silent), "w", "a word without events is one");
+        let word = spelled(long.word.as_ref());
+        assert!(word.starts_with("w#") && word.ends_with("/100"), "{word}");
+        assert_eq!(spelled(Some(&Word::default())), "w", "a word without events is one");
     }
 }

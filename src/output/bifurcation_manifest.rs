@@ -50,15 +50,15 @@ struct HysteresisObject {
     differing: usize,
     /// First and last value of each run of neighbours.
     ranges: Vec<[f64; 2]>,
-    /// Values at which words alone differ.
-    by_word: usize,
-    word_ranges: Vec<[f64; 2]>,
+    /// Values at which patterns alone differ.
+    by_pattern: usize,
+    pattern_ranges: Vec<[f64; 2]>,
 }
 
 impl From<Hysteresis> for HysteresisObject {
     fn from(found: Hysteresis) -> Self {
-        let Hysteresis { columns, differing, ranges, by_word, word_ranges } = found;
-        HysteresisObject { columns, differing, ranges, by_word, word_ranges }
+        let Hysteresis { columns, differing, ranges, by_pattern, pattern_ranges } = found;
+        HysteresisObject { columns, differing, ranges, by_pattern, pattern_ranges }
     }
 }
 

@@ -141,6 +141,9 @@ struct Object<'a> {
     /// Of these, by kind.
     by_class: usize,
     by_period: usize,
+    /// Cells that agree in both and differ by pattern, or by word where a map has no patterns.
+    by_pattern: usize,
+    by_word: usize,
     transitions: Vec<Transition>,
     /// Of cells of one period; null where a map does not have it.
     symmetric: Option<TallyObject>,
@@ -198,6 +201,8 @@ impl<'a> Object<'a> {
             differing: comparison.differing(),
             by_class: comparison.count(Kind::Class),
             by_period: comparison.count(Kind::Period),
+            by_pattern: comparison.count(Kind::Pattern),
+            by_word: comparison.count(Kind::Word),
             transitions: compared.transitions(),
             symmetric: tally(comparison.symmetric),
             words: tally(comparison.words),

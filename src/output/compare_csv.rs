@@ -1,4 +1,4 @@
-//! `compare.csv`: one row per cell in which two maps differ.
+//! `compare.csv`: one row per cell in which two maps differ by class, period, pattern or word.
 
 use std::path::Path;
 

@@ -29,7 +29,7 @@ const PATCH: (f64, f64) = (34.0, 20.0);
 struct Entry {
     color: Color,
     text: &'static str,
-    /// How its cells differ; none where they agree.
+    /// How its cells differ; none where class and period are the same.
     kind: Option<Kind>,
 }
 
@@ -72,8 +72,10 @@ fn place(classes: [Class; 2]) -> usize {
 /// A file that cannot be written, by name.
 pub(super) fn write(path: &Path, compared: &Compared<'_>) -> Result<(), FigureError> {
     let mut places: Vec<usize> = compared.classes().map(place).collect();
-    for &id in &compared.comparison.other_word {
-        places[id as usize] = OTHER_WORD;
+    for (place, kind) in places.iter_mut().zip(&compared.comparison.kinds) {
+        if kind.is_some_and(|kind| !kind.is_decisive()) {
+            *place = OTHER_WORD;
+        }
     }
     let [width, height] = compared.sides[0].cells.counts().map(side);
     let size = (LEFT + width + GAP + BESIDE, TOP + height.max(LOWEST) + BELOW);
@@ -96,8 +98,12 @@ fn draw(
     canvas.raster(rect, counts, |[i, j]| ENTRIES[places[j * counts[0] + i]].color)?;
     let [x, y] = [0, 1].map(|i| axis(&a.cells.scene().axes()[i]));
     Frame { rect, x, y }.draw_axes(canvas, true)?;
-    let has_patterns = compared.comparison.patterns.compared > 0;
-    draw_legend(canvas, places, has_patterns, rect.right + GAP)
+    let other_word = match [Kind::Pattern, Kind::Word].map(|kind| compared.comparison.count(kind)) {
+        [_, 0] => ENTRIES[OTHER_WORD].text,
+        [0, _] => "both periodic, other word",
+        _ => "both periodic, other pattern or word",
+    };
+    draw_legend(canvas, places, other_word, rect.right + GAP)
 }
 
 /// What differs between the runs: scenes, engines, versions.
@@ -132,12 +138,7 @@ fn subtitle(compared: &Compared<'_>) -> String {
 }
 
 /// Draws what the colours mean, with numbers and shares of cells, below the sum of their kind.
-fn draw_legend(
-    canvas: &Canvas<'_>,
-    places: &[usize],
-    has_patterns: bool,
-    left: f64,
-) -> Result<(), DrawError> {
+fn draw_legend(canvas: &Canvas<'_>, places: &[usize], other_word: &str, left: f64) -> Result<(), DrawError> {
     let mut counts = [0usize; ENTRIES.len()];
     places.iter().for_each(|&place| counts[place] += 1);
     let right = left + BESIDE - GAP - 20.0;
@@ -159,8 +160,7 @@ fn draw_legend(
             let patch = Rect { left, top, right: left + PATCH.0, bottom };
             canvas.fill(patch, RGBColor(r, g, b), 1.0)?;
             canvas.outline(patch, 1.0)?;
-            let is_word = entry.color == ENTRIES[OTHER_WORD].color && !has_patterns;
-            let text = if is_word { "both periodic, other word" } else { entry.text };
+            let text = if entry.color == ENTRIES[OTHER_WORD].color { other_word } else { entry.text };
             canvas.text(text, (left + PATCH.0 + 14.0, y), SMALL, Align::Left, DARK)?;
             canvas.text(&count(cells), (right, y), SMALL, Align::Right, DARK)?;
             y += ROW;

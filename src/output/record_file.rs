@@ -11,6 +11,8 @@
 //! The header is there whole or not at all: it is written under another name. A run that is killed while it writes leaves
 //! a torn last batch. A disk may do worse, anywhere: a damaged batch is lost, and its cells are computed again. So is
 //! what follows it where cells depend on those before them.
+//!
+//! Files from before there were patterns name fewer columns: they are read, and not gone on with.
 
 mod batch;
 mod columns;
@@ -135,6 +137,9 @@ impl RecordFile {
         let Some(reader) = Reader::of(&file, path, identity)? else {
             return RecordFile::create(path, identity);
         };
+        if !reader.has_all_columns() {
+            return Err(RecordFileError::OtherFields { path: path.to_owned() });
+        }
         let Extent { count, damage, good, next_number } = reader.batches(order, take)?;
         let (begin_of_batches, is_whole) = (reader.begin, reader.is_whole);
         let mended = match &good[..] {

@@ -329,7 +329,7 @@ const DIAGRAM: [&str; 4] = ["bifurcation.csv", "bifurcation.png", "bifurcation_c
 /// One row per value, with what `orbit` says of it.
 fn check_columns(path: &Path) {
     let mut table = csv::Reader::from_path(path).unwrap();
-    let header = "e,class,period,word,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
+    let header = "e,class,period,word,pattern,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
                   periods_run";
     assert_eq!(table.headers().unwrap().iter().collect::<Vec<_>>().join(","), header);
     let rows: Vec<csv::StringRecord> = table.records().collect::<Result<_, _>>().unwrap();
@@ -343,15 +343,17 @@ fn check_columns(path: &Path) {
         let is_periodic = &row[1] == "periodic";
         assert_eq!(orbit["class"], row[1]);
         assert_eq!(orbit["period"].as_u64(), row[2].parse().ok());
-        let word = format!("w{}", orbit["word"].as_str().unwrap());
-        assert_eq!(&row[3], if is_periodic { word.as_str() } else { "" });
+        for (field, name) in [(3, "word"), (4, "pattern")] {
+            let word = format!("w{}", orbit[name].as_str().unwrap());
+            assert_eq!(&row[field], if is_periodic { word.as_str() } else { "" });
+        }
         for (field, name) in
-            [(4, "lyapunov"), (5, "lyapunov_error"), (6, "impacts_per_period"), (7, "mesh_fraction")]
+            [(5, "lyapunov"), (6, "lyapunov_error"), (7, "impacts_per_period"), (8, "mesh_fraction")]
         {
             assert_eq!(row[field].parse().ok(), orbit[name].as_f64(), "{name} at {set}");
         }
-        assert_eq!(row[8].parse().ok(), orbit["symmetric"].as_bool());
-        assert_eq!(orbit["status"], row[9]);
+        assert_eq!(row[9].parse().ok(), orbit["symmetric"].as_bool());
+        assert_eq!(orbit["status"], row[10]);
     }
     assert!(rows.iter().any(|row| &row[1] == "periodic") && rows.iter().any(|row| &row[1] == "chaotic"));
 }

@@ -120,8 +120,39 @@ fn up_against_down_is_what_their_tables_say() {
     // Again: the folder is guarded; with --fail the difference is the exit code, and the files are there.
     compare(&folder, &["m/up", "m/down"]).code(2).stderr(says(&["the folder is not empty", "--force"]));
     let failed = compare(&folder, &["m/down", "m/up", "--fail", "--quiet"]).code(1).stdout("");
-    failed.stderr(format!("error: {} of 144 cells differ\n", differing.len()));
+    failed.stderr(format!("error: {} of 144 cells differ by class or period\n", differing.len()));
     assert!(folder.path().join("out/compare/down-up/manifest.json").is_file());
+}
+
+/// Rattling on the way up and motion without contact on the way down are of one class and period: rows of their own kind,
+/// which `--fail` does not heed.
+#[test]
+fn cells_of_another_pattern_are_told_and_do_not_fail() {
+    let sets = |policy| {
+        ["axis.0.parameter=e", "axis.0.min=0.05", "axis.0.max=0.1", "axis.0.count=2"]
+            .into_iter()
+            .chain(["axis.1.parameter=omega", "axis.1.min=8.5", "axis.1.max=12", "axis.1.count=8", policy])
+            .collect::<Vec<_>>()
+    };
+    let folder = maps(&[("up", &sets("start.policy=up")), ("down", &sets("start.policy=down"))]);
+    let patterns = ["up", "down"].map(|name| {
+        let path = folder.path().join(name).join("cells.csv");
+        let mut table = csv::Reader::from_path(path).unwrap();
+        let at = table.headers().unwrap().iter().position(|field| field == "pattern").unwrap();
+        table.records().map(|row| row.unwrap()[at].to_owned()).collect::<Vec<_>>()
+    });
+    let differing = patterns[0].iter().zip(&patterns[1]).filter(|(up, down)| up != down).count();
+    assert!(differing > 3, "{patterns:?}");
+    let done = compare(&folder, &["up", "down", "--fail", "--json", "--out", "c"]).success();
+    let told = json(&done.get_output().stdout);
+    let counts = ["differing", "by_pattern", "by_word"].map(|name| told[name].as_u64().unwrap());
+    assert_eq!(counts, [0, differing as u64, 0]);
+    let (_, rows) = rows(&folder.path().join("c/compare.csv"));
+    assert_eq!(rows.len(), differing);
+    assert!(rows.iter().all(|row| row[10] == "pattern"), "{rows:?}");
+    let picture = image::open(folder.path().join("c/compare.png")).unwrap().to_rgb8();
+    let pixels = picture.pixels().filter(|pixel| pixel.0 == [0xf6, 0xd9, 0x8b]).count();
+    assert!(pixels > 0, "a colour of their own");
 }
 
 /// The colours of the kinds take as much of the picture as their cells of the map.

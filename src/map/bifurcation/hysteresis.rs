@@ -12,30 +12,31 @@ pub struct Hysteresis {
     pub differing: usize,
     /// Runs of neighbouring values at which they do: the first and the last value of each.
     pub ranges: Vec<[f64; 2]>,
-    /// Values at which class and period are the same and the words alone differ, as where one way leads to motion
-    /// without contact and the other one to rattling. Words of an orbit and its mirror image are one.
-    pub by_word: usize,
+    /// Values at which class and period are the same and the patterns alone differ, as where one way leads to motion
+    /// without contact and the other one to rattling. Those of an orbit and its mirror image are one.
+    pub by_pattern: usize,
     /// Runs of neighbouring ones, as above.
-    pub word_ranges: Vec<[f64; 2]>,
+    pub pattern_ranges: Vec<[f64; 2]>,
 }
 
 /// Compares the two passes of a diagram by class and period; none if it shows one alone.
 pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     let pass = |direction| columns.iter().filter(move |column| column.direction == Some(direction));
     let [up, down] = Direction::BOTH.map(pass);
-    let (mut differing, mut by_word) = (Runs::default(), Runs::default());
+    let (mut differing, mut by_pattern) = (Runs::default(), Runs::default());
     for (up, down) in up.zip(down) {
         let differs = Kind::of(up.class, down.class).is_some();
         differing.take(up.value, differs);
-        let words = up.word.as_ref().zip(down.word.as_ref());
-        by_word.take(up.value, !differs && words.is_some_and(|(up, down)| words_differ(up, down)));
+        // Words count bounces before meshing, patterns do not.
+        let patterns = up.pattern().zip(down.pattern());
+        by_pattern.take(up.value, !differs && patterns.is_some_and(|(up, down)| words_differ(&up, &down)));
     }
     (differing.seen > 0).then_some(Hysteresis {
         columns: differing.seen,
         differing: differing.count,
         ranges: differing.ranges,
-        by_word: by_word.count,
-        word_ranges: by_word.ranges,
+        by_pattern: by_pattern.count,
+        pattern_ranges: by_pattern.ranges,
     })
 }
 
@@ -83,13 +84,14 @@ mod tests {
         };
         let mut both = [pass(Direction::Up, up), pass(Direction::Down, down)].concat();
         let mut spell = |i: usize, word: &[u8]| both[i].word = Some(Word::cyclic(word));
-        // An impact on either side against meshing; an orbit against its mirror image.
-        for (i, word) in [(0, b"36"), (7, b"14"), (4, b"22"), (11, b"55")] {
+        // An impact on either side against meshing; an orbit against its mirror image; as many bounces less.
+        let cycles: [(usize, &[u8]); 4] = [(0, b"36"), (7, b"14"), (4, b"1355546"), (11, b"462213")];
+        for (i, word) in cycles {
             spell(i, word);
         }
         let ranges = vec![[1.0, 2.0], [5.0, 5.0]];
         let expected =
-            Hysteresis { columns: 7, differing: 3, ranges, by_word: 1, word_ranges: vec![[0.0, 0.0]] };
+            Hysteresis { columns: 7, differing: 3, ranges, by_pattern: 1, pattern_ranges: vec![[0.0, 0.0]] };
         assert_eq!(hysteresis(&both), Some(expected));
         assert_eq!(hysteresis(&[column(None, 0.0, one)]), None);
     }

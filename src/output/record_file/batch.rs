@@ -27,9 +27,14 @@ pub(super) struct Head {
 /// A batch as it is written.
 pub(super) fn encode(number: u32, batch: &[(u32, Record)]) -> std::io::Result<Vec<u8>> {
     let (columns, body) = columns::encode(batch)?;
-    let (cells, bytes) = (batch.len() as u32, body.len() as u32);
-    let head = Head { number, cells, columns, bytes, sum: crc32fast::hash(&body) };
-    Ok([&head.bytes()[..], &body].concat())
+    Ok(framed(number, batch.len(), columns, &body))
+}
+
+/// These columns of so many cells behind their head.
+pub(super) fn framed(number: u32, cells: usize, columns: u32, body: &[u8]) -> Vec<u8> {
+    let (cells, bytes) = (cells as u32, body.len() as u32);
+    let head = Head { number, cells, columns, bytes, sum: crc32fast::hash(body) };
+    [&head.bytes()[..], body].concat()
 }
 
 impl Head {
@@ -53,10 +58,10 @@ impl Head {
         (head.bytes() == *bytes && head.cells as usize <= MOST_CELLS).then_some(head)
     }
 
-    /// The batch whose columns these are; none if they are not.
-    pub(super) fn decode(&self, body: &[u8]) -> Option<Vec<(u32, Record)>> {
+    /// The batch whose columns these are, in a file of so many; none if they are not.
+    pub(super) fn decode(&self, columns: usize, body: &[u8]) -> Option<Vec<(u32, Record)>> {
         let is_good = crc32fast::hash(body) == self.sum;
-        is_good.then(|| columns::decode(self.columns, self.cells as usize, body)).flatten()
+        is_good.then(|| columns::decode(columns, self.columns, self.cells as usize, body)).flatten()
     }
 }
 

@@ -37,6 +37,12 @@ pub(super) const NAMES: [&str; 17] = [
     "pattern_length",
 ];
 
+/// How many of them files have from before there were patterns: the first ones.
+pub(super) const BEFORE_PATTERNS: usize = 14;
+
+/// The row of those files: what was reserved then, 32 bytes, is where patterns begin now.
+const ROW_BEFORE_PATTERNS: usize = ID + offset_of!(Record, pattern) + 32;
+
 /// Where each begins in a row, in their order there, and how many bytes its numbers have. What is reserved goes with the last.
 const PLACES: [(usize, usize); 17] = [
     (0, 4),
@@ -58,10 +64,14 @@ const PLACES: [(usize, usize); 17] = [
     (ID + offset_of!(Record, pattern_length), 4),
 ];
 
-/// Places in a row of a column's bytes, the most significant of each number first.
-fn bytes_of(column: usize) -> impl Iterator<Item = usize> {
+/// Places in a row of a column's bytes, the most significant of each number first, in a file of so many columns.
+fn bytes_of(column: usize, columns: usize) -> impl Iterator<Item = usize> {
     let (from, width) = PLACES[column];
-    let to = PLACES.get(column + 1).map_or(ROW, |&(next, _)| next);
+    let to = match PLACES[..columns].get(column + 1) {
+        Some(&(next, _)) => next,
+        None if columns == BEFORE_PATTERNS => ROW_BEFORE_PATTERNS,
+        None => ROW,
+    };
     (from..to).step_by(width).flat_map(move |number| (number..number + width).rev())
 }
 
@@ -73,24 +83,26 @@ pub(super) fn encode(batch: &[(u32, Record)]) -> io::Result<(u32, Vec<u8>)> {
     let mut mask = 0;
     let mut output = DeflateEncoder::new(Vec::new(), Compression::fast());
     for column in 0..NAMES.len() {
-        if bytes_of(column).all(|at| rows.iter().all(|row| row[at] == 0)) {
+        if bytes_of(column, NAMES.len()).all(|at| rows.iter().all(|row| row[at] == 0)) {
             continue;
         }
         mask |= 1 << column;
-        for at in bytes_of(column) {
+        for at in bytes_of(column, NAMES.len()) {
             output.write_all(&rows.iter().map(|row| row[at]).collect::<Vec<_>>())?;
         }
     }
     Ok((mask, output.finish()?))
 }
 
-/// The batch of so many cells that was written; none if these are no columns of one.
-pub(super) fn decode(mask: u32, cells: usize, bytes: &[u8]) -> Option<Vec<(u32, Record)>> {
-    if mask >> NAMES.len() != 0 {
+/// The batch of so many cells that was written, in a file of so many columns; none if these are no columns of one.
+pub(super) fn decode(columns: usize, mask: u32, cells: usize, bytes: &[u8]) -> Option<Vec<(u32, Record)>> {
+    if mask >> columns != 0 {
         return None;
     }
-    let places: Vec<usize> =
-        (0..NAMES.len()).filter(|column| mask >> column & 1 == 1).flat_map(bytes_of).collect();
+    let places: Vec<usize> = (0..columns)
+        .filter(|column| mask >> column & 1 == 1)
+        .flat_map(|column| bytes_of(column, columns))
+        .collect();
     let whole = places.len() * cells;
     let mut planes = Vec::with_capacity(whole);
     // One more byte than there should be, lest a wrong one go unseen.

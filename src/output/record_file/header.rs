@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::batch;
-use super::columns::NAMES;
+use super::columns::{BEFORE_PATTERNS, NAMES};
 use super::identity::Identity;
 
 /// Raised whenever a file of the one before cannot be read any more.
@@ -33,6 +33,8 @@ pub(super) enum Found {
     /// One.
     Header {
         identity: Identity,
+        /// How many columns it names: fewer in files from before there were patterns.
+        columns: usize,
         /// Where batches begin.
         end: u64,
         /// Whether both copies are good.
@@ -42,7 +44,7 @@ pub(super) enum Found {
     Nothing,
     /// A file of format 1.
     OldFormat,
-    /// One of this format whose records have other fields.
+    /// One of this format whose records have fields that this version does not know.
     OtherFields,
     /// What no run leaves.
     Damaged(&'static str),
@@ -50,12 +52,13 @@ pub(super) enum Found {
 
 /// Both copies.
 pub(super) fn bytes(identity: &Identity) -> serde_json::Result<Vec<u8>> {
-    let columns = NAMES.map(ToOwned::to_owned).to_vec();
-    bytes_of(&Body { format: FORMAT, columns, identity: identity.clone() })
+    bytes_of(identity, &NAMES)
 }
 
-fn bytes_of(body: &Body) -> serde_json::Result<Vec<u8>> {
-    let body = serde_json::to_vec(body)?;
+/// Both copies, in a file of these columns.
+pub(super) fn bytes_of(identity: &Identity, columns: &[&str]) -> serde_json::Result<Vec<u8>> {
+    let columns = columns.iter().map(|&name| name.to_owned()).collect();
+    let body = serde_json::to_vec(&Body { format: FORMAT, columns, identity: identity.clone() })?;
     let length = (body.len() as u32).to_le_bytes();
     Ok([&MAGIC[..], &length, &checksum(length, &body).to_le_bytes(), &body].concat().repeat(2))
 }
@@ -66,8 +69,10 @@ pub(super) fn find(bytes: &[u8], whole: bool) -> Found {
     let copy = copy.or_else(|| second_copy(bytes).map(|(body, end)| (body, end, false, end)));
     if let Some((body, _, is_whole, end)) = copy {
         return match serde_json::from_slice::<Body>(body) {
-            Ok(Body { format: FORMAT, columns, identity }) if columns == NAMES => {
-                Found::Header { identity, end: end as u64, is_whole }
+            Ok(Body { format: FORMAT, columns, identity })
+                if columns == NAMES || columns == NAMES[..BEFORE_PATTERNS] =>
+            {
+                Found::Header { identity, columns: columns.len(), end: end as u64, is_whole }
             }
             Ok(Body { format: FORMAT, .. }) => Found::OtherFields,
             _ => Found::Damaged("its header is not one of this version"),
@@ -111,16 +116,14 @@ fn checksum(length: [u8; 4], body: &[u8]) -> u32 {
 mod tests {
     use super::*;
 
-    /// As versions wrote them whose records had no patterns.
     #[test]
     fn a_file_of_other_fields_is_not_taken_for_a_damaged_one() {
         let identity = Identity::new("cpu", "f64", "d", Vec::new());
-        let header = |columns: &[&str]| {
-            let columns = columns.iter().map(|&name| name.to_owned()).collect();
-            bytes_of(&Body { format: FORMAT, columns, identity: identity.clone() }).unwrap()
-        };
-        let own = find(&header(&NAMES), true);
-        assert!(matches!(own, Found::Header { is_whole: true, .. }));
-        assert!(matches!(find(&header(&NAMES[..14]), true), Found::OtherFields));
+        let found = |columns: &[&str]| find(&bytes_of(&identity, columns).unwrap(), true);
+        assert!(matches!(found(&NAMES), Found::Header { columns: 17, is_whole: true, .. }));
+        // As versions wrote them whose records had no patterns.
+        assert!(matches!(found(&NAMES[..14]), Found::Header { columns: 14, is_whole: true, .. }));
+        assert!(matches!(found(&NAMES[..13]), Found::OtherFields));
+        assert!(matches!(found(&[&NAMES[..], &["later"]].concat()), Found::OtherFields));
     }
 }

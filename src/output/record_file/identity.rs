@@ -46,6 +46,11 @@ impl Identity {
         Identity { sources: sources.to_owned(), target: target.to_owned(), ..self }
     }
 
+    /// The same run, its records in the layout of another.
+    pub(super) fn laid_out_as(self, other: &Identity) -> Identity {
+        Identity { record_version: other.record_version, ..self }
+    }
+
     /// A hash of the sources of this program that decide what a record holds.
     pub fn own_sources() -> &'static str {
         env!("RATTLEMAP_SOURCES")

@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::batch::{self, HEAD, Head};
+use super::columns::NAMES;
 use super::header::{self, Found};
 use super::{Identity, RecordFileError};
 use crate::record::{Record, valid};
@@ -86,6 +87,8 @@ pub(super) struct Reader<'a> {
     length: u64,
     /// Whose records follow.
     pub(super) identity: Identity,
+    /// How many columns its batches may have.
+    columns: usize,
     /// Where batches begin.
     pub(super) begin: u64,
     /// Whether both copies of the header are good.
@@ -100,8 +103,8 @@ impl<'a> Reader<'a> {
         let mut first = Vec::new();
         read_at(file, 0).map_err(io)?.take(header::SEARCHED as u64).read_to_end(&mut first).map_err(io)?;
         match header::find(&first, length == first.len() as u64) {
-            Found::Header { identity, end: begin, is_whole } => {
-                Ok(Some(Reader { file, path, length, identity, begin, is_whole }))
+            Found::Header { identity, columns, end: begin, is_whole } => {
+                Ok(Some(Reader { file, path, length, identity, columns, begin, is_whole }))
             }
             Found::Nothing => Ok(None),
             Found::OldFormat => Err(RecordFileError::OldFormat { path: path.to_owned() }),
@@ -117,11 +120,20 @@ impl<'a> Reader<'a> {
         identity: &Identity,
     ) -> Result<Option<Reader<'a>>, RecordFileError> {
         let Some(reader) = Reader::open(file, path)? else { return Ok(None) };
-        let differences = reader.identity.differences(identity);
+        let differences = match reader.has_all_columns() {
+            true => reader.identity.differences(identity),
+            // What an older layout has it says as this one does.
+            false => reader.identity.differences(&identity.clone().laid_out_as(&reader.identity)),
+        };
         match differences.is_empty() {
             true => Ok(Some(reader)),
             false => Err(RecordFileError::OtherRun { path: path.to_owned(), differences }),
         }
+    }
+
+    /// Whether batches of this version may follow its own.
+    pub(super) fn has_all_columns(&self) -> bool {
+        self.columns == NAMES.len()
     }
 
     /// Reads every good batch; `take` is as for [`RecordFile::resume`](super::RecordFile::resume).
@@ -194,7 +206,10 @@ impl<'a> Reader<'a> {
         if head.number < least {
             return Ok(Err("a batch is out of place"));
         }
-        Ok(head.decode(&body).map(|batch| (head, batch)).ok_or("a batch does not match its checksum"))
+        Ok(head
+            .decode(self.columns, &body)
+            .map(|batch| (head, batch))
+            .ok_or("a batch does not match its checksum"))
     }
 
     /// Where the next good head of a batch behind `at` is, or the end.
@@ -223,4 +238,46 @@ impl<'a> Reader<'a> {
 fn read_at(mut file: &File, at: u64) -> io::Result<&File> {
     file.seek(SeekFrom::Start(at))?;
     Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::io::Write;
+
+    use super::*;
+    use crate::output::RecordFile;
+    use flate2::Compression;
+    use flate2::write::DeflateEncoder;
+
+    /// As versions wrote them whose records had no patterns: rows of 164 bytes, the last 32 reserved.
+    #[test]
+    fn a_file_from_before_patterns_is_read_and_not_written() {
+        let own = Identity::new("cpu", "f64", "d", Vec::new());
+        let mut old = serde_json::to_value(&own).unwrap();
+        old["record_version"] = 1.into();
+        let old: Identity = serde_json::from_value(old).unwrap();
+        // Ids 3 and 4, periods 2 and 1: id, period and valid, the most significant bytes first, a plane each.
+        let plane = |low: [u8; 2]| [vec![0; 3 * 2], low.to_vec()].concat();
+        let valid = valid::PERIOD as u8;
+        let planes = [plane([3, 1]), plane([2, 1]), plane([valid; 2]), vec![0; 32 * 2]].concat();
+        let mut columns = DeflateEncoder::new(Vec::new(), Compression::fast());
+        columns.write_all(&planes).unwrap();
+        let batch = batch::framed(0, 2, 1 | 1 << 9 | 1 << 13, &columns.finish().unwrap());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("records.bin");
+        let bytes = [header::bytes_of(&old, &NAMES[..14]).unwrap(), batch].concat();
+        fs::write(&path, &bytes).unwrap();
+        let mut all = Vec::new();
+        let take = |batch: &[(u32, Record)]| {
+            all.extend_from_slice(batch);
+            true
+        };
+        let extent = RecordFile::read(&path, &own, Order::Any, take).unwrap();
+        let record = |period| Record { period, valid: valid::PERIOD, ..Record::default() };
+        assert_eq!((all, extent.damage), (vec![(3, record(2)), (4, record(1))], None));
+        let resumed = RecordFile::resume(&path, &own, Order::Any, |_| true);
+        assert!(matches!(resumed, Err(RecordFileError::OtherFields { .. })), "{resumed:?}");
+        assert_eq!(fs::read(&path).unwrap(), bytes);
+    }
 }
