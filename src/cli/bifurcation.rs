@@ -91,7 +91,7 @@ fn listed(ranges: &[[f64; 2]]) -> String {
     };
     let mut list: Vec<String> = ranges.iter().take(NAMED).map(range).collect();
     if ranges.len() > NAMED {
-        list.push(format!("{} more ranges", ranges.len() - NAMED));
+        list.push(format!("and {} more", ranges.len() - NAMED));
     }
     list.join(", ")
 }
