@@ -164,7 +164,7 @@ phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynam
 phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu --lib
 phase "the program on Windows" cargo check --target "$windows" -p rattlemap
 if [[ "${#ignored[@]}" -eq 0 ]]; then
-    phase "one motion on macOS" cargo check --target "$macos" -p rattlemap-dynamics
+    phase "the library on macOS" cargo check --target "$macos" -p rattlemap --no-default-features --features gpu --lib
 else
     phase "the program on macOS" cargo check --target "$macos" -p rattlemap
 fi
