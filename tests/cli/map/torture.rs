@@ -45,7 +45,9 @@ impl Victim {
         let mut random = Random::new(3);
         let mut cell = |id: u32| {
             let mut record: Record =
-                bytemuck::cast(std::array::from_fn::<u64, 20, _>(|_| match random.below(3) {
+                bytemuck::cast(std::array::from_fn::<u64, { size_of::<Record>() / 8 }, _>(|_| match random
+                    .below(3)
+                {
                     0 => 0,
                     1 => f64::NAN.to_bits(),
                     _ => random.bits(),
