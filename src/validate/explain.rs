@@ -95,8 +95,8 @@ fn is_multiple(cell: &Cell<'_>, claim: &Record, answer: &Answer) -> bool {
     else {
         return false;
     };
-    // A multiple has neither the word nor the symmetry of what it repeats.
-    let repeated = if ours == theirs { 0 } else { valid::WORD | valid::SYMMETRIC };
+    // A multiple has neither word, pattern nor symmetry of what it repeats.
+    let repeated = if ours == theirs { 0 } else { valid::WORD | valid::PATTERN | valid::SYMMETRIC };
     let valid = claim.valid & !repeated;
     let once = Record { period: theirs, status: record.status, valid, ..*claim };
     (ours % theirs == 0 || theirs % ours == 0) && cell.bars.agree(&once, answer)
