@@ -224,6 +224,27 @@ fn to_be_near_a_cycle_is_not_to_reach_it() {
     assert_eq!(found.mismatches.len(), 1, "{:?}", found.agreement);
 }
 
+/// A cycle that has just split off another repeats it, and has neither its word nor its pattern.
+#[test]
+fn a_cycle_of_twice_the_period_has_words_of_its_own() {
+    let (e, omega) = (0.8336594911937377, 3.045009784735812);
+    let plan = planned([e, 1.0], [omega, 20.0], 2, &["integration.undecided_periods=1584"]);
+    let mut record = Record {
+        period: 2,
+        status: Status::Slow.code(),
+        lyapunov: -0.0003997426808324721,
+        impacts_per_period: 6.0,
+        periods_run: 2082,
+        valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH | valid::SYMMETRIC,
+        ..Record::default()
+    };
+    record.set_word(&Word::cyclic(b"223556223556"));
+    record.set_pattern(&Word::cyclic(b"23562356"));
+    let found = first(&plan, record, Precision::F32);
+    let kinds: Vec<Kind> = found.mismatches.iter().map(|mismatch| mismatch.kind).collect();
+    assert_eq!(kinds, [Kind::Budget], "{:?}", found.mismatches);
+}
+
 /// A slow approach over a bent strobe map: the multiplier is a tenth off the cycle's where the lane reads it.
 #[test]
 fn a_multiplier_is_compared_where_it_was_read() {
