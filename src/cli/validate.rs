@@ -159,7 +159,8 @@ fn summary(validation: &Validation, device: Option<&str>) -> String {
     if let Some(half) = &validation.half_mesh {
         let HalfMesh { classes, periods, words, patterns } = half;
         lines.push(format!(
-            "half the mesh_speed changes {} of {} classes in meshing {}, and of {} cycles {} periods, {} words, {} patterns",
+            "half the mesh_speed changes the class of {} of {} meshing {}; of {} cycles the period of {}, the word of {}, \
+             the pattern of {}",
             classes.count,
             classes.among,
             validation.counted(),

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
-use predicates::prelude::*;
 use tempfile::TempDir;
+
+use crate::common::{rattlemap, rows, says};
 
 /// The fall of period 4 back to period 2.
 const HYSTERESIS: &str =
@@ -14,25 +14,13 @@ const HYSTERESIS: &str =
 /// What a diagram's folder holds.
 const DIAGRAM: [&str; 4] = ["bifurcation.csv", "bifurcation.png", "bifurcation_columns.csv", "manifest.json"];
 
-fn rattlemap(folder: &TempDir) -> Command {
-    let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder.path());
-    command
-}
-
 fn folder() -> TempDir {
     tempfile::tempdir().unwrap()
 }
 
-fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
-    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
-    predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
-}
-
 /// The rows of `bifurcation_columns.csv` in a folder.
 fn columns(folder: &Path) -> Vec<Vec<String>> {
-    let mut table = csv::Reader::from_path(folder.join("bifurcation_columns.csv")).unwrap();
-    table.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect()
+    rows(&folder.join("bifurcation_columns.csv")).1
 }
 
 fn names(folder: &Path) -> Vec<String> {

@@ -3,26 +3,14 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
-use predicates::prelude::*;
 use tempfile::TempDir;
+
+use crate::common::{rattlemap, says};
 
 const SMOKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke.toml");
 
-/// The binary, run inside `folder`.
-fn rattlemap(folder: &TempDir) -> Command {
-    let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder.path());
-    command
-}
-
 fn folder() -> TempDir {
     tempfile::tempdir().unwrap()
-}
-
-fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
-    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
-    predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
 }
 
 /// Asserts that a parsed `orbit --json` object has exactly the fields of the contract.

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
-use predicates::prelude::*;
 use rattlemap::output::{Identity, Order, RecordFile, inventory};
 use rattlemap::record::Record;
 use tempfile::TempDir;
+
+use crate::common::{rattlemap, rows, says};
 
 /// Around the fall of period 4, which comes later on the way up than on the way down.
 const SCENE: &str = "title = 'Around a fold'
@@ -39,23 +39,11 @@ fn maps(of: &[(&str, &[&str])]) -> TempDir {
 }
 
 fn run(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder.path()).env("XDG_RUNTIME_DIR", folder.path()).args(arguments).assert()
+    rattlemap(folder).args(arguments).assert()
 }
 
 fn compare(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
     run(folder, &[&["compare"], arguments].concat())
-}
-
-fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
-    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
-    predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
-}
-
-fn rows(path: &Path) -> (String, Vec<Vec<String>>) {
-    let mut table = csv::Reader::from_path(path).unwrap();
-    let header = table.headers().unwrap().iter().collect::<Vec<_>>().join(",");
-    (header, table.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect())
 }
 
 fn json(text: &[u8]) -> serde_json::Value {

@@ -4,6 +4,7 @@ mod bench;
 mod bifurcation;
 mod columns;
 mod commands;
+mod common;
 mod compare;
 #[cfg(unix)]
 mod faults;

@@ -8,14 +8,11 @@ use rattlemap::flow::Flow;
 use rattlemap::model::GearPair;
 use rattlemap::reference::Trajectory;
 
+use crate::common::rows;
+
 fn orbit(folder: &Path, arguments: &[&str]) {
     let mut command = Command::cargo_bin("rattlemap").unwrap();
     command.current_dir(folder).args(["orbit", "--out", "o", "--force"]).args(arguments).assert().code(0);
-}
-
-fn rows(path: &Path) -> Vec<Vec<String>> {
-    let mut table = csv::Reader::from_path(path).unwrap();
-    table.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect()
 }
 
 fn numbers(row: &[String]) -> [f64; 8] {
@@ -29,7 +26,7 @@ fn a_trajectory_has_its_events_and_what_lies_between() {
     orbit(folder.path(), &["--set", "e=0.06"]);
     let told: serde_json::Value =
         serde_json::from_slice(&fs::read(folder.path().join("o/orbit.json")).unwrap()).unwrap();
-    let rows = rows(&folder.path().join("o/trajectory.csv"));
+    let rows = rows(&folder.path().join("o/trajectory.csv")).1;
     let (events, samples): (Vec<_>, Vec<_>) = rows.iter().partition(|row| !row[9].is_empty());
     let listed = told["events"].as_array().unwrap();
     assert_eq!((events.len(), samples.len()), (2 * listed.len(), 2001));
@@ -78,7 +75,7 @@ fn a_spectrum_has_the_lines_of_its_cycle() {
     orbit(folder.path(), &["--set", "e=0.62"]);
     let told: serde_json::Value = serde_json::from_slice(&fs::read(dir.join("orbit.json")).unwrap()).unwrap();
     let period = told["period"].as_f64();
-    let lines = rows(&dir.join("spectrum.csv"));
+    let lines = rows(&dir.join("spectrum.csv")).1;
     let frequency = |row: &[String]| row[0].parse::<f64>().unwrap();
     assert_eq!(1.0 / frequency(&lines[1]), period.unwrap_or(128.0));
     assert_eq!(frequency(lines.last().unwrap()), 40.0);

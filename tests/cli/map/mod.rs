@@ -23,6 +23,8 @@ use predicates::prelude::*;
 use rattlemap_dynamics::word::Word;
 use tempfile::TempDir;
 
+use crate::common::{rattlemap, rows, says};
+
 const SCENE: &str = r#"title = "A <small> map"
 
 [[axis]]
@@ -62,8 +64,8 @@ fn folder() -> TempDir {
 }
 
 fn command(folder: &TempDir, arguments: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("rattlemap").unwrap();
-    command.current_dir(folder.path()).args(arguments);
+    let mut command = rattlemap(folder);
+    command.args(arguments);
     command
 }
 
@@ -71,18 +73,6 @@ fn command(folder: &TempDir, arguments: &[&str]) -> Command {
 fn map(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
     let engine: &[&str] = if arguments.contains(&"--engine") { &[] } else { &["--engine", "cpu"] };
     command(folder, &[&["map", "s.toml"], engine, arguments].concat()).assert()
-}
-
-fn says(parts: &[&str]) -> impl Predicate<str> + use<> {
-    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
-    predicate::function(move |text: &str| parts.iter().all(|part| text.contains(part.as_str())))
-}
-
-fn rows(path: &Path) -> (String, Vec<Vec<String>>) {
-    let mut table = csv::Reader::from_path(path).unwrap();
-    let header = table.headers().unwrap().iter().collect::<Vec<_>>().join(",");
-    let row = |row: csv::Result<csv::StringRecord>| row.unwrap().iter().map(ToOwned::to_owned).collect();
-    (header, table.records().map(row).collect())
 }
 
 fn names(folder: &Path) -> Vec<String> {
