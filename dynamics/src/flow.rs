@@ -120,7 +120,7 @@ impl Flow {
     /// Solves an oscillator, which must be valid as [`Oscillator::validate`] says.
     pub fn new(oscillator: &Oscillator) -> Flow {
         let [g0, g1] = oscillator.gap;
-        let [m1, m2] = oscillator.masses;
+        let [m1, m2] = oscillator.masses();
         let compliance = g0 * g0 / m1 + g1 * g1 / m2;
         let linear = |domain| LinearFlow::new(oscillator, domain);
         let free = linear(&oscillator.free);
@@ -134,7 +134,7 @@ impl Flow {
             rate: power_of_two(oscillator.omega),
             kick: -(g1 / m2) / compliance,
             gap: oscillator.gap,
-            masses: oscillator.masses,
+            masses: oscillator.masses(),
             symmetric: oscillator.mirror_symmetric(),
             non_impacting: NonImpacting::new(oscillator).or_else(|| NonImpacting::beside_rest(oscillator)),
             free,

@@ -15,7 +15,7 @@ mod stops;
 
 pub use gear_pair::GearPair;
 pub use non_impacting::NonImpacting;
-pub use oscillator::{Domain, Law, Oscillator, OscillatorError};
+pub use oscillator::{Contact, Domain, Law, Oscillator, OscillatorError};
 pub use parameter::{Parameter, ParameterError, Range, Shapes};
 pub use seam::{Boxed, Model, ModelError};
 pub use stops::Stops;
@@ -45,6 +45,15 @@ impl Side {
         match self {
             Side::Right => 1.0,
             Side::Left => -1.0,
+        }
+    }
+
+    /// Its place in arrays over both walls: 0 right, 1 left.
+    #[inline]
+    pub fn index(self) -> usize {
+        match self {
+            Side::Right => 0,
+            Side::Left => 1,
         }
     }
 

@@ -88,7 +88,7 @@ impl Constants {
             decay: 0.0,
         };
         if let Some(motion) = model::NonImpacting::new(oscillator) {
-            let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses);
+            let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses());
             constants.flow.steady = constants.to_lane(motion.steady());
             // In units of the free domain's energy form.
             constants.flow.reach = h * ((g0 * g0 / m1 + g1 * g1 / m2) * motion.reach()).sqrt();
@@ -114,7 +114,7 @@ impl Constants {
 
 /// Share of the contact impulse, per unit of gap rate, that the second displacement takes.
 fn kick(oscillator: &model::Oscillator) -> f64 {
-    let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses);
+    let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses());
     -(g1 / m2) / (g0 * g0 / m1 + g1 * g1 / m2)
 }
 
@@ -154,7 +154,7 @@ fn free_rate(oscillator: &model::Oscillator) -> f64 {
 
 /// Spectral norms of a domain's mass-scaled damping, and the root of that of its stiffness.
 fn norms(oscillator: &model::Oscillator, domain: &model::Domain) -> (f64, f64) {
-    let root = Vector2::from(oscillator.masses).map(|m| m.sqrt().recip());
+    let root = Vector2::from(oscillator.masses()).map(|m| m.sqrt().recip());
     let norm = |m: [[f64; 2]; 2]| {
         let scaled = [m[0][0] * root[0] * root[0], m[0][1] * root[0] * root[1], m[1][1] * root[1] * root[1]];
         let (mean, half) = (0.5 * (scaled[0] + scaled[2]), 0.5 * (scaled[0] - scaled[2]));
@@ -165,7 +165,7 @@ fn norms(oscillator: &model::Oscillator, domain: &model::Domain) -> (f64, f64) {
 
 /// The equations in `(z, x2)`, the gap measured from `wall`.
 fn equations(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64) -> Equations {
-    let ([g0, g1], m) = (oscillator.gap, oscillator.masses);
+    let ([g0, g1], m) = (oscillator.gap, oscillator.masses());
     // x1 = (z - g1 x2) / g0 turns columns, z = g . x turns rows.
     let turned = |a: [[f64; 2]; 2]| {
         let row = |i: usize| {
@@ -262,7 +262,7 @@ fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
 /// Returns the form `c^2 2 E` on `(w^2, w v, v^2, z^2, z x, x^2)` and the growth of its
 /// root per step, less the factor `angle^n`.
 fn gap_bound(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> ([f64; 6], f64) {
-    let ([g0, g1], [m1, m2], k) = (oscillator.gap, oscillator.masses, domain.stiffness);
+    let ([g0, g1], [m1, m2], k) = (oscillator.gap, oscillator.masses(), domain.stiffness);
     let compliance = g0 * g0 / m1 + g1 * g1 / m2;
     // A symmetric form on (x1, x2), written in (z, x2).
     let in_gap = |a: f64, b: f64, c: f64| {

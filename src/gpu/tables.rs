@@ -79,7 +79,7 @@ impl Tables {
             }
         }
         phasors.push([1.0, 0.0]);
-        let law = |law: &Law| layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed };
+        let law = |law: &Law| layout::Law { restitution: law.restitution[0], mesh_speed: law.mesh_speed[0] };
         let rows: Vec<layout::Law> = laws.iter().map(law).collect();
         let tables = reals(&tables, gpu.precision);
         let phasors = reals(&phasors, gpu.precision);

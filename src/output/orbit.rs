@@ -19,7 +19,8 @@ use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 /// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
 /// in meshing where that is more.
 pub(super) fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let Oscillator { masses: [m1, m2], gap: [g1, g2], free, meshing, omega, .. } = oscillator;
+    let [m1, m2] = oscillator.masses();
+    let Oscillator { gap: [g1, g2], free, meshing, omega, .. } = oscillator;
     // What a wall adds to the stiffness matrix is its own stiffness times g g'.
     let (i, square) = if *g2 == 0.0 { (0, g1 * g1) } else { (1, g1 * g2) };
     let added = |side: usize| (meshing[side].stiffness[0][i] - free.stiffness[0][i]) / square;

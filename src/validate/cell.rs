@@ -263,9 +263,9 @@ impl<'a> Cell<'a> {
             let share = match &*parameter.name {
                 // Leaving speeds carry the rounding of the whole motion's velocity.
                 "mesh_speed" => {
-                    let velocity = units[1].max(self.law.mesh_speed);
-                    (self.resolution * velocity / self.law.mesh_speed.max(f64::MIN_POSITIVE))
-                        .min(MOST_OF_MESH_SPEED)
+                    let speed = self.model.value(index);
+                    let velocity = units[1].max(speed);
+                    (self.resolution * velocity / speed.max(f64::MIN_POSITIVE)).min(MOST_OF_MESH_SPEED)
                 }
                 _ => self.resolution,
             };

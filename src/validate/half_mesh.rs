@@ -34,10 +34,10 @@ pub(super) struct Changes {
 
 /// What changes in a cell whose start reaches `truth`; none if that does not mesh, or at no speed.
 pub(super) fn changes(cell: &Cell<'_>, truth: &Answer) -> Option<Changes> {
-    if truth.record.mesh_fraction <= 0.0 || cell.law.mesh_speed <= 0.0 {
+    if truth.record.mesh_fraction <= 0.0 || cell.law.mesh_speed.iter().all(|&speed| speed <= 0.0) {
         return None;
     }
-    let halved = cell.obeying(Law { mesh_speed: 0.5 * cell.law.mesh_speed, ..cell.law });
+    let halved = cell.obeying(Law { mesh_speed: cell.law.mesh_speed.map(|speed| 0.5 * speed), ..cell.law });
     let [before, after] = [truth, &halved].map(|answer| classify(&answer.record));
     let cycle = match (before, after) {
         (Class::Periodic { period: before }, Class::Periodic { period: after }) => {

@@ -329,7 +329,7 @@ fn one_wall_is_enough() {
                 "{}: omega = {}, e = {}: {off:.1e}",
                 precision.name(),
                 oscillator.omega,
-                law.restitution
+                law.restitution[0]
             );
             assert_eq!(record.status, Status::Ok.code());
             assert!(off < bar([5.3e-6, 2.0e-14], precision), "{off:e}");

@@ -31,7 +31,7 @@ impl EnergyBound {
         n: u32,
         unit: f64,
     ) -> EnergyBound {
-        let masses = Vector2::from(oscillator.masses);
+        let masses = Vector2::from(oscillator.masses());
         let gap = Vector2::from(oscillator.gap);
         let reach = gap.component_mul(&gap).component_div(&masses).sum().sqrt();
         let scale = reach * unit.powi(6) / 14400.0;
@@ -71,7 +71,7 @@ fn energy_root(oscillator: &Oscillator, domain: &Domain) -> Matrix4<f64> {
     let root = Matrix2::from_diagonal(&eigen.eigenvalues.map(|l| l.max(0.0).sqrt()))
         * eigen.eigenvectors.transpose();
     let (potential, kinetic) =
-        (root * back, Matrix2::from_diagonal(&Vector2::from(oscillator.masses).map(f64::sqrt)) * back);
+        (root * back, Matrix2::from_diagonal(&Vector2::from(oscillator.masses()).map(f64::sqrt)) * back);
     let mut l = Matrix4::zeros();
     for i in 0..2 {
         for j in 0..2 {

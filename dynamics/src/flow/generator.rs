@@ -12,7 +12,7 @@ pub(super) type Generator = SMatrix<f64, 7, 7>;
 pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
     let d = displacement_matrix(oscillator);
     let d_inverse = d.try_inverse().expect("the first entry of the gap row is not zero");
-    let by_mass = Matrix2::from_diagonal(&Vector2::from(oscillator.masses).map(f64::recip));
+    let by_mass = Matrix2::from_diagonal(&Vector2::from(oscillator.masses()).map(f64::recip));
     let matrix =
         |m: [[f64; 2]; 2]| d * by_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * d_inverse;
     let (damping, stiffness) = (matrix(domain.damping), matrix(domain.stiffness));
@@ -35,7 +35,7 @@ pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
 
 /// A bound on all rates of the domain: forcing, and the norm of the mass-scaled system.
 pub(super) fn rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
-    let root = Vector2::from(oscillator.masses).map(|m| m.sqrt().recip());
+    let root = Vector2::from(oscillator.masses()).map(|m| m.sqrt().recip());
     let norm = |m: [[f64; 2]; 2]| {
         let scaled =
             Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]).component_mul(&(root * root.transpose()));

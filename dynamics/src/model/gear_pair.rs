@@ -1,7 +1,7 @@
 //! The gear pair with backlash: Table 1 and equations (11) to (13), (22) of the paper.
 
 use super::parameter::parameters;
-use super::{Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
+use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
 
 /// A pair of gears on damped elastic supports, meshing through a backlash `2b`.
 ///
@@ -100,9 +100,11 @@ impl GearPair {
             load: [sign * self.k * self.b, -sign * self.k * self.b],
         };
         let oscillator = Oscillator {
-            masses: [self.m1, self.m2],
+            degrees: 2,
+            mass: [[self.m1, 0.0], [0.0, self.m2]],
             gap: [1.0, -1.0],
             walls: [self.b, -self.b],
+            contacts: [Contact::Impact; 2],
             omega: self.omega,
             force: [self.force, 0.0],
             free,
@@ -114,7 +116,7 @@ impl GearPair {
 
     /// As [`Model::law`].
     pub fn law(&self) -> Law {
-        Law { restitution: self.e, mesh_speed: self.mesh_speed }
+        Law::both(self.e, self.mesh_speed)
     }
 }
 

@@ -35,7 +35,8 @@ pub struct NonImpacting {
 impl NonImpacting {
     /// None if there is no contact-free steady motion, or if it does not attract.
     pub fn new(oscillator: &Oscillator) -> Option<NonImpacting> {
-        let Oscillator { masses, omega, walls, .. } = *oscillator;
+        let Oscillator { omega, walls, .. } = *oscillator;
+        let masses = oscillator.masses();
         let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
         let (stiffness, damping) = (matrix(oscillator.free.stiffness), matrix(oscillator.free.damping));
         let gap = Vector2::from(oscillator.gap);
@@ -63,7 +64,8 @@ impl NonImpacting {
     /// own motion would decay makes no difference then.
     pub fn beside_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
-            let Oscillator { masses, gap, force, mut free, .. } = *oscillator;
+            let Oscillator { gap, force, mut free, .. } = *oscillator;
+            let masses = oscillator.masses();
             let moving = 1 - resting;
             let is_coupled = [free.stiffness, free.damping].iter().any(|m| m[0][1] != 0.0 || m[1][0] != 0.0);
             let stays = !is_coupled && force[resting] == 0.0 && free.load[resting] == 0.0;

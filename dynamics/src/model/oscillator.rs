@@ -32,6 +32,12 @@ pub enum OscillatorError {
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
+    /// A mass matrix by which some motion has no inertia.
+    #[error("mass = {matrix:?}: the matrix must be positive definite")]
+    NotDefinite {
+        /// The matrix.
+        matrix: [[f64; 2]; 2],
+    },
     /// A damping or stiffness matrix by which motion gains energy.
     #[error("{quantity} = {matrix:?}: the matrix must be positive semidefinite")]
     NotSemidefinite {
@@ -59,24 +65,42 @@ pub struct Domain {
 /// The least scale of length: what acts on nothing and reaches nowhere still gets one above zero.
 const LEAST_LENGTH: f64 = 1e-150;
 
+/// What a wall is to a motion that reaches it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contact {
+    /// An impact, `w+ = -e w-`; a pressed contact that leaves slowly enough lasts, and moves on a
+    /// spring and a damper behind the wall.
+    Impact,
+    /// An impact on a wall that does not yield: a pressed contact that has come to rest sticks to it
+    /// until the load pulls it off. The motion behind it is not asked for.
+    Rigid,
+    /// No impact: the motion goes on behind the wall at once, its state continuous.
+    Elastic,
+}
+
 /// A forced piecewise-linear oscillator of up to two degrees of freedom between two walls, of which
 /// either may be missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillator {
-    /// Masses of the two degrees of freedom, > 0.
-    pub masses: [f64; 2],
+    /// Degrees of freedom: 2, or 1 where the second displacement does not exist. Then it has a mass of 1,
+    /// nothing acts on it, no gap sees it, and its state is 0.
+    pub degrees: usize,
+    /// Mass matrix, symmetric and positive definite.
+    pub mass: [[f64; 2]; 2],
     /// Row `g` of the gap `z = g . x`; its first entry is not zero.
     pub gap: [f64; 2],
     /// Positions `z` of the right (upper) and left (lower) wall; `+inf` or `-inf` where there is none,
     /// and then nothing asks for the motion behind it.
     pub walls: [f64; 2],
+    /// What the right and the left wall are; of no meaning where there is none.
+    pub contacts: [Contact; 2],
     /// Excitation frequency, > 0.
     pub omega: f64,
     /// Amplitude of the harmonic force `force cos(omega t)`, the same in every domain.
     pub force: [f64; 2],
     /// Motion between the walls.
     pub free: Domain,
-    /// Motion in lasting contact with the right and with the left wall.
+    /// Motion in lasting contact with the right and with the left wall; of no meaning behind a rigid one.
     pub meshing: [Domain; 2],
 }
 
@@ -86,13 +110,25 @@ impl Oscillator {
         std::f64::consts::TAU / self.omega
     }
 
+    /// The diagonal of the mass matrix.
+    pub fn masses(&self) -> [f64; 2] {
+        [self.mass[0][0], self.mass[1][1]]
+    }
+
     /// Checks everything that flow and reference rest on.
     ///
     /// # Errors
     /// [`OscillatorError`] for the first thing that is wrong.
     pub fn validate(&self) -> Result<(), OscillatorError> {
-        for (i, mass) in self.masses.into_iter().enumerate() {
+        let [[m1, m], [other, m2]] = self.mass;
+        for (i, mass) in [m1, m2].into_iter().enumerate() {
             positive(|| format!("mass {}", i + 1), mass)?;
+        }
+        if m != other {
+            return Err(OscillatorError::NotSymmetric { quantity: "mass".to_owned(), matrix: self.mass });
+        }
+        if m != 0.0 && !(m1 * m2 > m * m) {
+            return Err(OscillatorError::NotDefinite { matrix: self.mass });
         }
         positive(|| "omega".to_owned(), self.omega)?;
         for (i, entry) in self.gap.into_iter().enumerate() {
@@ -142,7 +178,7 @@ impl Oscillator {
     /// The largest displacement of `(K + omega^2 M)^-1 force`.
     fn deflection(&self, force: [f64; 2]) -> f64 {
         let [[k1, k], [_, k2]] = self.free.stiffness;
-        let [a, b] = self.masses.map(|m| m * self.omega * self.omega);
+        let [a, b] = self.masses().map(|m| m * self.omega * self.omega);
         let (a, b) = (a + k1, b + k2);
         let determinant = a * b - k * k;
         let [f1, f2] = force;
@@ -154,6 +190,7 @@ impl Oscillator {
     pub fn mirror_symmetric(&self) -> bool {
         let mirrored = |domain: &Domain| Domain { load: domain.load.map(|value| -value), ..*domain };
         self.walls[0] == -self.walls[1]
+            && self.contacts[0] == self.contacts[1]
             && self.free == mirrored(&self.free)
             && self.meshing[0] == mirrored(&self.meshing[1])
     }
@@ -200,31 +237,37 @@ fn require(
 /// What happens at a wall: all that a cell needs beside its flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
-    /// Coefficient of restitution `e`, 0 to 1: `w+ = -e w-`.
-    pub restitution: f64,
-    /// Leaving speed `e |w-|` at or below which a pressed contact becomes meshing.
-    pub mesh_speed: f64,
+    /// Coefficient of restitution `e`, 0 to 1, of the right and of the left wall: `w+ = -e w-`.
+    /// Elastic contact has none.
+    pub restitution: [f64; 2],
+    /// Leaving speed `e |w-|` at or below which a pressed contact lasts, >= 0, likewise.
+    pub mesh_speed: [f64; 2],
 }
 
 impl Law {
+    /// The same law at both walls.
+    pub fn both(restitution: f64, mesh_speed: f64) -> Law {
+        Law { restitution: [restitution; 2], mesh_speed: [mesh_speed; 2] }
+    }
+
+    /// Whether both walls have the same.
+    pub fn is_symmetric(&self) -> bool {
+        self.restitution[0] == self.restitution[1] && self.mesh_speed[0] == self.mesh_speed[1]
+    }
+
     /// Checks both numbers.
     ///
     /// # Errors
     /// [`OscillatorError::OutOfRange`] for the first that is wrong.
     pub fn validate(&self) -> Result<(), OscillatorError> {
-        let Law { restitution, mesh_speed } = *self;
-        require(
-            (0.0..=1.0).contains(&restitution),
-            || "restitution".to_owned(),
-            restitution,
-            "between 0 and 1",
-        )?;
-        require(
-            mesh_speed.is_finite() && mesh_speed >= 0.0,
-            || "mesh speed".to_owned(),
-            mesh_speed,
-            "finite and at least 0",
-        )
+        for restitution in self.restitution {
+            let is_allowed = (0.0..=1.0).contains(&restitution);
+            require(is_allowed, || "restitution".to_owned(), restitution, "between 0 and 1")?;
+        }
+        self.mesh_speed.into_iter().try_for_each(|speed| {
+            let is_allowed = speed.is_finite() && speed >= 0.0;
+            require(is_allowed, || "mesh speed".to_owned(), speed, "finite and at least 0")
+        })
     }
 }
 
@@ -245,7 +288,7 @@ mod tests {
             change(&mut oscillator);
             oscillator.validate().unwrap_err().to_string()
         };
-        assert_eq!(slip(|o| o.masses[1] = 0.0), "mass 2 = 0: it must be finite and greater than 0");
+        assert_eq!(slip(|o| o.mass[1][1] = 0.0), "mass 2 = 0: it must be finite and greater than 0");
         assert_eq!(slip(|o| o.omega = f64::NAN), "omega = NaN: it must be finite and greater than 0");
         assert_eq!(slip(|o| o.gap[0] = 0.0), "entry 1 of the gap row = 0: it must be finite and not 0");
         assert_eq!(slip(|o| o.force[0] = f64::INFINITY), "force 1 = inf: it must be a finite number");
@@ -289,9 +332,9 @@ mod tests {
     fn laws_are_checked() {
         let law = GearPair::paper(0.5).law();
         assert_eq!(law.validate(), Ok(()));
-        let error = Law { restitution: 1.5, ..law }.validate().unwrap_err();
+        let error = Law { restitution: [0.5, 1.5], ..law }.validate().unwrap_err();
         assert_eq!(error.to_string(), "restitution = 1.5: it must be between 0 and 1");
-        assert!(Law { mesh_speed: -1.0, ..law }.validate().is_err());
+        assert!(Law { mesh_speed: [-1.0, 0.0], ..law }.validate().is_err());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A 1-DOF oscillator between stops: the second model, small enough to solve by hand.
 
 use super::parameter::parameters;
-use super::{Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
+use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
 
 /// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
 ///
@@ -77,9 +77,11 @@ impl Stops {
             load: [sign * self.stop_stiffness * self.b, 0.0],
         };
         let oscillator = Oscillator {
-            masses: [self.m, 1.0],
+            degrees: 1,
+            mass: [[self.m, 0.0], [0.0, 1.0]],
             gap: [1.0, 0.0],
             walls: [self.b, -self.b],
+            contacts: [Contact::Impact; 2],
             omega: self.omega,
             force: [self.force, 0.0],
             free: Domain { damping: first(self.r), stiffness: first(self.k), load: [0.0, 0.0] },
@@ -91,7 +93,7 @@ impl Stops {
 
     /// As [`Model::law`].
     pub fn law(&self) -> Law {
-        Law { restitution: self.e, mesh_speed: self.mesh_speed }
+        Law::both(self.e, self.mesh_speed)
     }
 }
 

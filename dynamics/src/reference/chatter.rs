@@ -63,8 +63,8 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Meanwhile the centre of mass moves as it does with the gap closed. Tangents are those of
     /// these formulas, up to second order.
     pub(super) fn close_chatter(&mut self, side: Side, leaving: f64, observer: &mut impl Observer) {
-        let e = self.law.restitution;
-        if self.law.mesh_speed > NO_THRESHOLD * self.flow.speed || leaving == 0.0 || e >= 1.0 {
+        let e = self.law.restitution[side.index()];
+        if self.law.mesh_speed[side.index()] > NO_THRESHOLD * self.flow.speed || leaving == 0.0 || e >= 1.0 {
             return;
         }
         let (flow, kick) = (self.flow, self.flow.kick);

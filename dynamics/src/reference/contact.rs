@@ -70,7 +70,7 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Free motion reaches a wall: the impact law, then meshing or not (22), (37).
     #[inline(always)]
     pub(super) fn contact(&mut self, side: Side, observer: &mut impl Observer) {
-        let e = self.law.restitution;
+        let e = self.law.restitution[side.index()];
         self.q[0] = self.flow.wall(side);
         let before = self.q;
         let approach = side.sign() * before[1];
@@ -82,7 +82,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let free = self.flow.domain(DomainKind::Free);
         let pressing = side.sign() * free.acceleration(&after, &self.phasor);
         let pressed = pressing > 0.0 || pressing == 0.0 && self.presses(DomainKind::Free, side, &after);
-        let meshes = leaving <= self.law.mesh_speed
+        let meshes = leaving <= self.law.mesh_speed[side.index()]
             && pressed
             && self.presses(DomainKind::Meshing(side), side, &after);
         if approach < GRAZING_SPEED * self.flow.speed && !pressed {

@@ -1,7 +1,7 @@
 //! Oscillators with one wall against closed form, and every oscillator in other units.
 
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Domain, GearPair, Law, Oscillator, REST, Side, State};
+use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, REST, Side, State};
 use rattlemap_dynamics::orbit::{
     Budget, Class, EventKind, Measured, Orbit, Settings, Status, analyse_flow, measure,
 };
@@ -36,9 +36,11 @@ impl ImpactOscillator {
         };
         let free = domain(2.0 * gamma, 1.0, 0.0);
         Oscillator {
-            masses: [1.0, 1.0],
+            degrees: 2,
+            mass: [[1.0, 0.0], [0.0, 1.0]],
             gap: [1.0, 0.0],
             walls: [self.sigma, f64::NEG_INFINITY],
+            contacts: [Contact::Impact; 2],
             omega: self.omega,
             force: [1.0, 0.0],
             free,
@@ -47,7 +49,7 @@ impl ImpactOscillator {
     }
 
     fn law(&self) -> Law {
-        Law { restitution: self.e, mesh_speed: 0.01 }
+        Law::both(self.e, 0.01)
     }
 
     /// Between impacts `x = P cos(omega t - psi) + exp(-gamma s) (a cos Omega s + b sin Omega s)`, `s` the
@@ -154,6 +156,7 @@ fn a_left_wall_alone_mirrors_a_right_one() {
         let mirrored = |d: &Domain| Domain { load: d.load.map(|x| -x), ..*d };
         let left = Oscillator {
             walls: [f64::INFINITY, -case.sigma],
+            contacts: [Contact::Impact; 2],
             force: right.force.map(|x| -x),
             free: mirrored(&right.free),
             meshing: [mirrored(&right.meshing[1]), mirrored(&right.meshing[0])],
@@ -214,9 +217,11 @@ fn a_ball_comes_to_rest_on_a_floor_at_zero() {
         };
         let free = domain(0.0, 0.0, g);
         Oscillator {
-            masses: [1.0, 1.0],
+            degrees: 2,
+            mass: [[1.0, 0.0], [0.0, 1.0]],
             gap: [1.0, 0.0],
             walls: [floor, f64::NEG_INFINITY],
+            contacts: [Contact::Impact; 2],
             omega: 1.0,
             force: [0.0, 0.0],
             free,
@@ -227,7 +232,7 @@ fn a_ball_comes_to_rest_on_a_floor_at_zero() {
         let oscillator = ball(floor);
         assert!(oscillator.length_scale() >= g);
         let flow = Flow::new(&oscillator);
-        let law = Law { restitution: e, mesh_speed: 0.0 };
+        let law = Law::both(e, 0.0);
         let mut trajectory = Trajectory::new(&flow, law, [floor, -v, 0.0, 0.0]);
         let mut events: Vec<Happening> = Vec::new();
         (0..3).for_each(|_| trajectory.advance_period(&mut events).unwrap());
@@ -272,6 +277,7 @@ fn in_units(
     };
     let scaled = Oscillator {
         walls: oscillator.walls.map(|wall| length * wall),
+        contacts: [Contact::Impact; 2],
         omega: rate * oscillator.omega,
         force: oscillator.force.map(|f| force * f),
         free: domain(&oscillator.free),
@@ -281,7 +287,7 @@ fn in_units(
     assert_eq!(scaled.length_scale(), length * oscillator.length_scale());
     let [x1, v1, x2, v2] = start;
     let start = [length * x1, length * rate * v1, length * x2, length * rate * v2];
-    (scaled, Law { mesh_speed: length * rate * law.mesh_speed, ..law }, start)
+    (scaled, Law { mesh_speed: law.mesh_speed.map(|speed| length * rate * speed), ..law }, start)
 }
 
 /// Gear pairs over the paper's plane, and the impact oscillators from rest below their wall.

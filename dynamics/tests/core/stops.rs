@@ -2,7 +2,7 @@
 
 use crate::common::REST;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Domain, Law, Oscillator, Side, State, Stops};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State, Stops};
 use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
 
 fn stops(e: f64) -> Stops {
@@ -130,9 +130,11 @@ fn ball(g: f64, damping: f64) -> Oscillator {
         load: [g + sign * 1e4 * 0.5, 0.0],
     };
     Oscillator {
-        masses: [1.0, 1.0],
+        degrees: 2,
+        mass: [[1.0, 0.0], [0.0, 1.0]],
         gap: [1.0, 0.0],
         walls: [0.5, -0.5],
+        contacts: [Contact::Impact; 2],
         omega: 1.0,
         force: [0.0, 0.0],
         free,
@@ -148,7 +150,7 @@ fn a_bouncing_ball_comes_to_rest_where_the_series_ends() {
     for e in [0.1, 0.5, 0.6, 0.9, 0.99] {
         // Damped: on an undamped stop it swings back to touch the wall at no speed, for ever.
         let flow = Flow::new(&ball(g, 20.0));
-        let law = Law { restitution: e, mesh_speed: 0.0 };
+        let law = Law::both(e, 0.0);
         let (scale, top) = (1.0 - e, v * v / (2.0 * g));
         assert!(top < 1.0, "it must not reach the other wall");
         // Slower, where the series would outlast the period.
@@ -176,7 +178,7 @@ fn a_bouncing_ball_comes_to_rest_where_the_series_ends() {
 fn a_bouncing_ball_meshes_at_the_threshold() {
     let (g, v, e, threshold) = (2.0, 1.0, 0.6, 1e-3);
     let flow = Flow::new(&ball(g, 0.0));
-    let law = Law { restitution: e, mesh_speed: threshold };
+    let law = Law::both(e, threshold);
     let events = events(&flow, law, [0.5, -v, 0.0, 0.0], 3);
     let count = (1..).find(|&n| v * e.powi(n) <= threshold).expect("it slows down") as usize;
     assert!(events[..count - 1].iter().all(|event| event.kind == EventKind::Impact), "{events:?}");
@@ -192,7 +194,7 @@ fn a_bouncing_ball_meshes_at_the_threshold() {
 fn a_throw_grazes_the_other_wall() {
     let g = 2.0f64;
     let flow = Flow::new(&ball(g, 0.0));
-    let law = Law { restitution: 0.5, mesh_speed: 0.0 };
+    let law = Law::both(0.5, 0.0);
     let grazing = (2.0 * g).sqrt();
     for beyond in [1e-4, 1e-8, 1e-11, 1e-13] {
         let first = |v: f64| events(&flow, law, [0.5, -v, 0.0, 0.0], 1)[0];
@@ -228,7 +230,7 @@ fn nothing_moves_what_nothing_acts_on() {
 #[test]
 fn closing_a_series_stops_where_it_was_asked_to() {
     let flow = Flow::new(&ball(2.0, 0.0));
-    let law = Law { restitution: 0.5, mesh_speed: 0.0 };
+    let law = Law::both(0.5, 0.0);
     // The series ends at 2.
     for short in [1e-3, 1e-4, 1e-5, 1e-6] {
         let mut trajectory = Trajectory::new(&flow, law, [0.5, -1.0, 0.0, 0.0]);

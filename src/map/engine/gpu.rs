@@ -276,7 +276,7 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
 
 /// Whether any cell of the plan may follow chatter by short flights.
 fn follows_chatter(plan: &Plan) -> bool {
-    let speeds = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed);
+    let speeds = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed[0]);
     let least = speeds.fold(f64::INFINITY, f64::min);
     let follows = |flow| gpu::follows_chatter(&plan.oscillator(flow), least);
     (0..plan.flow_count() as u32).into_par_iter().any(follows)

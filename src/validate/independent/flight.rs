@@ -21,7 +21,7 @@ pub struct Field {
 
 impl Field {
     fn new(oscillator: &Oscillator, domain: &Domain) -> Field {
-        let ([g0, g1], m) = (oscillator.gap, oscillator.masses);
+        let ([g0, g1], m) = (oscillator.gap, oscillator.masses());
         // On (x1, v1, x2, v2); then x1 = (z - g1 x2) / g0, and z'' = g . x''.
         let row = |i: usize| {
             let (k, c) = (domain.stiffness[i], domain.damping[i]);
@@ -320,7 +320,7 @@ impl Flight {
     /// The impact law, then meshing or not: equations (5), (6), (22), (37) of the paper.
     fn contact(&mut self, side: Side, t: f64, settling: bool) {
         self.put_on_wall(side);
-        let (s, e) = (side.sign(), self.law.restitution);
+        let (s, e) = (side.sign(), self.law.restitution[side.index()]);
         let cos = self.cos(t);
         let closing = s * self.q[1];
         if settling
@@ -330,13 +330,14 @@ impl Flight {
             return;
         }
         let leaving = e * closing.max(0.0);
-        let ([g0, g1], [m1, m2]) = (self.oscillator.gap, self.oscillator.masses);
+        let ([g0, g1], [m1, m2]) = (self.oscillator.gap, self.oscillator.masses());
         let impulse = -s * (1.0 + e) * closing.max(0.0) / (g0 * g0 / m1 + g1 * g1 / m2);
         self.q[1] = -s * leaving;
         self.q[3] += impulse * g1 / m2;
         let presses = |field: &Field| self.pressing(field, side, &self.q, cos) > 0.0;
-        let meshes =
-            leaving <= self.law.mesh_speed && presses(&self.fields[0]) && presses(self.meshing_field(side));
+        let meshes = leaving <= self.law.mesh_speed[side.index()]
+            && presses(&self.fields[0])
+            && presses(self.meshing_field(side));
         let kind = if meshes { EventKind::MeshStart } else { EventKind::Impact };
         self.events.push(Ended { t, kind, side });
         (self.mode, self.from) = match (meshes, leaving > 0.0) {
