@@ -3,8 +3,8 @@
 //! # Coordinates
 //!
 //! Each domain is `M x'' + C x' + K x = force cos(omega t) + load`. The flow works on
-//! `q = (z, w, x, v)`: the gap `z = g . x`, its rate `w`, and the second displacement
-//! with its velocity. The gap is a coordinate, so a contact puts it on the wall exactly
+//! `q = (z, w, x, v)`: the gap `z = g . x`, its rate `w`, and the displacement that the gap row
+//! weighs less, the second if both weigh alike, with its velocity. The gap is a coordinate, so a contact puts it on the wall exactly
 //! and no small difference of large numbers decides an event. Together with the forcing
 //! phasor and a constant it obeys an autonomous linear system
 //!
@@ -27,11 +27,11 @@
 //!
 //! Every derivative `y^(n)` of a solution solves the same equations with the force
 //! amplitude multiplied by `omega^n` and no load. Its energy
-//! `2 E = sum m_i v_i^2 + x K x` never grows by itself, because damping only takes:
+//! `2 E = v M v + x K x` never grows by itself, because damping only takes:
 //!
 //! ```text
-//! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(sum force_i^2 / m_i)
-//! |z^(n+1)(t + s)|   <= sqrt(sum g_i^2 / m_i) sqrt(2 E_n(t + s))        (Cauchy-Schwarz)
+//! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(force M^-1 force)
+//! |z^(n+1)(t + s)|   <= sqrt(g M^-1 g) sqrt(2 E_n(t + s))        (Cauchy-Schwarz)
 //! ```
 //!
 //! That holds at resonance and without damping, costs one square root, and is tight where
@@ -54,7 +54,7 @@ pub(crate) use short_flight::SHORT;
 
 use crate::model::{Model, ModelError, NonImpacting, Oscillator, Side, State};
 
-/// Gap coordinates `(z, w, x2, v2)`.
+/// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
 pub type Gap = [f64; 4];
 
 /// Forcing phasor `(cos, sin)` of the phase `omega t`.
@@ -90,7 +90,11 @@ pub struct Flow {
     /// Change of `v` per unit of approach speed removed by the contact impulse.
     pub(crate) kick: f64,
     gap: [f64; 2],
-    masses: [f64; 2],
+    /// Index of the displacement beside the gap.
+    other: usize,
+    /// Degrees of freedom.
+    pub(crate) degrees: usize,
+    mass: [[f64; 2]; 2],
     symmetric: bool,
     non_impacting: Option<NonImpacting>,
     free: LinearFlow,
@@ -119,9 +123,7 @@ impl Flow {
 
     /// Solves an oscillator, which must be valid as [`Oscillator::validate`] says.
     pub fn new(oscillator: &Oscillator) -> Flow {
-        let [g0, g1] = oscillator.gap;
-        let [m1, m2] = oscillator.masses();
-        let compliance = g0 * g0 / m1 + g1 * g1 / m2;
+        let other = oscillator.other();
         let linear = |domain| LinearFlow::new(oscillator, domain);
         let free = linear(&oscillator.free);
         let length = oscillator.length_scale();
@@ -132,9 +134,11 @@ impl Flow {
             length,
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
-            kick: -(g1 / m2) / compliance,
+            kick: -oscillator.accelerations(oscillator.gap)[other] / oscillator.mobility(oscillator.gap),
             gap: oscillator.gap,
-            masses: oscillator.masses(),
+            other,
+            degrees: oscillator.degrees,
+            mass: oscillator.mass,
             symmetric: oscillator.mirror_symmetric(),
             non_impacting: NonImpacting::new(oscillator).or_else(|| NonImpacting::beside_rest(oscillator)),
             free,
@@ -180,24 +184,36 @@ impl Flow {
 
     /// Gap coordinates of a state.
     pub fn to_gap(&self, y: State) -> Gap {
-        let [g0, g1] = self.gap;
-        [g0 * y[0] + g1 * y[2], g0 * y[1] + g1 * y[3], y[2], y[3]]
+        let ([g0, g1], o) = (self.gap, 2 * self.other);
+        [g0 * y[0] + g1 * y[2], g0 * y[1] + g1 * y[3], y[o], y[o + 1]]
+    }
+
+    /// Gap coordinates of a tangent vector: the second displacement of one degree of freedom has none.
+    pub(crate) fn tangent_to_gap(&self, [x1, v1, x2, v2]: State) -> Gap {
+        self.to_gap(if self.degrees == 1 { [x1, v1, 0.0, 0.0] } else { [x1, v1, x2, v2] })
     }
 
     /// State from gap coordinates.
     pub fn to_state(&self, q: Gap) -> State {
         let [g0, g1] = self.gap;
-        [(q[0] - g1 * q[2]) / g0, (q[1] - g1 * q[3]) / g0, q[2], q[3]]
+        if self.other == 1 {
+            [(q[0] - g1 * q[2]) / g0, (q[1] - g1 * q[3]) / g0, q[2], q[3]]
+        } else {
+            [q[2], q[3], (q[0] - g0 * q[2]) / g1, (q[1] - g0 * q[3]) / g1]
+        }
     }
 
     /// Kinetic energy of a state.
     pub fn kinetic_energy(&self, y: State) -> f64 {
-        0.5 * (self.masses[0] * y[1] * y[1] + self.masses[1] * y[3] * y[3])
+        let [[m1, m], [_, m2]] = self.mass;
+        0.5 * (m1 * y[1] * y[1] + m2 * y[3] * y[3] + 2.0 * m * y[1] * y[3])
     }
 
-    /// Linear momentum of a state; the contact impulse between two bodies keeps it.
+    /// The momentum across the gap row, `M v . (-g_2, g_1)`, which an impulse along the row keeps: for two
+    /// bodies that meet, `z = x1 - x2`, the sum of theirs.
     pub fn momentum(&self, y: State) -> f64 {
-        self.masses[0] * y[1] + self.masses[1] * y[3]
+        let ([[m1, m], [_, m2]], [g0, g1]) = (self.mass, self.gap);
+        g0 * (m2 * y[3] + m * y[1]) - g1 * (m1 * y[1] + m * y[3])
     }
 
     /// State after a time `tau >= 0` in one domain, starting at forcing phase `phase`
@@ -214,7 +230,8 @@ fn power_of_two(x: f64) -> f64 {
     f64::from_bits(x.to_bits() & f64::INFINITY.to_bits())
 }
 
-/// The matrix that takes displacements to `(z, x2)`.
+/// The matrix that takes displacements to the gap and the other displacement.
 fn displacement_matrix(oscillator: &Oscillator) -> Matrix2<f64> {
-    Matrix2::new(oscillator.gap[0], oscillator.gap[1], 0.0, 1.0)
+    let second = oscillator.other() as f64;
+    Matrix2::new(oscillator.gap[0], oscillator.gap[1], 1.0 - second, second)
 }

@@ -142,7 +142,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Replaces the tangent vectors.
     pub fn set_tangents(&mut self, tangents: [State; N]) {
         self.log_scale = 0.0;
-        self.tangents = tangents.map(|u| self.flow.to_gap(u));
+        self.tangents = tangents.map(|u| self.flow.tangent_to_gap(u));
     }
 
     /// The wall the teeth mesh on, if they do.

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bits;
 mod cells;
 mod flow;
 mod one_wall;
