@@ -38,6 +38,7 @@
 //! motion is slow: a stiff meshing spring that is not excited does not shorten the step.
 
 mod columns;
+mod constrained;
 mod energy;
 mod expansion;
 mod gap_polynomial;
@@ -52,7 +53,7 @@ pub use linear::LinearFlow;
 pub(crate) use linear::{RADIUS, Step};
 pub(crate) use short_flight::SHORT;
 
-use crate::model::{Model, ModelError, NonImpacting, Oscillator, Side, State};
+use crate::model::{Contact, Model, ModelError, NonImpacting, Oscillator, Side, State};
 
 /// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
 pub type Gap = [f64; 4];
@@ -65,7 +66,7 @@ pub type Phasor = [f64; 2];
 pub enum DomainKind {
     /// Between the walls.
     Free,
-    /// In lasting contact with a wall.
+    /// In lasting contact with a wall; at rest on a rigid one.
     Meshing(Side),
 }
 
@@ -87,8 +88,12 @@ pub struct Flow {
     pub(crate) speed: f64,
     /// The largest power of two up to `omega`: velocities over it compare with displacements, and lose no bit.
     pub(crate) rate: f64,
+    /// What the walls are.
+    pub(crate) contacts: [Contact; 2],
     /// Change of `v` per unit of approach speed removed by the contact impulse.
     pub(crate) kick: f64,
+    /// What the damper behind an elastic wall takes from `w'` and `v'` per unit of `w`.
+    pub(crate) dampers: [[f64; 2]; 2],
     gap: [f64; 2],
     /// Index of the displacement beside the gap.
     other: usize,
@@ -124,8 +129,22 @@ impl Flow {
     /// Solves an oscillator, which must be valid as [`Oscillator::validate`] says.
     pub fn new(oscillator: &Oscillator) -> Flow {
         let other = oscillator.other();
-        let linear = |domain| LinearFlow::new(oscillator, domain);
-        let free = linear(&oscillator.free);
+        let free = LinearFlow::new(oscillator, &oscillator.free);
+        let compliance = oscillator.mobility(oscillator.gap);
+        let pushed = oscillator.accelerations(oscillator.gap)[other];
+        let kick = -pushed / compliance;
+        let behind = |side: Side| match oscillator.contacts[side.index()] {
+            _ if oscillator.wall(side).is_infinite() => free.clone(),
+            Contact::Rigid => LinearFlow::on_rigid_wall(oscillator, kick),
+            Contact::Impact | Contact::Elastic => {
+                LinearFlow::new(oscillator, &oscillator.meshing[side.index()])
+            }
+        };
+        let damper = |side: Side| {
+            let damping = if oscillator.is_elastic(side) { oscillator.added(side)[1] } else { 0.0 };
+            [damping * compliance, damping * pushed]
+        };
+        let meshing = Side::BOTH.map(behind);
         let length = oscillator.length_scale();
         Flow {
             period: oscillator.period(),
@@ -134,7 +153,9 @@ impl Flow {
             length,
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
-            kick: -oscillator.accelerations(oscillator.gap)[other] / oscillator.mobility(oscillator.gap),
+            contacts: oscillator.contacts,
+            kick,
+            dampers: Side::BOTH.map(damper),
             gap: oscillator.gap,
             other,
             degrees: oscillator.degrees,
@@ -142,7 +163,7 @@ impl Flow {
             symmetric: oscillator.mirror_symmetric(),
             non_impacting: NonImpacting::new(oscillator).or_else(|| NonImpacting::beside_rest(oscillator)),
             free,
-            meshing: [linear(&oscillator.meshing[0]), linear(&oscillator.meshing[1])],
+            meshing,
         }
     }
 

@@ -23,6 +23,14 @@ pub(crate) struct EnergyBound {
 }
 
 impl EnergyBound {
+    /// Of what does not move.
+    pub(super) const NONE: EnergyBound = EnergyBound { columns: Columns::ZERO, growth: 0.0 };
+
+    /// A bound whose squares are summed by these columns, and that grows by so much in a Taylor step.
+    pub(super) fn of(columns: Columns, growth: f64) -> EnergyBound {
+        EnergyBound { columns, growth }
+    }
+
     /// A bound from the energy of `y^(n)`; `term` is `(G unit)^n / n!` and `unit` the Taylor step.
     pub(super) fn new(
         oscillator: &Oscillator,

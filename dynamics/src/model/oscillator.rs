@@ -122,6 +122,11 @@ impl Oscillator {
         std::f64::consts::TAU / self.omega
     }
 
+    /// Position of a wall.
+    pub(crate) fn wall(&self, side: Side) -> f64 {
+        self.walls[side.index()]
+    }
+
     /// The diagonal of the mass matrix.
     pub fn masses(&self) -> [f64; 2] {
         [self.mass[0][0], self.mass[1][1]]
@@ -221,11 +226,12 @@ impl Oscillator {
 
     /// Whether motion may go on behind a wall: there is one, and it yields.
     pub(crate) fn has_motion_behind(&self, side: Side) -> bool {
-        self.walls[side.index()].is_finite() && self.contacts[side.index()] != Contact::Rigid
+        self.wall(side).is_finite() && self.contacts[side.index()] != Contact::Rigid
     }
 
-    fn is_elastic(&self, side: Side) -> bool {
-        self.walls[side.index()].is_finite() && self.contacts[side.index()] == Contact::Elastic
+    /// Whether there is a wall that motion goes through without a jump.
+    pub(crate) fn is_elastic(&self, side: Side) -> bool {
+        self.wall(side).is_finite() && self.contacts[side.index()] == Contact::Elastic
     }
 
     /// Stiffness and damping that a wall adds along the gap row.
@@ -256,7 +262,7 @@ impl Oscillator {
                 return Err(OscillatorError::NotAlongGap { quantity, matrix });
             }
         }
-        let wall = self.walls[side.index()];
+        let wall = self.wall(side);
         for (i, g) in g.into_iter().enumerate() {
             let expected = free.load[i] + stiffness * wall * g;
             let size = free.load[i].abs() + (stiffness * wall * g).abs();
@@ -333,7 +339,7 @@ impl Oscillator {
         self.walls[0] == -self.walls[1]
             && self.contacts[0] == self.contacts[1]
             && self.free == mirrored(&self.free)
-            && self.meshing[0] == mirrored(&self.meshing[1])
+            && (!self.has_motion_behind(Side::Right) || self.meshing[0] == mirrored(&self.meshing[1]))
     }
 }
 
