@@ -53,7 +53,7 @@ pub use linear::LinearFlow;
 pub(crate) use linear::{RADIUS, Step};
 pub(crate) use short_flight::SHORT;
 
-use crate::model::{Contact, Model, ModelError, NonImpacting, Oscillator, Side, State};
+use crate::model::{Contact, Law, Model, ModelError, NonImpacting, Oscillator, Side, State};
 
 /// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
 pub type Gap = [f64; 4];
@@ -173,9 +173,9 @@ impl Flow {
         size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>()
     }
 
-    /// Whether `(y, t) -> (-y, t + T/2)` takes solutions to solutions.
-    pub fn mirror_symmetric(&self) -> bool {
-        self.symmetric
+    /// Whether `(y, t) -> (-y, t + T/2)` takes solutions to solutions: both walls are alike, and so is their law.
+    pub fn mirror_symmetric(&self, law: &Law) -> bool {
+        self.symmetric && law.is_symmetric()
     }
 
     /// The motion that never touches a wall, if there is a stable one, or does so as long as one

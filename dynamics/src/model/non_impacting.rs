@@ -35,6 +35,13 @@ pub struct NonImpacting {
 impl NonImpacting {
     /// None if there is no contact-free steady motion, or if it does not attract.
     pub fn new(oscillator: &Oscillator) -> Option<NonImpacting> {
+        if oscillator.degrees == 1 {
+            return NonImpacting::of_two(&beside_copy(oscillator, 1));
+        }
+        NonImpacting::of_two(oscillator)
+    }
+
+    fn of_two(oscillator: &Oscillator) -> Option<NonImpacting> {
         let Oscillator { omega, walls, mass, .. } = *oscillator;
         let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
         let (stiffness, damping) = (matrix(oscillator.free.stiffness), matrix(oscillator.free.damping));
@@ -63,7 +70,7 @@ impl NonImpacting {
     /// own motion would decay makes no difference then.
     pub fn beside_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
-            let Oscillator { gap, force, mut free, mass, .. } = *oscillator;
+            let Oscillator { gap, force, free, mass, .. } = *oscillator;
             let moving = 1 - resting;
             let is_coupled =
                 [free.stiffness, free.damping, mass].iter().any(|m| m[0][1] != 0.0 || m[1][0] != 0.0);
@@ -71,13 +78,7 @@ impl NonImpacting {
             if !stays || gap[moving] == 0.0 {
                 return None;
             }
-            // In its place a copy of the other, which no wall sees.
-            let share = mass[resting][resting] / mass[moving][moving];
-            free.stiffness[resting][resting] = share * free.stiffness[moving][moving];
-            free.damping[resting][resting] = share * free.damping[moving][moving];
-            let mut seen = gap;
-            seen[resting] = 0.0;
-            let quiet = NonImpacting::new(&Oscillator { gap: seen, free, ..*oscillator })?;
+            let quiet = NonImpacting::of_two(&beside_copy(oscillator, resting))?;
             Some(NonImpacting { resting: Some(resting), ..quiet })
         })
     }
@@ -114,6 +115,17 @@ impl NonImpacting {
     pub fn exponent(&self) -> f64 {
         self.exponent
     }
+}
+
+/// An oscillator with a copy of one degree of freedom in place of the other, which no wall sees.
+fn beside_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
+    let (mut copied, moving) = (*oscillator, 1 - resting);
+    let share = copied.mass[resting][resting] / copied.mass[moving][moving];
+    let free = &mut copied.free;
+    free.stiffness[resting][resting] = share * free.stiffness[moving][moving];
+    free.damping[resting][resting] = share * free.damping[moving][moving];
+    copied.gap[resting] = 0.0;
+    copied
 }
 
 /// The largest real part of the eigenvalues of free motion.
