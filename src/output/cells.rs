@@ -131,9 +131,9 @@ impl<'a> Cells<'a> {
         self.plan.start(id as u32, self.records)
     }
 
-    /// Whether a run's start is not the scene's own: it follows a neighbour or was drawn.
+    /// Whether a run's start is not the scene's own: it is swept, follows a neighbour or was drawn.
     pub(super) fn has_own_start(&self, id: usize) -> bool {
-        self.plan.policy().follows() || id >= self.plan.cell_count()
+        self.scene.sweeps_start() || self.plan.policy().follows() || id >= self.plan.cell_count()
     }
 
     pub(super) fn scene(&self) -> &'a Scene {

@@ -249,11 +249,12 @@ function choose(cell) {
   byId("replay").hidden = !cell;
   if (cell) {
     const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
-    const [first, second] = map.axes.map((axis) => axis.parameter);
     const place = 4 * (cell.j * columns + cell.i);
-    const start = starts ? ` --start ${[...starts.subarray(place, place + 4)].join(",")}` : "";
+    const own = map.start ?? starts?.subarray(place, place + 4);
+    const start = own ? ` --start ${[...own].map((x, k) => [a, b][map.axes.findIndex((axis) => axis.start === k)] ?? x).join(",")}` : "";
+    const sets = map.axes.map((axis, k) => (axis.start === undefined ? ` --set ${axis.parameter}=${[a, b][k]}` : "")).join("");
     const derived = derivedValues(cell).map(([name, value]) => ` --set ${name}=${value}`).join("");
-    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${derived}${map.replay}${start}`.split(" --");
+    const words = `rattlemap orbit${sets}${derived}${map.replay}${start}`.split(" --");
     // Lines break between arguments, never inside one.
     byId("command").replaceChildren(...words.flatMap((word, k) =>
       k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
