@@ -121,7 +121,7 @@ impl Seen {
             let mut half = trajectory.clone();
             half.advance_to(0.5 * flow.period, &mut ())?;
             trajectory.advance_period(&mut ())?;
-            if flow.mirror_symmetric() {
+            if flow.mirror_symmetric(&law) {
                 self.points.push(half.state().map(|x| -x));
             }
             self.points.push(trajectory.state());

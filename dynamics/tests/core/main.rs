@@ -3,12 +3,15 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bits;
 mod cells;
+mod elastic;
 mod flow;
 mod one_wall;
 mod orbits;
 mod paper;
 mod properties;
+mod sticking;
 mod stops;
 mod stress;
 mod tangents;
