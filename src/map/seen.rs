@@ -24,6 +24,8 @@ pub(super) struct Seen {
     /// Where the motion is one cycle later.
     pub(super) last: State,
     pub(super) is_non_impacting: bool,
+    /// Whether the mirror image of a motion is a motion.
+    pub(super) mirrors: bool,
 }
 
 impl Seen {
@@ -41,14 +43,21 @@ impl Seen {
 
     /// The motion from a state, for so many periods.
     pub(super) fn through(flow: &Flow, law: Law, state: State, period: u32) -> Seen {
-        let mut seen = Seen::at(state, period);
+        let mut seen = Seen { mirrors: flow.mirror_symmetric(&law), ..Seen::at(state, period) };
         // A motion that stops here is known by the state that it had.
         let _: Result<(), Stop> = seen.run(flow, law);
         seen
     }
 
     fn at(state: State, period: u32) -> Seen {
-        Seen { period, points: vec![state], halves: Vec::new(), last: state, is_non_impacting: false }
+        Seen {
+            period,
+            points: vec![state],
+            halves: Vec::new(),
+            last: state,
+            is_non_impacting: false,
+            mirrors: false,
+        }
     }
 
     fn run(&mut self, flow: &Flow, law: Law) -> Result<(), Stop> {
@@ -57,9 +66,7 @@ impl Seen {
             let mut half = trajectory.clone();
             half.advance_to(0.5 * flow.period, &mut ())?;
             trajectory.advance_period(&mut ())?;
-            if flow.mirror_symmetric(&law) {
-                self.halves.push(half.state());
-            }
+            self.halves.push(half.state());
             self.points.push(trajectory.state());
         }
         self.last = trajectory.state();
@@ -70,7 +77,8 @@ impl Seen {
 
     /// Strobe states of its symmetry-conjugate orbit: the mirror image of a motion is a motion, half a period later.
     fn mirrored(&self) -> impl Iterator<Item = State> {
-        self.halves.iter().map(|half| half.map(|x| -x))
+        let halves: &[State] = if self.mirrors { &self.halves } else { &[] };
+        halves.iter().map(|half| half.map(|x| -x))
     }
 
     /// Whether it, or its symmetry-conjugate orbit, comes through a state of a cycle of `period`.
