@@ -193,14 +193,14 @@ impl Basins {
         &self.list
     }
 
-    /// The label of the attractor that another record of the cell `id` shows; `flow` is the cell's. None if the record
-    /// decides nothing, or shows none of the map's attractors.
-    pub fn label(&self, id: usize, flow: &Flow, record: &Record) -> Option<u16> {
+    /// The label of the attractor that another record of the cell `id` shows. None if the record decides nothing, or
+    /// shows none of the map's attractors.
+    pub fn label(&self, id: usize, record: &Record) -> Option<u16> {
         let group = &self.groups[self.cut.group(id)];
         match classify(record) {
             Class::Chaotic => self.chaos,
             Class::Periodic { period } => {
-                let nth = group.catalogue.nearest(flow, &record.strobe, period)?;
+                let nth = group.catalogue.nearest(&record.strobe, period)?;
                 Some(group.labels[nth as usize]).filter(|&label| label != NONE)
             }
             Class::Undecided | Class::Failed => None,

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::attractors_csv::named;
 use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer};
 use super::map_figure::subtitle;
@@ -57,6 +58,8 @@ struct Data<'a> {
     sources: Vec<&'static str>,
     words: Vec<String>,
     patterns: Vec<String>,
+    /// By label.
+    attractors: Vec<String>,
     /// What became of an adaptive map.
     refinement: Option<RefinementObject>,
     validation: Option<&'a serde_json::Value>,
@@ -154,6 +157,9 @@ pub(super) fn write(
         sources: SOURCES.iter().map(|&source| names::source(source)).collect(),
         words: texts(spelled.words.as_ref()),
         patterns: texts(spelled.patterns.as_ref()),
+        attractors: cells.basins().map_or(Vec::new(), |basins| {
+            basins.attractors().iter().enumerate().map(|(label, attractor)| named(label, attractor)).collect()
+        }),
         refinement: cells.refinement().map(RefinementObject::from),
         validation,
     };
@@ -256,6 +262,10 @@ fn values(
     }
     if cells.refinement().is_some() {
         list.push(("source", bytes(|row| row.source as u8)));
+    }
+    if let Some(basins) = cells.basins() {
+        let labels: Vec<u32> = basins.labels().iter().map(|&label| label.into()).collect();
+        list.push(("attractor", packed("u32", &labels)));
     }
     if let Some(counts) = cells.attractors() {
         list.push(("attractors", packed("u8", counts)));

@@ -10,7 +10,7 @@ use crate::map::seen::{SAME, Seen, distance};
 use crate::record::Record;
 use crate::record::classify::classify;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Law, State};
+use rattlemap_dynamics::model::{Law, NonImpacting, State};
 use rattlemap_dynamics::orbit::Class;
 
 /// States this close, relative to the motion's size, lie on one cycle without a question: lanes in single precision
@@ -45,8 +45,9 @@ pub(crate) struct Cycle {
 }
 
 /// The cycles that are known.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Catalogue {
+    contact_free: Option<NonImpacting>,
     cycles: Vec<Cycle>,
     /// Strobe states with the cycle that each is on, by the first displacement.
     points: Vec<(State, u32)>,
@@ -57,6 +58,13 @@ pub(crate) struct Catalogue {
 }
 
 impl Catalogue {
+    /// None yet of an oscillator.
+    pub(crate) fn of(flow: &Flow) -> Catalogue {
+        // Beside a degree of freedom at rest it is one of many motions.
+        let contact_free = flow.non_impacting().filter(|free| free.resting().is_none()).cloned();
+        Catalogue { contact_free, cycles: Vec::new(), points: Vec::new(), reach: 0.0, free: None }
+    }
+
     pub(super) fn cycles(&self) -> &[Cycle] {
         &self.cycles
     }
@@ -71,8 +79,8 @@ impl Catalogue {
             (left, size) = (later, (2 * size).min(LARGEST_BLOCK));
             let known = &*self;
             let look = |record: &&Record| {
-                let new = |period| (period, refined(flow, law, record, period));
-                known.look(flow, record).map_err(new)
+                let new = |period| (period, known.refined(flow, law, record, period));
+                known.look(record).map_err(new)
             };
             let looked: Vec<_> = block.par_iter().map(look).collect();
             all.extend(looked.into_iter().map(|looked| match looked {
@@ -85,14 +93,14 @@ impl Catalogue {
     }
 
     /// What a record shows as far as it is known; else its period.
-    fn look(&self, flow: &Flow, record: &Record) -> Result<Found, u32> {
+    fn look(&self, record: &Record) -> Result<Found, u32> {
         match classify(record) {
             Class::Failed => Ok(Found::Failed),
             Class::Undecided => Ok(Found::Undecided),
             Class::Chaotic => Ok(Found::Chaos),
             Class::Periodic { .. } if !record.strobe.iter().all(|x| x.is_finite()) => Ok(Found::Undecided),
             Class::Periodic { period } => {
-                let free = self.free.filter(|_| is_contact_free(flow, &record.strobe));
+                let free = self.free.filter(|_| self.is_contact_free(&record.strobe));
                 free.or_else(|| self.within(NEAR, &record.strobe, period)).map(Found::Cycle).ok_or(period)
             }
         }
@@ -111,8 +119,34 @@ impl Catalogue {
     }
 
     /// The cycle that a state of a slow approach belongs to.
-    pub(super) fn nearest(&self, flow: &Flow, state: &State, period: u32) -> Option<u32> {
-        self.free.filter(|_| is_contact_free(flow, state)).or_else(|| self.within(SAME, state, period))
+    pub(super) fn nearest(&self, state: &State, period: u32) -> Option<u32> {
+        self.free.filter(|_| self.is_contact_free(state)).or_else(|| self.within(SAME, state, period))
+    }
+
+    /// The cycle that a record was on its way to, in as few periods as it closes in.
+    fn refined(&self, flow: &Flow, law: Law, record: &Record, period: u32) -> Option<Seen> {
+        if self.is_contact_free(&record.strobe) {
+            let steady = self.contact_free.as_ref()?.steady();
+            return Some(Seen::through(flow, law, steady, 1));
+        }
+        let seen = Seen::refined(flow, law, record.strobe, period)?;
+        let units = seen.units(flow);
+        let closes = |turn: &u32| {
+            let later = seen.points.get(*turn as usize);
+            period.is_multiple_of(*turn)
+                && later.is_some_and(|later| distance(units, &seen.points[0], later) < CLOSED)
+        };
+        let turn = (1..period).find(closes).unwrap_or(period);
+        let short = |mut states: Vec<State>| {
+            states.truncate(turn as usize);
+            states
+        };
+        Some(Seen { period: turn, points: short(seen.points), halves: short(seen.halves), ..seen })
+    }
+
+    /// Whether a state certainly leads to contact-free motion.
+    fn is_contact_free(&self, state: &State) -> bool {
+        self.contact_free.as_ref().is_some_and(|free| free.is_certain(*state))
     }
 
     /// The place of a cycle, which may be known.
@@ -151,14 +185,14 @@ impl Catalogue {
 
 /// What every one of these records shows, and the cycles that they are on.
 pub(super) fn learn(flow: &Flow, law: Law, records: &[Record], ids: &[usize]) -> (Catalogue, Vec<Found>) {
-    let mut catalogue = Catalogue::default();
+    let mut catalogue = Catalogue::of(flow);
     let own: Vec<&Record> = ids.iter().map(|&id| &records[id]).collect();
     let mut all = catalogue.learn(flow, law, &own);
     // What is left takes the nearest cycle, or is one of its own.
     for (found, &id) in all.iter_mut().zip(ids) {
         if let Found::Unresolved(period) = *found {
             let state = records[id].strobe;
-            let known = catalogue.nearest(flow, &state, period);
+            let known = catalogue.nearest(&state, period);
             *found = Found::Cycle(match known {
                 Some(nth) => nth,
                 None => catalogue.add(flow, Seen::through(flow, law, state, period)),
@@ -166,30 +200,4 @@ pub(super) fn learn(flow: &Flow, law: Law, records: &[Record], ids: &[usize]) ->
         }
     }
     (catalogue, all)
-}
-
-/// The cycle that a record was on its way to, in as few periods as it closes in.
-fn refined(flow: &Flow, law: Law, record: &Record, period: u32) -> Option<Seen> {
-    if is_contact_free(flow, &record.strobe) {
-        let steady = flow.non_impacting()?.steady();
-        return Some(Seen::through(flow, law, steady, 1));
-    }
-    let seen = Seen::refined(flow, law, record.strobe, period)?;
-    let units = seen.units(flow);
-    let closes = |turn: &u32| {
-        let later = seen.points.get(*turn as usize);
-        period.is_multiple_of(*turn)
-            && later.is_some_and(|later| distance(units, &seen.points[0], later) < CLOSED)
-    };
-    let turn = (1..period).find(closes).unwrap_or(period);
-    let short = |mut states: Vec<State>| {
-        states.truncate(turn as usize);
-        states
-    };
-    Some(Seen { period: turn, points: short(seen.points), halves: short(seen.halves), ..seen })
-}
-
-/// Whether a state certainly leads to contact-free motion.
-fn is_contact_free(flow: &Flow, state: &State) -> bool {
-    flow.non_impacting().is_some_and(|free| free.resting().is_none() && free.is_certain(*state))
 }

@@ -28,7 +28,7 @@ impl Basins {
         plan.is_basin().then(|| {
             let cell = plan.cell(0);
             let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
-            let (catalogue, foreseen) = (Catalogue::default(), HashMap::new());
+            let (catalogue, foreseen) = (Catalogue::of(&flow), HashMap::new());
             Basins { flow, law: plan.law(cell.law), catalogue, foreseen }
         })
     }

@@ -226,6 +226,7 @@ function facts({ i, j }) {
     ...(values.pattern ? [["pattern", pattern]] : []),
     ["word", word],
     ...(values.attractors ? [["attractors found", at("attractors")]] : []),
+    ...(values.attractor ? [["attractor", map.attractors[at("attractor")]]] : []),
     ["status", map.statuses[at("status")]],
     ...(values.source ? [["source", source]] : []),
     ["periods run", at("periods_run")],
@@ -470,7 +471,7 @@ const STRATA = { uniform: "drawn from all that were integrated", border: "drawn 
 const FIELDS = { class: "class", period: "period", word: "word, up to mirror image",
   pattern: "pattern, up to mirror image", symmetric: "symmetry",
   lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing", status: "status",
-  periods_run: "periods integrated", finite: "numbers are finite", again: "the same record again" };
+  attractor: "attractor of the start", periods_run: "periods integrated", finite: "numbers are finite", again: "the same record again" };
 const JUDGES = { reference: "the event-driven reference, without early stops",
   lanes_f64: "lanes in f64 and by the reference without early stops",
   dop853: "DOP853, an adaptive ODE library, with event location, and by the reference without early stops" };
