@@ -25,7 +25,8 @@ impl Scene {
             tell("model.hash".into(), list::hash(&[&file.definition().text], std::iter::empty()));
         }
         for (i, axis) in self.axes().iter().enumerate() {
-            tell(format!("axis.{i}.parameter"), axis.parameter().name.to_string());
+            let what = if axis.target().is_start() { "start" } else { "parameter" };
+            tell(format!("axis.{i}.{what}"), axis.parameter().name.to_string());
             if axis.scale() == Scale::Values {
                 tell(format!("axis.{i}.values"), values(axis));
                 continue;
