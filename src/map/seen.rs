@@ -24,6 +24,8 @@ pub(super) struct Seen {
     /// Where the motion is one cycle later.
     pub(super) last: State,
     pub(super) is_non_impacting: bool,
+    /// Whether the mirror image of a motion is a motion.
+    pub(super) mirrors: bool,
 }
 
 impl Seen {
@@ -41,14 +43,21 @@ impl Seen {
 
     /// The motion from a state, for so many periods.
     pub(super) fn through(flow: &Flow, law: Law, state: State, period: u32) -> Seen {
-        let mut seen = Seen::at(state, period);
+        let mut seen = Seen { mirrors: flow.mirror_symmetric(&law), ..Seen::at(state, period) };
         // A motion that stops here is known by the state that it had.
         let _: Result<(), Stop> = seen.run(flow, law);
         seen
     }
 
     fn at(state: State, period: u32) -> Seen {
-        Seen { period, points: vec![state], halves: Vec::new(), last: state, is_non_impacting: false }
+        Seen {
+            period,
+            points: vec![state],
+            halves: Vec::new(),
+            last: state,
+            is_non_impacting: false,
+            mirrors: false,
+        }
     }
 
     fn run(&mut self, flow: &Flow, law: Law) -> Result<(), Stop> {
@@ -67,8 +76,8 @@ impl Seen {
     }
 
     /// Strobe states of its symmetry-conjugate orbit: the mirror image of a motion is a motion, half a period later.
-    fn mirrored(&self, flow: &Flow) -> impl Iterator<Item = State> {
-        let halves: &[State] = if flow.mirror_symmetric() { &self.halves } else { &[] };
+    fn mirrored(&self) -> impl Iterator<Item = State> {
+        let halves: &[State] = if self.mirrors { &self.halves } else { &[] };
         halves.iter().map(|half| half.map(|x| -x))
     }
 
@@ -76,7 +85,7 @@ impl Seen {
     pub(super) fn passes(&self, flow: &Flow, state: &State, period: u32) -> bool {
         let is_close = |point: State| self.distance(flow, &point, state) < SAME;
         self.is_related(period)
-            && (self.points.iter().copied().any(is_close) || self.mirrored(flow).any(is_close))
+            && (self.points.iter().copied().any(is_close) || self.mirrored().any(is_close))
     }
 
     /// Whether one period divides the other: at a flip, noise makes a multiple of a period.
@@ -87,7 +96,7 @@ impl Seen {
     /// What distances are relative to: the size of the motion, but not less than the scale of length and what that is
     /// as a velocity.
     pub(super) fn units(&self, flow: &Flow) -> [f64; 2] {
-        let all = || self.points.iter().copied().chain(self.mirrored(flow));
+        let all = || self.points.iter().copied().chain(self.mirrored());
         let largest = |i: usize, j: usize| all().flat_map(|y| [y[i].abs(), y[j].abs()]).fold(0.0, f64::max);
         let position = largest(0, 2).max(flow.length);
         [position, largest(1, 3).max(flow.omega * position)]

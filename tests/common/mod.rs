@@ -6,6 +6,7 @@ mod motion;
 
 pub(crate) use motion::*;
 
+pub(crate) mod closed_form;
 pub(crate) mod gpu;
 
 /// The gear pair of a run.
