@@ -24,7 +24,7 @@ mod start;
 mod tests;
 
 pub use along::Along;
-pub use axis::{Axis, MAX_COUNT, Scale};
+pub use axis::{Axis, MAX_COUNT, Scale, Target};
 pub use builder::SceneBuilder;
 pub(crate) use derived::Rule;
 pub use error::{Place, Problem, SceneError};
@@ -157,9 +157,13 @@ impl Scene {
             Some(_) => Vec::new(),
             None => axis::read(&root, model, axis_count, command)?,
         };
+        if purpose == Purpose::Bifurcation {
+            axis::refuse_starts(&root, &axes, command)?;
+        }
         let is_swept = |index: usize| {
-            let is_column = |list: &List| list.indices().any(|column| column == index);
-            axes.iter().any(|axis| axis.index() == index) || list.as_ref().is_some_and(is_column)
+            let target = Target::Parameter(index);
+            let is_column = |list: &List| list.targets().any(|column| column == target);
+            axes.iter().any(|axis| axis.target() == target) || list.as_ref().is_some_and(is_column)
         };
         let derived = derived::read(&root, model, is_swept)?;
         let beside = Beside { axes: &axes, list: list.as_ref(), derived: &derived };
@@ -177,7 +181,7 @@ impl Scene {
             outputs: settings::read_outputs(&root, purpose, is_list)?,
             points,
         };
-        start::check(&root, scene.start, scene.draw)?;
+        start::check(&root, &scene)?;
         if is_list {
             list::check(&root, scene.start.follows())?;
         }
@@ -243,15 +247,26 @@ impl Scene {
         self.points.base()
     }
 
-    /// The parameters that cells differ in: those of the axes, or the columns of a list. Derived ones are not among
-    /// them.
+    /// The parameters, and components of the start, that cells differ in: those of the axes, or the columns of a list.
+    /// Derived ones are not among them.
     pub fn swept(&self) -> impl Iterator<Item = &Parameter> {
         self.points.swept()
     }
 
     /// Whether an axis or a column sets a parameter.
     pub fn sweeps(&self, parameter: &Parameter) -> bool {
-        self.swept().any(|swept| swept.name == parameter.name)
+        let index = self.base().index(&parameter.name).ok();
+        index.is_some_and(|index| self.points.targets().any(|target| target == Target::Parameter(index)))
+    }
+
+    /// Whether cells differ in their starts.
+    pub fn sweeps_start(&self) -> bool {
+        self.points.sweeps_start()
+    }
+
+    /// Whether it is a map of basins: an axis sweeps a component of the start.
+    pub fn is_basin(&self) -> bool {
+        self.list().is_none() && self.sweeps_start()
     }
 
     /// The parameters that follow others, each with its expression, in an order in which they can be computed.
@@ -263,7 +278,8 @@ impl Scene {
     pub fn fixed(&self) -> impl Iterator<Item = (&str, f64)> {
         let base = self.base();
         let all = base.parameters().iter().enumerate();
-        let fixed = all.filter(|&(index, p)| !self.sweeps(p) && !self.points.derived().has(index));
+        let is_swept = |index| self.points.targets().any(|target| target == Target::Parameter(index));
+        let fixed = all.filter(move |&(index, _)| !is_swept(index) && !self.points.derived().has(index));
         fixed.map(|(index, parameter)| (&*parameter.name, base.value(index)))
     }
 

@@ -37,7 +37,11 @@ impl Head {
 
 #[derive(Serialize)]
 pub(super) struct AxisObject {
+    /// Its name, and that of the columns in tables.
     parameter: String,
+    /// What it sweeps is a component of the start.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    is_start: bool,
     min: f64,
     max: f64,
     count: usize,
@@ -52,6 +56,7 @@ impl From<&Axis> for AxisObject {
     fn from(axis: &Axis) -> Self {
         AxisObject {
             parameter: axis.parameter().name.to_string(),
+            is_start: axis.target().is_start(),
             min: axis.min(),
             max: axis.max(),
             count: axis.count(),

@@ -5,9 +5,10 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Matrix4, Vector4};
 
 use super::Subject;
-use super::compare::{Answer, Bars};
+use super::compare::{Answer, Bars, Labels};
 use super::finite::not_finite;
 use crate::gpu::Precision;
+use crate::map::attractors::Basins;
 use crate::map::engine::measured_record;
 use crate::map::plan::Needs;
 use crate::map::random::Random;
@@ -48,7 +49,7 @@ pub(super) struct Cell<'a> {
     pub(super) law: Law,
     pub(super) start: State,
     budget: Budget,
-    pub(super) bars: Bars,
+    pub(super) bars: Bars<'a>,
     pub(super) precision: Precision,
     resolution: f64,
     seed: u64,
@@ -85,6 +86,12 @@ impl<'a> Cell<'a> {
             flow,
             halt,
         }
+    }
+
+    /// The same in a map of basins.
+    pub(super) fn in_basins(mut self, basins: Option<&'a Basins>, id: u32) -> Cell<'a> {
+        self.bars.labels = basins.map(|basins| Labels { basins, id: id as usize, own: self.record.strobe });
+        self
     }
 
     /// The plan's budget, all of it: a cell stops before in no case, and one that is undecided takes what the plan

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod any_oscillator;
 mod bits;
 mod cells;
 mod elastic;
@@ -11,6 +12,7 @@ mod one_wall;
 mod orbits;
 mod paper;
 mod properties;
+mod single_stop;
 mod sticking;
 mod stops;
 mod stress;

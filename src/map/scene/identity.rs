@@ -16,7 +16,8 @@ impl Scene {
             tell("model".into(), model.name().to_owned());
         }
         for (i, axis) in self.axes().iter().enumerate() {
-            tell(format!("axis.{i}.parameter"), axis.parameter().name.to_string());
+            let what = if axis.target().is_start() { "start" } else { "parameter" };
+            tell(format!("axis.{i}.{what}"), axis.parameter().name.to_string());
             if axis.scale() == Scale::Values {
                 tell(format!("axis.{i}.values"), values(axis));
                 continue;

@@ -8,6 +8,7 @@ mod derived;
 mod keys;
 mod ranges;
 mod sets;
+mod starts;
 mod texts;
 
 use super::*;
