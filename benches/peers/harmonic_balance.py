@@ -8,7 +8,7 @@ events, flights or strobes. Usage: python harmonic_balance.py > ../../tests/gall
 import numpy as np
 
 ZETA, MEAN, ALTERNATING = 0.05, 0.1, 0.05
-HARMONICS, SAMPLES = 120, 4096
+HARMONICS, SAMPLES = 40, 1024
 
 phase = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
 orders = np.arange(1, HARMONICS + 1)
@@ -98,7 +98,7 @@ def main():
                     low = middle
             tell("fold", fold)
         point, tangent, count = next_point, turned, count + 1
-        if count % 5 == 0:
+        if count % 2 == 0:
             tell("stable" if tangent[-1] > 0 else "unstable", point)
         length = min(1.5 * length, 0.02)
 

@@ -159,6 +159,7 @@ fn symmetric_orbits_of_two_impacts() {
             let speed = (at.before[1] - (orbit.before[1] - orbit.before[3])).abs();
             let theirs = multipliers(&monodromy).unwrap();
             let ours = multipliers(&found.monodromy).unwrap();
+            let scale = theirs[0][0].hypot(theirs[0][1]).max(1.0);
             let apart =
                 theirs.iter().zip(&ours).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
                     / scale;

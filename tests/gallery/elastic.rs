@@ -149,3 +149,98 @@ fn the_soft_stop_is_reached_where_the_response_is() {
     println!("grazing at {grazing}, off by {:.1e}", high - grazing);
     assert!((high - grazing).abs() < 1e-12);
 }
+
+/// A point of the frequency response by harmonic balance, `benches/peers/harmonic_balance.py`: 40 harmonics of the periodic
+/// motion, which know no events.
+struct Balanced {
+    kind: String,
+    omega: f64,
+    state: [f64; 2],
+    largest: f64,
+}
+
+fn balanced() -> Vec<Balanced> {
+    let text = include_str!("data/backlash.csv");
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |i: usize| cells[i].parse::<f64>().unwrap();
+        Balanced {
+            kind: cells[0].to_owned(),
+            omega: number(1),
+            state: [number(2), number(3)],
+            largest: number(4),
+        }
+    };
+    text.lines().skip(1).map(row).collect()
+}
+
+/// The cycle near a state by Newton's method on the reference's strobe map, and its monodromy matrix.
+fn cycle_near(omega: f64, mut state: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+    let (oscillator, law) = backlash(omega).oscillator();
+    for _ in 0..30 {
+        let found = followed(&oscillator, law, [state[0], state[1], 0.0, 0.0], 1);
+        let [[a, b], [c, d]] = first_block(&found.monodromy);
+        let off = [found.end[0] - state[0], found.end[1] - state[1]];
+        if off[0].hypot(off[1]) < 1e-13 {
+            return (state, [[a, b], [c, d]]);
+        }
+        let det = (1.0 - a) * (1.0 - d) - b * c;
+        state[0] += ((1.0 - d) * off[0] + b * off[1]) / det;
+        state[1] += (c * off[0] + (1.0 - a) * off[1]) / det;
+    }
+    panic!("no cycle at omega = {omega}");
+}
+
+/// What a multiplier of 1 makes zero.
+fn from_fold([[a, b], [c, d]]: [[f64; 2]; 2]) -> f64 {
+    1.0 - (a + d) + (a * d - b * c)
+}
+
+/// The jumps of the frequency response: its three branches, and the folds where they end, by another method.
+#[test]
+fn the_response_jumps_where_harmonic_balance_turns() {
+    let points = balanced();
+    let mut worst = 0.0f64;
+    for point in points.iter().filter(|point| point.kind != "fold") {
+        let (state, monodromy) = cycle_near(point.omega, point.state);
+        worst = worst.max((state[0] - point.state[0]).abs()).max((state[1] - point.state[1]).abs());
+        assert_eq!(from_fold(monodromy) > 0.0, point.kind == "stable", "omega = {}", point.omega);
+    }
+    let swings = |kind: &str| {
+        points.iter().filter(|point| point.kind == kind).map(|point| point.largest).collect::<Vec<_>>()
+    };
+    assert!(swings("stable").len() > 20 && swings("unstable").len() > 2);
+    println!("{} points of harmonic balance, off by {worst:.1e}", points.len());
+    assert!(worst < 2e-4);
+    let folds: Vec<&Balanced> = points.iter().filter(|point| point.kind == "fold").collect();
+    // The branch of small swings ends going up, that of large ones going down.
+    for (fold, inwards) in folds.iter().zip([-1.0, 1.0]) {
+        // Near its end the square of what makes a multiplier 1 is a parabola in omega: its root, by three points.
+        let at = |share: f64| {
+            let omega = fold.omega * (1.0 + inwards * share);
+            let stable = points.iter().filter(|p| p.kind == "stable" && (p.omega - omega) * inwards > 0.0);
+            let side = |p: &&Balanced| {
+                if inwards < 0.0 { p.largest < fold.largest } else { p.largest > fold.largest }
+            };
+            let nearest = stable
+                .filter(side)
+                .min_by(|a, b| (a.omega - omega).abs().total_cmp(&(b.omega - omega).abs()));
+            // From there on in steps that Newton's method can follow.
+            let from = nearest.unwrap();
+            let (mut state, mut monodromy) = (from.state, [[0.0; 2]; 2]);
+            for k in 1..=200 {
+                let share = f64::from(k) / 200.0;
+                let gone = 1.0 - (1.0 - share) * (1.0 - share);
+                (state, monodromy) = cycle_near(from.omega + gone * (omega - from.omega), state);
+            }
+            [omega, from_fold(monodromy).powi(2)]
+        };
+        let [[x0, y0], [x1, y1], [x2, y2]] = [1e-5, 2e-5, 4e-5].map(at);
+        // Inverse interpolation by Lagrange's polynomial.
+        let root = x0 * y1 * y2 / ((y0 - y1) * (y0 - y2))
+            + x1 * y0 * y2 / ((y1 - y0) * (y1 - y2))
+            + x2 * y0 * y1 / ((y2 - y0) * (y2 - y1));
+        println!("a branch ends at {root}; by harmonic balance at {}", fold.omega);
+        assert!((root - fold.omega).abs() < 2e-6, "{root} {}", fold.omega);
+    }
+}
