@@ -3,8 +3,8 @@
 //! # Coordinates
 //!
 //! Each domain is `M x'' + C x' + K x = force cos(omega t) + load`. The flow works on
-//! `q = (z, w, x, v)`: the gap `z = g . x`, its rate `w`, and the second displacement
-//! with its velocity. The gap is a coordinate, so a contact puts it on the wall exactly
+//! `q = (z, w, x, v)`: the gap `z = g . x`, its rate `w`, and the displacement that the gap row
+//! weighs less, the second if both weigh alike, with its velocity. The gap is a coordinate, so a contact puts it on the wall exactly
 //! and no small difference of large numbers decides an event. Together with the forcing
 //! phasor and a constant it obeys an autonomous linear system
 //!
@@ -27,17 +27,18 @@
 //!
 //! Every derivative `y^(n)` of a solution solves the same equations with the force
 //! amplitude multiplied by `omega^n` and no load. Its energy
-//! `2 E = sum m_i v_i^2 + x K x` never grows by itself, because damping only takes:
+//! `2 E = v M v + x K x` never grows by itself, because damping only takes:
 //!
 //! ```text
-//! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(sum force_i^2 / m_i)
-//! |z^(n+1)(t + s)|   <= sqrt(sum g_i^2 / m_i) sqrt(2 E_n(t + s))        (Cauchy-Schwarz)
+//! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(force M^-1 force)
+//! |z^(n+1)(t + s)|   <= sqrt(g M^-1 g) sqrt(2 E_n(t + s))        (Cauchy-Schwarz)
 //! ```
 //!
 //! That holds at resonance and without damping, costs one square root, and is tight where
 //! motion is slow: a stiff meshing spring that is not excited does not shorten the step.
 
 mod columns;
+mod constrained;
 mod energy;
 mod expansion;
 mod gap_polynomial;
@@ -52,9 +53,9 @@ pub use linear::LinearFlow;
 pub(crate) use linear::{RADIUS, Step};
 pub(crate) use short_flight::SHORT;
 
-use crate::model::{Model, ModelError, NonImpacting, Oscillator, Side, State};
+use crate::model::{Contact, Law, Model, ModelError, NonImpacting, Oscillator, Side, State};
 
-/// Gap coordinates `(z, w, x2, v2)`.
+/// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Oscillator::other`].
 pub type Gap = [f64; 4];
 
 /// Forcing phasor `(cos, sin)` of the phase `omega t`.
@@ -65,7 +66,7 @@ pub type Phasor = [f64; 2];
 pub enum DomainKind {
     /// Between the walls.
     Free,
-    /// In lasting contact with a wall.
+    /// In lasting contact with a wall; at rest on a rigid one.
     Meshing(Side),
 }
 
@@ -87,10 +88,18 @@ pub struct Flow {
     pub(crate) speed: f64,
     /// The largest power of two up to `omega`: velocities over it compare with displacements, and lose no bit.
     pub(crate) rate: f64,
+    /// What the walls are.
+    pub(crate) contacts: [Contact; 2],
     /// Change of `v` per unit of approach speed removed by the contact impulse.
     pub(crate) kick: f64,
+    /// What the damper behind an elastic wall takes from `w'` and `v'` per unit of `w`.
+    pub(crate) dampers: [[f64; 2]; 2],
     gap: [f64; 2],
-    masses: [f64; 2],
+    /// Index of the displacement beside the gap.
+    other: usize,
+    /// Degrees of freedom.
+    pub(crate) degrees: usize,
+    mass: [[f64; 2]; 2],
     symmetric: bool,
     non_impacting: Option<NonImpacting>,
     free: LinearFlow,
@@ -119,11 +128,23 @@ impl Flow {
 
     /// Solves an oscillator, which must be valid as [`Oscillator::validate`] says.
     pub fn new(oscillator: &Oscillator) -> Flow {
-        let [g0, g1] = oscillator.gap;
-        let [m1, m2] = oscillator.masses();
-        let compliance = g0 * g0 / m1 + g1 * g1 / m2;
-        let linear = |domain| LinearFlow::new(oscillator, domain);
-        let free = linear(&oscillator.free);
+        let other = oscillator.other();
+        let free = LinearFlow::new(oscillator, &oscillator.free);
+        let compliance = oscillator.mobility(oscillator.gap);
+        let pushed = oscillator.accelerations(oscillator.gap)[other];
+        let kick = -pushed / compliance;
+        let behind = |side: Side| match oscillator.contacts[side.index()] {
+            _ if oscillator.wall(side).is_infinite() => free.clone(),
+            Contact::Rigid => LinearFlow::on_rigid_wall(oscillator, kick),
+            Contact::Impact | Contact::Elastic => {
+                LinearFlow::new(oscillator, &oscillator.meshing[side.index()])
+            }
+        };
+        let damper = |side: Side| {
+            let damping = if oscillator.is_elastic(side) { oscillator.added(side)[1] } else { 0.0 };
+            [damping * compliance, damping * pushed]
+        };
+        let meshing = Side::BOTH.map(behind);
         let length = oscillator.length_scale();
         Flow {
             period: oscillator.period(),
@@ -132,13 +153,17 @@ impl Flow {
             length,
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
-            kick: -(g1 / m2) / compliance,
+            contacts: oscillator.contacts,
+            kick,
+            dampers: Side::BOTH.map(damper),
             gap: oscillator.gap,
-            masses: oscillator.masses(),
+            other,
+            degrees: oscillator.degrees,
+            mass: oscillator.mass,
             symmetric: oscillator.mirror_symmetric(),
             non_impacting: NonImpacting::new(oscillator).or_else(|| NonImpacting::beside_rest(oscillator)),
             free,
-            meshing: [linear(&oscillator.meshing[0]), linear(&oscillator.meshing[1])],
+            meshing,
         }
     }
 
@@ -148,9 +173,9 @@ impl Flow {
         size_of::<Flow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>()
     }
 
-    /// Whether `(y, t) -> (-y, t + T/2)` takes solutions to solutions.
-    pub fn mirror_symmetric(&self) -> bool {
-        self.symmetric
+    /// Whether `(y, t) -> (-y, t + T/2)` takes solutions to solutions: both walls are alike, and so is their law.
+    pub fn mirror_symmetric(&self, law: &Law) -> bool {
+        self.symmetric && law.is_symmetric()
     }
 
     /// The motion that never touches a wall, if there is a stable one, or does so as long as one
@@ -180,24 +205,36 @@ impl Flow {
 
     /// Gap coordinates of a state.
     pub fn to_gap(&self, y: State) -> Gap {
-        let [g0, g1] = self.gap;
-        [g0 * y[0] + g1 * y[2], g0 * y[1] + g1 * y[3], y[2], y[3]]
+        let ([g0, g1], o) = (self.gap, 2 * self.other);
+        [g0 * y[0] + g1 * y[2], g0 * y[1] + g1 * y[3], y[o], y[o + 1]]
+    }
+
+    /// Gap coordinates of a tangent vector: the second displacement of one degree of freedom has none.
+    pub(crate) fn tangent_to_gap(&self, [x1, v1, x2, v2]: State) -> Gap {
+        self.to_gap(if self.degrees == 1 { [x1, v1, 0.0, 0.0] } else { [x1, v1, x2, v2] })
     }
 
     /// State from gap coordinates.
     pub fn to_state(&self, q: Gap) -> State {
         let [g0, g1] = self.gap;
-        [(q[0] - g1 * q[2]) / g0, (q[1] - g1 * q[3]) / g0, q[2], q[3]]
+        if self.other == 1 {
+            [(q[0] - g1 * q[2]) / g0, (q[1] - g1 * q[3]) / g0, q[2], q[3]]
+        } else {
+            [q[2], q[3], (q[0] - g0 * q[2]) / g1, (q[1] - g0 * q[3]) / g1]
+        }
     }
 
     /// Kinetic energy of a state.
     pub fn kinetic_energy(&self, y: State) -> f64 {
-        0.5 * (self.masses[0] * y[1] * y[1] + self.masses[1] * y[3] * y[3])
+        let [[m1, m], [_, m2]] = self.mass;
+        0.5 * (m1 * y[1] * y[1] + m2 * y[3] * y[3] + 2.0 * m * y[1] * y[3])
     }
 
-    /// Linear momentum of a state; the contact impulse between two bodies keeps it.
+    /// The momentum across the gap row, `M v . (-g_2, g_1)`, which an impulse along the row keeps: for two
+    /// bodies that meet, `z = x1 - x2`, the sum of theirs.
     pub fn momentum(&self, y: State) -> f64 {
-        self.masses[0] * y[1] + self.masses[1] * y[3]
+        let ([[m1, m], [_, m2]], [g0, g1]) = (self.mass, self.gap);
+        g0 * (m2 * y[3] + m * y[1]) - g1 * (m1 * y[1] + m * y[3])
     }
 
     /// State after a time `tau >= 0` in one domain, starting at forcing phase `phase`
@@ -214,7 +251,8 @@ fn power_of_two(x: f64) -> f64 {
     f64::from_bits(x.to_bits() & f64::INFINITY.to_bits())
 }
 
-/// The matrix that takes displacements to `(z, x2)`.
+/// The matrix that takes displacements to the gap and the other displacement.
 fn displacement_matrix(oscillator: &Oscillator) -> Matrix2<f64> {
-    Matrix2::new(oscillator.gap[0], oscillator.gap[1], 0.0, 1.0)
+    let second = oscillator.other() as f64;
+    Matrix2::new(oscillator.gap[0], oscillator.gap[1], 1.0 - second, second)
 }

@@ -19,11 +19,13 @@ mod allowance;
 mod chatter;
 mod clock;
 mod contact;
+mod elastic;
 mod event;
 mod localisation;
 mod short_flight;
 mod start;
 mod step_verdict;
+mod sticking;
 mod tangent;
 
 pub use allowance::Allowance;
@@ -49,8 +51,10 @@ enum Mode {
     Free,
     /// Meshing has begun with a leaving speed: the gap is still short of the wall.
     Onset(Side),
-    /// Meshing, pressed beyond the wall.
+    /// Meshing, pressed beyond the wall; motion behind an elastic one.
     Sustained(Side),
+    /// At rest on a rigid wall, pressed.
+    Stuck(Side),
 }
 
 impl Mode {
@@ -58,7 +62,7 @@ impl Mode {
     fn domain(self) -> DomainKind {
         match self {
             Mode::Free => DomainKind::Free,
-            Mode::Onset(side) | Mode::Sustained(side) => DomainKind::Meshing(side),
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => DomainKind::Meshing(side),
         }
     }
 
@@ -67,6 +71,7 @@ impl Mode {
             Mode::Free => Mode::Free,
             Mode::Onset(side) => Mode::Onset(side.mirrored()),
             Mode::Sustained(side) => Mode::Sustained(side.mirrored()),
+            Mode::Stuck(side) => Mode::Stuck(side.mirrored()),
         }
     }
 }
@@ -142,14 +147,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// Replaces the tangent vectors.
     pub fn set_tangents(&mut self, tangents: [State; N]) {
         self.log_scale = 0.0;
-        self.tangents = tangents.map(|u| self.flow.to_gap(u));
+        self.tangents = tangents.map(|u| self.flow.tangent_to_gap(u));
     }
 
-    /// The wall the teeth mesh on, if they do.
+    /// The wall of the contact that lasts, if one does.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
             Mode::Free => None,
-            Mode::Onset(side) | Mode::Sustained(side) => Some(side),
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
         }
     }
 
@@ -246,7 +251,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     fn check_bounds(&self, linear: &LinearFlow) -> Result<(), Stop> {
         let bound = match self.mode {
             Mode::Free | Mode::Sustained(_) => &linear.gap_bound,
-            Mode::Onset(_) => &linear.pressing_bound,
+            Mode::Onset(_) | Mode::Stuck(_) => &linear.pressing_bound,
         };
         let finite = bound.remainder(&self.q, &self.phasor, 1.0).is_finite();
         if finite { Ok(()) } else { Err(Stop::NonFinite) }
@@ -286,7 +291,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                     return Ok(());
                 }
                 StepVerdict::Rests => {
-                    self.near_grazing = true;
+                    self.note_grazing();
                     self.clear_step(linear, step, until);
                     return Ok(());
                 }

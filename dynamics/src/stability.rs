@@ -180,9 +180,10 @@ pub struct Cycle {
     pub period: u32,
     /// Whether the orbit is its own mirror image.
     pub symmetric: bool,
-    /// The monodromy matrix: derivative of the strobe map over one cycle.
+    /// The monodromy matrix: derivative of the strobe map over one cycle. In one degree of freedom the second
+    /// displacement has nothing in it.
     pub monodromy: Matrix4<f64>,
-    /// Floquet multipliers `[re, im]`, largest modulus first.
+    /// Floquet multipliers `[re, im]`, largest modulus first; two for each degree of freedom.
     pub multipliers: Vec<[f64; 2]>,
     /// `ln |mu1|`, also where `mu1` itself is below the range of f64; minus infinity where
     /// the orbit is superstable.

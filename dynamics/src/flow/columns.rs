@@ -107,6 +107,14 @@ impl Columns {
         Columns { columns: self.columns.map(|c| weights.homogeneous(&c.to_array())), rotation: [0.0; 2] }
     }
 
+    /// The same matrix with a constant added to one row.
+    pub(super) fn plus_constant(mut self, row: usize, value: f64) -> Columns {
+        let mut constant = self.columns[6].to_array();
+        constant[row] += value;
+        self.columns[6] = f64x4::from(constant);
+        self
+    }
+
     /// `u (t_0 + u (t_1 + u (t_2 + ...)))`. Seven chains side by side keep both multipliers
     /// busy; splitting even and odd terms was tried and only spilled registers.
     pub(super) fn horner(terms: &[Columns], u: f64) -> Columns {

@@ -1,6 +1,6 @@
 //! Bounds on derivatives of the gap from the energy of differentiated solutions.
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Matrix4};
 
 use super::columns::Columns;
 use super::{Gap, Phasor, displacement_matrix};
@@ -23,6 +23,14 @@ pub(crate) struct EnergyBound {
 }
 
 impl EnergyBound {
+    /// Of what does not move.
+    pub(super) const NONE: EnergyBound = EnergyBound { columns: Columns::ZERO, growth: 0.0 };
+
+    /// A bound whose squares are summed by these columns, and that grows by so much in a Taylor step.
+    pub(super) fn of(columns: Columns, growth: f64) -> EnergyBound {
+        EnergyBound { columns, growth }
+    }
+
     /// A bound from the energy of `y^(n)`; `term` is `(G unit)^n / n!` and `unit` the Taylor step.
     pub(super) fn new(
         oscillator: &Oscillator,
@@ -31,12 +39,9 @@ impl EnergyBound {
         n: u32,
         unit: f64,
     ) -> EnergyBound {
-        let masses = Vector2::from(oscillator.masses());
-        let gap = Vector2::from(oscillator.gap);
-        let reach = gap.component_mul(&gap).component_div(&masses).sum().sqrt();
+        let reach = oscillator.mobility(oscillator.gap).sqrt();
         let scale = reach * unit.powi(6) / 14400.0;
-        let force = Vector2::from(oscillator.force);
-        let drive = force.component_mul(&force).component_div(&masses).sum().sqrt();
+        let drive = oscillator.mobility(oscillator.force).sqrt();
         let factorial: u32 = (1..=n).product();
         // Not a number, and so nothing that certifies a step, where powers leave the range of f64.
         let power = scale / unit.powi(n as i32) * f64::from(factorial);
@@ -62,16 +67,15 @@ impl EnergyBound {
     }
 }
 
-/// A matrix `L` with `|L q|^2 = sum m_i v_i^2 + x K x`.
+/// A matrix `L` with `|L q|^2 = v M v + x K x`.
 fn energy_root(oscillator: &Oscillator, domain: &Domain) -> Matrix4<f64> {
-    let back =
-        displacement_matrix(oscillator).try_inverse().expect("the gap row starts with a non-zero entry");
+    let back = displacement_matrix(oscillator).try_inverse().expect("the gap row is not zero");
     let k = domain.stiffness;
     let eigen = Matrix2::new(k[0][0], k[0][1], k[1][0], k[1][1]).symmetric_eigen();
     let root = Matrix2::from_diagonal(&eigen.eigenvalues.map(|l| l.max(0.0).sqrt()))
         * eigen.eigenvectors.transpose();
-    let (potential, kinetic) =
-        (root * back, Matrix2::from_diagonal(&Vector2::from(oscillator.masses()).map(f64::sqrt)) * back);
+    let [[first, _], [below, second]] = oscillator.mass_root();
+    let (potential, kinetic) = (root * back, Matrix2::new(first, below, 0.0, second) * back);
     let mut l = Matrix4::zeros();
     for i in 0..2 {
         for j in 0..2 {

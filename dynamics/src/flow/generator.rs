@@ -8,11 +8,12 @@ use crate::model::{Domain, Oscillator};
 /// Generator and propagators of `a = (z, w, x, v, cos, sin, 1)`.
 pub(super) type Generator = SMatrix<f64, 7, 7>;
 
-/// `a' = G a`, from the equations of motion in the coordinates `(z, x2)`.
+/// `a' = G a`, from the equations of motion in the coordinates of the gap.
 pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
     let d = displacement_matrix(oscillator);
-    let d_inverse = d.try_inverse().expect("the first entry of the gap row is not zero");
-    let by_mass = Matrix2::from_diagonal(&Vector2::from(oscillator.masses()).map(f64::recip));
+    let d_inverse = d.try_inverse().expect("the gap row is not zero");
+    // Symmetric: columns are rows.
+    let by_mass = Matrix2::from(oscillator.inverse_mass());
     let matrix =
         |m: [[f64; 2]; 2]| d * by_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * d_inverse;
     let (damping, stiffness) = (matrix(domain.damping), matrix(domain.stiffness));
@@ -35,10 +36,16 @@ pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
 
 /// A bound on all rates of the domain: forcing, and the norm of the mass-scaled system.
 pub(super) fn rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
-    let root = Vector2::from(oscillator.masses()).map(|m| m.sqrt().recip());
+    let [[first, _], [below, second]] = oscillator.mass_root();
+    let root = Vector2::new(first.recip(), second.recip());
     let norm = |m: [[f64; 2]; 2]| {
-        let scaled =
-            Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]).component_mul(&(root * root.transpose()));
+        let m = Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
+        let scaled = if below == 0.0 {
+            m.component_mul(&(root * root.transpose()))
+        } else {
+            let inverse = Matrix2::new(root[0], 0.0, -below * root[0] * root[1], root[1]);
+            inverse * m * inverse.transpose()
+        };
         scaled.symmetric_eigenvalues().abs().max()
     };
     (norm(domain.damping) + norm(domain.stiffness).sqrt()).max(oscillator.omega)

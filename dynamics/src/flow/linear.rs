@@ -4,6 +4,7 @@ use nalgebra::{Matrix4, SMatrix};
 use wide::f64x4;
 
 use super::columns::Columns;
+use super::constrained;
 use super::energy::EnergyBound;
 use super::expansion::{FINEST_PART, Grid};
 use super::gap_polynomial::GapPolynomial;
@@ -82,11 +83,12 @@ pub struct LinearFlow {
     pub(crate) short_flight: ShortFlight,
     /// Columns of the vector field `(w, w', v, v')`.
     field: Columns,
-    /// Rows of `z'', z''', z''''` on `a`.
+    /// Rows of `z'', z''', z''''` on `a`; of motion on a rigid wall, of the acceleration that the wall takes
+    /// up, and of its first two rates.
     gap_rates: [[f64; 7]; 3],
     /// Bound on `z^(6)`, for the gap itself.
     pub(crate) gap_bound: EnergyBound,
-    /// Bound on `z^(8)`, for the relative acceleration.
+    /// Bound on `z^(8)`, for the relative acceleration; likewise.
     pub(crate) pressing_bound: EnergyBound,
 }
 
@@ -100,6 +102,30 @@ impl LinearFlow {
     pub(super) fn new(oscillator: &Oscillator, domain: &Domain) -> LinearFlow {
         let generator = generator(oscillator, domain);
         let rate = rate(oscillator, domain);
+        let bounds = |table: &[Columns], unit: f64| {
+            let bound = |n: u32| EnergyBound::new(oscillator, domain, &table[n as usize - 1], n, unit);
+            [bound(5), bound(7)]
+        };
+        LinearFlow::assemble(oscillator, generator, rate, generator * generator, bounds)
+    }
+
+    /// Motion at rest on a rigid wall: the gap is held, and the other displacement moves on. What is called the
+    /// relative acceleration is that which the wall takes up.
+    pub(super) fn on_rigid_wall(oscillator: &Oscillator, kick: f64) -> LinearFlow {
+        let motion = constrained::Motion::new(oscillator, kick);
+        let bounds = |table: &[Columns], unit: f64| [EnergyBound::NONE, motion.bound(&table[4], unit)];
+        LinearFlow::assemble(oscillator, motion.generator, motion.rate, motion.watched, bounds)
+    }
+
+    /// All there is to know of a system `a' = G a`; the first row of `watched` is that of `z''`, or of what is
+    /// watched in its place.
+    fn assemble(
+        oscillator: &Oscillator,
+        generator: Generator,
+        rate: f64,
+        watched: Generator,
+        bounds: impl Fn(&[Columns], f64) -> [EnergyBound; 2],
+    ) -> LinearFlow {
         let unit = RADIUS / rate;
         let columns = Columns::of(&generator);
         let table = taylor_table(&columns, unit);
@@ -109,16 +135,17 @@ impl LinearFlow {
         let coarse = fit.clamp(0.0, COARSE_LEVELS as f64) as usize;
         let grid = Grid::new(&table, 1 << coarse);
 
-        let mut power = generator;
-        let mut gap_rates = [[0.0; 7]; 3];
-        for rates in &mut gap_rates {
+        let mut power = watched;
+        let gap_rates = std::array::from_fn(|_| {
+            let rates = std::array::from_fn(|j| power[(0, j)]);
             power *= generator;
-            *rates = std::array::from_fn(|j| power[(0, j)]);
-        }
+            rates
+        });
+        let [gap_bound, pressing_bound] = bounds(&table, unit);
         let mut linear = LinearFlow {
             field: columns,
-            gap_bound: EnergyBound::new(oscillator, domain, &table[4], 5, unit),
-            pressing_bound: EnergyBound::new(oscillator, domain, &table[6], 7, unit),
+            gap_bound,
+            pressing_bound,
             generator,
             rate,
             unit,
@@ -162,13 +189,13 @@ impl LinearFlow {
         self.field.apply(q, phasor).to_array()
     }
 
-    /// The relative acceleration `w' = z''`.
+    /// The relative acceleration `w' = z''`; of motion on a rigid wall, what the wall takes up of it.
     #[inline]
     pub fn acceleration(&self, q: &Gap, phasor: &Phasor) -> f64 {
         dot(&self.gap_rates[0], q, phasor)
     }
 
-    /// `z'', z''', z''''`.
+    /// `z'', z''', z''''`, or what the wall takes up, and its first two rates.
     #[inline]
     pub(crate) fn acceleration_rates(&self, q: &Gap, phasor: &Phasor) -> [f64; 3] {
         self.gap_rates.map(|row| dot(&row, q, phasor))

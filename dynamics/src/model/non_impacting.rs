@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-9;
 pub struct NonImpacting {
     /// The steady state at phase 0.
     steady: State,
-    masses: [f64; 2],
+    mass: [[f64; 2]; 2],
     stiffness: Matrix2<f64>,
     /// `sqrt(2 E)` up to which a transient keeps clear of the walls.
     reach: f64,
@@ -35,15 +35,21 @@ pub struct NonImpacting {
 impl NonImpacting {
     /// None if there is no contact-free steady motion, or if it does not attract.
     pub fn new(oscillator: &Oscillator) -> Option<NonImpacting> {
-        let Oscillator { omega, walls, .. } = *oscillator;
-        let masses = oscillator.masses();
+        if oscillator.degrees == 1 {
+            return NonImpacting::of_two(&beside_copy(oscillator, 1));
+        }
+        NonImpacting::of_two(oscillator)
+    }
+
+    fn of_two(oscillator: &Oscillator) -> Option<NonImpacting> {
+        let Oscillator { omega, walls, mass, .. } = *oscillator;
         let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
         let (stiffness, damping) = (matrix(oscillator.free.stiffness), matrix(oscillator.free.damping));
         let gap = Vector2::from(oscillator.gap);
         let compliance = stiffness.cholesky()?.inverse();
-        let inverse_mass = Matrix2::from_diagonal(&Vector2::from(masses.map(f64::recip)));
+        let inverse_mass = matrix(oscillator.inverse_mass());
         let exponent = exponent(&(inverse_mass * stiffness), &(inverse_mass * damping));
-        let inertia = Matrix2::from_diagonal(&Vector2::from(masses)) * (omega * omega);
+        let inertia = matrix(mass) * (omega * omega);
         let dynamic =
             (stiffness - inertia).map(Complex::from) + damping.map(|c| Complex::new(0.0, omega * c));
         let amplitude = dynamic.try_inverse()? * Vector2::from(oscillator.force).map(Complex::from);
@@ -57,28 +63,22 @@ impl NonImpacting {
         }
         let steady = [0, 1].map(|i| [amplitude[i].re + middle[i], -omega * amplitude[i].im]);
         let steady = [steady[0][0], steady[0][1], steady[1][0], steady[1][1]];
-        Some(NonImpacting { steady, masses, stiffness, reach, exponent, resting: None })
+        Some(NonImpacting { steady, mass, stiffness, reach, exponent, resting: None })
     }
 
     /// The same where one degree of freedom keeps at rest: nothing moves it between the walls. Whether its
     /// own motion would decay makes no difference then.
     pub fn beside_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
-            let Oscillator { gap, force, mut free, .. } = *oscillator;
-            let masses = oscillator.masses();
+            let Oscillator { gap, force, free, mass, .. } = *oscillator;
             let moving = 1 - resting;
-            let is_coupled = [free.stiffness, free.damping].iter().any(|m| m[0][1] != 0.0 || m[1][0] != 0.0);
+            let is_coupled =
+                [free.stiffness, free.damping, mass].iter().any(|m| m[0][1] != 0.0 || m[1][0] != 0.0);
             let stays = !is_coupled && force[resting] == 0.0 && free.load[resting] == 0.0;
             if !stays || gap[moving] == 0.0 {
                 return None;
             }
-            // In its place a copy of the other, which no wall sees.
-            let share = masses[resting] / masses[moving];
-            free.stiffness[resting][resting] = share * free.stiffness[moving][moving];
-            free.damping[resting][resting] = share * free.damping[moving][moving];
-            let mut seen = gap;
-            seen[resting] = 0.0;
-            let quiet = NonImpacting::new(&Oscillator { gap: seen, free, ..*oscillator })?;
+            let quiet = NonImpacting::of_two(&beside_copy(oscillator, resting))?;
             Some(NonImpacting { resting: Some(resting), ..quiet })
         })
     }
@@ -95,8 +95,9 @@ impl NonImpacting {
         }
         let q: State = std::array::from_fn(|i| y[i] - self.steady[i]);
         let x = Vector2::new(q[0], q[2]);
-        let twice_energy =
-            self.masses[0] * q[1] * q[1] + self.masses[1] * q[3] * q[3] + x.dot(&(self.stiffness * x));
+        let [[m1, m], [_, m2]] = self.mass;
+        let kinetic = m1 * q[1] * q[1] + m2 * q[3] * q[3] + 2.0 * m * q[1] * q[3];
+        let twice_energy = kinetic + x.dot(&(self.stiffness * x));
         twice_energy < self.reach * self.reach
     }
 
@@ -114,6 +115,17 @@ impl NonImpacting {
     pub fn exponent(&self) -> f64 {
         self.exponent
     }
+}
+
+/// An oscillator with a copy of one degree of freedom in place of the other, which no wall sees.
+fn beside_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
+    let (mut copied, moving) = (*oscillator, 1 - resting);
+    let share = copied.mass[resting][resting] / copied.mass[moving][moving];
+    let free = &mut copied.free;
+    free.stiffness[resting][resting] = share * free.stiffness[moving][moving];
+    free.damping[resting][resting] = share * free.damping[moving][moving];
+    copied.gap[resting] = 0.0;
+    copied
 }
 
 /// The largest real part of the eigenvalues of free motion.

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use super::Side;
+
 /// How far rounding may take a semidefinite matrix from being one, relative to its entries.
 const ROUNDING: f64 = 1e-12;
 
@@ -27,6 +29,16 @@ pub enum OscillatorError {
     /// A damping or stiffness matrix that is not its own transpose.
     #[error("{quantity} = {matrix:?}: the matrix must be symmetric")]
     NotSymmetric {
+        /// Which matrix it is.
+        quantity: String,
+        /// The matrix.
+        matrix: [[f64; 2]; 2],
+    },
+    /// A matrix behind an elastic wall that does more than act along the gap row.
+    #[error(
+        "{quantity} = {matrix:?}: behind an elastic wall it must be that of free motion and a part along the gap row"
+    )]
+    NotAlongGap {
         /// Which matrix it is.
         quantity: String,
         /// The matrix.
@@ -87,7 +99,7 @@ pub struct Oscillator {
     pub degrees: usize,
     /// Mass matrix, symmetric and positive definite.
     pub mass: [[f64; 2]; 2],
-    /// Row `g` of the gap `z = g . x`; its first entry is not zero.
+    /// Row `g` of the gap `z = g . x`; not zero.
     pub gap: [f64; 2],
     /// Positions `z` of the right (upper) and left (lower) wall; `+inf` or `-inf` where there is none,
     /// and then nothing asks for the motion behind it.
@@ -110,9 +122,59 @@ impl Oscillator {
         std::f64::consts::TAU / self.omega
     }
 
+    /// Position of a wall.
+    pub(crate) fn wall(&self, side: Side) -> f64 {
+        self.walls[side.index()]
+    }
+
     /// The diagonal of the mass matrix.
     pub fn masses(&self) -> [f64; 2] {
         [self.mass[0][0], self.mass[1][1]]
+    }
+
+    /// Index of the displacement that goes with the gap as a coordinate: the one that the gap row weighs
+    /// less, the second if both weigh alike.
+    pub fn other(&self) -> usize {
+        usize::from(self.gap[0].abs() >= self.gap[1].abs())
+    }
+
+    /// `M^-1 force`: the accelerations that a force gives.
+    pub fn accelerations(&self, force: [f64; 2]) -> [f64; 2] {
+        let ([[m1, m], [_, m2]], [f1, f2]) = (self.mass, force);
+        if m == 0.0 {
+            return [f1 / m1, f2 / m2];
+        }
+        let share = m / m1;
+        let second = (f2 - share * f1) / (m2 - share * m);
+        [(f1 - m * second) / m1, second]
+    }
+
+    /// The inverse of the mass matrix.
+    pub fn inverse_mass(&self) -> [[f64; 2]; 2] {
+        let [[m1, m], [_, m2]] = self.mass;
+        if m == 0.0 {
+            return [[m1.recip(), 0.0], [0.0, m2.recip()]];
+        }
+        let [[a, c], [_, d]] = [self.accelerations([1.0, 0.0]), self.accelerations([0.0, 1.0])];
+        [[a, c], [c, d]]
+    }
+
+    /// `row M^-1 row`: what an impulse along a row changes of that row's velocity.
+    pub fn mobility(&self, row: [f64; 2]) -> f64 {
+        let ([[m1, m], [_, m2]], [r1, r2]) = (self.mass, row);
+        if m == 0.0 {
+            return r1 * r1 / m1 + r2 * r2 / m2;
+        }
+        let share = m / m1;
+        let rest = r2 - share * r1;
+        r1 * r1 / m1 + rest * rest / (m2 - share * m)
+    }
+
+    /// Lower factor `L` of the mass matrix `L L^T`.
+    pub(crate) fn mass_root(&self) -> [[f64; 2]; 2] {
+        let [[m1, m], [_, m2]] = self.mass;
+        let first = m1.sqrt();
+        [[first, 0.0], [m / first, (m2 - m / m1 * m).sqrt()]]
     }
 
     /// Checks everything that flow and reference rest on.
@@ -120,6 +182,8 @@ impl Oscillator {
     /// # Errors
     /// [`OscillatorError`] for the first thing that is wrong.
     pub fn validate(&self) -> Result<(), OscillatorError> {
+        let is_known = matches!(self.degrees, 1 | 2);
+        require(is_known, || "degrees of freedom".to_owned(), self.degrees as f64, "1 or 2")?;
         let [[m1, m], [other, m2]] = self.mass;
         for (i, mass) in [m1, m2].into_iter().enumerate() {
             positive(|| format!("mass {}", i + 1), mass)?;
@@ -127,15 +191,16 @@ impl Oscillator {
         if m != other {
             return Err(OscillatorError::NotSymmetric { quantity: "mass".to_owned(), matrix: self.mass });
         }
-        if m != 0.0 && !(m1 * m2 > m * m) {
+        let is_definite = m == 0.0 || m1 * m2 > m * m;
+        if !is_definite {
             return Err(OscillatorError::NotDefinite { matrix: self.mass });
         }
         positive(|| "omega".to_owned(), self.omega)?;
         for (i, entry) in self.gap.into_iter().enumerate() {
-            let is_allowed = entry.is_finite() && (i > 0 || entry != 0.0);
-            let requirement = if i == 0 { "finite and not 0" } else { "a finite number" };
-            require(is_allowed, || format!("entry {} of the gap row", i + 1), entry, requirement)?;
+            finite(|| format!("entry {} of the gap row", i + 1), entry)?;
         }
+        let largest = self.gap[1 - self.other()];
+        require(largest != 0.0, || "the largest entry of the gap row".to_owned(), largest, "not 0")?;
         for (i, force) in self.force.into_iter().enumerate() {
             finite(|| format!("force {}", i + 1), force)?;
         }
@@ -146,8 +211,89 @@ impl Oscillator {
             return Err(OscillatorError::Walls { walls: self.walls });
         }
         self.free.validate("free motion")?;
-        self.meshing[0].validate("contact with the right wall")?;
-        self.meshing[1].validate("contact with the left wall")
+        for (side, place) in
+            [(Side::Right, "contact with the right wall"), (Side::Left, "contact with the left wall")]
+        {
+            if self.has_motion_behind(side) {
+                self.meshing[side.index()].validate(place)?;
+            }
+            if self.is_elastic(side) {
+                self.validate_elastic(side, place)?;
+            }
+        }
+        if self.degrees == 1 { self.validate_single() } else { Ok(()) }
+    }
+
+    /// Whether motion may go on behind a wall: there is one, and it yields.
+    pub(crate) fn has_motion_behind(&self, side: Side) -> bool {
+        self.wall(side).is_finite() && self.contacts[side.index()] != Contact::Rigid
+    }
+
+    /// Whether there is a wall that motion goes through without a jump.
+    pub(crate) fn is_elastic(&self, side: Side) -> bool {
+        self.wall(side).is_finite() && self.contacts[side.index()] == Contact::Elastic
+    }
+
+    /// Stiffness and damping that a wall adds along the gap row.
+    pub(crate) fn added(&self, side: Side) -> [f64; 2] {
+        let behind = &self.meshing[side.index()];
+        [
+            along(self.gap, behind.stiffness, self.free.stiffness),
+            along(self.gap, behind.damping, self.free.damping),
+        ]
+    }
+
+    /// An elastic wall acts along the gap row, and from its position on: motion has no jump there.
+    fn validate_elastic(&self, side: Side, place: &str) -> Result<(), OscillatorError> {
+        let (behind, free, g) = (&self.meshing[side.index()], &self.free, self.gap);
+        let [stiffness, damping] = self.added(side);
+        let matrices = [
+            ("stiffness", behind.stiffness, free.stiffness, stiffness),
+            ("damping", behind.damping, free.damping, damping),
+        ];
+        for (name, matrix, before, added) in matrices {
+            let size = matrix.iter().chain(&before).flatten().fold(0.0f64, |size, x| size.max(x.abs()));
+            let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
+            let is_along = |(i, j): (usize, usize)| {
+                (matrix[i][j] - before[i][j] - added * g[i] * g[j]).abs() <= ROUNDING * size
+            };
+            if !(added >= 0.0 && pairs.into_iter().all(is_along)) {
+                let quantity = format!("{name} in {place}");
+                return Err(OscillatorError::NotAlongGap { quantity, matrix });
+            }
+        }
+        let wall = self.wall(side);
+        for (i, g) in g.into_iter().enumerate() {
+            let expected = free.load[i] + stiffness * wall * g;
+            let size = free.load[i].abs() + (stiffness * wall * g).abs();
+            let is_continuous = (behind.load[i] - expected).abs() <= ROUNDING * size;
+            let requirement = "the load of free motion and the spring's at the wall";
+            require(is_continuous, || format!("load {} in {place}", i + 1), behind.load[i], requirement)?;
+        }
+        Ok(())
+    }
+
+    /// The second displacement of one degree of freedom is there in name only.
+    fn validate_single(&self) -> Result<(), OscillatorError> {
+        let none = |what: &str, value: f64| {
+            let requirement = "0, since one degree of freedom has no second displacement";
+            require(value == 0.0, || what.to_owned(), value, requirement)
+        };
+        none("entry 2 of the gap row", self.gap[1])?;
+        none("force 2", self.force[1])?;
+        none("mass 1, 2", self.mass[0][1])?;
+        let mass = self.mass[1][1];
+        require(mass == 1.0, || "mass 2".to_owned(), mass, "1 where there is one degree of freedom")?;
+        let behind = Side::BOTH.into_iter().filter(|&side| self.has_motion_behind(side));
+        let domains = behind.map(|side| &self.meshing[side.index()]).chain([&self.free]);
+        for domain in domains {
+            none("load 2", domain.load[1])?;
+            for (name, matrix) in [("damping", domain.damping), ("stiffness", domain.stiffness)] {
+                none(&format!("{name} 1, 2"), matrix[0][1])?;
+                none(&format!("{name} 2, 2"), matrix[1][1])?;
+            }
+        }
+        Ok(())
     }
 
     /// What distances are measured by, > 0: half the walls' distance, or where a wall is missing or
@@ -178,8 +324,9 @@ impl Oscillator {
     /// The largest displacement of `(K + omega^2 M)^-1 force`.
     fn deflection(&self, force: [f64; 2]) -> f64 {
         let [[k1, k], [_, k2]] = self.free.stiffness;
-        let [a, b] = self.masses().map(|m| m * self.omega * self.omega);
-        let (a, b) = (a + k1, b + k2);
+        let [[m1, m], [_, m2]] = self.mass;
+        let [a, b, m] = [m1, m2, m].map(|m| m * self.omega * self.omega);
+        let (a, b, k) = (a + k1, b + k2, m + k);
         let determinant = a * b - k * k;
         let [f1, f2] = force;
         ((b * f1 - k * f2) / determinant).abs().max(((a * f2 - k * f1) / determinant).abs())
@@ -192,7 +339,7 @@ impl Oscillator {
         self.walls[0] == -self.walls[1]
             && self.contacts[0] == self.contacts[1]
             && self.free == mirrored(&self.free)
-            && self.meshing[0] == mirrored(&self.meshing[1])
+            && (!self.has_motion_behind(Side::Right) || self.meshing[0] == mirrored(&self.meshing[1]))
     }
 }
 
@@ -212,6 +359,13 @@ impl Domain {
         }
         self.load.into_iter().try_for_each(|load| finite(|| format!("load in {place}"), load))
     }
+}
+
+/// What one matrix has more than another along a row: `c` where the difference is `c row row^T`.
+fn along(row: [f64; 2], matrix: [[f64; 2]; 2], less: [[f64; 2]; 2]) -> f64 {
+    let square = row[0] * row[0] + row[1] * row[1];
+    let product = |i: usize, j: usize| row[i] * (matrix[i][j] - less[i][j]) * row[j];
+    (product(0, 0) + product(0, 1) + product(1, 0) + product(1, 1)) / (square * square)
 }
 
 fn finite(quantity: impl Fn() -> String, value: f64) -> Result<(), OscillatorError> {
@@ -290,7 +444,13 @@ mod tests {
         };
         assert_eq!(slip(|o| o.mass[1][1] = 0.0), "mass 2 = 0: it must be finite and greater than 0");
         assert_eq!(slip(|o| o.omega = f64::NAN), "omega = NaN: it must be finite and greater than 0");
-        assert_eq!(slip(|o| o.gap[0] = 0.0), "entry 1 of the gap row = 0: it must be finite and not 0");
+        assert_eq!(slip(|o| o.gap = [0.0; 2]), "the largest entry of the gap row = 0: it must be not 0");
+        assert_eq!(slip(|o| o.gap[1] = f64::NAN), "entry 2 of the gap row = NaN: it must be a finite number");
+        assert_eq!(slip(|o| o.degrees = 3), "degrees of freedom = 3: it must be 1 or 2");
+        assert_eq!(
+            slip(|o| o.degrees = 1),
+            "entry 2 of the gap row = -1: it must be 0, since one degree of freedom has no second displacement"
+        );
         assert_eq!(slip(|o| o.force[0] = f64::INFINITY), "force 1 = inf: it must be a finite number");
         assert_eq!(
             slip(|o| o.walls = [-0.5, 0.5]),

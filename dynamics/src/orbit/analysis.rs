@@ -278,7 +278,7 @@ impl Analysis<'_> {
     /// period can be symmetric; those are found more surely by the half-period map.
     pub(super) fn maps(&self, period: u32) -> Vec<StrobeMap> {
         let whole = StrobeMap::Periods(period);
-        if period % 2 == 1 && self.flow.mirror_symmetric() {
+        if period % 2 == 1 && self.flow.mirror_symmetric(&self.law) {
             vec![StrobeMap::MirroredHalves(period), whole]
         } else {
             vec![whole]

@@ -234,7 +234,7 @@ impl<'a> Watch<'a> {
             lyapunov: flow.non_impacting().map(|motion| [motion.exponent(), 0.0]),
             impacts_per_period: 0.0,
             mesh_fraction: 0.0,
-            symmetric: flow.mirror_symmetric().then_some(true),
+            symmetric: flow.mirror_symmetric(&self.analysis.law).then_some(true),
             word: Some(Word::default()),
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,

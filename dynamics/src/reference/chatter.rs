@@ -2,7 +2,7 @@
 
 use super::{EventKind, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow, Phasor, RADIUS};
-use crate::model::Side;
+use crate::model::{Contact, Side};
 
 /// A series is closed once its whole duration, in units of the fastest rate of free
 /// motion, is this short: what the closed form leaves out is of third order in it.
@@ -92,16 +92,17 @@ impl<const N: usize> Trajectory<'_, N> {
         let per_speed = (1.0 - 2.0 * bend * whole) * whole / leaving;
         let per_pressing = whole / pressing;
         let pressing_at_end = pressing + duration * pressing_rate;
+        let is_rigid = flow.contacts[side.index()] == Contact::Rigid;
         self.tangents = self.tangents.map(|[dz, dw, dx, dv]| {
             // A neighbour leaves the wall `later`, and so at another speed and under another pressing
             // acceleration; its series ends `late`. Until then it misses what presses it at the end.
-            // The centre of mass feels the way of the gap alone.
+            // The centre of mass feels the way of the gap alone. On a rigid wall it comes to rest, too.
             let (dx, dv) = (dx + kick * dz, dv + kick * dw);
             let later = s * dz / leaving;
             let leaves = -s * dw - (pressing + sliding.damping * leaving) * later;
             let presses = s * (gradient[0] * dx + gradient[1] * dv) + pressing_rate * later;
             let late = later + per_speed * leaves - per_pressing * presses;
-            let behind = -s * pressing_at_end * late;
+            let behind = if is_rigid { 0.0 } else { -s * pressing_at_end * late };
             let dv_rate = v_gradient[0] * dx + v_gradient[1] * dv;
             [0.0, behind, dx + duration * dv, dv + duration * dv_rate - sliding.drag * dz - kick * behind]
         });
@@ -111,6 +112,10 @@ impl<const N: usize> Trajectory<'_, N> {
         let before = self.q;
         self.short_flight = false;
         self.record(EventKind::MeshStart, side, before, observer);
-        self.start_meshing(side, 0.0);
+        if is_rigid {
+            self.rest_on(side);
+        } else {
+            self.start_meshing(side, 0.0);
+        }
     }
 }

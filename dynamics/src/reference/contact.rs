@@ -2,7 +2,7 @@
 
 use super::{Crossing, EventKind, Happening, Mode, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow};
-use crate::model::Side;
+use crate::model::{Contact, Side};
 
 /// Approach speeds below this, relative to the scale of length and the rate of free motion
 /// and with the load pulling away, count as near grazing: the saltation matrix grows like
@@ -16,7 +16,11 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Finds out where the start lies.
     pub(super) fn enter(&mut self) {
         for side in Side::BOTH {
-            let beyond = side.sign() * (self.q[0] - self.flow.wall(side));
+            let mut beyond = side.sign() * (self.q[0] - self.flow.wall(side));
+            if beyond > 0.0 && self.flow.contacts[side.index()] == Contact::Rigid {
+                self.q[0] = self.flow.wall(side);
+                beyond = 0.0;
+            }
             if beyond > 0.0 {
                 self.mode = Mode::Sustained(side);
                 self.origin = Some(side);
@@ -43,6 +47,9 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.mode = Mode::Sustained(side);
                 self.from_wall = Some((side, 1));
             }
+            Crossing::MeshEnds(side) if self.flow.contacts[side.index()] == Contact::Elastic => {
+                self.come_out(side, observer);
+            }
             Crossing::MeshEnds(side) => {
                 self.q[0] = self.flow.wall(side);
                 let rate = self.q[1];
@@ -56,6 +63,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.end_meshing(side, &ALONG_GAP, rate, observer);
                 self.contact(side.mirrored(), observer);
             }
+            Crossing::PressingEnds(side) if self.mode == Mode::Stuck(side) => self.let_go(side, observer),
             Crossing::PressingEnds(side) => {
                 let linear = self.flow.domain(DomainKind::Meshing(side));
                 let row = linear.acceleration_row();
@@ -67,9 +75,19 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Free motion reaches a wall: the impact law, then meshing or not (22), (37).
+    /// Free motion reaches a wall.
     #[inline(always)]
     pub(super) fn contact(&mut self, side: Side, observer: &mut impl Observer) {
+        match self.flow.contacts[side.index()] {
+            Contact::Elastic => self.go_behind(side, observer),
+            Contact::Rigid if self.sticks(side) => self.stick(side, observer),
+            Contact::Impact | Contact::Rigid => self.impact(side, observer),
+        }
+    }
+
+    /// The impact law, then meshing or not (22), (37).
+    #[inline(always)]
+    fn impact(&mut self, side: Side, observer: &mut impl Observer) {
         let e = self.law.restitution[side.index()];
         self.q[0] = self.flow.wall(side);
         let before = self.q;
@@ -84,6 +102,7 @@ impl<const N: usize> Trajectory<'_, N> {
         let pressed = pressing > 0.0 || pressing == 0.0 && self.presses(DomainKind::Free, side, &after);
         let meshes = leaving <= self.law.mesh_speed[side.index()]
             && pressed
+            && self.flow.contacts[side.index()] == Contact::Impact
             && self.presses(DomainKind::Meshing(side), side, &after);
         if approach < GRAZING_SPEED * self.flow.speed && !pressed {
             self.near_grazing = true;
@@ -116,6 +135,8 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     pub(super) fn start_meshing(&mut self, side: Side, leaving: f64) {
+        // Both sides share one length of step, and one may have fewer.
+        self.level[1] = self.level[1].min(self.flow.domain(DomainKind::Meshing(side)).levels - 1);
         if leaving > 0.0 {
             self.mode = Mode::Onset(side);
             self.from_wall = Some((side, 1));
@@ -136,20 +157,20 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// Free motion starts on a wall.
-    fn leave(&mut self, side: Side) {
+    pub(super) fn leave(&mut self, side: Side) {
         self.mode = Mode::Free;
         let order = if self.q[1] == 0.0 { self.rest_order(DomainKind::Free) } else { 1 };
         self.from_wall = Some((side, order));
     }
 
     /// Order of the root of the distance for a gap that rests on the wall.
-    fn rest_order(&self, kind: DomainKind) -> usize {
+    pub(super) fn rest_order(&self, kind: DomainKind) -> usize {
         if self.flow.domain(kind).acceleration(&self.q, &self.phasor) == 0.0 { 3 } else { 2 }
     }
 
     /// Whether the relative acceleration, or else the first of its rates that is not zero,
     /// points into the wall.
-    fn presses(&self, kind: DomainKind, side: Side, q: &Gap) -> bool {
+    pub(super) fn presses(&self, kind: DomainKind, side: Side, q: &Gap) -> bool {
         let linear = self.flow.domain(kind);
         let a = linear.acceleration(q, &self.phasor);
         if a != 0.0 {
@@ -162,7 +183,7 @@ impl<const N: usize> Trajectory<'_, N> {
     /// The first flight of all comes from no wall and has no symbol.
     pub(super) fn record(&mut self, kind: EventKind, side: Side, before: Gap, observer: &mut impl Observer) {
         let symbol = match (self.mode, self.origin) {
-            (Mode::Onset(side) | Mode::Sustained(side), _) => {
+            (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => {
                 Some(if side == Side::Right { b'1' } else { b'4' })
             }
             (Mode::Free, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
@@ -220,6 +241,12 @@ impl<const N: usize> Trajectory<'_, N> {
                     (false, false) => return false,
                 }
             }
+            Mode::Stuck(side) => {
+                if self.presses(DomainKind::Meshing(side), side, &self.q) {
+                    return false;
+                }
+                self.let_go(side, observer);
+            }
         }
         true
     }
@@ -228,11 +255,26 @@ impl<const N: usize> Trajectory<'_, N> {
     /// from the wall.
     fn touch(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
-        if side.sign() * self.q[1] > 0.0 {
+        let closing = side.sign() * self.q[1];
+        let stays = self.flow.contacts[side.index()] != Contact::Impact
+            && closing == 0.0
+            && self.presses(DomainKind::Free, side, &self.q);
+        if closing > 0.0 || stays {
             self.contact(side, observer);
         } else {
             self.origin = Some(side);
             self.leave(side);
+        }
+    }
+
+    /// Something touches a wall within rounding. Elastic ones it may go through or not: the linearisation is
+    /// as good.
+    #[cold]
+    pub(super) fn note_grazing(&mut self) {
+        let [right, left] = self.flow.walls.map(|wall| (self.q[0] - wall).abs());
+        let nearer = if right <= left { Side::Right } else { Side::Left };
+        if self.flow.contacts[nearer.index()] != Contact::Elastic {
+            self.near_grazing = true;
         }
     }
 
@@ -245,7 +287,7 @@ impl<const N: usize> Trajectory<'_, N> {
         until: f64,
         observer: &mut impl Observer,
     ) {
-        self.near_grazing = true;
+        self.note_grazing();
         let remaining = self.clock.remaining(until);
         let s = h.min(remaining);
         self.move_within(linear, s);

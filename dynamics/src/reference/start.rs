@@ -3,7 +3,7 @@
 use super::clock::Clock;
 use super::{Allowance, Mode, Trajectory, Work};
 use crate::flow::{DomainKind, Flow};
-use crate::model::{Law, Side, State};
+use crate::model::{Contact, Law, Side, State};
 
 /// A gap this near to a wall, relative to its position or the scale of length, lies on it.
 const ON_WALL: f64 = 1e-9;
@@ -11,7 +11,8 @@ const ON_WALL: f64 = 1e-9;
 impl<'f> Trajectory<'f, 0> {
     /// A trajectory that starts at phase 0 in the state `y`.
     ///
-    /// A start beyond a wall is meshing on it; on a wall and closing it is a contact.
+    /// A start beyond a wall is meshing on it, beyond a rigid one it begins on it; on a wall and closing it is
+    /// a contact.
     pub fn new(flow: &'f Flow, law: Law, y: State) -> Self {
         Self::with_tangents(flow, law, y, [])
     }
@@ -20,7 +21,10 @@ impl<'f> Trajectory<'f, 0> {
     /// in the contact onset.
     pub fn meshing_from(flow: &'f Flow, law: Law, y: State, meshing: Option<Side>) -> Self {
         let mut trajectory = Self::new(flow, law, y);
-        if let (Mode::Free, Some(side)) = (trajectory.mode, meshing) {
+        let contact = meshing.map(|side| flow.contacts[side.index()]);
+        if let (Some(side), Some(Contact::Rigid)) = (meshing, contact) {
+            trajectory.stand_on(side);
+        } else if let (Mode::Free, Some(side), Some(Contact::Impact)) = (trajectory.mode, meshing, contact) {
             trajectory.mode = Mode::Onset(side);
             trajectory.origin = Some(side);
             trajectory.from_wall = None;
@@ -49,7 +53,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             goal: 0.0,
             period: 0,
             level: levels,
-            tangents: tangents.map(|u| flow.to_gap(u)),
+            tangents: tangents.map(|u| flow.tangent_to_gap(u)),
             log_scale: 0.0,
             events_in_period: 0,
             steps_in_period: 0,
@@ -78,7 +82,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             goal: self.goal,
             period: self.period,
             level: self.level,
-            tangents: tangents.map(|u| self.flow.to_gap(u)),
+            tangents: tangents.map(|u| self.flow.tangent_to_gap(u)),
             log_scale: 0.0,
             events_in_period: self.events_in_period,
             steps_in_period: self.steps_in_period,
@@ -95,15 +99,37 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// at the start of meshing; neighbours of a motion that is have to be told. It is allowed what is left of this
     /// one's work.
     pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
-        Trajectory {
-            mode: self.mode,
-            origin: self.origin,
-            from_wall: None,
-            short_flight: false,
-            pending: None,
-            allowance: self.allowance(),
-            ..Trajectory::with_tangents(self.flow, self.law, y, tangents)
+        self.placed(self.mode, self.origin, y, tangents)
+    }
+
+    /// The same in a domain that need not be this one's.
+    fn placed<const M: usize>(
+        &self,
+        mode: Mode,
+        origin: Option<Side>,
+        y: State,
+        tangents: [State; M],
+    ) -> Trajectory<'f, M> {
+        let mut placed = Trajectory::with_tangents(self.flow, self.law, y, tangents);
+        placed.allowance = self.allowance();
+        // Behind an elastic wall is where the gap is, whatever its neighbours do.
+        let is_elastic = |side: Side| self.flow.contacts[side.index()] == Contact::Elastic;
+        if let Mode::Sustained(side) = placed.mode
+            && is_elastic(side)
+        {
+            return placed;
         }
+        let mode = match mode {
+            Mode::Sustained(side) if is_elastic(side) => Mode::Free,
+            mode => mode,
+        };
+        if let Mode::Stuck(side) = mode {
+            placed.stand_on(side);
+        } else {
+            (placed.mode, placed.from_wall, placed.pending) = (mode, None, None);
+        }
+        placed.origin = origin;
+        placed
     }
 
     /// Whether it is in the same domain as another one, and comes from the same wall.
@@ -125,10 +151,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
     /// half a period on, a motion goes on as this one does.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         let y = self.state().map(|value| -value);
-        Trajectory {
-            mode: self.mode.mirrored(),
-            origin: self.origin.map(Side::mirrored),
-            ..self.at(y, tangents)
-        }
+        self.placed(self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
     }
 }

@@ -121,7 +121,7 @@ impl Newton {
             }
             let step = newton_step(&image, &residual)?;
             if patience.leaves_unstable && nth > 0 && now < CLOSE && is_unstable(&image) {
-                return cycle(map, (y + step).into(), &image);
+                return cycle(seed, map, (y + step).into(), &image);
             }
             if !is_near(&(y + step).into()) {
                 return None;
@@ -136,7 +136,7 @@ impl Newton {
             }
         }
         if size(&residual, rate) <= 1e3 * CONVERGED * size_of(seed, &y) {
-            cycle(map, y.into(), &image)
+            cycle(seed, map, y.into(), &image)
         } else {
             None
         }
@@ -213,9 +213,10 @@ fn balanced_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<V
     svd.solve(&-residual, cutoff).ok()
 }
 
-fn cycle(map: StrobeMap, state: State, image: &Image) -> Option<Cycle> {
+fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> Option<Cycle> {
     let (scaled, log_scale) = map.monodromy(image);
-    let scaled_multipliers = multipliers(&balanced(&scaled, image.rate))?;
+    let mut scaled_multipliers = multipliers(&balanced(&scaled, image.rate))?;
+    scaled_multipliers.truncate(2 * seed.flow().degrees);
     let [re, im] = scaled_multipliers[0];
     let scale = log_scale.exp();
     Some(Cycle {

@@ -5,6 +5,7 @@ use rattlemap_dynamics::flow::{DomainKind, Flow};
 use rattlemap_dynamics::model::{GearPair, Side, State};
 use rattlemap_dynamics::reference::{EventKind, Happening, Stop, Trajectory, Work};
 
+pub(crate) mod linear;
 pub(crate) mod table;
 
 /// At rest in the middle of the gap.

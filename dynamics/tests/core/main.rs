@@ -3,12 +3,17 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod any_oscillator;
+mod bits;
 mod cells;
+mod elastic;
 mod flow;
 mod one_wall;
 mod orbits;
 mod paper;
 mod properties;
+mod single_stop;
+mod sticking;
 mod stops;
 mod stress;
 mod tangents;

@@ -1,0 +1,96 @@
+//! Motion at rest on a rigid wall.
+//!
+//! The wall takes up the gap's acceleration `p`, which is linear in the state, by an impulse along the gap
+//! row: `z' = w' = 0`, and the displacement `x` beside the gap moves by `v' = v'_free + kick p`. That is the
+//! motion along `t` with `g . t = 0` and `t = 1` for `x`:
+//!
+//! ```text
+//! m x'' + c x' + k x = f cos(omega t) + load,    m = t M t, c = t C t, k = t K t, f = t . force
+//! p = a_x x + a_v v + a_cos cos(omega t) + constant
+//! ```
+//!
+//! Its energy `2 E_5 = m x^(6)^2 + k x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of
+//! motion it bounds what the certificate asks for:
+//!
+//! ```text
+//! |p^(6)| <= reach sqrt(2 E_5) + |a_cos| omega^6 + |a_v f / m| omega^5
+//! reach    = |a_x - a_v c / m| / sqrt(m) + |a_v| sqrt(k) / m
+//! ```
+//!
+//! In one degree of freedom `p` is the forcing and a constant.
+
+use nalgebra::Matrix4;
+
+use super::columns::Columns;
+use super::energy::EnergyBound;
+use super::generator::{Generator, generator};
+use crate::model::Oscillator;
+
+/// Motion at rest on a rigid wall of an oscillator.
+pub(super) struct Motion {
+    pub(super) generator: Generator,
+    /// A bound on its rates.
+    pub(super) rate: f64,
+    /// The row of `p` on `a`, first of the matrix.
+    pub(super) watched: Generator,
+    omega: f64,
+    mass: f64,
+    stiffness: f64,
+    force: f64,
+    reach: f64,
+    /// What forcing alone makes of `p^(6)`.
+    forced: f64,
+}
+
+impl Motion {
+    /// `kick` is the change of `v` per unit of approach speed that the wall takes.
+    pub(super) fn new(oscillator: &Oscillator, kick: f64) -> Motion {
+        let free = generator(oscillator, &oscillator.free);
+        let mut generator = free;
+        let mut watched = Generator::zeros();
+        for j in 0..7 {
+            watched[(0, j)] = free[(1, j)];
+            generator[(0, j)] = 0.0;
+            generator[(1, j)] = 0.0;
+            generator[(3, j)] += kick * free[(1, j)];
+        }
+        let (omega, other) = (oscillator.omega, oscillator.other());
+        let mut along = [1.0; 2];
+        along[1 - other] = -oscillator.gap[other] / oscillator.gap[1 - other];
+        let square = |m: [[f64; 2]; 2]| {
+            let row = |i: usize| along[0] * m[0][i] + along[1] * m[1][i];
+            row(0) * along[0] + row(1) * along[1]
+        };
+        let mass = square(oscillator.mass);
+        // Rounding must not make them negative.
+        let [damping, stiffness] =
+            [oscillator.free.damping, oscillator.free.stiffness].map(|m| square(m).max(0.0));
+        let force = along[0] * oscillator.force[0] + along[1] * oscillator.force[1];
+        let [a_x, a_v, a_cos] = [2, 3, 4].map(|j| free[(1, j)]);
+        Motion {
+            generator,
+            rate: (damping / mass + (stiffness / mass).sqrt()).max(omega),
+            watched,
+            omega,
+            mass,
+            stiffness,
+            force: force.abs(),
+            reach: (a_x - a_v * damping / mass).abs() / mass.sqrt() + a_v.abs() * stiffness.sqrt() / mass,
+            forced: a_cos.abs() * omega.powi(6) + (a_v * force / mass).abs() * omega.powi(5),
+        }
+    }
+
+    /// The bound of `p^(6)`; `fifth` is `(G unit)^5 / 5!` and `unit` the Taylor step.
+    pub(super) fn bound(&self, fifth: &Columns, unit: f64) -> EnergyBound {
+        let scale = unit.powi(6) / 14400.0;
+        // `a + b <= sqrt(2) sqrt(a^2 + b^2)` puts both parts under one root.
+        let weight = 2f64.sqrt() * scale;
+        let energy = weight * self.reach * 120.0 / unit.powi(5);
+        let mut root = Matrix4::zeros();
+        root[(0, 2)] = energy * self.stiffness.sqrt();
+        root[(1, 3)] = energy * self.mass.sqrt();
+        let columns = fifth.weighted(&root).plus_constant(2, weight * self.forced);
+        let growth = scale * self.reach * self.omega.powi(5) * self.force / self.mass.sqrt() * unit;
+        EnergyBound::of(columns, growth)
+    }
+}

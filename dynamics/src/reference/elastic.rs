@@ -1,0 +1,48 @@
+//! Elastic walls: the motion goes through them without a jump.
+//!
+//! On the wall both fields agree but for the damper `c` behind it, `f+ - f- = -(c w) M^-1 g`. In the saltation
+//! matrix `w` cancels: `S = I - c M^-1 g n^T` on the way in, `S = I + c M^-1 g n^T` on the way out, exactly and
+//! at any speed. So no crossing of an elastic wall is too near to grazing, and without a damper the strobe map
+//! is continuously differentiable there.
+
+use super::{EventKind, Observer, Trajectory};
+use crate::flow::DomainKind;
+use crate::model::Side;
+
+impl<const N: usize> Trajectory<'_, N> {
+    /// Free motion reaches an elastic wall. At no speed the first rate of the gap that is not zero decides
+    /// whether it goes on behind it.
+    pub(super) fn go_behind(&mut self, side: Side, observer: &mut impl Observer) {
+        self.q[0] = self.flow.wall(side);
+        let closing = side.sign() * self.q[1];
+        let goes_on = closing > 0.0 || closing == 0.0 && self.presses(DomainKind::Free, side, &self.q);
+        if !goes_on {
+            self.leave(side);
+            return;
+        }
+        self.cross_damper(side, -1.0);
+        self.record(EventKind::MeshStart, side, self.q, observer);
+        self.start_meshing(side, 0.0);
+        if closing > 0.0 {
+            self.from_wall = Some((side, 1));
+        }
+    }
+
+    /// The gap comes back to an elastic wall from behind.
+    pub(super) fn come_out(&mut self, side: Side, observer: &mut impl Observer) {
+        self.q[0] = self.flow.wall(side);
+        if self.q[1] == 0.0 && self.presses(DomainKind::Meshing(side), side, &self.q) {
+            self.from_wall = Some((side, self.rest_order(DomainKind::Meshing(side))));
+            return;
+        }
+        self.cross_damper(side, 1.0);
+        self.record(EventKind::MeshEnd, side, self.q, observer);
+        self.leave(side);
+    }
+
+    /// `S u = u + sign c M^-1 g (n . u)` on the velocities of every tangent vector.
+    fn cross_damper(&mut self, side: Side, sign: f64) {
+        let [on_gap, on_other] = self.flow.dampers[side.index()].map(|damper| sign * damper);
+        self.tangents = self.tangents.map(|[z, w, x, v]| [z, w + on_gap * z, x, v + on_other * z]);
+    }
+}

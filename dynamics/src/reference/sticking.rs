@@ -1,0 +1,74 @@
+//! Rigid walls: a pressed contact that has come to rest sticks until the load pulls it off.
+//!
+//! While it lasts the gap is on the wall, `z = wall` and `w = 0` to the bit, and the other displacement moves
+//! by the constrained motion (`flow/constrained.rs`); the wall takes up the acceleration `p` of the gap. Where
+//! that ceases to point into the wall the gap leaves it, from rest and without acceleration: state and field
+//! are continuous there, and neighbours keep their tangents.
+
+use super::{EventKind, Mode, Observer, Trajectory};
+use crate::flow::{DomainKind, Gap};
+use crate::model::Side;
+
+/// The order of the root of the distance for a gap that is let go: its acceleration is zero there, its rate is not.
+const LET_GO: usize = 3;
+
+impl<const N: usize> Trajectory<'_, N> {
+    /// Whether a contact with a rigid wall lasts: it leaves slowly enough, and at rest it is pressed.
+    pub(super) fn sticks(&self, side: Side) -> bool {
+        let leaving = self.law.restitution[side.index()] * self.q[1].abs();
+        leaving <= self.law.mesh_speed[side.index()]
+            && self.presses(DomainKind::Meshing(side), side, &self.at_rest_on(side))
+    }
+
+    /// The state after an impact that takes all of the gap's velocity.
+    fn at_rest_on(&self, side: Side) -> Gap {
+        let [_, w, x, v] = self.q;
+        [self.flow.wall(side), 0.0, x, v + self.flow.kick * w]
+    }
+
+    /// Comes to rest on a rigid wall.
+    ///
+    /// Neighbours meet it earlier or later and come to rest there, too. Of `S = R + (f+ - R f-) n^T / (n f-)`,
+    /// with `R` the impact that takes all velocity, the approach speed cancels: what is left is the way of the
+    /// other displacement, and the damping that its acceleration owes to the gap's velocity.
+    pub(super) fn stick(&mut self, side: Side, observer: &mut impl Observer) {
+        self.q[0] = self.flow.wall(side);
+        let before = self.q;
+        self.q = self.at_rest_on(side);
+        if N > 0 {
+            let kick = self.flow.kick;
+            let row = self.flow.domain(DomainKind::Meshing(side)).second_acceleration_row();
+            let drag = row[1] - kick * row[3];
+            self.tangents =
+                self.tangents.map(|[z, w, x, v]| [0.0, 0.0, x + kick * z, v + kick * w - drag * z]);
+        }
+        self.record(EventKind::MeshStart, side, before, observer);
+        self.rest_on(side);
+    }
+
+    /// Goes on at rest on a rigid wall.
+    pub(super) fn rest_on(&mut self, side: Side) {
+        self.mode = Mode::Stuck(side);
+        self.from_wall = None;
+        self.short_flight = false;
+        self.level[1] = self.flow.domain(DomainKind::Meshing(side)).taylor_level;
+    }
+
+    /// Stands on a rigid wall from the start.
+    pub(super) fn stand_on(&mut self, side: Side) {
+        self.rest_on(side);
+        self.origin = Some(side);
+        self.pending = None;
+        [self.q[0], self.q[1]] = [self.flow.wall(side), 0.0];
+        self.tangents = self.tangents.map(|[_, _, x, v]| [0.0, 0.0, x, v]);
+    }
+
+    /// The load lets go of a gap at rest on a rigid wall.
+    pub(super) fn let_go(&mut self, side: Side, observer: &mut impl Observer) {
+        self.record(EventKind::MeshEnd, side, self.q, observer);
+        self.mode = Mode::Free;
+        self.from_wall = Some((side, LET_GO));
+        // Short steps would not see it move.
+        self.level[0] = self.level[0].min(self.flow.domain(DomainKind::Free).taylor_level);
+    }
+}

@@ -1,0 +1,111 @@
+//! Oscillators of any kind for tests, and linear motion of one degree of freedom in closed form.
+
+use rattlemap_dynamics::model::{Contact, Domain, Oscillator, Side};
+
+/// `x'' + 2 gamma x' + square x = force cos(omega t) + load`, underdamped.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Linear {
+    pub(crate) gamma: f64,
+    pub(crate) square: f64,
+    pub(crate) force: f64,
+    pub(crate) load: f64,
+    pub(crate) omega: f64,
+}
+
+impl Linear {
+    /// Amplitude and lag of the steady response.
+    pub(crate) fn response(&self) -> [f64; 2] {
+        let (real, imaginary) = (self.square - self.omega * self.omega, 2.0 * self.gamma * self.omega);
+        [self.force / real.hypot(imaginary), imaginary.atan2(real)]
+    }
+
+    /// Displacement and velocity of the steady response.
+    pub(crate) fn steady(&self, t: f64) -> [f64; 2] {
+        let [amplitude, lag] = self.response();
+        let (sin, cos) = (self.omega * t - lag).sin_cos();
+        [self.load / self.square + amplitude * cos, -self.omega * amplitude * sin]
+    }
+
+    /// What a departure from it becomes in a time: the rows of a matrix.
+    pub(crate) fn fundamental(&self, tau: f64) -> [[f64; 2]; 2] {
+        let own = (self.square - self.gamma * self.gamma).sqrt();
+        let (sin, cos) = (own * tau).sin_cos();
+        let (decay, lean) = ((-self.gamma * tau).exp(), self.gamma / own * sin);
+        [[decay * (cos + lean), decay * sin / own], [-decay * self.square / own * sin, decay * (cos - lean)]]
+    }
+
+    /// From a state at a time, a time later.
+    pub(crate) fn flow(&self, [x, v]: [f64; 2], t: f64, tau: f64) -> [f64; 2] {
+        let ([p, q], [p_end, q_end]) = (self.steady(t), self.steady(t + tau));
+        let [[a, b], [c, d]] = self.fundamental(tau);
+        let (x, v) = (x - p, v - q);
+        [p_end + a * x + b * v, q_end + c * x + d * v]
+    }
+
+    /// The acceleration.
+    pub(crate) fn acceleration(&self, [x, v]: [f64; 2], t: f64) -> f64 {
+        self.force * (self.omega * t).cos() + self.load - 2.0 * self.gamma * v - self.square * x
+    }
+
+    /// The oscillator of one degree of freedom and unit mass that moves so, without a wall.
+    pub(crate) fn oscillator(&self) -> Oscillator {
+        let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
+        let free = Domain {
+            damping: first(2.0 * self.gamma),
+            stiffness: first(self.square),
+            load: [self.load, 0.0],
+        };
+        Oscillator {
+            degrees: 1,
+            mass: [[1.0, 0.0], [0.0, 1.0]],
+            gap: [1.0, 0.0],
+            walls: [f64::INFINITY, f64::NEG_INFINITY],
+            contacts: [Contact::Rigid; 2],
+            omega: self.omega,
+            force: [self.force, 0.0],
+            free,
+            meshing: [free; 2],
+        }
+    }
+}
+
+/// The product of two matrices given by their rows.
+pub(crate) fn product(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
+}
+
+/// Trace and determinant.
+pub(crate) fn invariants([[a, b], [c, d]]: [[f64; 2]; 2]) -> [f64; 2] {
+    [a + d, a * d - b * c]
+}
+
+/// The same of a matrix with these eigenvalues.
+pub(crate) fn invariants_of(multipliers: &[[f64; 2]]) -> [f64; 2] {
+    let [[a, b], [c, d]] = multipliers else { panic!("one degree of freedom has two: {multipliers:?}") };
+    [a + c, a * c - b * d]
+}
+
+/// The oscillator with a wall, and along the gap row a spring and a damper behind it.
+pub(crate) fn with_wall(
+    oscillator: Oscillator,
+    side: Side,
+    at: f64,
+    contact: Contact,
+    [stiffness, damping]: [f64; 2],
+) -> Oscillator {
+    let ([g0, g1], free) = (oscillator.gap, oscillator.free);
+    let along = [[g0 * g0, g0 * g1], [g0 * g1, g1 * g1]];
+    let plus = |matrix: [[f64; 2]; 2], added: f64| -> [[f64; 2]; 2] {
+        std::array::from_fn(|i| std::array::from_fn(|j| matrix[i][j] + added * along[i][j]))
+    };
+    let mut walled = oscillator;
+    let i = usize::from(side == Side::Left);
+    walled.walls[i] = at;
+    walled.contacts[i] = contact;
+    walled.meshing[i] = Domain {
+        damping: plus(free.damping, damping),
+        stiffness: plus(free.stiffness, stiffness),
+        load: [free.load[0] + stiffness * at * g0, free.load[1] + stiffness * at * g1],
+    };
+    walled
+}

@@ -1,0 +1,169 @@
+//! Elastic walls: motion goes on behind them without a jump.
+
+use crate::common::REST;
+use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
+use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow};
+use rattlemap_dynamics::reference::{Happening, Trajectory};
+
+/// Neither is of meaning to an elastic wall.
+const LAW: Law = Law { restitution: [0.5; 2], mesh_speed: [0.01; 2] };
+
+/// Two unit tangents of one degree of freedom.
+const UNITS: [State; 2] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
+
+/// Bilinear: free motion, and that behind an elastic wall on the right.
+struct Bilinear {
+    free: Linear,
+    behind: Linear,
+    oscillator: Oscillator,
+}
+
+fn bilinear(free: Linear, at: f64, stiffness: f64, damping: f64) -> Bilinear {
+    let behind = Linear {
+        gamma: free.gamma + 0.5 * damping,
+        square: free.square + stiffness,
+        load: free.load + stiffness * at,
+        ..free
+    };
+    let oscillator = with_wall(free.oscillator(), Side::Right, at, Contact::Elastic, [stiffness, damping]);
+    Bilinear { free, behind, oscillator }
+}
+
+fn near(a: f64, b: f64, within: f64) -> bool {
+    (a - b).abs() <= within
+}
+
+/// Between the two crossings of the wall each flight is linear: the closed forms lead from one to the other, and
+/// their product is the monodromy.
+#[test]
+fn a_bilinear_oscillator_closes_over_two_linear_flights() {
+    let mut damped = 0;
+    for (gamma, omega, load, at, stiffness, damping) in [
+        (0.05, 0.8, 0.0, 0.0, 8.0, 0.0),
+        (0.05, 1.5, 0.0, 0.2, 8.0, 0.0),
+        (0.05, 2.1, 0.1, 0.0, 24.0, 1.5),
+        (0.1, 1.2, 0.0, -0.5, 3.0, 0.4),
+        (0.02, 1.3, -0.2, 0.5, 100.0, 6.0),
+    ] {
+        let free = Linear { gamma, square: 1.0, force: 1.0, load, omega };
+        let Bilinear { free, behind, oscillator } = bilinear(free, at, stiffness, damping);
+        oscillator.validate().expect("an elastic wall");
+        let flow = Flow::new(&oscillator);
+        let orbit = analyse_flow(&flow, LAW, REST, &Settings::default(), 8);
+        let case = format!("gamma {gamma}, omega {omega}: {orbit:?}");
+        assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Ok), "{case}");
+        assert_eq!((orbit.word.time_order().as_str(), orbit.impacts_per_period), ("12", 0.0), "{case}");
+        let start =
+            orbit.events.iter().find(|event| event.kind == EventKind::MeshStart).expect("goes behind");
+        let end = orbit.events.iter().find(|event| event.kind == EventKind::MeshEnd).expect("comes back");
+        assert_eq!((start.before, end.before), (start.after, end.after), "{case}");
+        let period = flow.period;
+        let behind_for = (end.t - start.t).rem_euclid(period);
+        let flights = [(&behind, start, end, behind_for), (&free, end, start, period - behind_for)];
+        for (linear, from, to, tau) in flights {
+            let [x, v] = linear.flow([from.after[0], from.after[1]], from.t, tau);
+            assert!(near(x, at, 1e-12) && near(v, to.before[1], 1e-12), "{x}, {v}: {case}");
+        }
+        assert!(near(orbit.mesh_fraction, behind_for / period, 1e-12), "{case}");
+        let saltation = |sign: f64| [[1.0, 0.0], [sign * damping, 1.0]];
+        let out = product(free.fundamental(period - behind_for), saltation(1.0));
+        let monodromy = product(out, product(behind.fundamental(behind_for), saltation(-1.0)));
+        let (ours, exact) =
+            (invariants_of(orbit.floquet.as_deref().expect("a cycle")), invariants(monodromy));
+        assert!((0..2).all(|i| near(ours[i], exact[i], 1e-11)), "{ours:?}, {exact:?}: {case}");
+        damped += u32::from(damping > 0.0);
+    }
+    assert_eq!(damped, 3);
+}
+
+/// The tangents of a period, and where it ends.
+fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<Happening>) {
+    let mut trajectory = Trajectory::with_tangents(flow, LAW, [start[0], start[1], 0.0, 0.0], UNITS);
+    let mut events = Vec::new();
+    trajectory.advance_period(&mut events).expect("an ordinary cell");
+    assert!(!trajectory.near_grazing(), "no crossing of an elastic wall is near grazing: {start:?}");
+    let [a, b] = trajectory.tangents();
+    let [x, v, ..] = trajectory.state();
+    ([[a[0], b[0]], [a[1], b[1]]], [x, v], events)
+}
+
+/// The largest entry of a difference.
+fn apart(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> f64 {
+    a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Central differences of the strobe map.
+fn differences(flow: &Flow, [x, v]: [f64; 2], h: f64) -> [[f64; 2]; 2] {
+    let column = |along: [f64; 2]| {
+        let at = |h: f64| strobe(flow, [x + h * along[0], v + h * along[1]]).1;
+        let (right, left) = (at(h), at(-h));
+        [0, 1].map(|i| (right[i] - left[i]) / (2.0 * h))
+    };
+    let (a, b) = (column([1.0, 0.0]), column([0.0, 1.0]));
+    [[a[0], b[0]], [a[1], b[1]]]
+}
+
+/// A spring alone is continuous: where the motion just touches the wall the strobe map has one derivative from either
+/// side, that of free motion, and its second one grows like the root of the distance. Differences over `h` are as good
+/// as that root.
+#[test]
+fn a_spring_leaves_the_strobe_map_smooth_at_grazing() {
+    let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
+    let [amplitude, _] = free.response();
+    let Bilinear { oscillator, .. } = bilinear(free, amplitude, 20.0, 0.0);
+    let flow = Flow::new(&oscillator);
+    let exact = free.fundamental(flow.period);
+    let grazing = free.steady(0.0);
+    let (at_grazing, ..) = strobe(&flow, grazing);
+    assert!(apart(at_grazing, exact) < 1e-6, "{at_grazing:?}, {exact:?}");
+    let (mut through, mut past) = (0, 0);
+    for power in 2..=10 {
+        let h = 10f64.powi(-power);
+        let root = 60.0 * h.sqrt();
+        if power < 7 {
+            let off = apart(differences(&flow, grazing, h), exact);
+            assert!(off < root, "differences over {h:e}: {off:e}");
+        }
+        for sign in [1.0, -1.0] {
+            let (tangents, _, events) = strobe(&flow, [grazing[0] + sign * h, grazing[1]]);
+            let off = apart(tangents, exact);
+            assert!(off < root, "{h:e} to the side: {off:e}");
+            if events.is_empty() { past += 1 } else { through += 1 }
+        }
+    }
+    assert!(through >= 8 && past >= 8, "{through} through, {past} past");
+}
+
+/// Across a crossing at speed they are the derivatives, dampers included.
+#[test]
+fn tangents_are_derivatives_across_dampers() {
+    for damping in [0.0, 0.7, 5.0] {
+        let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
+        let Bilinear { oscillator, .. } = bilinear(free, 0.3, 20.0, damping);
+        let flow = Flow::new(&oscillator);
+        let (tangents, _, events) = strobe(&flow, [0.1, 0.9]);
+        assert!(events.len() >= 2, "{events:?}");
+        let off = apart(tangents, differences(&flow, [0.1, 0.9], 1e-5));
+        assert!(off < 1e-8, "damper {damping}: {off:e}");
+    }
+}
+
+/// From rest on the wall the load decides, and where it ceases the next rate does.
+#[test]
+fn a_start_on_the_wall_goes_where_the_load_leads() {
+    for (load, force, behind) in [(0.5, 0.0, true), (-0.5, 0.0, false), (-1.0, 1.0, false), (1.0, -1.0, true)]
+    {
+        let free = Linear { gamma: 0.1, square: 1.0, force, load, omega: 1.0 };
+        let Bilinear { oscillator, .. } = bilinear(free, 0.0, 50.0, 2.0);
+        let flow = Flow::new(&oscillator);
+        let mut trajectory = Trajectory::new(&flow, LAW, REST);
+        let mut events: Vec<Happening> = Vec::new();
+        trajectory.advance_to(0.1, &mut events).expect("an ordinary cell");
+        assert_eq!(trajectory.meshing(), behind.then_some(Side::Right), "load {load}, force {force}");
+        assert_eq!(trajectory.state()[0] > 0.0, behind);
+        assert_eq!(events.len(), usize::from(behind), "{events:?}");
+        assert!(!trajectory.near_grazing());
+    }
+}
