@@ -152,6 +152,7 @@ fn blamed(error: &ModelError) -> (Table, &str) {
     let quantity = match error {
         OscillatorError::OutOfRange { quantity, .. }
         | OscillatorError::NotSymmetric { quantity, .. }
+        | OscillatorError::NotAlongGap { quantity, .. }
         | OscillatorError::NotSemidefinite { quantity, .. } => quantity.as_str(),
         OscillatorError::NotDefinite { .. } => "mass",
         OscillatorError::Walls { .. } => "position",
