@@ -10,4 +10,5 @@ mod cycle;
 mod ball;
 mod clearance;
 mod elastic;
+mod random;
 mod single_impact;
