@@ -19,12 +19,16 @@ use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 /// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
 /// in meshing where that is more.
 pub(super) fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let [m1, m2] = oscillator.masses();
     let Oscillator { gap: [g1, g2], free, meshing, omega, .. } = oscillator;
     // What a wall adds to the stiffness matrix is its own stiffness times g g'.
-    let (i, square) = if *g2 == 0.0 { (0, g1 * g1) } else { (1, g1 * g2) };
-    let added = |side: usize| (meshing[side].stiffness[0][i] - free.stiffness[0][i]) / square;
-    let ringing = (added(0).max(added(1)) * (g1 * g1 / m1 + g2 * g2 / m2)).sqrt() / omega;
+    let (i, j, square) = match (*g1 == 0.0, *g2 == 0.0) {
+        (true, _) => (1, 1, g2 * g2),
+        (_, true) => (0, 0, g1 * g1),
+        _ => (0, 1, g1 * g2),
+    };
+    let added = |side: usize| (meshing[side].stiffness[i][j] - free.stiffness[i][j]) / square;
+    let [a1, a2] = oscillator.accelerations(oscillator.gap);
+    let ringing = (added(0).max(added(1)).max(0.0) * (g1 * a1 + g2 * a2)).sqrt() / omega;
     (20.0 * ringing).clamp(400.0, 50_000.0) as usize
 }
 
