@@ -11,12 +11,13 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::gpu::Precision;
+use crate::map::attractors;
 use crate::map::coexistence;
 use crate::map::effect;
 use crate::map::engine::Engine;
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
-use crate::map::schedule::Schedule;
+use crate::map::schedule::{Refined, Schedule};
 use crate::map::sweep::{self, SweepError};
 use crate::output::map::LIST;
 use crate::output::{self, Cells, Folder, Identity, Order, RECORDS, RecordFile, RecordFileError, unfinished};
@@ -78,7 +79,11 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let Kept { elapsed_before, clock, .. } = kept;
     let elapsed = clock.elapsed();
     let attractors = coexistence::attractors(&plan, &records);
-    let cells = Cells::new(&scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
+    let basins = attractors::basins(&plan, &records, filled_from(refined.as_ref()));
+    let cells = Cells::new(&scene, &plan, &records)
+        .counting(attractors.as_deref())
+        .in_basins(basins.as_ref())
+        .refined(refined.as_ref());
     let (device, lane_steps) = (engine.device(), engine.lane_steps());
     let (engine, precision) = (engine.name(), engine.precision());
     let run = output::map::Run {
@@ -121,6 +126,11 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")
+}
+
+/// For every cell of an adaptive map of basins the one that it was filled from.
+pub(crate) fn filled_from(refined: Option<&Refined>) -> &[u32] {
+    refined.map_or(&[], |refined| &refined.filled_from)
 }
 
 /// A new folder, an earlier run's with `--force`, an interrupted one's with `--resume`.

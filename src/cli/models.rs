@@ -9,7 +9,7 @@ use rattlemap_dynamics::orbit::Status;
 use crate::cli::arguments::{DEFAULT_RESTITUTION, Models};
 use crate::cli::error::Failure;
 use crate::cli::say;
-use crate::output::{caption, print};
+use crate::output::print;
 
 /// A model as this command knows it.
 struct Page {
@@ -59,7 +59,9 @@ impl Page {
         for status in Status::ALL {
             let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
         }
-        let source = caption::source(&*self.model)
+        let source = self
+            .model
+            .source()
             .map_or(String::new(), |title| format!("\"{title}\"; numbers in brackets are its equations"));
         text + &format!("\n{ERRORS}\n\nSource\n\n    {source}\n")
     }

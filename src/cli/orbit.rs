@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::model::{GearPair, Model, State};
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
 use super::arguments::{DEFAULT_RESTITUTION, FigureFormat, Orbit};
@@ -16,7 +16,7 @@ use crate::output::orbit::{Asked, Instant as At};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
-    let model = scene::single_cell(DEFAULT_RESTITUTION, &ask.set)?;
+    let model = scene::single_cell(&GearPair::paper(DEFAULT_RESTITUTION), &ask.set)?;
     let flow = Flow::of(&*model)?;
     check_time(ask.time, flow.period)?;
     let interrupt = Interrupt::listen(true)?;

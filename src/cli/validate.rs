@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use crate::gpu::{self, AdapterChoice, Gpu, Precision};
+use crate::map::attractors;
 use crate::map::coexistence;
 use crate::map::plan::Plan;
 use crate::output::inventory::Finding;
@@ -20,6 +21,7 @@ use crate::cli::arguments::Validate;
 use crate::cli::error::Failure;
 use crate::cli::finished_map::{self, Manifest};
 use crate::cli::interrupt::Interrupt;
+use crate::cli::map::filled_from;
 use crate::cli::progress::Progress;
 use crate::cli::say;
 
@@ -44,6 +46,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         precision: precision(&manifest).map_err(Failure::Usage)?,
         is_lane: manifest.engine == "gpu",
     };
+    let basins = attractors::basins(&plan, &records, filled_from(refined.as_ref()));
     let sample = validate::sample(&plan, &records, ask.samples as usize, ask.seed);
     let count = sample.ids().len();
     let tell = |what: &str| (!ask.quiet).then(|| say::note(format_args!("{what}")));
@@ -68,10 +71,14 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         replayed.fetch_max(done, Ordering::Relaxed);
         progress.report(done, count);
     };
-    let replay = validate::replay_until(&subject, &sample, &lanes, &report, interrupt.raised());
+    let replay =
+        validate::replay_until(&subject, basins.as_ref(), &sample, &lanes, &report, interrupt.raised());
     let Some(validation) = replay else { return Err(interrupted(replayed.into_inner())) };
     let attractors = coexistence::attractors(&plan, &records);
-    let cells = Cells::new(scene, &plan, &records).counting(attractors.as_deref()).refined(refined.as_ref());
+    let cells = Cells::new(scene, &plan, &records)
+        .counting(attractors.as_deref())
+        .in_basins(basins.as_ref())
+        .refined(refined.as_ref());
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let device = lanes.device.as_deref();
     let files = write_validation(&folder, &cells, &made, device, &validation, clock.elapsed())?;

@@ -42,7 +42,8 @@ pub fn without_effect<'p>(plan: &'p Plan, records: &[Record], rounding: f64) -> 
         }
         compared > 0
     };
-    let axes = plan.axes().iter().enumerate();
+    // A start may change nothing and is no parameter.
+    let axes = plan.axes().iter().enumerate().filter(|(_, axis)| !axis.target().is_start());
     axes.filter(|&(i, _)| changes_nothing(i)).map(|(_, axis)| axis.parameter()).collect()
 }
 

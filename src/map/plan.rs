@@ -128,7 +128,9 @@ impl Plan {
         assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
         let points = scene.points().clone();
         let [columns, rows] = points.counts();
-        let needs = needs(&scene.outputs().quantities);
+        let mut needs = needs(&scene.outputs().quantities);
+        // Chaos is an attractor, too.
+        needs.exponent |= scene.is_basin();
         let integration = scene.integration();
         Plan {
             flows: Parts::flows(&points),
@@ -194,6 +196,11 @@ impl Plan {
         &self.points
     }
 
+    /// Whether it is a map of basins: an axis sweeps a component of the start.
+    pub fn is_basin(&self) -> bool {
+        !self.is_list() && self.points.sweeps_start()
+    }
+
     /// How many cells there are.
     pub fn cell_count(&self) -> usize {
         self.order.len()
@@ -251,7 +258,7 @@ impl Plan {
     fn own_start(&self, id: u32) -> State {
         let nth = id as usize / self.cell_count();
         match nth {
-            0 => self.starts.first(),
+            0 => self.points.start(id as usize, self.starts.first()),
             _ => self.starts.drawn(nth, &self.oscillator(self.flow_of(id))),
         }
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
+use super::attractors::{self, Basins};
 use super::coexistence;
 #[cfg(feature = "gpu")]
 use super::engine::Gpu;
@@ -189,6 +190,12 @@ impl Map {
     /// What became of an adaptive map.
     pub fn refined(&self) -> Option<&Refined> {
         self.refined.as_ref()
+    }
+
+    /// To which attractor each start leads; none where no axis sweeps the start.
+    pub fn basins(&self) -> Option<Basins> {
+        let filled_from = self.refined.as_ref().map_or(&[][..], |refined| &refined.filled_from);
+        attractors::basins(&self.plan, &self.records, filled_from)
     }
 
     /// On how many attractors the starts of each cell end, by id; none where each has one start.

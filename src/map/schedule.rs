@@ -2,7 +2,7 @@
 //!
 //! Without `[refine]` every cell is, in Morton order. With it the map is adaptive: cells of a
 //! coarse grid first, then what lies in blocks in which cells are known to differ (in
-//! class, period, and symmetry or word where they are asked for), or that touch one whose corners do,
+//! class, period, and symmetry or word where they are asked for; in a map of basins in the attractor), or that touch one whose corners do,
 //! down to single cells. The rest is filled from the corners around it. An audit then
 //! integrates a random sample of the filled cells. If it finds too many of them wrong, and more
 //! than chance may put there, blocks filled with what is wrong are halved and the audit is
@@ -17,6 +17,7 @@
 
 mod adaptive;
 mod audit;
+mod basins;
 mod blocks;
 mod errors;
 mod fill;
@@ -83,6 +84,8 @@ pub struct Refined {
     /// Audits in order; the last one found no more wrong cells than the scene allows, unless
     /// nothing was left to refine or blocks had been halved as often as they may.
     pub audits: Vec<Audit>,
+    /// Of a map of basins: for every cell the one that it was filled from, itself where it was integrated.
+    pub filled_from: Vec<u32>,
 }
 
 impl Schedule {
@@ -141,6 +144,13 @@ impl Schedule {
         matches!(self.rule, Rule::Whole)
     }
 
+    /// Looks at records that are taken up next: all at once is faster, and the same.
+    pub fn foresee(&mut self, records: &[(u32, Record)]) {
+        if let Rule::Adaptive(adaptive) = &mut self.rule {
+            adaptive.foresee(records);
+        }
+    }
+
     /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included.
     pub fn take(&mut self, id: u32, records: &[Record]) {
         self.states[id as usize] = State::Come;
@@ -192,13 +202,14 @@ impl Schedule {
     /// Fills what was not integrated and says how it went; none where every cell was.
     pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
         let Rule::Adaptive(adaptive) = &self.rule else { return None };
-        let filled = adaptive.fill(records);
+        let (filled, filled_from) = adaptive.fill(records);
         Some(Refined {
             integrated: self.sequence.len(),
             filled,
             rounds: adaptive.rounds(),
             max_error: adaptive.max_error(),
             audits: adaptive.audits().to_vec(),
+            filled_from,
         })
     }
 }

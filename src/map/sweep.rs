@@ -74,6 +74,7 @@ pub async fn run(
             Ok(ended) => {
                 pace.adapt(under_way, ended.len(), clock.elapsed());
                 under_way -= ended.len();
+                schedule.foresee(ended);
                 for &(id, record) in ended {
                     records[id as usize] = record;
                     schedule.take(id, records);
@@ -98,6 +99,7 @@ pub async fn run(
 /// Takes up records of an interrupted run, in the order in which they were kept. False if the schedule does not
 /// wait for one of them.
 pub fn replay(schedule: &mut Schedule, records: &mut [Record], kept: &[(u32, Record)]) -> bool {
+    schedule.foresee(kept);
     kept.iter().all(|&(id, record)| {
         let is_waited_for = schedule.waits_for(id);
         if is_waited_for {

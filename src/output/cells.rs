@@ -1,5 +1,6 @@
 //! A finished map as rows: the one view that tables, figures and reports are made from.
 
+use crate::map::attractors::{Basins, NONE};
 use crate::map::plan::Plan;
 use crate::map::scene::{Continuous, Quantity, Scene};
 use crate::map::schedule::Refined;
@@ -36,6 +37,8 @@ pub(super) struct Row {
     pub(super) source: Source,
     /// Attractors that several starts found.
     pub(super) attractors: Option<u8>,
+    /// The one that the start leads to, in a map of basins.
+    pub(super) attractor: Option<u16>,
 }
 
 /// A scene, its plan, and one record per run; what is shown of a cell is its first run.
@@ -45,6 +48,7 @@ pub struct Cells<'a> {
     plan: &'a Plan,
     records: &'a [Record],
     attractors: Option<&'a [u8]>,
+    basins: Option<&'a Basins>,
     refined: Option<&'a Refined>,
 }
 
@@ -55,7 +59,7 @@ impl<'a> Cells<'a> {
     /// If there are not as many records as runs.
     pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a [Record]) -> Cells<'a> {
         assert_eq!(plan.run_count(), records.len(), "one record per run");
-        Cells { scene, plan, records, attractors: None, refined: None }
+        Cells { scene, plan, records, attractors: None, basins: None, refined: None }
     }
 
     /// The same with what became of an adaptive map.
@@ -75,6 +79,12 @@ impl<'a> Cells<'a> {
     pub fn counting(self, attractors: Option<&'a [u8]>) -> Cells<'a> {
         assert!(attractors.is_none_or(|list| list.len() == self.plan.cell_count()), "one number per cell");
         Cells { attractors, ..self }
+    }
+
+    /// The same with the basin of every cell.
+    #[must_use]
+    pub fn in_basins(self, basins: Option<&'a Basins>) -> Cells<'a> {
+        Cells { basins, ..self }
     }
 
     /// Cells along the two axes; a list is one row.
@@ -126,14 +136,19 @@ impl<'a> Cells<'a> {
         self.attractors
     }
 
+    /// The basins of a map that has them.
+    pub(super) fn basins(&self) -> Option<&'a Basins> {
+        self.basins
+    }
+
     /// The state in which the run `id` starts.
     pub(super) fn start(&self, id: usize) -> State {
         self.plan.start(id as u32, self.records)
     }
 
-    /// Whether a run's start is not the scene's own: it follows a neighbour or was drawn.
+    /// Whether a run's start is not the scene's own: it is swept, follows a neighbour or was drawn.
     pub(super) fn has_own_start(&self, id: usize) -> bool {
-        self.plan.policy().follows() || id >= self.plan.cell_count()
+        self.scene.sweeps_start() || self.plan.policy().follows() || id >= self.plan.cell_count()
     }
 
     pub(super) fn scene(&self) -> &'a Scene {
@@ -190,6 +205,10 @@ impl<'a> Cells<'a> {
             periods_run: record.periods_run,
             source: if is_filled { Source::Filled } else { Source::Integrated },
             attractors: self.attractors.and_then(|list| list.get(id).copied()),
+            attractor: self
+                .basins
+                .and_then(|basins| basins.labels().get(id).copied())
+                .filter(|&label| label != NONE),
         }
     }
 }

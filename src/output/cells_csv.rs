@@ -20,6 +20,9 @@ const PART: usize = 1 << 12;
 /// The last field of maps that count attractors.
 pub(super) const ATTRACTORS: &str = "attractors";
 
+/// The last field of maps of basins.
+pub(super) const ATTRACTOR: &str = "attractor";
+
 /// Fields after the indices and the axes.
 const MEASURED: [&str; 8] = [
     "class",
@@ -45,7 +48,7 @@ const RUN: [&str; 3] = ["status", "periods_run", "source"];
 pub(super) fn write(path: &Path, cells: &Cells<'_>) -> Result<(), WriteError> {
     let mut file = BufWriter::new(File::create(path)?);
     let mut header = csv::Writer::from_writer(Vec::new());
-    let counted = cells.attractors().map(|_| ATTRACTORS);
+    let counted = cells.attractors().map(|_| ATTRACTORS).or(cells.basins().map(|_| ATTRACTOR));
     let pattern = cells.asks(Quantity::Pattern).then_some(PATTERN);
     let fields = MEASURED.into_iter().chain(pattern).chain(RUN).chain(counted);
     header.write_record(places(cells).iter().copied().chain(swept(cells)).chain(fields))?;
@@ -81,7 +84,8 @@ fn part(cells: &Cells<'_>, ids: std::ops::Range<usize>) -> Result<Vec<u8>, Write
         let places = row.indices[..places.len()].iter().map(|index| index.to_string());
         let values = cells.values(id).into_iter().map(|value| format!("{value:?}"));
         let pattern = cells.asks(Quantity::Pattern).then(|| spelled(cells.pattern(id)));
-        let counted = row.attractors.map(|count| count.to_string());
+        let label = || row.attractor.map_or(String::new(), |label| label.to_string());
+        let counted = row.attractors.map(|count| count.to_string()).or(cells.basins().map(|_| label()));
         let fields = measured(&row, spelled(cells.word(id))).into_iter().chain(pattern).chain(run(&row));
         table.write_record(places.chain(values).chain(fields).chain(counted))?;
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use npyz::{DType, Field, TypeStr, TypeWrite, WriterBuilder};
 
 use super::cells::{Cells, Row};
-use super::cells_csv::{ATTRACTORS, places, swept};
+use super::cells_csv::{ATTRACTOR, ATTRACTORS, places, swept};
 use super::words_csv::Rows;
 use super::{WriteError, names};
 use crate::map::scene::Quantity;
@@ -63,6 +63,10 @@ const COLUMNS: [Column; 12] = [
 
 const COUNTED: Column = column(ATTRACTORS, "|u1", None, |shown, to| to.extend(shown.row.attractors));
 
+const LABELLED: Column = column(ATTRACTOR, "<i4", None, |shown, to| {
+    to.extend(shown.row.attractor.map_or(i32::from(ABSENT), i32::from).to_le_bytes());
+});
+
 fn put_code(code: Option<i8>, to: &mut Vec<u8>) {
     to.extend(code.unwrap_or(ABSENT).to_le_bytes());
 }
@@ -74,14 +78,14 @@ fn put_float(value: Option<f64>, to: &mut Vec<u8>) {
 /// Writes the array to `path`: one dimension, the fields of `cells.csv` by name as far as they are asked for. Classes,
 /// statuses and sources are their codes, words and patterns rows of `words.csv`; an absent period is 0, an absent float
 /// NaN, an absent class or symmetry -1, an absent word or pattern row 0, which is empty. Where attractors are counted, a
-/// last field has their number.
+/// last field has their number; in a map of basins the start's own, -1 where it has none.
 ///
 /// # Errors
 /// If the file cannot be written.
 pub(super) fn write(path: &Path, cells: &Cells<'_>, rows: &Rows<'_>) -> Result<(), WriteError> {
     let places = places(cells);
     let is_asked = |column: &&Column| column.of.is_none_or(|quantity| cells.asks(quantity));
-    let counted = cells.attractors().map(|_| &COUNTED);
+    let counted = cells.attractors().map(|_| &COUNTED).or(cells.basins().map(|_| &LABELLED));
     let columns: Vec<&Column> = COLUMNS.iter().filter(is_asked).chain(counted).collect();
     let place = places.iter().map(|&name| (name, PLACE_KIND));
     let value = swept(cells).map(|name| (name, VALUE_KIND));

@@ -4,6 +4,7 @@
 //! the colours mean: by name, on a bar, or both.
 
 mod attractors;
+mod basins;
 mod classes;
 mod colors;
 mod scale;
@@ -80,11 +81,15 @@ pub(super) fn share(cells: usize, total: usize) -> String {
     }
 }
 
+/// The layer of classes where another is the map.
+pub(super) const CLASS: &str = "class";
+
 /// The layers that the scene asks for, the first being the map itself, patterns before words.
 pub(super) fn of(cells: &Cells<'_>, spelled: &Spelled) -> Vec<Layer> {
-    let mut layers = Vec::new();
+    let mut layers: Vec<Layer> = cells.basins().map(basins::layer).into_iter().collect();
     if cells.asks(Quantity::Class) {
-        layers.push(classes::layer(cells));
+        let classes = classes::layer(cells);
+        layers.push(if layers.is_empty() { classes } else { Layer { name: CLASS, ..classes } });
     }
     layers.extend(SCALES.iter().filter(|scale| cells.asks(scale.quantity)).map(|scale| scale.layer(cells)));
     layers.extend(spelled.patterns.as_ref().map(words::patterns));

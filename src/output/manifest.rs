@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::map::scene::{Axis, Scale, Scene, Start};
+use crate::model_file::FileModel;
+use rattlemap_dynamics::model::Model;
 
 /// The manifest's name. It is the last file that a run writes: a folder that has one is complete.
 pub const MANIFEST: &str = "manifest.json";
@@ -35,9 +37,34 @@ impl Head {
     }
 }
 
+/// What moves. With its text a folder is enough to make its files again.
+#[derive(Serialize)]
+pub(super) struct ModelObject {
+    name: String,
+    title: String,
+    source: Option<String>,
+    /// The model's file; null where the model is none.
+    text: Option<String>,
+}
+
+impl ModelObject {
+    pub(super) fn of(model: &dyn Model) -> ModelObject {
+        ModelObject {
+            name: model.name().to_owned(),
+            title: model.title().to_owned(),
+            source: model.source().map(str::to_owned),
+            text: model.downcast_ref().map(|file: &FileModel| file.definition().text.clone()),
+        }
+    }
+}
+
 #[derive(Serialize)]
 pub(super) struct AxisObject {
+    /// Its name, and that of the columns in tables.
     parameter: String,
+    /// What it sweeps is a component of the start.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    is_start: bool,
     min: f64,
     max: f64,
     count: usize,
@@ -52,6 +79,7 @@ impl From<&Axis> for AxisObject {
     fn from(axis: &Axis) -> Self {
         AxisObject {
             parameter: axis.parameter().name.to_string(),
+            is_start: axis.target().is_start(),
             min: axis.min(),
             max: axis.max(),
             count: axis.count(),

@@ -14,8 +14,8 @@ use super::validation_json::ValidationObject;
 use super::words::{self, Spelled};
 use super::words_csv::Rows;
 use super::{
-    Cells, Folder, OutputError, RECORDS, WriteError, cells_csv, cells_npy, inventory, layers, map_figure,
-    map_manifest, names, report, unfinished,
+    Cells, Folder, OutputError, RECORDS, WriteError, attractors_csv, cells_csv, cells_npy, inventory, layers,
+    map_figure, map_manifest, names, report, unfinished,
 };
 use crate::map::scene::{Format, List, Scene};
 use crate::validate::Validation;
@@ -27,17 +27,19 @@ const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
 const WORDS: &str = "words.csv";
 const HTML: &str = "report.html";
+const ATTRACTORS: &str = "attractors.csv";
 /// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
 pub const LIST: &str = "list.csv";
 /// What a validation found.
 pub const VALIDATION: &str = "validation.json";
 
 /// The layers of which there are figures, in every format of figures.
-const LAYERS: [&str; 7] = ["map", "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
+const LAYERS: [&str; 8] =
+    ["map", layers::CLASS, "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
 
 /// Every file that a map may have beside its records, but for its list, which is not made of them.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let tables = [MANIFEST, CSV, NPY, WORDS, HTML, VALIDATION].map(str::to_owned);
+    let tables = [MANIFEST, CSV, NPY, WORDS, ATTRACTORS, HTML, VALIDATION].map(str::to_owned);
     let figures = LAYERS.into_iter().flat_map(|layer| names::figures(layer).map(|(_, name)| name));
     tables.into_iter().chain(figures).collect()
 });
@@ -202,7 +204,13 @@ fn write_tables(
         || write_if(asks(Format::Npy), NPY, &|path| cells_npy::write(path, cells, &rows)),
     );
     let words = write_if(asks(Format::Npy) && has_words, WORDS, &|path| rows.write(path));
-    Ok([csv?, npy?, words?].into_iter().flatten().collect())
+    let attractors = match cells.basins() {
+        Some(basins) => {
+            write_if(asks(Format::Csv), ATTRACTORS, &|path| attractors_csv::write(path, cells, basins))?
+        }
+        None => None,
+    };
+    Ok([csv?, npy?, words?, attractors].into_iter().flatten().collect())
 }
 
 fn write_pictures(

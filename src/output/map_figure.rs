@@ -95,6 +95,10 @@ fn draw(
 pub(super) fn subtitle(scene: &Scene) -> String {
     let last = scene.axes().last().map_or(String::new(), |axis| symbol(&axis.parameter().name));
     let start = match scene.start() {
+        Start::Rest if scene.sweeps_start() => "from its own state, the other components 0".to_owned(),
+        Start::State(state) if scene.sweeps_start() => {
+            format!("from its own state, the other components of ({})", state.map(number).join(", "))
+        }
         Start::Rest => "from rest".to_owned(),
         Start::State(state) => format!("from ({})", state.map(number).join(", ")),
         Start::Up => format!("from the attractor at the next lower {last}"),

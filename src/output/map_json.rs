@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::cells::Cells;
-use super::map_manifest::{RefinementObject, Run, statuses, tally};
+use super::map_manifest::{BasinObject, RefinementObject, Run, basins, statuses, tally};
 use super::{OutputError, names};
 use crate::map::plan::count_classes;
 
@@ -27,6 +27,9 @@ struct MapObject<'a> {
     /// Cells by the number of attractors that their starts found.
     #[serde(skip_serializing_if = "Option::is_none")]
     attractors: Option<BTreeMap<u8, usize>>,
+    /// Attractors of a map of basins, by label.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    basins: Option<Vec<BasinObject>>,
     refinement: Option<RefinementObject>,
     /// Forcing periods integrated.
     periods: u64,
@@ -73,6 +76,7 @@ pub fn print(
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
+        basins: basins(cells),
         refinement: run.refined.as_ref().map(RefinementObject::from),
         periods: cells.periods(),
         without_effect: &run.without_effect,

@@ -8,11 +8,12 @@ use serde::Serialize;
 use super::cells::{Cells, SOURCES};
 use super::cells_npy::ABSENT;
 use super::inventory::FileEntry;
-use super::manifest::{AxisObject, DerivedObject, Head, StartObject, derived, start};
+use super::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
 use super::map::LIST;
 use super::names;
 use super::parameters::Parameters;
 use super::record_file::Identity;
+use crate::map::attractors::Attractor;
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
 use crate::map::schedule::{Audit, Deviation, Refined};
@@ -74,6 +75,7 @@ pub(super) struct Manifest<'a> {
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
+    model: ModelObject,
     axes: Vec<AxisObject>,
     /// The list in the place of axes.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -90,6 +92,9 @@ pub(super) struct Manifest<'a> {
     /// Cells by the number of attractors that their starts found.
     #[serde(skip_serializing_if = "Option::is_none")]
     attractors: Option<BTreeMap<u8, usize>>,
+    /// Attractors of a map of basins, by label.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    basins: Option<Vec<BasinObject>>,
     periods: u64,
     /// Swept parameters that changed nothing that was measured.
     without_effect: &'a [String],
@@ -100,6 +105,28 @@ pub(super) struct Manifest<'a> {
     refinement: Option<RefinementObject>,
     timings: TimingsObject,
     files: &'a [FileEntry],
+}
+
+/// An attractor and the size of its basin.
+#[derive(Serialize)]
+pub(super) struct BasinObject {
+    class: &'static str,
+    period: Option<u32>,
+    cells: usize,
+    share: f64,
+}
+
+/// The attractors of a map of basins, in the order of their labels.
+pub(super) fn basins(cells: &Cells<'_>) -> Option<Vec<BasinObject>> {
+    let basins = cells.basins()?;
+    let total = basins.labels().len() as f64;
+    let object = |attractor: &Attractor| BasinObject {
+        class: names::class(attractor.class),
+        period: names::period(attractor.class),
+        cells: attractor.cells,
+        share: attractor.cells as f64 / total,
+    };
+    Some(basins.attractors().iter().map(object).collect())
 }
 
 /// Which cells there are, where they are listed.
@@ -268,6 +295,7 @@ pub(super) fn map<'a>(
         title: scene.title(),
         scene: scene.text(),
         set: run.sets,
+        model: ModelObject::of(scene.base()),
         axes: scene.axes().iter().map(AxisObject::from).collect(),
         list: scene.list().map(ListObject::from),
         parameters: Parameters::of_scene(scene),
@@ -279,6 +307,7 @@ pub(super) fn map<'a>(
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
+        basins: basins(cells),
         periods: cells.periods(),
         without_effect: &run.without_effect,
         codes: codes(),

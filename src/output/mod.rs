@@ -1,5 +1,6 @@
 //! Results, written down: files in a guarded folder, and text for the terminal.
 
+mod attractors_csv;
 pub mod bifurcation;
 mod bifurcation_columns_csv;
 mod bifurcation_csv;

@@ -37,7 +37,9 @@ fn start(model: &dyn Model, state: State) -> String {
 /// The whole command for the run `id`.
 pub(super) fn command(cells: &Cells<'_>, id: usize) -> String {
     let scene = cells.scene();
-    let swept = scene.swept().map(|parameter| &*parameter.name).zip(cells.values(id));
+    let targets = scene.points().targets();
+    let swept = targets.zip(scene.swept().map(|parameter| &*parameter.name).zip(cells.values(id)));
+    let swept = swept.filter(|(target, _)| !target.is_start()).map(|(_, named)| named);
     let sets = swept.chain(cells.derived(id)).map(|(name, value)| format!(" --set {name}={value:?}"));
     let sets: String = sets.collect();
     // A later argument wins over the scene's own.

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::attractors_csv::named;
 use super::cells::{Cells, Row, SOURCES};
 use super::layers::{Color, Layer};
 use super::map_figure::subtitle;
@@ -27,7 +28,7 @@ use super::map_manifest::RefinementObject;
 use super::symbols::symbol;
 use super::words::{Spelled, Words};
 use super::{WriteError, caption, names, replay};
-use crate::map::scene::{Quantity, Rule, Scale, Scene};
+use crate::map::scene::{Quantity, Rule, Scale, Scene, Target};
 use rattlemap_dynamics::orbit::Status;
 
 const PAGE: &str = include_str!("report/page.html");
@@ -40,7 +41,7 @@ struct Data<'a> {
     subtitle: String,
     /// Every parameter that no axis sweeps, with its value or what it follows; and what the model is taken from.
     fixed: String,
-    source: Option<&'static str>,
+    source: Option<String>,
     axes: Vec<AxisData>,
     derived: Vec<DerivedData>,
     /// What follows the `--set` of swept and derived parameters in the command that replays a cell.
@@ -48,6 +49,8 @@ struct Data<'a> {
     /// Where cells start that follow their neighbours: four numbers per cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     starts: Option<Packed>,
+    /// The first cell's start, where axes sweep components of it.
+    start: Option<Vec<f64>>,
     layers: Vec<LayerData>,
     values: serde_json::Map<String, serde_json::Value>,
     classes: [&'static str; 4],
@@ -55,6 +58,8 @@ struct Data<'a> {
     sources: Vec<&'static str>,
     words: Vec<String>,
     patterns: Vec<String>,
+    /// By label.
+    attractors: Vec<String>,
     /// What became of an adaptive map.
     refinement: Option<RefinementObject>,
     validation: Option<&'a serde_json::Value>,
@@ -69,6 +74,9 @@ struct AxisData {
     max: f64,
     count: usize,
     scale: &'static str,
+    /// The place of the component, where it sweeps the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    start: Option<usize>,
     /// Of an axis that is not linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     values: Option<Vec<f64>>,
@@ -136,11 +144,12 @@ pub(super) fn write(
         title: scene.title().to_owned(),
         subtitle: subtitle(scene),
         fixed: caption::all_fixed(scene),
-        source: caption::source(scene.base()),
+        source: scene.base().source().map(str::to_owned),
         axes: scene.axes().iter().map(AxisData::from).collect(),
         derived: derived(scene),
         replay: replay::arguments(scene),
         starts: starts(cells),
+        start: scene.sweeps_start().then(|| cells.start(0)[..scene.base().state_names().len()].to_vec()),
         layers: layers.par_iter().map(LayerData::from).collect(),
         values: values(cells, spelled)?,
         classes: names::CLASSES,
@@ -148,6 +157,9 @@ pub(super) fn write(
         sources: SOURCES.iter().map(|&source| names::source(source)).collect(),
         words: texts(spelled.words.as_ref()),
         patterns: texts(spelled.patterns.as_ref()),
+        attractors: cells.basins().map_or(Vec::new(), |basins| {
+            basins.attractors().iter().enumerate().map(|(label, attractor)| named(label, attractor)).collect()
+        }),
         refinement: cells.refinement().map(RefinementObject::from),
         validation,
     };
@@ -192,7 +204,13 @@ fn derived(scene: &Scene) -> Vec<DerivedData> {
     let points = scene.points();
     let [columns, rows] = points.counts();
     let of = |rule: &Rule| {
-        let along = [0, 1].map(|i| scene.axes().get(i).is_some_and(|axis| rule.follows(axis.index())));
+        let along = [0, 1].map(|i| {
+            scene
+                .axes()
+                .get(i)
+                .and_then(|axis| axis.target().parameter())
+                .is_some_and(|index| rule.follows(index))
+        });
         let counts = [if along[0] { columns } else { 1 }, if along[1] { rows } else { 1 }];
         let cells = (0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| j * columns + i));
         let values: Vec<f64> = cells.map(|cell| points.model(cell).value(rule.index())).collect();
@@ -245,6 +263,10 @@ fn values(
     if cells.refinement().is_some() {
         list.push(("source", bytes(|row| row.source as u8)));
     }
+    if let Some(basins) = cells.basins() {
+        let labels: Vec<u32> = basins.labels().iter().map(|&label| label.into()).collect();
+        list.push(("attractor", packed("u32", &labels)));
+    }
     if let Some(counts) = cells.attractors() {
         list.push(("attractors", packed("u8", counts)));
     }
@@ -276,6 +298,10 @@ impl From<&crate::map::scene::Axis> for AxisData {
             max: axis.max(),
             count: axis.count(),
             scale: axis.scale().name(),
+            start: match axis.target() {
+                Target::Start(place) => Some(place),
+                Target::Parameter(_) => None,
+            },
             values: (axis.scale() != Scale::Linear).then(|| axis.values().collect()),
         }
     }

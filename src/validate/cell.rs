@@ -5,9 +5,10 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{Matrix4, Vector4};
 
 use super::Subject;
-use super::compare::{Answer, Bars};
+use super::compare::{Answer, Bars, Labels};
 use super::finite::not_finite;
 use crate::gpu::Precision;
+use crate::map::attractors::Basins;
 use crate::map::engine::measured_record;
 use crate::map::plan::Needs;
 use crate::map::random::Random;
@@ -48,7 +49,7 @@ pub(super) struct Cell<'a> {
     pub(super) law: Law,
     pub(super) start: State,
     budget: Budget,
-    pub(super) bars: Bars,
+    pub(super) bars: Bars<'a>,
     pub(super) precision: Precision,
     resolution: f64,
     seed: u64,
@@ -85,6 +86,12 @@ impl<'a> Cell<'a> {
             flow,
             halt,
         }
+    }
+
+    /// The same in a map of basins.
+    pub(super) fn in_basins(mut self, basins: Option<&'a Basins>, id: u32) -> Cell<'a> {
+        self.bars.labels = basins.map(|basins| Labels { basins, id: id as usize, own: self.record.strobe });
+        self
     }
 
     /// The plan's budget, all of it: a cell stops before in no case, and one that is undecided takes what the plan
@@ -241,7 +248,7 @@ impl<'a> Cell<'a> {
         })
     }
 
-    /// The distance of two states relative to the size of the motion, but not less than the walls' distance.
+    /// The distance of two states relative to the size of the motion, but not less than the scale of length.
     pub(super) fn apart(&self, a: &State, b: &State) -> f64 {
         let [position, velocity] = self.units(a);
         let by = |i: usize| distance::apart(a[i], b[i]) / [position, velocity][i % 2];
@@ -249,8 +256,7 @@ impl<'a> Cell<'a> {
     }
 
     fn units(&self, y: &State) -> [f64; 2] {
-        let reach = 0.5 * (self.flow.walls[0] - self.flow.walls[1]);
-        let position = y[0].abs().max(y[2].abs()).max(reach);
+        let position = y[0].abs().max(y[2].abs()).max(self.flow.length);
         [position, y[1].abs().max(y[3].abs()).max(self.flow.omega * position)]
     }
 
@@ -259,26 +265,24 @@ impl<'a> Cell<'a> {
         let mut random = Random::new(self.seed ^ k);
         let mut model = self.model.clone();
         let units = self.units(&self.record.strobe);
-        for (index, parameter) in self.model.parameters().iter().enumerate() {
-            let share = match &*parameter.name {
-                // Leaving speeds carry the rounding of the whole motion's velocity.
-                "mesh_speed" => {
-                    let speed = self.model.value(index);
-                    let velocity = units[1].max(speed);
-                    (self.resolution * velocity / speed.max(f64::MIN_POSITIVE)).min(MOST_OF_MESH_SPEED)
-                }
-                _ => self.resolution,
-            };
+        for index in 0..self.model.parameters().len() {
             let value = self.model.value(index);
             // At the end of its range a parameter stays where it is.
-            let _ = model.set_at(index, value * (1.0 + share * (2.0 * random.unit() - 1.0)));
+            let _ = model.set_at(index, value * (1.0 + self.resolution * (2.0 * random.unit() - 1.0)));
+        }
+        // Leaving speeds carry the rounding of the whole motion's velocity.
+        let mut law = model.law();
+        for speed in &mut law.mesh_speed {
+            let share = self.resolution * units[1].max(*speed) / speed.max(f64::MIN_POSITIVE);
+            *speed *= 1.0 + share.min(MOST_OF_MESH_SPEED) * (2.0 * random.unit() - 1.0);
         }
         let units = self.units(&self.start);
-        let start = std::array::from_fn(|i| {
-            self.start[i] + self.resolution * units[i % 2] * (2.0 * random.unit() - 1.0)
-        });
+        let mut start = self.start;
+        for (i, x) in start.iter_mut().enumerate().take(self.model.state_names().len()) {
+            *x += self.resolution * units[i % 2] * (2.0 * random.unit() - 1.0);
+        }
         let flow = Box::new(Flow::new(&model.oscillator().ok()?));
-        Some(Moved { flow, law: model.law(), start, resolution: self.resolution, random, halt: self.halt })
+        Some(Moved { flow, law, start, resolution: self.resolution, random, halt: self.halt })
     }
 }
 

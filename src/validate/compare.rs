@@ -4,9 +4,11 @@ use serde::Serialize;
 
 use super::finite::not_finite;
 use crate::gpu::Precision;
+use crate::map::attractors::{Basins, NONE};
 use crate::record::classify::{classify, status};
 use crate::record::distance::{apart, is_within};
 use crate::record::{Record, Spelling, valid};
+use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Budget, Class, Status};
 use rattlemap_dynamics::word::Word;
 
@@ -25,6 +27,8 @@ pub enum Field {
     Symmetric,
     /// The exponent: by the largest multiplier of cycles, within wide bars otherwise.
     Exponent,
+    /// The attractor that the start leads to, in a map of basins, where both are periodic.
+    Attractor,
     /// Impacts per forcing period.
     Impacts,
     /// Fraction of time spent meshing.
@@ -41,13 +45,14 @@ pub enum Field {
 
 impl Field {
     /// Every field, in the order in which they are told.
-    pub const ALL: [Field; 12] = [
+    pub const ALL: [Field; 13] = [
         Field::Class,
         Field::Period,
         Field::Word,
         Field::Pattern,
         Field::Symmetric,
         Field::Exponent,
+        Field::Attractor,
         Field::Impacts,
         Field::Mesh,
         Field::Status,
@@ -65,6 +70,7 @@ impl Field {
             Field::Pattern => "pattern",
             Field::Symmetric => "symmetric",
             Field::Exponent => "lyapunov",
+            Field::Attractor => "attractor",
             Field::Impacts => "impacts_per_period",
             Field::Mesh => "mesh_fraction",
             Field::Status => "status",
@@ -169,7 +175,7 @@ impl Answer {
 /// over the plane 99 % are within 3e-4 (f32) and 4e-6 (f64) of the reference's multiplier, all but those whose
 /// multiplier is close to 1 or which had not settled within 6e-3 and 3e-3; their meshing within 2e-6 and 3e-8.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bars {
+pub(super) struct Bars<'a> {
     /// Natural logarithm of the largest multiplier, per forcing period and at least per five: every period of a
     /// cycle adds its own error.
     multiplier: f64,
@@ -178,6 +184,26 @@ pub(super) struct Bars {
     mesh: f64,
     forcing_period: f64,
     budget: Budget,
+    pub(super) labels: Option<Labels<'a>>,
+}
+
+/// The attractors of a map of basins, as one cell of it knows them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Labels<'a> {
+    pub(super) basins: &'a Basins,
+    pub(super) id: usize,
+    /// The strobe state of the map's own record.
+    pub(super) own: State,
+}
+
+impl Labels<'_> {
+    /// What the map says of its own record; of another the attractor that it shows, if that is one of the map's.
+    fn of(&self, record: &Record) -> Option<u16> {
+        match record.strobe == self.own {
+            true => Some(self.basins.labels()[self.id]).filter(|&label| label != NONE),
+            false => self.basins.label(self.id, record),
+        }
+    }
 }
 
 /// Growth or decay, as a logarithm, that takes rounding to the size of the motion or back: what has had less of it by
@@ -193,13 +219,13 @@ const ERRORS: f64 = 8.0;
 /// Beside that: an exponent per forcing period, and shares of impacts and of time.
 const CHAOS_BARS: [f64; 3] = [0.1, 0.5, 0.25];
 
-impl Bars {
-    pub(super) fn new(precision: Precision, forcing_period: f64, budget: &Budget) -> Bars {
+impl Bars<'_> {
+    pub(super) fn new(precision: Precision, forcing_period: f64, budget: &Budget) -> Self {
         let (multiplier, no_multiplier, mesh) = match precision {
             Precision::F32 => (4e-3, 1e-2, 2e-5),
             Precision::F64 => (1e-3, 1e-5, 1e-6),
         };
-        Bars { multiplier, no_multiplier, mesh, forcing_period, budget: *budget }
+        Bars { multiplier, no_multiplier, mesh, forcing_period, budget: *budget, labels: None }
     }
 
     /// Compares a record with what its judge says, field by field as far as both have them.
@@ -224,6 +250,7 @@ impl Bars {
             (Class::Periodic { period: ours }, Class::Periodic { period: theirs }) => {
                 let counts = || (Value::Count(ours), Value::Count(theirs));
                 list.push(compared(Field::Period, ours == theirs, counts));
+                list.extend(self.compare_labels(record, judge));
                 if ours == theirs {
                     self.compare_cycle(record, answer, f64::from(ours), &mut list);
                 }
@@ -234,6 +261,14 @@ impl Bars {
             _ => {}
         }
         list
+    }
+
+    /// Whether two cycles are the same attractor, in a map of basins.
+    fn compare_labels(&self, record: &Record, judge: &Record) -> Option<Compared> {
+        let labels = self.labels?;
+        let [ours, theirs] = [record, judge].map(|record| labels.of(record));
+        let shown = |label: Option<u16>| Value::Text(label.map_or("none of them".into(), |n| n.to_string()));
+        Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
     /// Whether two ends of motion of one class are the same. Lanes call an approach slow where they stand farther than

@@ -6,6 +6,7 @@
 //! separates. Where neither is seen, as on the way to a cycle that is slow, nothing is claimed.
 
 pub mod dop853;
+pub mod field;
 pub mod flight;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -56,6 +57,8 @@ struct Strobed<'a> {
 #[derive(Clone, Debug, Default)]
 struct Tally {
     impacts: usize,
+    /// Whether there were infinitely many, of which not all are counted.
+    series: bool,
     meshing_time: f64,
     symbols: Vec<u8>,
 }
@@ -81,6 +84,7 @@ impl Strobed<'_> {
         self.solver.advance(&mut self.flight, 0.0, self.period)?;
         let mut meshing_since = meshed.then_some(0.0);
         for ended in std::mem::take(&mut self.flight.events) {
+            self.tally.series |= ended.after_series;
             match ended.kind {
                 EventKind::Impact => self.tally.impacts += 1,
                 EventKind::MeshStart => meshing_since = Some(ended.t),
@@ -129,7 +133,7 @@ fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> 
     }
     let window = &strobes[strobes.len().saturating_sub(kept)..];
     let largest = |i: usize| window.iter().map(|q| q[i].abs().max(q[i + 2].abs())).fold(0.0, f64::max);
-    let position = largest(0).max(0.5 * (oscillator.walls[0] - oscillator.walls[1]));
+    let position = largest(0).max(oscillator.length_scale());
     let units = [position, largest(1).max(oscillator.omega * position)];
     let apart = |a: &[f64; 4], b: &[f64; 4]| {
         (0..4).map(|i| distance::apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
@@ -143,22 +147,24 @@ fn follow(mut motion: Strobed<'_>, oscillator: &Oscillator, budget: &Budget) -> 
         Some(lag) if lags.clone().any(|part| part < lag && lag % part == 0 && recurs(part, NEARLY)) => {
             return None;
         }
-        Some(lag) => cycle(&motion, lag as u32, units)?,
+        Some(lag) => cycle(&motion, lag as u32, oscillator.degrees, units)?,
         None => chaos(motion, budget.settings.observed_periods, units)?,
     };
     Some(Record { periods_run: budget.periods(), ..record })
 }
 
-/// The derivative of one period, by differences of motions to either side.
-fn derivative(on: &Strobed, units: [f64; 2]) -> Option<Matrix4<f64>> {
+/// The derivative of one period, by differences of motions to either side, in the directions that there are.
+fn derivative(on: &Strobed, degrees: usize, units: [f64; 2]) -> Option<Matrix4<f64>> {
     let image = |j: usize, by: f64| {
-        let mut other = on.clone();
-        other.flight.q[j] += by;
+        let mut direction = [0.0; 4];
+        direction[j] = by;
+        let mut other = Strobed { flight: on.flight.displaced(&direction), ..on.clone() };
         other.advance()?;
         Some(other.flight.q)
     };
     let mut derivative = Matrix4::zeros();
-    for j in 0..4 {
+    let held = if on.flight.is_stuck() { 2 } else { 0 };
+    for j in held..2 * degrees {
         let by = BESIDE * units[j % 2];
         let (ahead, behind) = (image(j, by)?, image(j, -by)?);
         (0..4).for_each(|i| derivative[(i, j)] = (ahead[i] - behind[i]) / (2.0 * by));
@@ -167,13 +173,13 @@ fn derivative(on: &Strobed, units: [f64; 2]) -> Option<Matrix4<f64>> {
 }
 
 /// A cycle, if it is stable.
-fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
+fn cycle(on: &Strobed, period: u32, degrees: usize, units: [f64; 2]) -> Option<Record> {
     let span = f64::from(period) * on.period;
     let mut motion = on.clone();
     motion.tally = Tally::default();
     let mut monodromy = Matrix4::identity();
     for _ in 0..period {
-        monodromy = derivative(&motion, units)? * monodromy;
+        monodromy = derivative(&motion, degrees, units)? * monodromy;
         motion.advance()?;
     }
     let [re, im] = *multipliers(&monodromy)?.first()?;
@@ -189,8 +195,13 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
         ..Record::default()
     };
     let word = Word::cyclic(&tally.symbols);
-    record.set_word(&word);
     record.set_pattern(&word.pattern());
+    // How many of infinitely many impacts are told is nobody's claim.
+    if tally.series {
+        record.valid &= !valid::IMPACTS;
+    } else {
+        record.set_word(&word);
+    }
     if radius > LEAST_MULTIPLIER {
         record.valid |= valid::LYAPUNOV;
     }
@@ -201,7 +212,9 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
 fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
     motion.tally = Tally::default();
     let mut other = motion.clone();
-    other.flight.q[0] += BESIDE * units[0];
+    let mut aside = [0.0; 4];
+    aside[if motion.flight.is_stuck() { 2 } else { 0 }] = BESIDE * units[0];
+    other.flight = motion.flight.displaced(&aside);
     let mut growth = Vec::new();
     for _ in 0..periods {
         motion.advance()?;
@@ -212,12 +225,13 @@ fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
         growth.push((length / BESIDE).ln());
         // In its domain, and as near as it was.
         other = motion.clone();
-        (0..4).for_each(|i| other.flight.q[i] += BESIDE * units[i % 2] * difference[i] / length);
+        aside = std::array::from_fn(|i| BESIDE * units[i % 2] * difference[i] / length);
+        other.flight = motion.flight.displaced(&aside);
     }
     let mean = growth.iter().sum::<f64>() / growth.len().max(1) as f64;
     let error = standard_error(&growth);
     let span = f64::from(periods);
-    let record = Record {
+    let mut record = Record {
         lyapunov: mean / motion.period,
         lyapunov_error: error / motion.period,
         impacts_per_period: motion.tally.impacts as f64 / span,
@@ -226,5 +240,8 @@ fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
         valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH,
         ..Record::default()
     };
+    if motion.tally.series {
+        record.valid &= !valid::IMPACTS;
+    }
     (mean > CHAOS_ERRORS * error).then_some(record)
 }

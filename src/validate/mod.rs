@@ -37,6 +37,7 @@ pub use sample::{Draw, Sample, Stratum, sample};
 pub use states::{HORIZON, Off, StateCheck};
 
 use crate::gpu::Precision;
+use crate::map::attractors::Basins;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::{Record, valid};
@@ -246,18 +247,20 @@ pub fn replay(
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
 ) -> Validation {
-    replay_whole(subject, sample, lanes, report, &NEVER)
+    replay_whole(subject, None, sample, lanes, report, &NEVER)
 }
 
-/// [`replay`] until a flag is raised; none if it was by then.
+/// [`replay`] until a flag is raised; none if it was by then. In a map of basins a start has to lead to its attractor,
+/// too.
 pub fn replay_until(
     subject: &Subject<'_>,
+    basins: Option<&Basins>,
     sample: &Sample,
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
     halt: &AtomicBool,
 ) -> Option<Validation> {
-    let validation = replay_whole(subject, sample, lanes, report, halt);
+    let validation = replay_whole(subject, basins, sample, lanes, report, halt);
     (!halt.load(Ordering::Relaxed)).then_some(validation)
 }
 
@@ -267,6 +270,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 /// What comes back once `halt` is raised is of no use.
 fn replay_whole(
     subject: &Subject<'_>,
+    basins: Option<&Basins>,
     sample: &Sample,
     lanes: &Lanes,
     report: &(dyn Fn(usize) + Sync),
@@ -285,7 +289,7 @@ fn replay_whole(
             if is_halted() {
                 return None;
             }
-            let cell = Cell::new(subject, id, halt);
+            let cell = Cell::new(subject, id, halt).in_basins(basins, id);
             let replayed = replay_cell(subject, &cell, id, judge, lanes, uniform.binary_search(&id).is_ok());
             (!is_halted()).then(|| {
                 report(done.fetch_add(1, Ordering::Relaxed) + 1);

@@ -52,6 +52,11 @@ fn columns_are_those_of_the_files() {
     run(dir, &["compare", "out/plane", "out/plane", "--quiet"]);
     assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed("cells.csv and cells.npy"));
+    let start = |name| axis(name, -0.5, 0.5).replace("parameter", "start");
+    let starts = format!("[parameters]\ne = 0.3\n{}{}", start("x1"), start("v2"));
+    fs::write(dir.join("starts.toml"), starts).unwrap();
+    run(dir, &["map", "starts.toml", "--engine", "cpu", "--quiet"]);
+    assert_eq!(header(&dir.join("out/starts/attractors.csv")), listed("attractors.csv"));
     assert_eq!(header(&dir.join("out/plane/words.csv")), listed("words.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));

@@ -5,6 +5,7 @@ mod common;
 
 mod audit;
 mod axes;
+mod basins;
 mod models;
 mod runs;
 mod starts;

@@ -9,6 +9,7 @@ mod short_cells;
 mod classes_agree;
 mod half_mesh;
 mod independent;
+mod kinds;
 mod not_finite;
 mod replay;
 mod short_lanes;

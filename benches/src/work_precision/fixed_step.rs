@@ -4,7 +4,8 @@
 use super::PERIODS;
 use super::cells::{Latest, Subject};
 use super::outcome::Outcome;
-use rattlemap::validate::independent::flight::{Field, Flight};
+use rattlemap::validate::independent::field::Field;
+use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Gap;
 
 /// Endings in one period beyond which a lane is given up.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
-use crate::map::scene::Points;
+use crate::map::scene::{Points, Target};
 use rattlemap_dynamics::model::Parameter;
 
 /// The distinct flows of all cells, or the distinct laws, numbered from 0.
@@ -28,7 +28,9 @@ impl Parts {
     }
 
     fn new(points: &Points, is_shaped: fn(&Parameter) -> bool) -> Parts {
-        let shapes: Vec<bool> = points.swept_indices().map(|index| points.shapes(index, is_shaped)).collect();
+        // Cells that differ in their starts alone share everything.
+        let shapes = |target: Target| target.parameter().is_some_and(|index| points.shapes(index, is_shaped));
+        let shapes: Vec<bool> = points.targets().map(shapes).collect();
         let Some(list) = points.list() else {
             let along = [0, 1].map(|i| shapes.get(i).copied().unwrap_or(false));
             return Parts::Grid { counts: points.counts(), along };

@@ -40,6 +40,7 @@ pub(super) fn take(document: &mut Node, model: &dyn Model, along: Option<&Along>
             (None, _) | (Some(_), []) => return Ok(()),
             (Some(_), _) => axis::read(&root, model, tables.len(), command)?,
         };
+        axis::refuse_starts(&root, &axes, command)?;
         let is_argument = |i| axis::named(&root, i).map(|field| field.is_argument());
         let are_arguments = (0..axes.len()).map(is_argument).collect::<Result<Vec<bool>, _>>()?;
         (axes, are_arguments)
@@ -49,7 +50,7 @@ pub(super) fn take(document: &mut Node, model: &dyn Model, along: Option<&Along>
     let Value::Table(root) = &mut document.value else { return Ok(()) };
     keep(root, axes.iter().position(|axis| *axis.parameter().name == *along.parameter));
     for (axis, value) in held {
-        let place = axes.iter().position(|other| other.index() == axis.index());
+        let place = axes.iter().position(|other| other.target() == axis.target());
         let is_argument = place.is_some_and(|i| are_arguments[i]);
         hold(root, &axis.parameter().name, value, is_argument)?;
     }
@@ -106,7 +107,7 @@ fn held<'a>(axes: &'a [Axis], along: &Along) -> Result<Vec<(&'a Axis, Node)>, Sc
                  --set {name}={value}"
             )));
         };
-        if held.iter().any(|(other, _)| other.index() == axis.index()) {
+        if held.iter().any(|(other, _)| other.target() == axis.target()) {
             return Err(conflict("--at names it twice; drop one of the two".to_owned()));
         }
         let argument: Arc<str> = argument.as_str().into();
@@ -115,7 +116,7 @@ fn held<'a>(axes: &'a [Axis], along: &Along) -> Result<Vec<(&'a Axis, Node)>, Sc
     }
     let is_open = |axis: &&Axis| {
         *axis.parameter().name != *along.parameter
-            && !held.iter().any(|(other, _)| other.index() == axis.index())
+            && !held.iter().any(|(other, _)| other.target() == axis.target())
     };
     if let Some(axis) = axes.iter().find(is_open) {
         let name = &axis.parameter().name;

@@ -1,4 +1,4 @@
-//! Axes: which parameter is swept, and its values.
+//! Axes: which parameter is swept, or which component of the start, and its values.
 
 use std::sync::Arc;
 
@@ -6,12 +6,52 @@ use super::document::{Node, Value};
 use super::error::SceneError;
 use super::keys;
 use super::section::{Field, Section};
-use rattlemap_dynamics::model::{Model, Parameter};
+use rattlemap_dynamics::model::{Model, Parameter, Range, Shapes, State};
 
 /// The most values that one axis may have.
 pub const MAX_COUNT: u32 = 1_000_000;
 
 const EXAMPLE: &str = "write [[axis]] with parameter, min, max and count, or with parameter and values";
+
+const NEITHER: &str = "name one of the model's parameters, or with `start` a component of the start";
+
+/// What an axis, or a column of a list, sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// The parameter with this index in the model's table.
+    Parameter(usize),
+    /// The component of the start with this place among the model's [state names](Model::state_names).
+    Start(usize),
+}
+
+impl Target {
+    /// The parameter's index, if it is one.
+    pub(crate) fn parameter(self) -> Option<usize> {
+        match self {
+            Target::Parameter(index) => Some(index),
+            Target::Start(_) => None,
+        }
+    }
+
+    /// Whether it is a component of the start.
+    pub fn is_start(self) -> bool {
+        matches!(self, Target::Start(_))
+    }
+
+    /// Gives a model the value, if it has it.
+    pub(super) fn set(self, model: &mut dyn Model, value: f64) {
+        if let Target::Parameter(index) = self {
+            model.assign(index, value);
+        }
+    }
+
+    /// Gives a start the value, if it has it.
+    pub(super) fn begin(self, start: &mut State, value: f64) {
+        if let Target::Start(component) = self {
+            start[component] = value;
+        }
+    }
+}
 
 /// How the values of an axis follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,12 +75,11 @@ impl Scale {
     }
 }
 
-/// The values of one parameter, strictly increasing.
+/// The values of one parameter, or of one component of the start, strictly increasing.
 #[derive(Clone, Debug)]
 pub struct Axis {
     parameter: Parameter,
-    /// Of the parameter in the model's table.
-    index: usize,
+    target: Target,
     min: f64,
     max: f64,
     count: usize,
@@ -50,20 +89,25 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// The swept parameter.
+    /// The swept parameter; of a component of the start its name, its meaning and its range.
     pub fn parameter(&self) -> &Parameter {
         &self.parameter
     }
 
-    /// The parameter's place in the model's table.
-    pub(crate) fn index(&self) -> usize {
-        self.index
+    /// What the axis sets.
+    pub fn target(&self) -> Target {
+        self.target
     }
 
     /// Gives a model the axis' value `i`.
     pub(crate) fn set(&self, model: &mut dyn Model, i: usize) {
         // Between two ends in the parameter's range, which is an interval.
-        model.assign(self.index, self.value(i));
+        self.target.set(model, self.value(i));
+    }
+
+    /// Gives a start the axis' value `i`.
+    pub(crate) fn begin(&self, start: &mut State, i: usize) {
+        self.target.begin(start, self.value(i));
     }
 
     /// The first value.
@@ -152,6 +196,16 @@ pub(super) fn read(
     Ok(axes)
 }
 
+/// Refuses axes of the start where `command` has no use for them.
+pub(super) fn refuse_starts(root: &Section<'_>, axes: &[Axis], command: &str) -> Result<(), SceneError> {
+    match axes.iter().position(|axis| axis.target.is_start()) {
+        Some(i) => Err(named(root, i)?.conflict(format!(
+            "`{command}` follows one motion along a parameter; starts are for `map`, which shows their basins"
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// The place of the axis too many, with the number of axes as the value shown.
 fn count_node(at: &Node, count: usize) -> Node {
     let shown = format!("{count} {}", if count == 1 { "table" } else { "tables" });
@@ -160,16 +214,54 @@ fn count_node(at: &Node, count: usize) -> Node {
 
 fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axis, SceneError> {
     let section = Section::open(table.node, &table.path, &keys::names("axis"))?;
-    let field = section.require("parameter", "name one of the model's parameters")?;
+    let (field, is_start) = told_name(&section)?;
     let name = field.text()?;
-    let index = model.index(name).map_err(|_| field.unknown_among(name, &names(model), &meanings(model)))?;
-    let parameter = model.parameters()[index].clone();
-    if let Some(i) = before.iter().position(|axis| axis.index == index) {
-        return Err(field.conflict(format!("axis {i} sweeps it already; name another parameter")));
+    let (target, parameter) = if is_start {
+        let names = model.state_names();
+        let place = names.iter().position(|known| *known == name);
+        let place = place.ok_or_else(|| field.unknown_among(name, &names, &names.join(", ")))?;
+        (Target::Start(place), component(model, place))
+    } else {
+        let index =
+            model.index(name).map_err(|_| field.unknown_among(name, &names(model), &meanings(model)))?;
+        (Target::Parameter(index), model.parameters()[index].clone())
+    };
+    if let Some(i) = before.iter().position(|axis| axis.target == target) {
+        let what = if is_start { "component of the start" } else { "parameter" };
+        return Err(field.conflict(format!("axis {i} sweeps it already; name another {what}")));
     }
     match told_values(&section)? {
-        Some(values) => read_values(&values, parameter, index),
-        None => read_range(&section, parameter, index),
+        Some(values) => read_values(&values, parameter, target),
+        None => read_range(&section, parameter, target),
+    }
+}
+
+/// The name of what an axis sweeps, and whether that is a component of the start: an argument wins over the text.
+fn told_name<'a>(section: &Section<'a>) -> Result<(Field<'a>, bool), SceneError> {
+    match (section.get("parameter"), section.get("start")) {
+        (Some(parameter), Some(start)) if parameter.is_argument() == start.is_argument() => Err(start
+            .conflict(format!(
+                "`{}` is given, too, and an axis sweeps one thing; drop either",
+                parameter.path
+            ))),
+        (Some(parameter), Some(_)) if parameter.is_argument() => Ok((parameter, false)),
+        (_, Some(start)) => Ok((start, true)),
+        (Some(parameter), None) => Ok((parameter, false)),
+        (None, None) => Err(section.missing("parameter", NEITHER)),
+    }
+}
+
+/// A component of the start, as it is told where parameters are.
+pub(super) fn component(model: &dyn Model, place: usize) -> Parameter {
+    let name = model.state_names()[place].to_owned();
+    let meaning = if place.is_multiple_of(2) { "displacement at the start" } else { "velocity at the start" };
+    Parameter {
+        name: name.into(),
+        meaning: meaning.into(),
+        default: None,
+        range: Range::Finite,
+        // Neither: nothing asks.
+        shapes: Shapes::Both,
     }
 }
 
@@ -188,7 +280,7 @@ fn told_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneErro
     Ok((is_argument || others.next().is_none()).then_some(values))
 }
 
-fn read_values(field: &Field<'_>, parameter: Parameter, index: usize) -> Result<Axis, SceneError> {
+fn read_values(field: &Field<'_>, parameter: Parameter, target: Target) -> Result<Axis, SceneError> {
     let wanted = format!("a list of 2 to {MAX_COUNT} numbers, each greater than the one before it");
     let items = field.list(&wanted)?;
     if !(2..=MAX_COUNT as usize).contains(&items.len()) {
@@ -203,10 +295,10 @@ fn read_values(field: &Field<'_>, parameter: Parameter, index: usize) -> Result<
         table.push(value);
     }
     let (min, max, count) = (table[0], table[items.len() - 1], items.len());
-    Ok(Axis { parameter, index, min, max, count, scale: Scale::Values, table: table.into() })
+    Ok(Axis { parameter, target, min, max, count, scale: Scale::Values, table: table.into() })
 }
 
-fn read_range(section: &Section<'_>, parameter: Parameter, index: usize) -> Result<Axis, SceneError> {
+fn read_range(section: &Section<'_>, parameter: Parameter, target: Target) -> Result<Axis, SceneError> {
     let scale = match section.get("scale") {
         Some(field) => field.choice(&[Scale::Linear, Scale::Log].map(|scale| (scale.name(), scale)))?,
         None => Scale::Linear,
@@ -235,7 +327,7 @@ fn read_range(section: &Section<'_>, parameter: Parameter, index: usize) -> Resu
         Scale::Log => geometric(min, max, count),
         _ => Arc::new([]),
     };
-    let axis = Axis { parameter, index, min, max, count, scale, table };
+    let axis = Axis { parameter, target, min, max, count, scale, table };
     if axis.values().zip(axis.values().skip(1)).any(|(value, next)| value >= next) {
         return Err(count_field.out_of_range("so small that no two values are the same number"));
     }
@@ -254,10 +346,11 @@ fn in_range(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError>
     }
 }
 
-/// The name of axis `i`'s parameter.
+/// The name of what axis `i` sweeps.
 pub(super) fn named<'a>(root: &Section<'a>, i: usize) -> Result<Field<'a>, SceneError> {
     let tables = root.require("axis", EXAMPLE)?.list("a list of tables, [[axis]]")?;
-    Section::open(tables[i].node, &tables[i].path, &keys::names("axis"))?.require("parameter", EXAMPLE)
+    let section = Section::open(tables[i].node, &tables[i].path, &keys::names("axis"))?;
+    told_name(&section).map(|(field, _)| field)
 }
 
 pub(super) fn names(model: &dyn Model) -> Vec<&str> {

@@ -33,8 +33,8 @@ pub struct SceneBuilder {
     title: Option<String>,
     parameters: Vec<(String, f64)>,
     derived: Vec<(String, String)>,
-    /// Names of parameters, each with the other lines of its table.
-    axes: Vec<(String, String)>,
+    /// What each sweeps, its name, and the other lines of its table.
+    axes: Vec<(&'static str, String, String)>,
     /// A table.
     cells: Option<String>,
     integration: Option<Integration>,
@@ -101,11 +101,17 @@ impl SceneBuilder {
     }
 
     fn swept(mut self, parameter: &str, lines: String) -> SceneBuilder {
-        self.axes.push((parameter.to_owned(), lines));
+        self.axes.push(("parameter", parameter.to_owned(), lines));
         self
     }
 
-    /// Lists cells in the place of axes: values of these parameters, row by row.
+    /// Sweeps a component of the start, by its name among the model's state names: the map then shows basins.
+    pub fn start_axis(mut self, component: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
+        self.axes.push(("start", component.to_owned(), range_lines(&range, count)));
+        self
+    }
+
+    /// Lists cells in the place of axes: values of these parameters or components of the start, row by row.
     pub fn cells<const N: usize>(mut self, parameters: [&str; N], rows: &[[f64; N]]) -> SceneBuilder {
         let row = |row: &[f64; N]| row.map(number).join(",");
         let rows = rows.iter().map(row);
@@ -166,7 +172,7 @@ impl SceneBuilder {
         let text = self.text();
         let document = document::read(&text, "scene")?.placed(Place::Builder);
         let cells = self.cells.clone().unwrap_or_default();
-        let find = |_: &str| Ok(FileText { name: "cells".to_owned(), text: cells.clone() });
+        let find = |_, _: &str| Ok(FileText { name: "cells".to_owned(), text: cells.clone() });
         Scene::read(text, &document, &*self.model, purpose, &find)
     }
 
@@ -178,13 +184,14 @@ impl SceneBuilder {
             let _ = writeln!(text, "{line}");
         };
         self.title.iter().for_each(|title| line(format!("title = {}", quoted(title))));
-        line(format!("model = {}", quoted(self.model.name())));
+        line(format!("model = {}", quoted(&super::models::named(&*self.model))));
         line("\n[parameters]".to_owned());
         let mut parameters = self.parameters.clone();
         for (index, parameter) in self.model.parameters().iter().enumerate() {
             let (name, value) = (&*parameter.name, self.model.value(index));
             let is_told = parameters.iter().any(|(told, _)| told == name)
-                || self.axes.iter().chain(&self.derived).any(|(set, _)| set == name)
+                || self.axes.iter().any(|(what, set, _)| *what == "parameter" && set == name)
+                || self.derived.iter().any(|(set, _)| set == name)
                 || self.cells.as_ref().is_some_and(|table| {
                     table.lines().next().is_some_and(|names| names.split(',').any(|column| column == name))
                 });
@@ -204,8 +211,8 @@ impl SceneBuilder {
         for (name, expression) in &self.derived {
             line(format!("{} = {}", quoted(name), quoted(expression)));
         }
-        for (name, lines) in &self.axes {
-            line(format!("\n[[axis]]\nparameter = {}\n{lines}", quoted(name)));
+        for (what, name, lines) in &self.axes {
+            line(format!("\n[[axis]]\n{what} = {}\n{lines}", quoted(name)));
         }
         if self.cells.is_some() {
             line("\n[cells]\nfile = \"cells.csv\"".to_owned());

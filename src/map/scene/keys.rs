@@ -64,20 +64,21 @@ const fn key(
     Key { table, name, default, takes, meaning }
 }
 
-const END: Takes = Takes::Words("the parameter's range");
+const END: Takes = Takes::Words("the parameter's range; of a start any finite number");
 
 /// Every key, in the order in which messages list them; `[parameters]` has those of the model.
 #[rustfmt::skip]
 pub const KEYS: &[Key] = &[
     key("", "title", Words("from the axes"), Takes::Text(LONGEST_TITLE), "heading of figures and of the report"),
-    key("", "model", Value("\"gear-pair\""), Takes::OneOf(&["gear-pair"]), "what moves"),
+    key("", "model", Value("\"gear-pair\""), Takes::Words("a name that `rattlemap models` lists, or the path of a model's file (`.toml`), from the scene's folder"), "what moves"),
     key("axis", "parameter", KeyDefault::None, Takes::Words("a parameter of the model"), "what the axis sweeps; the first axis runs along columns"),
+    key("axis", "start", KeyDefault::None, Takes::Words("a component of the start, such as v1"), "what the axis sweeps instead: cells then belong to basins"),
     key("axis", "min", KeyDefault::None, END, "first value"),
     key("axis", "max", KeyDefault::None, END, "last value, greater than min"),
     key("axis", "count", KeyDefault::None, Takes::Whole(2, MAX_COUNT), "how many values, both ends included"),
     key("axis", "scale", Value("\"linear\""), Takes::OneOf(&["linear", "log"]), "values by equal differences, or by equal ratios (min above 0)"),
     key("axis", "values", KeyDefault::None, Takes::Words("2 to 1000000 numbers in the parameter's range, each greater than the one before"), "the values themselves, in the place of min, max, count and scale"),
-    key("cells", "file", KeyDefault::None, Takes::Words("path of a CSV table, from the scene's folder"), "cells in the place of axes: a column per parameter, a row per cell"),
+    key("cells", "file", KeyDefault::None, Takes::Words("path of a CSV table, from the scene's folder"), "cells in the place of axes: a column per parameter or component of the start, a row per cell"),
     key("integration", "steps_per_period", Value("\"auto\""), Takes::WholeOrAuto(1, MOST_STEPS), "grid of the lanes; the reference has none"),
     key("integration", "transient_periods", Value("400"), Takes::Whole(1, MAX_PERIODS), "forcing periods before anything is read; an upper bound where cells may stop early"),
     key("integration", "observed_periods", Value("128"), Takes::Whole(2, MAX_PERIODS), "forcing periods after that, likewise"),

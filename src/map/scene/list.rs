@@ -5,12 +5,12 @@ use std::fmt::Write;
 use sha2::{Digest, Sha256};
 
 use super::Purpose;
-use super::axis::{meanings, names};
+use super::axis::{Target, component, meanings, names};
 use super::document::shorten;
 use super::error::{Place, Problem, SceneError, suggest};
 use super::keys;
 use super::section::{Field, Section};
-use rattlemap_dynamics::model::{Model, Parameter};
+use rattlemap_dynamics::model::{Model, Parameter, State};
 
 /// A file beside a scene, as whoever reads the scene has found it.
 #[derive(Clone, Debug)]
@@ -21,10 +21,19 @@ pub struct FileText {
     pub text: String,
 }
 
-/// Finds a file beside a scene, by its name in the scene; the error says why it cannot be read.
-pub type FindFile<'f> = &'f dyn Fn(&str) -> Result<FileText, String>;
+/// What a scene names a file for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beside {
+    /// A table of cells.
+    Cells,
+    /// A model.
+    Model,
+}
 
-/// A list of cells: parameters, and a value of each per cell.
+/// Finds a file beside a scene, by its name in the scene; the error says why it cannot be read.
+pub type FindFile<'f> = &'f dyn Fn(Beside, &str) -> Result<FileText, String>;
+
+/// A list of cells: parameters or components of the start, and a value of each per cell.
 #[derive(Clone, Debug)]
 pub struct List {
     file: String,
@@ -38,8 +47,7 @@ pub struct List {
 #[derive(Clone, Debug)]
 struct Column {
     parameter: Parameter,
-    /// Of the parameter in the model's table.
-    index: usize,
+    target: Target,
 }
 
 impl List {
@@ -48,7 +56,7 @@ impl List {
         &self.file
     }
 
-    /// The parameters of its columns, in their order.
+    /// The parameters, or components of the start, of its columns, in their order.
     pub fn parameters(&self) -> impl ExactSizeIterator<Item = &Parameter> {
         self.columns.iter().map(|column| &column.parameter)
     }
@@ -91,17 +99,19 @@ impl List {
         text
     }
 
-    /// Places of the columns' parameters in the model's table.
-    pub(crate) fn indices(&self) -> impl ExactSizeIterator<Item = usize> {
-        self.columns.iter().map(|column| column.index)
+    /// What the columns set.
+    pub(crate) fn targets(&self) -> impl ExactSizeIterator<Item = Target> {
+        self.columns.iter().map(|column| column.target)
     }
 
     /// Gives a model the values of a cell.
     pub(crate) fn set(&self, model: &mut dyn Model, cell: usize) {
-        self.columns
-            .iter()
-            .zip(self.row(cell))
-            .for_each(|(column, &value)| model.assign(column.index, value));
+        self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.set(model, value));
+    }
+
+    /// Gives a start the values of a cell.
+    pub(crate) fn begin(&self, start: &mut State, cell: usize) {
+        self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.begin(start, value));
     }
 }
 
@@ -122,7 +132,7 @@ pub(super) fn read(
     }
     let field = section.require("file", "name a table, such as file = \"points.csv\"")?;
     let file = field.text()?.to_owned();
-    let found = find(&file).map_err(|reason| field.unreadable(&reason))?;
+    let found = find(Beside::Cells, &file).map_err(|reason| field.unreadable(&reason))?;
     let (columns, values) = table(&found, model)?;
     let names: Vec<&str> = columns.iter().map(|column| &*column.parameter.name).collect();
     let hash = hash(&names, values.iter().copied());
@@ -194,15 +204,22 @@ fn columns(
     for (i, name) in header.iter().enumerate() {
         let (field, value) = (format!("column {}", i + 1), shorten(name));
         let at = |problem| wrong(file, 1, i + 1, problem);
-        let Ok(index) = model.index(name) else {
-            let remedy = suggest(name, &names(model), &meanings(model));
-            return Err(at(Problem::UnknownName { field, value, remedy }));
-        };
-        if columns.iter().any(|before| before.index == index) {
+        let components = model.state_names();
+        let (target, parameter) =
+            match (model.index(name), components.iter().position(|known| *known == name)) {
+                (Ok(index), _) => (Target::Parameter(index), model.parameters()[index].clone()),
+                (Err(_), Some(place)) => (Target::Start(place), component(model, place)),
+                (Err(_), None) => {
+                    let all = format!("{}; or of the start {}", meanings(model), components.join(", "));
+                    let remedy = suggest(name, &[names(model), components].concat(), &all);
+                    return Err(at(Problem::UnknownName { field, value, remedy }));
+                }
+            };
+        if columns.iter().any(|before| before.target == target) {
             let remedy = "another column sets it already; drop either".to_owned();
             return Err(at(Problem::Conflict { field, value, remedy }));
         }
-        columns.push(Column { parameter: model.parameters()[index].clone(), index });
+        columns.push(Column { parameter, target });
     }
     match columns.is_empty() {
         false => Ok(columns),

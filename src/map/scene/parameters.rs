@@ -1,6 +1,6 @@
 //! `[parameters]`: the base from which every cell is made.
 
-use super::axis::{self, Axis, meanings, names};
+use super::axis::{self, Axis, Target, meanings, names};
 use super::derived::Derived;
 use super::error::SceneError;
 use super::list::List;
@@ -17,11 +17,11 @@ pub(super) struct Beside<'a> {
 
 impl Beside<'_> {
     fn axis(&self, index: usize) -> Option<usize> {
-        self.axes.iter().position(|axis| axis.index() == index)
+        self.axes.iter().position(|axis| axis.target() == Target::Parameter(index))
     }
 
     fn column(&self, index: usize) -> Option<&List> {
-        self.list.filter(|list| list.indices().any(|column| column == index))
+        self.list.filter(|list| list.targets().any(|column| column == Target::Parameter(index)))
     }
 }
 

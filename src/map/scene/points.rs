@@ -1,11 +1,11 @@
-//! The points of a sweep: which parameters the cells differ in, and the model of each.
+//! The points of a sweep: which parameters and components of the start the cells differ in, and what each has.
 
 use std::sync::Arc;
 
-use super::axis::Axis;
+use super::axis::{Axis, Target};
 use super::derived::Derived;
 use super::list::List;
-use rattlemap_dynamics::model::{Model, Parameter};
+use rattlemap_dynamics::model::{Model, Parameter, State};
 
 /// All cells of a scene, numbered from 0: along the first axis, then along the second; or in the order of a list.
 #[derive(Clone, Debug)]
@@ -67,18 +67,32 @@ impl Points {
         model
     }
 
-    /// What cells differ in: the axes' parameters, or the list's.
+    /// The start of a cell: components that cells differ in from there, the others from `start`.
+    pub(crate) fn start(&self, cell: usize, mut start: State) -> State {
+        match &self.list {
+            Some(list) => list.begin(&mut start, cell),
+            None => self.axes.iter().zip(self.indices(cell)).for_each(|(axis, i)| axis.begin(&mut start, i)),
+        }
+        start
+    }
+
+    /// Whether cells differ in their starts.
+    pub(crate) fn sweeps_start(&self) -> bool {
+        self.targets().any(Target::is_start)
+    }
+
+    /// What cells differ in: the axes' parameters or components of the start, or the list's.
     pub(crate) fn swept(&self) -> impl Iterator<Item = &Parameter> {
         let listed = self.list.iter().flat_map(|list| list.parameters());
         self.axes.iter().map(Axis::parameter).chain(listed)
     }
 
-    /// The same by their places in the model's table.
-    pub(crate) fn swept_indices(&self) -> impl Iterator<Item = usize> {
-        self.axes.iter().map(Axis::index).chain(self.list.iter().flat_map(|list| list.indices()))
+    /// The same by what they set.
+    pub(crate) fn targets(&self) -> impl Iterator<Item = Target> {
+        self.axes.iter().map(Axis::target).chain(self.list.iter().flat_map(|list| list.targets()))
     }
 
-    /// Values of the swept parameters in a cell.
+    /// Values of what is swept in a cell.
     pub(crate) fn values(&self, cell: usize) -> Vec<f64> {
         match &self.list {
             Some(list) => list.row(cell).to_vec(),

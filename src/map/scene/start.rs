@@ -1,9 +1,9 @@
 //! `[start]`: the states in which cells begin.
 
-use super::Purpose;
 use super::error::SceneError;
 use super::keys;
 use super::section::{Field, Section};
+use super::{Purpose, Scene};
 use rattlemap_dynamics::model::{Model, REST, State};
 
 /// The most states that one cell may start from: attractors are counted in a byte.
@@ -136,11 +136,27 @@ pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<D
     }
 }
 
-/// Refuses starts that do not fit each other, or a map that is refined.
-pub(super) fn check(root: &Section<'_>, start: Start, draw: Option<Draw>) -> Result<(), SceneError> {
+/// Refuses starts that do not fit each other, the axes, or a map that is refined.
+pub(super) fn check(root: &Section<'_>, scene: &Scene) -> Result<(), SceneError> {
+    let (start, draw) = (scene.start, scene.draw);
     let section = root.section("start", &keys::names("start"))?;
     let is_refined = root.get("refine").is_some();
+    let sweeps_start = scene.sweeps_start();
+    let is_one_of_two = scene.is_basin() && !scene.axes().iter().all(|axis| axis.target().is_start());
+    if let Some(refine) = root.get("refine").filter(|_| is_one_of_two) {
+        return Err(refine.conflict(
+            "attractors at different parameters are told the same only once all are known; sweep two components of \
+             the start, or drop [refine]"
+                .into(),
+        ));
+    }
     match (section.get("policy"), section.get("count")) {
+        (Some(policy), _) if sweeps_start && start.follows() => Err(policy.conflict(
+            "cells have starts of their own here and follow none; use \"rest\" or \"state\"".into(),
+        )),
+        (_, Some(count)) if sweeps_start && draw.is_some() => {
+            Err(count.conflict("cells have starts of their own here; drop the count".into()))
+        }
         (_, Some(count)) if draw.is_some() && start.follows() => Err(count.conflict(
             "cells that follow their neighbours have one start each; use policy \"rest\" or \"state\"".into(),
         )),

@@ -7,6 +7,7 @@
 mod auditing;
 
 use super::audit::Audit;
+use super::basins::Basins;
 use super::fill::Filling;
 use super::label::Label;
 use super::tiling::{Tile, Tiling};
@@ -32,6 +33,8 @@ pub(super) struct Adaptive {
     refine: Refine,
     /// What makes borders: what the scene asks for, words only where they are to.
     needs: Needs,
+    /// What makes borders in a map of basins.
+    basins: Option<Basins>,
     /// By cell id; unknown where nothing was integrated.
     labels: Vec<Label>,
     /// By cell id.
@@ -97,6 +100,7 @@ impl Adaptive {
             refine,
             narrow: if needs.symmetric { NARROWEST } else { NARROW },
             needs,
+            basins: Basins::of(plan),
             labels: vec![Label::default(); cells],
             is_asked: vec![false; cells],
             unasked: cells,
@@ -131,9 +135,19 @@ impl Adaptive {
         1 + self.deepest as usize + self.samples
     }
 
+    /// Looks at records that are taken up next.
+    pub(super) fn foresee(&mut self, records: &[(u32, Record)]) {
+        if let Some(basins) = &mut self.basins {
+            basins.foresee(records);
+        }
+    }
+
     /// Takes up the record of a cell that was asked for; `asks` gets the cells that are needed for that.
     pub(super) fn take(&mut self, id: u32, record: &Record, asks: &mut Vec<u32>) {
-        let label = Label::of(record, &self.needs);
+        let label = match &mut self.basins {
+            Some(basins) => basins.label(id, record),
+            None => Label::of(record, &self.needs),
+        };
         self.labels[id as usize] = label;
         if self.stage != Stage::Auditing {
             self.show(self.at(id), label);
@@ -288,9 +302,11 @@ impl Adaptive {
         self.labels[self.id(at)]
     }
 
-    /// Fills every cell that was not integrated; returns how many.
-    pub(super) fn fill(&self, records: &mut [Record]) -> usize {
+    /// Fills every cell that was not integrated; returns how many, and in a map of basins from which cell each was.
+    pub(super) fn fill(&self, records: &mut [Record]) -> (usize, Vec<u32>) {
         let mut count = 0;
+        let cells = if self.basins.is_some() { records.len() } else { 0 };
+        let mut from: Vec<u32> = (0..cells as u32).collect();
         for tile in self.tiling.tiles().filter(|&tile| self.tiling.is_leaf(tile)) {
             let block = self.tiling.block(tile);
             let corners = block.corners().map(|at| records[self.id(at)]);
@@ -299,11 +315,14 @@ impl Adaptive {
                 let id = self.id(at);
                 if !self.is_asked[id] {
                     records[id] = filling.record(at);
+                    if let Some(from) = from.get_mut(id) {
+                        *from = self.id(block.corners()[block.nearest(at)]) as u32;
+                    }
                     count += 1;
                 }
             }
         }
-        count
+        (count, from)
     }
 }
 

@@ -31,6 +31,20 @@ impl Block {
         (j0..=j1).flat_map(move |j| (i0..=i1).map(move |i| [i, j]))
     }
 
+    /// How far along its sides a cell lies.
+    pub(super) fn shares(&self, [i, j]: [usize; 2]) -> [f64; 2] {
+        let share = |at: usize, [from, to]: [usize; 2]| {
+            if to > from { (at - from) as f64 / (to - from) as f64 } else { 0.0 }
+        };
+        [share(i, self.i), share(j, self.j)]
+    }
+
+    /// The corner, by its place among them, that is nearest to a cell.
+    pub(super) fn nearest(&self, at: [usize; 2]) -> usize {
+        let [u, v] = self.shares(at);
+        usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5)
+    }
+
     /// The blocks that the lines through its middle leave.
     pub(super) fn halves(&self) -> Vec<Block> {
         self.cut([(self.i[0] + self.i[1]) / 2, (self.j[0] + self.j[1]) / 2])

@@ -41,13 +41,10 @@ impl<'r> Filling<'r> {
     /// The record of a cell of the block: the nearest corner's, with bilinear averages of what
     /// varies continuously inside a region. A word or a pattern is filled where all corners have the same, and so are the
     /// impacts of cycles: whole numbers over the period, which no average of others is.
-    pub(super) fn record(&self, [i, j]: [usize; 2]) -> Record {
-        let share = |at: usize, [from, to]: [usize; 2]| {
-            if to > from { (at - from) as f64 / (to - from) as f64 } else { 0.0 }
-        };
-        let (u, v) = (share(i, self.block.i), share(j, self.block.j));
+    pub(super) fn record(&self, at: [usize; 2]) -> Record {
+        let [u, v] = self.block.shares(at);
         let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-        let nearest = usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5);
+        let nearest = self.block.nearest(at);
         let average = |field: fn(&Record) -> f64| {
             // What counts for nothing may be infinite: the exponent of a superstable cycle.
             let beside = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);

@@ -5,7 +5,8 @@ use crate::record::classify::classify;
 use crate::record::{Record, Spelling, valid, word_hash};
 use rattlemap_dynamics::orbit::Class;
 
-/// Class, period and whether there is contact; symmetry and word or pattern where they are asked for.
+/// Class, period and whether there is contact; symmetry and word or pattern where they are asked for. In a map of basins
+/// the attractor instead.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Label {
     /// See [`word_of`] and [`pattern_of`].
@@ -31,6 +32,11 @@ impl Label {
             (false, false) => 0,
         };
         Label { word, kind: 8 * class + 4 * free + symmetry }
+    }
+
+    /// Of a kind, and nothing else.
+    pub(super) fn of_kind(kind: u32) -> Label {
+        Label { word: 0, kind }
     }
 
     pub(super) fn is_known(self) -> bool {

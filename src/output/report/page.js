@@ -226,6 +226,7 @@ function facts({ i, j }) {
     ...(values.pattern ? [["pattern", pattern]] : []),
     ["word", word],
     ...(values.attractors ? [["attractors found", at("attractors")]] : []),
+    ...(values.attractor ? [["attractor", map.attractors[at("attractor")]]] : []),
     ["status", map.statuses[at("status")]],
     ...(values.source ? [["source", source]] : []),
     ["periods run", at("periods_run")],
@@ -249,11 +250,12 @@ function choose(cell) {
   byId("replay").hidden = !cell;
   if (cell) {
     const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
-    const [first, second] = map.axes.map((axis) => axis.parameter);
     const place = 4 * (cell.j * columns + cell.i);
-    const start = starts ? ` --start ${[...starts.subarray(place, place + 4)].join(",")}` : "";
+    const own = map.start ?? starts?.subarray(place, place + 4);
+    const start = own ? ` --start ${[...own].map((x, k) => [a, b][map.axes.findIndex((axis) => axis.start === k)] ?? x).join(",")}` : "";
+    const sets = map.axes.map((axis, k) => (axis.start === undefined ? ` --set ${axis.parameter}=${[a, b][k]}` : "")).join("");
     const derived = derivedValues(cell).map(([name, value]) => ` --set ${name}=${value}`).join("");
-    const words = `rattlemap orbit --set ${first}=${a} --set ${second}=${b}${derived}${map.replay}${start}`.split(" --");
+    const words = `rattlemap orbit${sets}${derived}${map.replay}${start}`.split(" --");
     // Lines break between arguments, never inside one.
     byId("command").replaceChildren(...words.flatMap((word, k) =>
       k === 0 ? [element("span", word)] : [" ", element("span", `--${word}`)]));
@@ -469,7 +471,7 @@ const STRATA = { uniform: "drawn from all that were integrated", border: "drawn 
 const FIELDS = { class: "class", period: "period", word: "word, up to mirror image",
   pattern: "pattern, up to mirror image", symmetric: "symmetry",
   lyapunov: "exponent", impacts_per_period: "impacts per period", mesh_fraction: "time in meshing", status: "status",
-  periods_run: "periods integrated", finite: "numbers are finite", again: "the same record again" };
+  attractor: "attractor of the start", periods_run: "periods integrated", finite: "numbers are finite", again: "the same record again" };
 const JUDGES = { reference: "the event-driven reference, without early stops",
   lanes_f64: "lanes in f64 and by the reference without early stops",
   dop853: "DOP853, an adaptive ODE library, with event location, and by the reference without early stops" };

@@ -8,7 +8,8 @@ use std::cell::Cell;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, System, Vector5};
 
-use super::flight::{Field, Flight, Sighting};
+use super::field::Field;
+use super::flight::{Flight, Sighting};
 use rattlemap_dynamics::flow::Gap;
 
 /// Endings in one stretch beyond which a motion is given up.

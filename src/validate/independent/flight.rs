@@ -1,48 +1,25 @@
 //! Flights and contacts for integrators that step through time: where a step meets a wall, and
 //! what happens there. Written from the equations of motion, in time and in gap coordinates
-//! `(z, w, x2, v2)`: a gap that is put on a wall is exactly there.
+//! `(z, w, x, v)`: a gap that is put on a wall is exactly there.
 
+use super::field::{Coordinates, Field};
 use rattlemap_dynamics::flow::Gap;
-use rattlemap_dynamics::model::{Domain, Law, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::reference::EventKind;
 
 /// Trials of a root search; Newton's method gets the first of them.
 const ROOT_CAP: u32 = 100;
 const NEWTON_CAP: u32 = 20;
 
-/// The equations of motion of one domain in gap coordinates, solved for the accelerations.
-#[derive(Clone, Copy, Debug)]
-pub struct Field {
-    /// Accelerations of gap and second displacement per `(z, w, x2, v2)`.
-    rows: [[f64; 4]; 2],
-    force: [f64; 2],
-    load: [f64; 2],
-}
+/// Bisections for the least of an acceleration.
+const TURN_CAP: u32 = 30;
 
-impl Field {
-    fn new(oscillator: &Oscillator, domain: &Domain) -> Field {
-        let ([g0, g1], m) = (oscillator.gap, oscillator.masses());
-        // On (x1, v1, x2, v2); then x1 = (z - g1 x2) / g0, and z'' = g . x''.
-        let row = |i: usize| {
-            let (k, c) = (domain.stiffness[i], domain.damping[i]);
-            let [x1, v1, x2, v2] = [k[0], c[0], k[1], c[1]].map(|a| -a / m[i]);
-            [x1 / g0, v1 / g0, x2 - x1 * g1 / g0, v2 - v1 * g1 / g0]
-        };
-        let (first, second) = (row(0), row(1));
-        let gap_row = std::array::from_fn(|j| g0 * first[j] + g1 * second[j]);
-        let per_mass = |f: [f64; 2]| [g0 * f[0] / m[0] + g1 * f[1] / m[1], f[1] / m[1]];
-        Field { rows: [gap_row, second], force: per_mass(oscillator.force), load: per_mass(domain.load) }
-    }
+/// An infinite series of impacts is over where what is left of it takes no more than this, in radians of free motion:
+/// what that leaves out is of second order in it.
+const SERIES_ENDS: f64 = 1e-6;
 
-    /// Accelerations of gap and second displacement where the forcing stands at `cos`.
-    #[inline(always)]
-    pub fn accelerations(&self, q: &Gap, cos: f64) -> [f64; 2] {
-        [0, 1].map(|i| {
-            let r = &self.rows[i];
-            (r[0] * q[0] + r[1] * q[1]) + (r[2] * q[2] + r[3] * q[3]) + (self.force[i] * cos + self.load[i])
-        })
-    }
-}
+/// A gap that opens from a wall is rounding where it lies no farther beyond, relative to its position.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// What may end a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +32,17 @@ pub enum Ending {
     MeshEnds(Side),
     /// Pressing ceases inside the contact onset.
     PressingEnds(Side),
+    /// A gap that opens during the contact onset reaches the other wall.
+    Through(Side),
+    /// The load pulls the gap off the rigid wall that it sticks to.
+    PulledOff(Side),
+}
+
+impl Ending {
+    /// Whether it is where the gap meets a wall; otherwise it is where an acceleration falls through zero.
+    fn is_of_gap(self) -> bool {
+        !matches!(self, Ending::PressingEnds(_) | Ending::PulledOff(_))
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +50,8 @@ enum Mode {
     Free,
     Onset(Side),
     Sustained(Side),
+    /// At rest on a rigid wall.
+    Stuck(Side),
 }
 
 /// A step that holds an ending: its distance is negative `within` after the start.
@@ -84,13 +74,19 @@ pub struct Ended {
     pub kind: EventKind,
     /// At which wall.
     pub side: Side,
+    /// Whether infinitely many impacts, of which not all are told, came before it.
+    pub after_series: bool,
 }
 
 /// A motion between walls.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    oscillator: Oscillator,
+    walls: [f64; 2],
+    contacts: [Contact; 2],
+    omega: f64,
     law: Law,
+    coordinates: Coordinates,
+    /// Of free motion, and of contact that lasts with the right and the left wall.
     fields: [Field; 3],
     mode: Mode,
     /// The ending that the present motion starts on, and the order of that root.
@@ -102,45 +98,69 @@ pub struct Flight {
 }
 
 impl Flight {
-    /// A motion from `start` at phase 0; beyond a wall it is meshing.
+    /// A motion from `start` at phase 0; beyond a wall it is meshing, but beyond a rigid one it begins on it.
     pub fn new(oscillator: &Oscillator, law: Law, start: State) -> Flight {
-        let ([right, left], [g0, g1]) = (&oscillator.meshing, oscillator.gap);
+        let coordinates = Coordinates::new(oscillator);
+        let free = Field::new(oscillator, &oscillator.free);
+        let behind = |side: Side| match oscillator.contacts[side.index()] {
+            _ if oscillator.walls[side.index()].is_infinite() => free,
+            Contact::Rigid => free.held(&coordinates),
+            _ => Field::new(oscillator, &oscillator.meshing[side.index()]),
+        };
         let mut flight = Flight {
-            oscillator: *oscillator,
+            walls: oscillator.walls,
+            contacts: oscillator.contacts,
+            omega: oscillator.omega,
             law,
-            fields: [&oscillator.free, right, left].map(|domain| Field::new(oscillator, domain)),
+            coordinates,
+            fields: [free, behind(Side::Right), behind(Side::Left)],
             mode: Mode::Free,
             from: None,
-            q: [g0 * start[0] + g1 * start[2], g0 * start[1] + g1 * start[3], start[2], start[3]],
+            q: coordinates.gap(&start),
             events: Vec::new(),
         };
         let beyond = |side: &Side| flight.beyond(*side, &flight.q) > 0.0;
         if let Some(side) = Side::BOTH.into_iter().find(beyond) {
-            flight.mode = Mode::Sustained(side);
+            match flight.is_rigid(side) {
+                true => flight.put_on_wall(side),
+                false => flight.mode = Mode::Sustained(side),
+            }
         }
         flight
     }
 
     /// The state `(x1, v1, x2, v2)`.
     pub fn state(&self) -> State {
-        let ([g0, g1], [z, w, x, v]) = (self.oscillator.gap, self.q);
-        [(z - g1 * x) / g0, (w - g1 * v) / g0, x, v]
+        self.coordinates.state(&self.q)
     }
 
-    /// The wall the teeth mesh on, if they do.
+    /// The wall that a contact lasts on, if one does.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
             Mode::Free => None,
-            Mode::Onset(side) | Mode::Sustained(side) => Some(side),
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
         }
+    }
+
+    /// Whether the gap is held where it is.
+    pub fn is_stuck(&self) -> bool {
+        matches!(self.mode, Mode::Stuck(_))
+    }
+
+    /// A motion beside it, by so much in gap coordinates as the gap is free to move.
+    pub fn displaced(&self, by: &Gap) -> Flight {
+        let mut other = self.clone();
+        let held = if self.is_stuck() { 2 } else { 0 };
+        (held..4).for_each(|i| other.q[i] += by[i]);
+        other
     }
 
     /// The equations that govern the motion now.
     #[inline]
     pub fn field(&self) -> &Field {
-        match self.mode {
-            Mode::Free => &self.fields[0],
-            Mode::Onset(side) | Mode::Sustained(side) => self.meshing_field(side),
+        match self.meshing() {
+            None => &self.fields[0],
+            Some(side) => self.meshing_field(side),
         }
     }
 
@@ -149,7 +169,7 @@ impl Flight {
     pub fn longest_step(&self) -> f64 {
         let field =
             if let Mode::Onset(side) = self.mode { self.meshing_field(side) } else { &self.fields[0] };
-        (-field.rows[0][0]).max(-field.rows[1][2]).max(self.oscillator.omega.powi(2)).sqrt().recip()
+        field.rate().max(self.omega).recip()
     }
 
     /// The next step does not start on a wall any more.
@@ -163,7 +183,11 @@ impl Flight {
     }
 
     fn wall(&self, side: Side) -> f64 {
-        self.oscillator.walls[if side == Side::Right { 0 } else { 1 }]
+        self.walls[side.index()]
+    }
+
+    fn is_rigid(&self, side: Side) -> bool {
+        self.contacts[side.index()] == Contact::Rigid
     }
 
     /// How far the gap lies beyond a wall.
@@ -172,17 +196,35 @@ impl Flight {
         side.sign() * (q[0] - self.wall(side))
     }
 
-    /// Acceleration of the gap into a wall.
+    /// Acceleration of the gap into a wall by the equations of a domain.
     #[inline]
-    fn pressing(&self, field: &Field, side: Side, q: &Gap, cos: f64) -> f64 {
-        side.sign() * field.accelerations(q, cos)[0]
+    fn pressing(&self, field: &Field, side: Side, q: &Gap, t: f64) -> f64 {
+        side.sign() * field.accelerations(q, self.cos(t))[0]
     }
 
-    fn endings(&self) -> ([Ending; 2], usize) {
+    /// Whether a gap at rest on a wall is driven into it by the equations of a domain: the first derivative that is not
+    /// zero decides.
+    fn presses(&self, field: &Field, side: Side, q: &Gap, t: f64) -> bool {
+        let pressing = self.pressing(field, side, q, t);
+        pressing > 0.0 || pressing == 0.0 && self.pressing_rate(field, field, side, q, t) > 0.0
+    }
+
+    /// How fast the acceleration into a wall by one domain's equations changes along the motion by another's.
+    fn pressing_rate(&self, of: &Field, along: &Field, side: Side, q: &Gap, t: f64) -> f64 {
+        let (sin, cos) = (self.omega * t).sin_cos();
+        let [a, b] = along.accelerations(q, cos);
+        side.sign() * of.gap_rate(&[q[1], a, q[3], b], -self.omega * sin)
+    }
+
+    /// What may end the motion now; the last ones may be told twice.
+    fn endings(&self) -> [Ending; 3] {
         match self.mode {
-            Mode::Free => ([Ending::Contact(Side::Right), Ending::Contact(Side::Left)], 2),
-            Mode::Sustained(side) => ([Ending::MeshEnds(side); 2], 1),
-            Mode::Onset(side) => ([Ending::OnsetEnds(side), Ending::PressingEnds(side)], 2),
+            Mode::Free => [Side::Right, Side::Left, Side::Left].map(Ending::Contact),
+            Mode::Sustained(side) => [Ending::MeshEnds(side); 3],
+            Mode::Onset(side) => {
+                [Ending::OnsetEnds(side), Ending::PressingEnds(side), Ending::Through(side.mirrored())]
+            }
+            Mode::Stuck(side) => [Ending::PulledOff(side); 3],
         }
     }
 
@@ -192,15 +234,21 @@ impl Flight {
     fn distance(&self, ending: Ending, q: &Gap, t: f64) -> (f64, f64) {
         let rate = |side: Side| side.sign() * q[1];
         match ending {
-            Ending::Contact(side) | Ending::OnsetEnds(side) => (-self.beyond(side, q), -rate(side)),
+            Ending::Contact(side) | Ending::OnsetEnds(side) | Ending::Through(side) => {
+                (-self.beyond(side, q), -rate(side))
+            }
             Ending::MeshEnds(side) => (self.beyond(side, q), rate(side)),
-            Ending::PressingEnds(side) => (self.pressing(self.field(), side, q, self.cos(t)), 0.0),
+            Ending::PressingEnds(side) => (self.pressing(self.field(), side, q, t), 0.0),
+            Ending::PulledOff(side) => {
+                let free = &self.fields[0];
+                (self.pressing(free, side, q, t), self.pressing_rate(free, self.field(), side, q, t))
+            }
         }
     }
 
     #[inline]
     fn cos(&self, t: f64) -> f64 {
-        (self.oscillator.omega * t).cos()
+        (self.omega * t).cos()
     }
 
     /// The ending on a step of length `h` from `q0` at time `t` to `q1`, if one is seen: beyond
@@ -216,31 +264,57 @@ impl Flight {
         q1: &Gap,
         after: impl Fn(f64) -> Gap,
     ) -> Option<Sighting> {
-        let (endings, count) = self.endings();
-        endings[..count].iter().find_map(|&ending| {
-            let starts_there = first && self.from.is_some_and(|(from, _)| from == ending);
-            let left = self.distance(ending, q0, t);
-            if !starts_there && left.0 <= 0.0 {
-                return Some(Sighting { ending, within: 0.0, guess: 0.0 });
-            }
-            let right = self.distance(ending, q1, t + h);
-            if right.0 < 0.0 {
-                let share =
-                    if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
-                return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99) });
-            }
-            if right.1 <= 0.0 {
-                return None;
-            }
-            let left = if starts_there { (0.0, left.1) } else { left };
-            let turn = h * turning_point(left, right, h)?;
-            // The polynomial is no proof: the equations decide, at their own turning point.
+        let seen = |ending| self.find(ending, first, q0, t, h, q1, &after);
+        let sightings = self.endings().into_iter().filter_map(seen);
+        sightings.min_by(|a, b| a.guess.total_cmp(&b.guess))
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "a step")]
+    fn find(
+        &self,
+        ending: Ending,
+        first: bool,
+        q0: &Gap,
+        t: f64,
+        h: f64,
+        q1: &Gap,
+        after: impl Fn(f64) -> Gap,
+    ) -> Option<Sighting> {
+        let starts_there = first && self.from.is_some_and(|(from, _)| from == ending);
+        let left = self.distance(ending, q0, t);
+        if !starts_there && left.0 <= 0.0 {
+            return Some(Sighting { ending, within: 0.0, guess: 0.0 });
+        }
+        let right = self.distance(ending, q1, t + h);
+        // Off a wall that the gap leaves slowly.
+        let is_rounding = ending.is_of_gap() && right.1 > 0.0 && right.0 >= -ROUNDING * q1[0].abs();
+        if right.0 < 0.0 && !(starts_there && is_rounding) {
+            let share = if starts_there { second_root(left, right, h) } else { left.0 / (left.0 - right.0) };
+            return Some(Sighting { ending, within: h, guess: h * share.clamp(0.01, 0.99) });
+        }
+        if right.1 <= 0.0 {
+            return None;
+        }
+        let left = if starts_there { (0.0, left.1) } else { left };
+        let mut turn = h * turning_point(left, right, h)?;
+        // The polynomial is no proof: the equations decide, at their own turning point.
+        if ending.is_of_gap() {
             let q = after(turn);
             let [acceleration, _] = self.field().accelerations(&q, self.cos(t + turn));
-            let turn = (turn - q[1] / acceleration).clamp(0.0, h);
-            let is_beyond = self.distance(ending, &after(turn), t + turn).0 < 0.0;
-            is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn })
-        })
+            turn = (turn - q[1] / acceleration).clamp(0.0, h);
+        } else {
+            let (mut lo, mut hi) = (0.0, h);
+            for _ in 0..TURN_CAP {
+                if self.distance(ending, &after(turn), t + turn).1 < 0.0 {
+                    lo = turn
+                } else {
+                    hi = turn
+                }
+                turn = 0.5 * (lo + hi);
+            }
+        }
+        let is_beyond = self.distance(ending, &after(turn), t + turn).0 < 0.0;
+        is_beyond.then_some(Sighting { ending, within: turn, guess: 0.5 * turn })
     }
 
     /// The time from `q0` at `t` to an ending that was seen: Newton's method on the integrator,
@@ -270,8 +344,8 @@ impl Flight {
                 // What a Newton step leaves over is of second order in it.
                 let [acceleration, _] = self.field().accelerations(&q, self.cos(t + tau));
                 let left_over = acceleration.abs() * step * step;
-                let within_rounding = left_over <= 0.5 * f64::EPSILON * tau * rate.abs()
-                    || step.abs() <= 2.0 * f64::EPSILON * tau;
+                let is_left_over = ending.is_of_gap() && left_over <= 0.5 * f64::EPSILON * tau * rate.abs();
+                let within_rounding = is_left_over || step.abs() <= 2.0 * f64::EPSILON * tau;
                 if (0.0..=within).contains(&next) && within_rounding {
                     return Some(next);
                 }
@@ -300,51 +374,102 @@ impl Flight {
             }
             Ending::MeshEnds(side) => {
                 let rate = side.sign() * self.q[1];
-                if settling && rate > 0.0 {
-                    self.from = Some((ending, 1));
+                let stays =
+                    rate > 0.0 || rate == 0.0 && self.presses(self.meshing_field(side), side, &self.q, t);
+                if settling && stays {
+                    self.from = Some((ending, if rate > 0.0 { 1 } else { 2 }));
                     return;
                 }
                 self.put_on_wall(side);
-                self.mode = Mode::Free;
-                self.from = Some((Ending::Contact(side), if rate == 0.0 { 2 } else { 1 }));
-                self.events.push(Ended { t, kind: EventKind::MeshEnd, side });
+                self.leave(side, t);
+                self.tell(t, EventKind::MeshEnd, side);
             }
             Ending::PressingEnds(side) => {
                 self.mode = Mode::Free;
                 self.from = None;
-                self.events.push(Ended { t, kind: EventKind::MeshEnd, side });
+                self.tell(t, EventKind::MeshEnd, side);
+            }
+            Ending::Through(side) => {
+                self.mode = Mode::Free;
+                self.tell(t, EventKind::MeshEnd, side.mirrored());
+                self.contact(side, t, false);
+            }
+            Ending::PulledOff(side) => {
+                self.mode = Mode::Free;
+                self.from = Some((Ending::Contact(side), 3));
+                self.tell(t, EventKind::MeshEnd, side);
             }
         }
     }
 
-    /// The impact law, then meshing or not: equations (5), (6), (22), (37) of the paper.
+    /// Free motion reaches a wall.
     fn contact(&mut self, side: Side, t: f64, settling: bool) {
         self.put_on_wall(side);
+        let closing = side.sign() * self.q[1];
+        if settling && (closing < 0.0 || closing == 0.0 && !self.presses(&self.fields[0], side, &self.q, t)) {
+            self.leave(side, t);
+        } else if self.contacts[side.index()] == Contact::Elastic {
+            // The motion goes on at once.
+            self.mode = Mode::Sustained(side);
+            self.from = Some((Ending::MeshEnds(side), if closing > 0.0 { 1 } else { 2 }));
+            self.tell(t, EventKind::MeshStart, side);
+        } else {
+            self.impact(side, t, closing.max(0.0));
+        }
+    }
+
+    /// The impact law, then lasting contact or not: equations (5), (6), (22), (37) of the paper.
+    fn impact(&mut self, side: Side, t: f64, closing: f64) {
         let (s, e) = (side.sign(), self.law.restitution[side.index()]);
-        let cos = self.cos(t);
-        let closing = s * self.q[1];
-        if settling
-            && (closing < 0.0 || closing == 0.0 && self.pressing(&self.fields[0], side, &self.q, cos) <= 0.0)
-        {
-            self.from = Some((Ending::Contact(side), if closing == 0.0 { 2 } else { 1 }));
+        let leaving = e * closing;
+        // The impulse acts along the gap row.
+        let kicked = |e: f64| {
+            let [z, _, x, v] = self.q;
+            [z, -s * e * closing, x, v - s * (1.0 + e) * closing * self.coordinates.kick()]
+        };
+        let (after, at_rest) = (kicked(e), kicked(0.0));
+        let presses = |q: &Gap| {
+            self.presses(&self.fields[0], side, q, t)
+                && (self.is_rigid(side) || self.presses(self.meshing_field(side), side, q, t))
+        };
+        let is_slow = leaving <= self.law.mesh_speed[side.index()];
+        let is_series_over = !is_slow && e < 1.0 && self.law.mesh_speed[side.index()] == 0.0 && {
+            let pressing = self.pressing(&self.fields[0], side, &at_rest, t);
+            let is_pressed = pressing > 0.0 && presses(&at_rest);
+            is_pressed && 2.0 * leaving < SERIES_ENDS * (1.0 - e) * pressing * self.longest_step()
+        };
+        let rests = is_series_over || is_slow && self.is_rigid(side);
+        let lasts = (is_slow || is_series_over) && presses(if rests { &at_rest } else { &after });
+        self.q = if lasts && rests { at_rest } else { after };
+        if !lasts {
+            self.leave(side, t);
+            self.tell(t, EventKind::Impact, side);
             return;
         }
-        let leaving = e * closing.max(0.0);
-        let ([g0, g1], [m1, m2]) = (self.oscillator.gap, self.oscillator.masses());
-        let impulse = -s * (1.0 + e) * closing.max(0.0) / (g0 * g0 / m1 + g1 * g1 / m2);
-        self.q[1] = -s * leaving;
-        self.q[3] += impulse * g1 / m2;
-        let presses = |field: &Field| self.pressing(field, side, &self.q, cos) > 0.0;
-        let meshes = leaving <= self.law.mesh_speed[side.index()]
-            && presses(&self.fields[0])
-            && presses(self.meshing_field(side));
-        let kind = if meshes { EventKind::MeshStart } else { EventKind::Impact };
-        self.events.push(Ended { t, kind, side });
-        (self.mode, self.from) = match (meshes, leaving > 0.0) {
-            (true, true) => (Mode::Onset(side), Some((Ending::OnsetEnds(side), 1))),
-            (true, false) => (Mode::Sustained(side), Some((Ending::MeshEnds(side), 2))),
-            (false, moves) => (Mode::Free, Some((Ending::Contact(side), if moves { 1 } else { 2 }))),
+        (self.mode, self.from) = match (self.is_rigid(side), leaving > 0.0 && !rests) {
+            (true, _) => (Mode::Stuck(side), None),
+            (false, true) => (Mode::Onset(side), Some((Ending::OnsetEnds(side), 1))),
+            (false, false) => (Mode::Sustained(side), Some((Ending::MeshEnds(side), 2))),
         };
+        self.tell(t, EventKind::MeshStart, side);
+        if let Some(ended) = self.events.last_mut() {
+            ended.after_series = is_series_over;
+        }
+    }
+
+    /// Free motion from a wall.
+    fn leave(&mut self, side: Side, t: f64) {
+        self.mode = Mode::Free;
+        let order = match self.q[1] == 0.0 {
+            false => 1,
+            true if self.pressing(&self.fields[0], side, &self.q, t) != 0.0 => 2,
+            true => 3,
+        };
+        self.from = Some((Ending::Contact(side), order));
+    }
+
+    fn tell(&mut self, t: f64, kind: EventKind, side: Side) {
+        self.events.push(Ended { t, kind, side, after_series: false });
     }
 
     fn put_on_wall(&mut self, side: Side) {

@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod axes;
+mod basins;
 mod check;
 mod dry_run;
 mod engines;

@@ -79,19 +79,32 @@ impl Adaptive {
         let mut wrong = Vec::new();
         let filled = self.audits.pop().map_or(0, |audit| audit.filled);
         let mut audit = Audit { filled, sampled: self.audited.len(), ..Audit::default() };
-        let mut by_kind: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
+        let mut by_kind: BTreeMap<(usize, u32), [usize; 2]> = BTreeMap::new();
+        // Attractors are numbered as their records came; the order in which they are sampled does not depend on that.
+        let mut sampled_kinds: Vec<u32> = Vec::new();
         let mut pairs = Vec::with_capacity(self.audited.len());
         let mut fillings: HashMap<Tile, Filling<'_>> = HashMap::new();
         for &id in &self.audited {
             let at = self.at(id);
             let tile = self.tiling.owner(at);
             let fill = fillings.entry(tile).or_insert_with(|| self.filling(tile, records)).record(at);
-            let label = Label::of(&fill, &self.needs);
+            let label = match self.basins {
+                Some(_) => self.label(self.corner(tile, at)),
+                None => Label::of(&fill, &self.needs),
+            };
             let is_wrong = label != self.labels[id as usize];
             if is_wrong {
                 wrong.push(id);
             }
-            let [sampled, amiss] = by_kind.entry(label.kind).or_default();
+            let rank = match (&self.basins, sampled_kinds.iter().position(|&kind| kind == label.kind)) {
+                (None, _) => 0,
+                (Some(_), Some(rank)) => rank,
+                (Some(_), None) => {
+                    sampled_kinds.push(label.kind);
+                    sampled_kinds.len() - 1
+                }
+            };
+            let [sampled, amiss] = by_kind.entry((rank, label.kind)).or_default();
             *sampled += 1;
             *amiss += usize::from(is_wrong && self.may_halve(tile));
             if fill.valid & valid::WORD != 0 {
@@ -112,6 +125,12 @@ impl Adaptive {
         Verdict { wrong, bad: worst(&by_kind, (self.refine.max_error * audit.sampled as f64) as usize) }
     }
 
+    /// The corner that a cell of a block is filled from.
+    fn corner(&self, tile: Tile, at: [usize; 2]) -> [usize; 2] {
+        let block = self.tiling.block(tile);
+        block.corners()[block.nearest(at)]
+    }
+
     fn filling<'r>(&self, tile: Tile, records: &'r [Record]) -> Filling<'r> {
         let block = self.tiling.block(tile);
         Filling::new(&block, block.corners().map(|at| &records[self.id(at)]))
@@ -119,16 +138,16 @@ impl Adaptive {
 }
 
 /// The kinds of which the largest part is wrong, as many as it takes until no more than `allowed` wrong
-/// cells are of other kinds. Of every kind it is known how many cells were sampled and were wrong.
-fn worst(by_kind: &BTreeMap<u32, [usize; 2]>, allowed: usize) -> HashSet<u32> {
+/// cells are of other kinds. Equal parts go by the first number. Of every kind it is known how many cells were sampled and were wrong.
+fn worst(by_kind: &BTreeMap<(usize, u32), [usize; 2]>, allowed: usize) -> HashSet<u32> {
     let mut kinds: Vec<_> = by_kind.iter().collect();
     // Compares amiss / sampled, without a division.
     kinds.sort_by(|(_, [n, a]), (_, [m, b])| (b * n).cmp(&(a * m)));
     let mut left: usize = kinds.iter().map(|(_, [_, amiss])| amiss).sum();
-    let is_needed = |(_, [_, amiss]): &(&u32, &[usize; 2])| {
+    let is_needed = |(_, [_, amiss]): &(&(usize, u32), &[usize; 2])| {
         let is_needed = left > allowed;
         left -= amiss;
         is_needed
     };
-    kinds.into_iter().take_while(is_needed).map(|(kind, _)| *kind).collect()
+    kinds.into_iter().take_while(is_needed).map(|((_, kind), _)| *kind).collect()
 }

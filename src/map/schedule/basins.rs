@@ -1,0 +1,61 @@
+//! Labels of starts in a map of basins, while it is made: what their attractors are.
+
+use std::collections::HashMap;
+
+use super::label::Label;
+use crate::map::attractors::catalogue::{Catalogue, Found};
+use crate::map::plan::Plan;
+use crate::record::Record;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::Law;
+
+/// Kinds below are those of starts without a cycle; those above of cycles without a place.
+const FIRST_CYCLE: u32 = 4;
+const FIRST_UNRESOLVED: u32 = 1 << 24;
+
+/// The attractors that are known, all of one oscillator: an adaptive map of basins sweeps starts alone.
+pub(super) struct Basins {
+    flow: Box<Flow>,
+    law: Law,
+    catalogue: Catalogue,
+    /// Labels of records that have not been taken up yet.
+    foreseen: HashMap<u32, Label>,
+}
+
+impl Basins {
+    /// None where the map is of something else.
+    pub(super) fn of(plan: &Plan) -> Option<Basins> {
+        plan.is_basin().then(|| {
+            let cell = plan.cell(0);
+            let flow = Box::new(Flow::new(&plan.oscillator(cell.flow)));
+            let (catalogue, foreseen) = (Catalogue::of(&flow), HashMap::new());
+            Basins { flow, law: plan.law(cell.law), catalogue, foreseen }
+        })
+    }
+
+    /// Labels of records that are taken up next: side by side, for some of them take Newton's method.
+    pub(super) fn foresee(&mut self, records: &[(u32, Record)]) {
+        let (ids, records): (Vec<u32>, Vec<&Record>) =
+            records.iter().map(|(id, record)| (*id, record)).unzip();
+        let found = self.catalogue.learn(&self.flow, self.law, &records);
+        self.foreseen.extend(ids.into_iter().zip(found.into_iter().map(label)));
+    }
+
+    pub(super) fn label(&mut self, id: u32, record: &Record) -> Label {
+        let foreseen = self.foreseen.remove(&id);
+        foreseen.unwrap_or_else(|| {
+            let found = self.catalogue.learn(&self.flow, self.law, &[record]);
+            found.into_iter().next().map_or(Label::default(), label)
+        })
+    }
+}
+
+fn label(found: Found) -> Label {
+    Label::of_kind(match found {
+        Found::Failed => 1,
+        Found::Undecided => 2,
+        Found::Chaos => 3,
+        Found::Cycle(nth) => FIRST_CYCLE + nth,
+        Found::Unresolved(period) => FIRST_UNRESOLVED + period,
+    })
+}

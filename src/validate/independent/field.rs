@@ -1,0 +1,153 @@
+//! Equations of motion in gap coordinates `(z, w, x, v)`: the gap, and the displacement that is the less of it.
+
+use nalgebra::{Matrix2, Vector2};
+
+use rattlemap_dynamics::flow::Gap;
+use rattlemap_dynamics::model::{Domain, Oscillator, State};
+
+/// How gap coordinates follow from displacements.
+#[derive(Clone, Copy, Debug)]
+pub struct Coordinates {
+    gap: [f64; 2],
+    /// The displacement that is kept.
+    other: usize,
+    /// What it gets of an impulse that changes the gap's rate by 1.
+    kick: f64,
+}
+
+impl Coordinates {
+    /// Those of an oscillator. Of two equal entries of the gap row the second displacement is kept.
+    pub fn new(oscillator: &Oscillator) -> Coordinates {
+        let gap = oscillator.gap;
+        let other = usize::from(gap[0].abs() >= gap[1].abs());
+        let row = Vector2::from(gap);
+        let along = inverse(oscillator.mass) * row;
+        Coordinates { gap, other, kick: along[other] / row.dot(&along) }
+    }
+
+    /// What the displacement that is kept gets of an impulse that changes the gap's rate by 1.
+    pub(super) fn kick(&self) -> f64 {
+        self.kick
+    }
+
+    /// Gap coordinates of a state.
+    pub fn gap(&self, y: &State) -> Gap {
+        let [g0, g1] = self.gap;
+        [g0 * y[0] + g1 * y[2], g0 * y[1] + g1 * y[3], y[2 * self.other], y[2 * self.other + 1]]
+    }
+
+    /// The state of gap coordinates.
+    pub fn state(&self, [z, w, x, v]: &Gap) -> State {
+        let (kept, told) = (self.gap[self.other], self.gap[1 - self.other]);
+        let (y, rate) = ((z - kept * x) / told, (w - kept * v) / told);
+        if self.other == 1 { [y, rate, *x, *v] } else { [*x, *v, y, rate] }
+    }
+}
+
+fn inverse(m: [[f64; 2]; 2]) -> Matrix2<f64> {
+    let [[a, b], [c, d]] = m;
+    Matrix2::new(d, -b, -c, a) / (a * d - b * c)
+}
+
+/// The equations of motion of one domain in gap coordinates, solved for the accelerations.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    /// Accelerations of the gap and of the displacement that is kept, per `(z, w, x, v)`.
+    rows: [[f64; 4]; 2],
+    force: [f64; 2],
+    load: [f64; 2],
+}
+
+impl Field {
+    /// Those of one domain.
+    pub fn new(oscillator: &Oscillator, domain: &Domain) -> Field {
+        let Coordinates { gap, other, .. } = Coordinates::new(oscillator);
+        // Rows of `(z, x)` in terms of displacements, and back.
+        let kept = |value: [f64; 2]| if other == 1 { value } else { [value[1], value[0]] };
+        let [told, rest] = kept(gap);
+        let to_gap = match other {
+            1 => Matrix2::new(told, rest, 0.0, 1.0),
+            _ => Matrix2::new(rest, told, 1.0, 0.0),
+        };
+        let from_gap = match other {
+            1 => Matrix2::new(1.0 / told, -rest / told, 0.0, 1.0),
+            _ => Matrix2::new(0.0, 1.0, 1.0 / told, -rest / told),
+        };
+        let per_mass = to_gap * inverse(oscillator.mass);
+        let matrix =
+            |m: [[f64; 2]; 2]| -per_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * from_gap;
+        let (k, c) = (matrix(domain.stiffness), matrix(domain.damping));
+        let vector = |f: [f64; 2]| (per_mass * Vector2::from(f)).into();
+        Field {
+            rows: [0, 1].map(|i| [k[(i, 0)], c[(i, 0)], k[(i, 1)], c[(i, 1)]]),
+            force: vector(oscillator.force),
+            load: vector(domain.load),
+        }
+    }
+
+    /// The same with the gap held at rest: the wall takes up its acceleration.
+    pub(super) fn held(&self, coordinates: &Coordinates) -> Field {
+        let kick = coordinates.kick();
+        let of = |pair: [f64; 2]| [0.0, pair[1] - kick * pair[0]];
+        let [gap, kept] = self.rows;
+        let row = std::array::from_fn(|j| kept[j] - kick * gap[j]);
+        Field { rows: [[0.0; 4], row], force: of(self.force), load: of(self.load) }
+    }
+
+    /// Accelerations of gap and displacement where the forcing stands at `cos`.
+    #[inline(always)]
+    pub fn accelerations(&self, q: &Gap, cos: f64) -> [f64; 2] {
+        [0, 1].map(|i| {
+            let r = &self.rows[i];
+            (r[0] * q[0] + r[1] * q[1]) + (r[2] * q[2] + r[3] * q[3]) + (self.force[i] * cos + self.load[i])
+        })
+    }
+
+    /// The rate of the gap's acceleration where the state changes so fast, and the forcing by `cos_rate`.
+    pub(super) fn gap_rate(&self, rates: &Gap, cos_rate: f64) -> f64 {
+        let row = self.rows[0].iter().zip(rates);
+        row.map(|(a, rate)| a * rate).sum::<f64>() + self.force[0] * cos_rate
+    }
+
+    /// A bound on the frequencies of undamped motion.
+    pub(super) fn rate(&self) -> f64 {
+        let [gap, kept] = self.rows.map(|row| row[0].abs() + row[2].abs());
+        gap.max(kept).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::GearPair;
+
+    /// A full mass matrix, and a gap that the second displacement has the larger share of: the accelerations are those
+    /// of the equations of motion.
+    #[test]
+    fn any_gap_row_obeys_the_equations_of_motion() {
+        let pair = GearPair::paper(0.5).oscillator().unwrap();
+        for gap in [[1.0, -1.0], [0.3, 2.0], [0.0, -1.5], [-2.0, 0.5]] {
+            let oscillator = Oscillator { mass: [[2.0, 0.7], [0.7, 1.0]], gap, ..pair };
+            let coordinates = Coordinates::new(&oscillator);
+            let y = [0.3, -1.2, 0.9, 2.1];
+            let q = coordinates.gap(&y);
+            let back = coordinates.state(&q);
+            let off = (0..4).map(|i| (back[i] - y[i]).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-15, "{gap:?}: {back:?}");
+            for domain in [oscillator.free, oscillator.meshing[0]] {
+                let cos = 0.6;
+                let [a, b] = Field::new(&oscillator, &domain).accelerations(&q, cos);
+                let x = coordinates.state(&[a, 0.0, b, 0.0]);
+                let (acceleration, k, c) = ([x[0], x[2]], domain.stiffness, domain.damping);
+                for i in 0..2 {
+                    let inertia =
+                        oscillator.mass[i][0] * acceleration[0] + oscillator.mass[i][1] * acceleration[1];
+                    let rest = c[i][0] * y[1] + c[i][1] * y[3] + k[i][0] * y[0] + k[i][1] * y[2];
+                    let drive = oscillator.force[i] * cos + domain.load[i];
+                    let off = inertia + rest - drive;
+                    assert!(off.abs() < 1e-11 * (1.0 + rest.abs()), "{gap:?}: {off:e}");
+                }
+            }
+        }
+    }
+}

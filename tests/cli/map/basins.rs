@@ -1,0 +1,130 @@
+//! Maps of basins: their files, and that a run which goes on gives the same bytes.
+
+use rattlemap::output::{Identity, Order, RecordFile};
+
+use super::*;
+
+/// Contact-free motion beside rattling, most of it filled.
+const BASIN: &str = r#"[parameters]
+e = 0.98
+omega = 9.2
+
+[[axis]]
+start = "x1"
+min = -0.5
+max = 0.5
+count = 65
+
+[[axis]]
+start = "v2"
+min = -6.0
+max = 6.0
+count = 49
+
+[start]
+policy = "state"
+state = [9.0, 0.25, -0.1, 9.0]
+
+[refine]
+max_error = 0.05
+
+[outputs]
+quantities = ["class", "lyapunov"]
+"#;
+
+/// Files that a run gives to the byte.
+const FILES: [&str; 7] =
+    ["cells.csv", "cells.npy", "attractors.csv", "map.png", "class.png", "lyapunov.png", "report.html"];
+
+fn bytes(out: &Path) -> Vec<Vec<u8>> {
+    FILES.iter().map(|name| fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))).collect()
+}
+
+fn basin() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("s.toml"), BASIN).unwrap();
+    folder
+}
+
+#[test]
+fn basins_have_their_files_and_are_confirmed() {
+    let folder = basin();
+    map(&folder, &["--quiet"]).success();
+    let out = folder.path().join("out/s");
+    let (header, cells) = rows(&out.join("cells.csv"));
+    assert!(header.starts_with("i,j,x1,v2,class,") && header.ends_with(",source,attractor"), "{header}");
+    let (header, attractors) = rows(&out.join("attractors.csv"));
+    let columns = "label,class,period,word,exponent,largest_multiplier,symmetric,\
+                   strobe_x1,strobe_v1,strobe_x2,strobe_v2,cells,share";
+    assert_eq!(header, columns);
+    assert!(attractors.len() >= 2, "{attractors:?}");
+    let mut left = cells.len();
+    for (label, row) in attractors.iter().enumerate() {
+        let own: Vec<_> = cells.iter().filter(|cell| cell.last() == Some(&label.to_string())).collect();
+        assert_eq!([row[0].clone(), row[11].clone()], [label.to_string(), own.len().to_string()]);
+        let share = own.len() as f64 / cells.len() as f64;
+        assert!((row[12].parse::<f64>().unwrap() - share).abs() < 1e-12);
+        assert!(own.iter().all(|cell| cell[4] == row[1]), "one class in a basin");
+        left -= own.len();
+    }
+    let unlabelled = cells.iter().filter(|cell| cell.last().is_some_and(String::is_empty)).count();
+    assert_eq!(left, unlabelled);
+    assert!(cells.iter().filter(|cell| cell[15] == "filled").count() > 1000);
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["basins"].as_array().unwrap().len(), attractors.len());
+    assert_eq!(
+        (&manifest["axes"][0]["parameter"], &manifest["axes"][0]["is_start"]),
+        (&"x1".into(), &true.into())
+    );
+    assert_eq!(manifest["without_effect"], serde_json::json!([]));
+    // Labels are confirmed, and a file of them is made anew.
+    command(&folder, &["validate", "out/s", "--samples", "60", "--quiet"]).assert().success();
+    let validation: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("validation.json")).unwrap()).unwrap();
+    assert!(validation.to_string().contains("\"attractor\""), "{validation}");
+    let table = fs::read(out.join("attractors.csv")).unwrap();
+    fs::remove_file(out.join("attractors.csv")).unwrap();
+    command(&folder, &["check", "out/s", "--repair", "--quiet"]).assert().success();
+    assert!(fs::read(out.join("attractors.csv")).unwrap() == table);
+}
+
+/// Of all that an adaptive run has kept a part is enough.
+#[test]
+fn basins_that_go_on_are_the_same_to_the_byte() {
+    let folder = basin();
+    map(&folder, &["--quiet", "--out", "whole"]).success();
+    let whole = folder.path().join("whole");
+    let path = whole.join("records.bin");
+    let identity = Identity::read(&path).unwrap().unwrap();
+    let mut all = Vec::new();
+    RecordFile::read(&path, &identity, Order::AsKept, |batch| {
+        all.extend_from_slice(batch);
+        true
+    })
+    .unwrap();
+    let cut = folder.path().join("cut");
+    for kept in [1, all.len() / 3, all.len() - 1] {
+        fs::create_dir(&cut).unwrap();
+        let mut file = RecordFile::create(&cut.join("records.bin"), &identity).unwrap();
+        // In two batches, for what is known at the second depends on the first.
+        let (first, second) = all[..kept].split_at(kept / 2);
+        [first, second]
+            .into_iter()
+            .filter(|batch| !batch.is_empty())
+            .for_each(|batch| file.append(batch).unwrap());
+        drop(file);
+        map(&folder, &["--out", "cut", "--resume", "--quiet"]).success();
+        assert!(bytes(&cut) == bytes(&whole), "{kept} of {}", all.len());
+        fs::remove_dir_all(&cut).unwrap();
+    }
+}
+
+#[test]
+fn a_command_replays_a_start() {
+    let folder = basin();
+    map(&folder, &["--quiet", "--set", "axis.0.count=3", "--set", "axis.1.count=2"]).success();
+    let page = fs::read_to_string(folder.path().join("out/s/report.html")).unwrap();
+    assert!(page.contains("\"start\":[-0.5,0.25,-0.1,-6.0]"), "the first cell's own start");
+    assert!(page.contains("\"parameter\":\"v2\"") && page.contains("\"start\":3"));
+}

@@ -1,0 +1,154 @@
+//! The independent integrator on every kind of oscillator: one wall, contact without impact, sticking, a full mass matrix,
+//! any gap row, each against what is known of it in closed form.
+
+use crate::common::closed_form::{Linear, Wall, Walled};
+use crate::common::{REST, apart, paper};
+use rattlemap::validate::independent::dop853::Solver;
+use rattlemap::validate::independent::flight::{Ended, Flight};
+use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
+use rattlemap_dynamics::reference::EventKind;
+
+/// Times since phase 0 of the first period, kinds and walls.
+type Told = Vec<(f64, EventKind, usize)>;
+
+/// Periods from a start, by the integrator that judges maps.
+fn run(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> (State, Told) {
+    let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
+    let mut flight = Flight::new(oscillator, law, start);
+    let mut told = Vec::new();
+    for n in 0..periods {
+        solver.advance(&mut flight, 0.0, oscillator.period()).expect("an ordinary motion");
+        let begun = f64::from(n) * oscillator.period();
+        told.extend(
+            flight.events.drain(..).map(|Ended { t, kind, side, .. }| (begun + t, kind, side.index())),
+        );
+    }
+    (flight.state(), told)
+}
+
+/// The worst distance of instants, where the events are the same.
+fn apart_in_time(ours: &Told, theirs: &Told) -> f64 {
+    let names = |told: &Told| told.iter().map(|&(_, kind, side)| (kind, side)).collect::<Vec<_>>();
+    assert_eq!(names(ours), names(theirs), "{ours:?} {theirs:?}");
+    ours.iter().zip(theirs).map(|(ours, theirs)| (ours.0 - theirs.0).abs()).fold(0.0, f64::max)
+}
+
+fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) -> Told {
+    let (oscillator, law) = walled.oscillator();
+    let (theirs, events) = walled.run(start, periods);
+    let (ours, told) = run(&oscillator, law, [start[0], start[1], 0.0, 0.0], periods);
+    let off = apart(ours, [theirs[0], theirs[1], 0.0, 0.0]).max(apart_in_time(&told, &events));
+    println!("{what}: {} events, off by {off:.1e}", events.len());
+    assert!(off < 1e-10, "{what}: {off:e}");
+    told
+}
+
+const FREE: Linear = Linear { m: 1.0, c: 0.1, k: 1.0, force: 1.0, omega: 0.8, load: 0.0 };
+
+#[test]
+fn one_wall_and_two_unlike_ones() {
+    let stop = Some(Wall::Rigid { at: 0.3, e: 0.0 });
+    let spring = Some(Wall::Elastic { at: -0.2, k: 29.0, c: 0.5 });
+    for (walls, what) in [
+        ([stop, None], "a stop on the right"),
+        ([None, Some(Wall::Rigid { at: -0.7, e: 0.0 })], "a stop on the left"),
+        ([None, spring], "a spring on the left"),
+        ([stop, spring], "a stop and a spring"),
+        ([Some(Wall::Elastic { at: 0.0, k: 4.0, c: 0.0 }), None], "a bilinear spring"),
+        ([Some(Wall::Rigid { at: -0.5, e: 0.0 }), None], "a stop that is pressed and sticks"),
+    ] {
+        let at = walls[0].map_or(0.0, |wall| match wall {
+            Wall::Rigid { at, .. } | Wall::Elastic { at, .. } => at,
+        });
+        let told = agrees(&Walled { free: FREE, walls }, [at.min(0.0) - 0.1, 0.3], 6, what);
+        assert!(told.len() > 4, "{what}: {told:?}");
+    }
+}
+
+/// A plastic ball on a table that shakes with 1.5 g: it sticks until the table falls faster than it, and then flies.
+#[test]
+fn a_load_holds_on_a_rigid_wall_until_it_pulls_off() {
+    let ball = Linear { m: 1.0, c: 0.0, k: 0.0, force: 1.5, omega: 1.0, load: -1.0 };
+    let table = Walled { free: ball, walls: [None, Some(Wall::Rigid { at: 0.0, e: 0.0 })] };
+    let told = agrees(&table, [0.0, 0.0], 3, "a plastic ball");
+    // At phase 0 the table throws it off; later its own acceleration of 1 g does.
+    let off = told.iter().filter(|(t, kind, _)| *kind == EventKind::MeshEnd && *t > 1.0).map(|(t, ..)| t);
+    let phases: Vec<f64> = off.map(|t| (1.5 * t.cos() - 1.0).abs()).collect();
+    assert!(phases.len() >= 2 && phases.iter().all(|off| *off < 1e-10), "{phases:?}");
+}
+
+/// On a table at rest a ball comes to rest after `2 v / (g (1 - e))`, and infinitely many impacts.
+#[test]
+fn a_ball_bounces_infinitely_often_in_finite_time() {
+    let ball = Linear { m: 1.0, c: 0.0, k: 0.0, force: 0.0, omega: 1.0, load: -1.0 };
+    let table = Walled { free: ball, walls: [None, Some(Wall::Rigid { at: 0.0, e: 0.6 })] };
+    let (oscillator, law) = table.oscillator();
+    let (state, told) = run(&oscillator, law, [0.0, 0.9, 0.0, 0.0], 2);
+    let (t, kind, _) = *told.last().unwrap();
+    let rest = 2.0 * 0.9 / (1.0 - 0.6);
+    assert!(kind == EventKind::MeshStart && (t - rest).abs() < 1e-6 * rest, "{t} {rest}");
+    assert_eq!(state, REST);
+    assert!(told.len() > 20);
+}
+
+/// New displacements `x = T u`: the gap, its events and its walls stay what they are.
+fn turned(o: &Oscillator, t: [[f64; 2]; 2]) -> Oscillator {
+    let [[a, b], [c, d]] = t;
+    let congruent = |m: [[f64; 2]; 2]| {
+        let of = |u: [f64; 2], v: [f64; 2]| {
+            u[0] * (m[0][0] * v[0] + m[0][1] * v[1]) + u[1] * (m[1][0] * v[0] + m[1][1] * v[1])
+        };
+        let (first, second) = ([a, c], [b, d]);
+        [[of(first, first), of(first, second)], [of(first, second), of(second, second)]]
+    };
+    let covariant = |f: [f64; 2]| [a * f[0] + c * f[1], b * f[0] + d * f[1]];
+    let domain = |domain: &Domain| Domain {
+        damping: congruent(domain.damping),
+        stiffness: congruent(domain.stiffness),
+        load: covariant(domain.load),
+    };
+    Oscillator {
+        mass: congruent(o.mass),
+        gap: covariant(o.gap),
+        force: covariant(o.force),
+        free: domain(&o.free),
+        meshing: [domain(&o.meshing[0]), domain(&o.meshing[1])],
+        ..*o
+    }
+}
+
+/// Gear pairs in other coordinates, with which their mass matrix is full and their gap any row.
+#[test]
+fn coordinates_make_no_difference() {
+    let matrices = [[[1.0, 0.3], [0.0, 1.0]], [[0.4, 2.0], [1.0, 0.7]], [[1.0, 1.0], [1.0, 0.0]]];
+    for (e, contacts, what) in [
+        (0.6, [Contact::Impact; 2], "impacts"),
+        (0.0, [Contact::Impact; 2], "meshing"),
+        (0.0, [Contact::Rigid; 2], "sticking"),
+        (0.3, [Contact::Elastic, Contact::Rigid], "a soft and a rigid wall"),
+        (0.0, [Contact::Elastic; 2], "backlash without impact"),
+    ] {
+        let pair = paper(e, 5.6);
+        let oscillator = Oscillator { contacts, ..pair.oscillator().unwrap() };
+        let (state, told) = run(&oscillator, pair.law(), REST, 3);
+        assert!(told.len() > 5, "{what}: {told:?}");
+        for t in matrices {
+            let (other, theirs) = run(&turned(&oscillator, t), pair.law(), REST, 3);
+            let back = [0, 1].map(|i| [0, 1].map(|rate| t[i][0] * other[rate] + t[i][1] * other[2 + rate]));
+            let off = apart(state, [back[0][0], back[0][1], back[1][0], back[1][1]]);
+            let off = off.max(apart_in_time(&told, &theirs));
+            println!("{what}, {t:?}: off by {off:.1e}");
+            assert!(off < 1e-9, "{what}, {t:?}: {off:e}");
+        }
+    }
+}
+
+#[test]
+fn a_start_beyond_a_rigid_wall_begins_on_it() {
+    let oscillator = Oscillator { contacts: [Contact::Rigid; 2], ..paper(0.0, 5.6).oscillator().unwrap() };
+    let flight = Flight::new(&oscillator, Law::both(0.0, 0.0), [0.9, 0.0, 0.1, 0.0]);
+    assert_eq!((flight.q, flight.meshing()), ([0.5, 0.0, 0.1, 0.0], None));
+    let soft = Oscillator { contacts: [Contact::Elastic; 2], ..oscillator };
+    let flight = Flight::new(&soft, Law::both(0.0, 0.0), [0.9, 0.0, 0.1, 0.0]);
+    assert_eq!(flight.meshing(), Some(Side::Right));
+}
