@@ -247,7 +247,8 @@ impl Definition {
 /// Motion against a spring `stiffness (z - at)` and a damper along the gap row.
 fn with_spring(free: Domain, gap: [f64; 2], at: f64, stiffness: f64, damping: f64) -> Domain {
     let along = |matrix: [[f64; 2]; 2], k: f64| {
-        let entry = |i: usize, j: usize| plus(matrix[i][j], k * gap[i] * gap[j]);
+        // Symmetric to the bit.
+        let entry = |i: usize, j: usize| plus(matrix[i][j], k * (gap[i] * gap[j]));
         [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
     };
     let force = stiffness * at;

@@ -21,7 +21,6 @@ use crate::common::apart;
 const HANGS: Duration = Duration::from_secs(60);
 
 pub(crate) struct Drawn {
-    pub(crate) text: String,
     pub(crate) model: FileModel,
     pub(crate) oscillator: Oscillator,
     pub(crate) law: Law,
@@ -122,7 +121,7 @@ pub(crate) fn drawn(seed: u64) -> Drawn {
     if random.unit() < 0.5 {
         (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));
     }
-    Drawn { oscillator: model.oscillator().expect("valid"), law: model.law(), text, model, start }
+    Drawn { oscillator: model.oscillator().expect("valid"), law: model.law(), model, start }
 }
 
 pub(crate) const SETTINGS: Settings =
@@ -164,7 +163,9 @@ fn end_well(seeds: std::ops::Range<u32>) {
     for status in Status::ALL {
         let count = ends.iter().filter(|end| end.1 == status).count();
         if count > 0 {
-            println!("{count} {}", status.name());
+            let seeds: Vec<u32> =
+                ends.iter().filter(|end| end.1 == status).map(|end| end.0).take(8).collect();
+            println!("{count} {}, such as {seeds:?}", status.name());
         }
     }
     let slowest = ends.iter().max_by_key(|end| end.3).unwrap();
@@ -208,7 +209,11 @@ fn agree(seeds: std::ops::Range<u32>) {
             solver.advance(&mut flight, 0.0, cell.oscillator.period())?;
             let state = trajectory.state();
             let scale = state.iter().fold(cell.oscillator.length_scale(), |m, x| m.max(x.abs()));
-            Some((seed, apart(flight.state(), state) / scale, [events.len(), flight.events.len()]))
+            let told = match flight.events.iter().any(|ended| ended.after_series) {
+                true => [0; 2],
+                false => [events.len(), flight.events.len()],
+            };
+            Some((seed, apart(flight.state(), state) / scale, told))
         })
         .collect();
     let differ: Vec<_> =
@@ -216,7 +221,7 @@ fn agree(seeds: std::ops::Range<u32>) {
     let mut sizes: Vec<f64> = off.iter().map(|(_, off, _)| *off).collect();
     sizes.sort_by(f64::total_cmp);
     println!("{} models, median {:.1e}; differ: {differ:?}", off.len(), sizes[sizes.len() / 2]);
-    assert!(off.len() > 100 && 50 * differ.len() <= off.len());
+    assert!(off.len() > 100 && differ.is_empty());
 }
 
 #[test]
