@@ -9,15 +9,14 @@ use std::{env, fs};
 use sha2::{Digest, Sha256};
 
 /// What decides the bits of a record, or the order of work that records are replayed in.
-const DECIDING: [&str; 17] = [
+const DECIDING: [&str; 19] = [
     "dynamics/src",
+    "models/gear_pair.toml",
     "shaders",
     "src/gpu",
     "src/record",
     "src/map/engine.rs",
     "src/map/engine",
-    "src/map/expression.rs",
-    "src/map/expression",
     "src/map/plan.rs",
     "src/map/plan",
     "src/map/random.rs",
@@ -27,6 +26,9 @@ const DECIDING: [&str; 17] = [
     "src/map/scene/points.rs",
     "src/map/schedule.rs",
     "src/map/schedule",
+    "src/model_file",
+    "src/text/expression.rs",
+    "src/text/expression",
 ];
 
 /// Packages whose arithmetic, or whose code for a device, goes into a record.
@@ -47,8 +49,16 @@ const PACKAGES: [&str; 13] = [
 ];
 
 /// What the program is made of.
-const SOURCES: [&str; 7] =
-    ["src", "dynamics/src", "dynamics/Cargo.toml", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
+const SOURCES: [&str; 8] = [
+    "src",
+    "dynamics/src",
+    "dynamics/Cargo.toml",
+    "models",
+    "shaders",
+    "Cargo.toml",
+    "Cargo.lock",
+    "build.rs",
+];
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

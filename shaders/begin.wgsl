@@ -23,7 +23,7 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     motions[lane].now = motion;
     motions[lane].seen = seen;
     motions[lane].tangents = array<Real, 16>();
-    motions[lane].vector = FRESH;
+    motions[lane].vector = fresh();
     tallies[lane].now = tally;
     tallies[lane].noted = noted;
     tallies[lane].distances = array<u32, 16>();

@@ -2,8 +2,8 @@
 // recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
 
 // Whether impacts that the load presses back have no end.
-fn is_endless() -> bool {
-    return law.restitution < 1.0 && law.mesh_speed * h <= NO_THRESHOLD * speed;
+fn is_endless(side: u32) -> bool {
+    return restitution(side) < 1.0 && mesh_speed(side) <= NO_THRESHOLD * speed;
 }
 
 // Closes an infinite series of impacts by its limit, once it is so short that what the
@@ -15,10 +15,10 @@ fn is_endless() -> bool {
 // Meanwhile the other coordinate moves as it does with the gap closed. Tangents are those of these
 // formulas, up to the second order.
 fn close_chatter(side: u32, u: Real) {
-    if !is_endless() {
+    if !is_endless(side) {
         return;
     }
-    let e = law.restitution;
+    let e = restitution(side);
     let sign = sign_of(side);
     let rate = motion.q[3] + kick * motion.q[1];
     let closed = array<Real, 4>(motion.q[0], 0.0, motion.q[2], rate);
@@ -48,7 +48,8 @@ fn close_chatter(side: u32, u: Real) {
         let per_speed = (1.0 - 2.0 * (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole) * whole / u;
         let per_pressing = whole / pressing;
         crossing.lasts = lasts;
-        crossing.pressing = sign * (pressing + lasts * change);
+        // What sticks to the wall at the end does so wherever it comes from.
+        crossing.pressing = select(sign * (pressing + lasts * change), Real(0.0), is_rigid(side));
         crossing.late_by = array<Real, 4>(
             sign * (1.0 - per_speed * (pressing + damping * u) - per_pressing * change) / u,
             -sign * per_speed,
@@ -68,6 +69,10 @@ fn close_chatter(side: u32, u: Real) {
     count_event(side);
     tally.mode = MODE_SUSTAINED + side;
     tally.order = 2u;
+    if is_rigid(side) {
+        tally.mode = MODE_STUCK + side;
+        tally.order = held_order(side);
+    }
     enter(domain_of(tally.mode));
 }
 
@@ -77,16 +82,16 @@ var<private> chatters: bool;
 // Whether the flight from wall `side` is short, by its parabola, and two more after it, leaving
 // at speed `u`.
 fn begins_chatter(side: u32, u: Real) -> bool {
-    let e = law.restitution;
+    let e = restitution(side);
     let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
     let is_short = u > 0.0 && 2.0 * u < SHORT * pressing;
-    return law.mesh_speed * h <= FOLLOWED_MESH_SPEED * speed && is_short && e * e * u > least_leaving(pressing);
+    return mesh_speed(side) <= FOLLOWED_MESH_SPEED * speed && is_short && e * e * u > least_leaving(side, pressing);
 }
 
 // The leaving speed at which a series ends in meshing, or by its limit where it has no end.
-fn least_leaving(pressing: Real) -> Real {
+fn least_leaving(side: u32, pressing: Real) -> Real {
     // A hundredth more than `close_chatter` asks for, so that it is met before.
-    return select(law.mesh_speed * h, 0.505 * closing * (1.0 - law.restitution) * pressing, is_endless());
+    return select(mesh_speed(side), 0.505 * closing * (1.0 - restitution(side)) * pressing, is_endless(side));
 }
 
 // Flights that are followed in one go.
@@ -107,7 +112,7 @@ const SHORT_FLIGHTS: u32 = 100u;
 // after the load has ceased to press, is left to the careful step.
 fn follow_chatter(side: u32) {
     let sign = sign_of(side);
-    let e = law.restitution;
+    let e = restitution(side);
     let row = here.gap_row;
     let damping = kick * row[3] - row[1];
     let begun = motion.phasor;
@@ -122,7 +127,7 @@ fn follow_chatter(side: u32) {
         let removed = (1.0 + e) * end.rate;
         let leaving = e * sign * end.rate;
         let pressing = sign * (end.acceleration + damping * removed);
-        if !(pressing > 0.0 && leaving > least_leaving(pressing)) {
+        if !(pressing > 0.0 && leaving > least_leaving(side, pressing)) {
             break;
         }
         iterations += 1u;

@@ -35,6 +35,16 @@ fn fetch_constants() {
     enter(domain_of(tally.mode));
 }
 
+// The law at a wall. Arrays that are indexed would not stay in registers.
+fn restitution(side: u32) -> Real {
+    return select(law.restitution[1], law.restitution[0], side == SIDE_RIGHT);
+}
+
+// Leaving speed per free step at or below which a pressed contact lasts.
+fn mesh_speed(side: u32) -> Real {
+    return select(law.mesh_speed[1], law.mesh_speed[0], side == SIDE_RIGHT) * h;
+}
+
 // Domain `d` governs from here on.
 fn enter(d: u32) {
     if !KEEP {

@@ -54,7 +54,7 @@ fn watch(tau: Real) -> Watch {
         );
     }
     let sign = sign_of(side_of(tally.mode));
-    if tally.mode < MODE_ONSET {
+    if tally.mode < MODE_ONSET || sticks() {
         return Watch(vec3<Real>(offsets.x + sign * z.x, sign * z.y, sign * z.z), vec3<Real>(1.0, 0.0, 0.0));
     }
     return Watch(vec3<Real>(offsets.x - sign * z.x, -sign * z.y, -sign * z.z), sign * pressing_jet(tau));
@@ -64,6 +64,8 @@ fn set_offsets() {
     let z = motion.q[0];
     if tally.mode == MODE_FREE {
         offsets = vec2<Real>(walls[0] - z, z - walls[1]);
+    } else if sticks() {
+        offsets = vec2<Real>(sign_of(side_of(tally.mode)) * gap_terms[0], 0.0);
     } else {
         let sign = sign_of(side_of(tally.mode));
         offsets = vec2<Real>(select(sign, -sign, tally.mode >= MODE_ONSET) * z, 0.0);
@@ -207,8 +209,11 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 0.5 * dt;
             continue;
         }
-        // The shortest stretch is still undecided: what touches here does so within rounding.
-        tally.grazes += 1u;
+        // The shortest stretch is still undecided: what touches here does so within rounding. Elastic walls do not mind.
+        let touched = select(side_of(tally.mode), select(SIDE_LEFT, SIDE_RIGHT, first != CLEAR), tally.mode == MODE_FREE);
+        if !is_elastic(touched) {
+            tally.grazes += 1u;
+        }
         if right.first.x <= 0.0 {
             return Find(true, false, b);
         }
@@ -270,11 +275,21 @@ fn careful() -> bool {
     sync_phasor();
     iterations += 1u;
     expand();
+    if sticks() {
+        expand_held();
+    }
+    if KINDS && tally.order == 3u {
+        // Let go.
+        gap_terms[2] = 0.0;
+    }
     set_offsets();
     motion.bound =
         derivative_bound(120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
-    if tally.mode >= MODE_ONSET {
+    if sticks() {
+        motion.bound = held_bound();
+    }
+    if is_onset() {
         pressing_bound =
             derivative_bound(5040.0 * gap_terms[7], 40320.0 * gap_terms[8], 5040.0 * x_terms[7], 40320.0 * x_terms[8]);
     }
@@ -294,11 +309,16 @@ fn careful() -> bool {
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
     let order = select(vec2<u32>(tally.order, 0u), vec2<u32>(0u, tally.order), on_second);
     let found = first_event(len, here.growth, order);
-    if tally.mode >= MODE_ONSET && crosses_backlash(found.tau) {
+    if is_onset() && crosses_backlash(found.tau) {
         tally.status = STATUS_TOO_STIFF;
     }
     tally.passes_in_period += 1u;
     motion.q = state_at(found.tau, substeps);
+    let held = sticks();
+    if held {
+        motion.q[0] = 0.0;
+        motion.q[1] = 0.0;
+    }
     motion.bound += here.growth;
     tally.order = 0u;
     if MESH && d > 0u {
@@ -317,7 +337,7 @@ fn careful() -> bool {
         act(found.second, found.tau);
     }
     if EXPONENT {
-        carry_tangents(flown, found.tau);
+        carry_tangents(flown, found.tau, held);
     }
     return tally.step >= stop;
 }
@@ -339,6 +359,8 @@ fn act(second: bool, tau: Real) {
     }
     if mode == MODE_FREE {
         jump = contact(side, settling);
+    } else if sticks() {
+        jump = let_go(side);
     } else if mode < MODE_ONSET {
         jump = end_meshing(side, settling, tau);
     } else if second {
@@ -354,9 +376,15 @@ fn act(second: bool, tau: Real) {
     if !(mode >= MODE_ONSET && second) {
         tally.order = select(1u, 2u, motion.q[1] == 0.0);
     }
+    if sticks() {
+        tally.order = 3u;
+    }
     if jump.mode != mode {
         tally.mode = jump.mode;
         enter(domain_of(jump.mode));
+    }
+    if sticks() {
+        tally.order = held_order(side);
     }
     if EXPONENT && jump.event {
         crossing.jump = jump;

@@ -87,8 +87,11 @@ const ALONG_GAP = array<Real, 4>(1.0, 0.0, 0.0, 0.0);
 
 // Free motion reaches a wall: the impact law, then meshing or not. The gap is on the wall.
 fn contact(side: u32, settling: bool) -> Jump {
+    if is_elastic(side) {
+        return enter_elastic(side);
+    }
     let sign = sign_of(side);
-    let e = law.restitution;
+    let e = restitution(side);
     let closing = sign * motion.q[1];
     let approach = max(closing, Real(0.0));
     let leaving = e * approach;
@@ -101,12 +104,18 @@ fn contact(side: u32, settling: bool) -> Jump {
     if settling && (closing < 0.0 || (closing == 0.0 && !pressed)) {
         return jump;
     }
+    if is_rigid(side) && leaving <= mesh_speed(side) {
+        let at_rest = stick(side);
+        if at_rest.event {
+            return at_rest;
+        }
+    }
     jump.event = true;
     if !pressed && approach < GRAZING_SPEED * speed {
         tally.grazes += 1u;
     }
     motion.q = after;
-    if pressed && leaving <= law.mesh_speed * h {
+    if pressed && leaving <= mesh_speed(side) && !is_rigid(side) {
         after[0] = 0.0;
         if presses(meshing_pull(side), side, after) {
             jump.mode = select(MODE_SUSTAINED, MODE_ONSET, leaving > 0.0) + side;
@@ -125,6 +134,13 @@ fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
     var jump = Jump(false, tally.mode, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
     if settling && sign * motion.q[1] > 0.0 {
         return jump;
+    }
+    if is_elastic(side) {
+        if stays_behind(side) {
+            motion.q[1] = 0.0;
+            return jump;
+        }
+        pass_damper(side, -1.0);
     }
     jump.event = true;
     jump.mode = MODE_FREE;

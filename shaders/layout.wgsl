@@ -45,6 +45,10 @@ struct Flow {
     steady: array<Real, 4>,
     reach: Real,
     decay: Real,
+    // Acceleration of a gap that is held at the right and at the left wall, as a domain's `gap_row` measured from there.
+    pressing: array<array<Real, 6>, 2>,
+    // What the rates of the gap and of x change by, per displacement of the gap, where an elastic wall is reached.
+    damper: array<array<Real, 2>, 2>,
 }
 
 struct FlowShape {
@@ -52,13 +56,16 @@ struct FlowShape {
     steps: u32,
     // Where its phasors start.
     phasors: u32,
-    // 1 if the mirror image of a motion is a motion.
-    mirror: u32,
+    // How many displacements there are: of one, the second rests at 0.
+    degrees: u32,
+    // CONTACT_* of the right and of the left wall.
+    contacts: array<u32, 2>,
 }
 
+// At the right and at the left wall.
 struct Law {
-    restitution: Real,
-    mesh_speed: Real,
+    restitution: array<Real, 2>,
+    mesh_speed: array<Real, 2>,
 }
 
 struct Cell {
@@ -66,6 +73,8 @@ struct Cell {
     law_index: u32,
     // Status of a lane that is refused before it starts, else 0.
     refused: u32,
+    // 1 if the mirror image of a motion is a motion.
+    mirror: u32,
 }
 
 struct Settings {
@@ -330,6 +339,7 @@ const STAGE_DONE: u32 = 3u;
 const MODE_FREE: u32 = 0u;
 const MODE_SUSTAINED: u32 = 1u; // + side
 const MODE_ONSET: u32 = 3u; // + side
+const MODE_STUCK: u32 = 5u; // + side
 
 const SIDE_RIGHT: u32 = 0u;
 const SIDE_LEFT: u32 = 1u;

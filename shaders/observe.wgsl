@@ -112,7 +112,9 @@ fn begin_reading() {
     if EXPONENT {
         set_vector_aside();
         tally.tangent_count = 4u;
-        motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        // A displacement that there is not has no neighbours.
+        let x = select(Real(0.0), Real(1.0), shapes[cell.flow_index].degrees > 1u);
+        motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, x, 0.0, 0.0, 0.0, 0.0, x);
     }
 }
 

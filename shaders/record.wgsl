@@ -74,7 +74,7 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     // Contact-free motion has not been read. On a slow approach, or where rounding is amplified, a lost
     // symmetry cannot be told from one not reached, unless it is lost by far. Every impact has an image on a
     // cycle that is its own mirror image.
-    if SYMMETRY && shapes[cell.flow_index].mirror == 1u {
+    if SYMMETRY && cell.mirror == 1u {
         let has_conjugate = tally.impacts % 2u == 0u;
         let is_symmetric = noted.has_read == 0u || (is_surely_symmetric() && has_conjugate);
         if is_symmetric || !has_conjugate || is_surely_unsymmetric() {

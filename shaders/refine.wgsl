@@ -10,7 +10,7 @@ fn refine(to: array<Real, 4>) -> bool {
     }
     let stalls = noted.refinements > 0u && noted.apart < noted.apart_before + SHRUNK;
     let is_over = noted.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
-    if stalls || is_over || tally.mode >= MODE_ONSET || tally.order > 0u {
+    if stalls || is_over || is_onset() || tally.order > 0u {
         return false;
     }
     if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(noted.passed)) < Real(REACH)) {
@@ -19,6 +19,10 @@ fn refine(to: array<Real, 4>) -> bool {
     motion.q = to;
     if tally.mode != MODE_FREE {
         motion.q[0] -= walls[side_of(tally.mode)];
+    }
+    if sticks() {
+        motion.q[0] = 0.0;
+        motion.q[1] = 0.0;
     }
     motion.bound = 0.0;
     noted.refinements += 1u;
@@ -92,6 +96,9 @@ fn give_up() {
     tally.order = 0u;
     if tally.mode != MODE_FREE {
         motion.q[0] -= walls[side_of(tally.mode)];
+    }
+    if sticks() {
+        motion.q[0] = 0.0;
     }
     motion.bound = 0.0;
     noted.refinements = 0u;

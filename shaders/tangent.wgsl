@@ -43,7 +43,10 @@ fn fetch_tangent() {
 }
 
 // A vector in no direction in particular.
-const FRESH: array<Real, 4> = array<Real, 4>(0.5, 0.5, 0.5, 0.5);
+fn fresh() -> array<Real, 4> {
+    let x = select(Real(0.0), Real(0.5), shapes[cell.flow_index].degrees > 1u);
+    return array<Real, 4>(0.5, 0.5, x, x);
+}
 
 // While a cycle is read the vector is not carried along.
 fn set_vector_aside() {
@@ -66,7 +69,7 @@ fn carry_vector() {
     }
     let size = largest(image);
     if !(size > 1e-30 && size < 1e30) {
-        motions[lane].vector = FRESH;
+        motions[lane].vector = fresh();
         return;
     }
     let length = unit(&image, size);
@@ -136,16 +139,23 @@ struct Crossing {
     pressing: Real,
     late_by: array<Real, 4>,
     v_by: array<Real, 3>,
+    // The state and the field go on, but for this change of the rates of gap and x per displacement of the gap.
+    is_smooth: bool,
+    jolt: array<Real, 2>,
 }
 
 var<private> crossing: Crossing;
 
-// Carries every vector over a part of a step and what follows it.
-fn carry_tangents(flown: Pull, tau: Real) {
+// Carries every vector over a part of a step and what follows it. A gap that was held has had no neighbours.
+fn carry_tangents(flown: Pull, tau: Real, held: bool) {
     let back = 1.0 / flown.share;
     for (var i = 0u; i < tally.tangent_count; i++) {
         iterations += 1u;
         var u = tangent(i);
+        if held {
+            u[0] = 0.0;
+            u[1] = 0.0;
+        }
         u[1] *= flown.share;
         u[3] *= flown.share;
         u = glide(flown, u, tau);
@@ -237,6 +247,9 @@ fn field() -> array<Real, 4> {
 // `S u = R u + (f+ - R f-) (n . u) / (n . f-)`, with R the jump of rates by `kept` (-e at a
 // contact, 1 elsewhere) and `kick`.
 fn saltate(u: array<Real, 4>) -> array<Real, 4> {
+    if KINDS && crossing.is_smooth {
+        return array<Real, 4>(u[0], u[1] + crossing.jolt[0] * u[0], u[2], u[3] + crossing.jolt[1] * u[0]);
+    }
     let jump = crossing.jump;
     let before = crossing.before;
     let after = crossing.after;
@@ -269,7 +282,7 @@ fn renormalise() -> Real {
     let size = largest(u);
     if !(size > 1e-30) {
         // Superstable: as large a loss as can be told. Start anew.
-        set_tangent(0u, FRESH);
+        set_tangent(0u, fresh());
         return -100.0;
     }
     let length = unit(&u, size);

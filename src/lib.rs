@@ -8,6 +8,8 @@
 //! | [`output`] | files: one per format |
 //! | [`mod@validate`] | how right is a finished map |
 //! | [`map`] | many motions: scene, plan, schedule, engines |
+//! | [`model_file`] | models written down as files |
+//! | [`mod@text`] | what people write, with places for errors |
 //! | [`gpu`] | the host's side of lanes |
 //! | [`record`] | what an engine hands back per cell, and its classes |
 //! | [`dynamics`] | one motion, exactly: a package of its own |
@@ -39,6 +41,10 @@ pub use rattlemap_dynamics as dynamics;
 pub use rattlemap_dynamics::{certificate, flow, model, orbit, reference, stability, word};
 
 pub mod record;
+
+pub mod text;
+
+pub mod model_file;
 
 #[cfg(feature = "gpu")]
 pub mod gpu;

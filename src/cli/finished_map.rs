@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::map::plan::Plan;
-use crate::map::scene::{FileText, Purpose, Scene};
+use crate::map::scene::{FileBeside, FileText, Purpose, Scene};
 use crate::map::schedule::{Refined, Schedule};
 use crate::map::sweep;
 use crate::output::inventory::{self, FileEntry, Finding};
@@ -34,7 +34,14 @@ pub(crate) struct Manifest {
     target: String,
     scene: String,
     set: Vec<String>,
+    model: Option<ModelObject>,
     pub(crate) files: Vec<FileEntry>,
+}
+
+/// The model of a map: its file's text, where it has one.
+#[derive(Deserialize)]
+struct ModelObject {
+    text: Option<String>,
 }
 
 /// Refuses what is no folder.
@@ -113,7 +120,12 @@ impl Manifest {
     pub(crate) fn scene(&self, dir: &Path) -> Result<FinishedMap<'_>, Failure> {
         let name = dir.join(MANIFEST).display().to_string();
         // The folder's own copy: the file that the scene names may be elsewhere by now, or another.
-        let find = |_: &str| {
+        let find = |what, _: &str| {
+            if what == FileBeside::Model {
+                let text = self.model.as_ref().and_then(|model| model.text.clone());
+                let text = text.ok_or("is not told by the manifest; make the map again with --force")?;
+                return Ok(FileText { name: format!("{name}, model"), text });
+            }
             let path = dir.join(LIST);
             let text = read_table(&path, MOST_OF_COPY).map_err(|error| {
                 format!(

@@ -6,10 +6,13 @@ use std::path::Path;
 
 use super::arguments::{FigureFormat, SceneOptions};
 use super::capacity::bytes;
-use crate::map::scene::{Along, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::map::scene::{Along, FileBeside, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 
 /// The most bytes that a table of cells may have.
 const MOST: u64 = 256_000_000;
+
+/// The most bytes that a model may have.
+const MOST_OF_MODEL: u64 = 1_000_000;
 
 /// Of the folder's own copy, whose numbers are written out: 1e15 has 18 characters there.
 pub(crate) const MOST_OF_COPY: u64 = 4 * MOST;
@@ -51,14 +54,28 @@ fn load_from(
         place: Place::File { file: name.as_str().into() },
         problem: Problem::Unreadable { reason: error.to_string() },
     })?;
-    let find = |file: &str| {
+    let find = |what, file: &str| {
         let beside = path.parent().unwrap_or(Path::new("")).join(file);
+        if what == FileBeside::Model {
+            return find_model(&beside);
+        }
         match kept.filter(|kept| !beside.exists() && kept.exists()) {
             Some(kept) => find(kept, MOST_OF_COPY),
             None => find(&beside, MOST),
         }
     };
     Scene::parse_along(&text, &name, sets, purpose, along, &find)
+}
+
+/// Reads the file of a model; the error is the end of a sentence that names it.
+pub(crate) fn find_model(path: &Path) -> Result<FileText, String> {
+    let name = path.display().to_string();
+    match read_text(path, MOST_OF_MODEL, "write a shorter model") {
+        Ok(text) => Ok(FileText { name, text }),
+        Err(error) => Err(format!(
+            "cannot be read at {name} ({error}); give the path of a model's file, in a scene from the scene's folder"
+        )),
+    }
 }
 
 /// Reads a table of cells.
@@ -72,20 +89,26 @@ fn find(path: &Path, most: u64) -> Result<FileText, String> {
     }
 }
 
-/// The text of a table of cells that has `most` bytes at most. A pipe would be waited for, and a device may never end.
+/// The text of a table of cells that has `most` bytes at most.
+///
+/// # Errors
+/// As [`read_text`].
+pub(crate) fn read_table(path: &Path, most: u64) -> io::Result<String> {
+    read_text(path, most, "list fewer cells")
+}
+
+/// A text that has `most` bytes at most. A pipe would be waited for, and a device may never end.
 ///
 /// # Errors
 /// If it is no regular file, is larger, or cannot be read.
-pub(crate) fn read_table(path: &Path, most: u64) -> io::Result<String> {
+fn read_text(path: &Path, most: u64, remedy: &str) -> io::Result<String> {
     let data = fs::metadata(path)?;
     if !data.is_file() {
         return Err(io::Error::other("it is no regular file"));
     }
     if data.len() > most {
         let (size, most) = (bytes(data.len()), bytes(most));
-        return Err(io::Error::other(format!(
-            "it has {size}, and at most {most} are read: list fewer cells"
-        )));
+        return Err(io::Error::other(format!("it has {size}, and at most {most} are read: {remedy}")));
     }
     fs::read_to_string(path)
 }

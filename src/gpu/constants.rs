@@ -1,11 +1,12 @@
 //! Constants of a lane, derived in f64 from the model's description.
 
 use bytemuck::Zeroable;
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::SMatrix;
 
+use super::coordinates::Coordinates;
 use super::layout::{Domain, Flow};
 use crate::record::limits::MOST_STEPS;
-use rattlemap_dynamics::model;
+use rattlemap_dynamics::model::{self, Contact};
 use rattlemap_dynamics::reference::CLOSING_ANGLE;
 
 /// Largest angle, in radians, that the fastest mode may turn in one step: Taylor series and
@@ -31,16 +32,12 @@ pub struct Constants {
     pub phasors: Vec<[f64; 2]>,
     /// Whether the mirror image of a motion is a motion.
     pub mirror_symmetric: bool,
-    gap: [f64; 2],
-}
-
-/// Second-order form `y'' = -stiffness y - damping y' + force cos + load` of a domain, in
-/// the displacements `(z, x2)`.
-struct Equations {
-    stiffness: [[f64; 2]; 2],
-    damping: [[f64; 2]; 2],
-    force: [f64; 2],
-    load: [f64; 2],
+    /// How many displacements there are.
+    pub degrees: u32,
+    /// What the right and the left wall are.
+    pub contacts: [Contact; 2],
+    walls: [f64; 2],
+    coordinates: Coordinates,
 }
 
 impl Constants {
@@ -59,63 +56,86 @@ impl Constants {
         let steps = Constants::steps(oscillator, asked)?;
         let period = oscillator.period();
         let h = period / f64::from(steps);
-        let substeps = |domain: &model::Domain| {
-            (h * rate(oscillator, domain) / STEP_ANGLE).max(1.0).log2().ceil().exp2()
-        };
-        let [right, left] = oscillator.meshing;
         let walls = walls(oscillator);
-        let domain = |d: &model::Domain, wall: f64, substeps: f64| domain(oscillator, d, wall, h, substeps);
+        let coordinates = Coordinates::new(oscillator);
+        let [right, left] = [0, 1].map(|side| behind_wall(oscillator, side, walls[side], h));
+        let held = |wall: f64| rows(oscillator, &oscillator.free, wall, h)[0];
+        let damper =
+            |behind: &model::Domain| coordinates.damper(&oscillator.free, behind).map(|rate| -h * rate);
         let mut constants = Constants {
             flow: Zeroable::zeroed(),
             steps,
             phasors: phasors(steps),
             mirror_symmetric: oscillator.mirror_symmetric(),
-            gap: oscillator.gap,
+            degrees: oscillator.degrees as u32,
+            contacts: oscillator.contacts,
+            walls: oscillator.walls,
+            coordinates,
         };
         constants.flow = Flow {
-            domains: [
-                domain(&oscillator.free, 0.0, 1.0),
-                domain(&right, walls[0], substeps(&right)),
-                domain(&left, walls[1], substeps(&left)),
-            ],
+            domains: [domain(oscillator, &oscillator.free, 0.0, h, 1.0), right, left],
             walls,
-            kick: kick(oscillator),
+            kick: coordinates.kick(),
             h,
             speed: speed(oscillator) * h,
             closing: CLOSING_ANGLE / free_rate(oscillator) / h,
             steady: [0.0; 4],
             reach: -1.0,
             decay: 0.0,
+            pressing: walls.map(held),
+            damper: oscillator.meshing.each_ref().map(damper),
         };
-        if let Some(motion) = model::NonImpacting::new(oscillator) {
-            let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses());
+        if let Some(motion) = non_impacting(oscillator) {
             constants.flow.steady = constants.to_lane(motion.steady());
             // In units of the free domain's energy form.
-            constants.flow.reach = h * ((g0 * g0 / m1 + g1 * g1 / m2) * motion.reach()).sqrt();
+            constants.flow.reach = h * (coordinates.compliance() * motion.reach()).sqrt();
             constants.flow.decay = motion.exponent() * period / std::f64::consts::LN_2;
         }
         Some(constants)
     }
 
-    /// Lane units `(z, z', x2, x2')` of a state `(x1, v1, x2, v2)`.
+    /// Lane units `(z, z', x, x')` of a state, `x` the displacement beside the gap.
     pub fn to_lane(&self, y: model::State) -> [f64; 4] {
-        let [g0, g1] = self.gap;
-        let h = self.flow.h;
-        [g0 * y[0] + g1 * y[2], h * (g0 * y[1] + g1 * y[3]), y[2], h * y[3]]
+        self.coordinates.to_lane(y, self.flow.h)
+    }
+
+    /// Where a lane begins: a gap beyond a rigid wall lies on it.
+    pub(super) fn start(&self, y: model::State) -> [f64; 4] {
+        let mut q = self.to_lane(y);
+        let [right, left] = self.flow.walls;
+        let [is_right_rigid, is_left_rigid] = self.contacts.map(|contact| contact == Contact::Rigid);
+        if is_right_rigid {
+            q[0] = q[0].min(right);
+        }
+        if is_left_rigid {
+            q[0] = q[0].max(left);
+        }
+        q
+    }
+
+    /// Whether a wall is there that is elastic or rigid.
+    pub(super) fn has_elastic_or_rigid_wall(&self) -> bool {
+        has_elastic_or_rigid_wall(self.contacts, self.walls)
     }
 
     /// The state of lane units.
     pub fn to_state(&self, q: [f64; 4]) -> model::State {
-        let [g0, g1] = self.gap;
-        let (w, v) = (q[1] / self.flow.h, q[3] / self.flow.h);
-        [(q[0] - g1 * q[2]) / g0, (w - g1 * v) / g0, q[2], v]
+        self.coordinates.to_state(q, self.flow.h)
     }
 }
 
-/// Share of the contact impulse, per unit of gap rate, that the second displacement takes.
-fn kick(oscillator: &model::Oscillator) -> f64 {
-    let ([g0, g1], [m1, m2]) = (oscillator.gap, oscillator.masses());
-    -(g1 / m2) / (g0 * g0 / m1 + g1 * g1 / m2)
+/// Whether a wall is there that is elastic or rigid.
+pub(super) fn has_elastic_or_rigid_wall(contacts: [Contact; 2], walls: [f64; 2]) -> bool {
+    contacts.iter().zip(walls).any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite())
+}
+
+/// Motion that never touches a wall again; of a displacement that there is not nothing is asked but its rest.
+fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> {
+    let beside_rest = || {
+        let is_alone = oscillator.degrees == 1;
+        is_alone.then(|| model::NonImpacting::beside_rest(oscillator)).flatten()
+    };
+    model::NonImpacting::new(oscillator).or_else(beside_rest)
 }
 
 fn phasors(steps: u32) -> Vec<[f64; 2]> {
@@ -131,7 +151,7 @@ fn phasors(steps: u32) -> Vec<[f64; 2]> {
 /// system. A mode that is damped until it no longer swings may decay as fast as all of the damping:
 /// half of it would leave 9e-6 of such a mode to the terms that single precision leaves out.
 fn rate(oscillator: &model::Oscillator, domain: &model::Domain) -> f64 {
-    let (damping, frequency) = norms(oscillator, domain);
+    let (damping, frequency) = Coordinates::new(oscillator).norms(domain);
     (0.5 * damping + frequency.max(0.5 * damping)).max(oscillator.omega)
 }
 
@@ -148,42 +168,37 @@ fn walls(oscillator: &model::Oscillator) -> [f64; 2] {
 
 /// The rate of free motion that thresholds are measured by; the reference's, so that both mean the same.
 fn free_rate(oscillator: &model::Oscillator) -> f64 {
-    let (damping, frequency) = norms(oscillator, &oscillator.free);
+    let (damping, frequency) = Coordinates::new(oscillator).norms(&oscillator.free);
     (damping + frequency).max(oscillator.omega)
 }
 
-/// Spectral norms of a domain's mass-scaled damping, and the root of that of its stiffness.
-fn norms(oscillator: &model::Oscillator, domain: &model::Domain) -> (f64, f64) {
-    let root = Vector2::from(oscillator.masses()).map(|m| m.sqrt().recip());
-    let norm = |m: [[f64; 2]; 2]| {
-        let scaled = [m[0][0] * root[0] * root[0], m[0][1] * root[0] * root[1], m[1][1] * root[1] * root[1]];
-        let (mean, half) = (0.5 * (scaled[0] + scaled[2]), 0.5 * (scaled[0] - scaled[2]));
-        mean.abs() + half.hypot(scaled[1])
-    };
-    (norm(domain.damping), norm(domain.stiffness).sqrt())
+/// Accelerations of the gap and of the other displacement, in units of a step `h`, the gap measured from `wall`.
+fn rows(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64, h: f64) -> [[f64; 6]; 2] {
+    let equations = Coordinates::new(oscillator).equations(domain, oscillator.force, wall);
+    [0, 1].map(|i| {
+        let (k, c) = (equations.stiffness[i], equations.damping[i]);
+        [
+            -k[0] * h * h,
+            -c[0] * h,
+            -k[1] * h * h,
+            -c[1] * h,
+            equations.force[i] * h * h,
+            equations.load[i] * h * h,
+        ]
+    })
 }
 
-/// The equations in `(z, x2)`, the gap measured from `wall`.
-fn equations(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64) -> Equations {
-    let ([g0, g1], m) = (oscillator.gap, oscillator.masses());
-    // x1 = (z - g1 x2) / g0 turns columns, z = g . x turns rows.
-    let turned = |a: [[f64; 2]; 2]| {
-        let row = |i: usize| {
-            let [p, q] = [a[i][0] / m[i], a[i][1] / m[i]];
-            [p / g0, q - p * g1 / g0]
-        };
-        let (first, second) = (row(0), row(1));
-        [[g0 * first[0] + g1 * second[0], g0 * first[1] + g1 * second[1]], second]
-    };
-    let projected = |f: [f64; 2]| [g0 * f[0] / m[0] + g1 * f[1] / m[1], f[1] / m[1]];
-    let stiffness = turned(domain.stiffness);
-    let load = projected(domain.load);
-    Equations {
-        damping: turned(domain.damping),
-        force: projected(oscillator.force),
-        load: [load[0] - stiffness[0][0] * wall, load[1] - stiffness[1][0] * wall],
-        stiffness,
+/// What governs the motion in lasting contact; of a wall that there is not nobody asks.
+fn behind_wall(oscillator: &model::Oscillator, side: usize, wall: f64, free_step: f64) -> Domain {
+    if oscillator.walls[side].is_infinite() {
+        return Domain::zeroed();
     }
+    if oscillator.contacts[side] == Contact::Rigid {
+        return held(oscillator, wall, free_step);
+    }
+    let behind = &oscillator.meshing[side];
+    let substeps = (free_step * rate(oscillator, behind) / STEP_ANGLE).max(1.0).log2().ceil().exp2();
+    domain(oscillator, behind, wall, free_step, substeps)
 }
 
 fn domain(
@@ -195,19 +210,7 @@ fn domain(
 ) -> Domain {
     let h = free_step / substeps;
     let angle = oscillator.omega * h;
-    let equations = equations(oscillator, domain, wall);
-    let row = |i: usize| {
-        let (k, c) = (equations.stiffness[i], equations.damping[i]);
-        [
-            -k[0] * h * h,
-            -c[0] * h,
-            -k[1] * h * h,
-            -c[1] * h,
-            equations.force[i] * h * h,
-            equations.load[i] * h * h,
-        ]
-    };
-    let (gap_row, x_row) = (row(0), row(1));
+    let [gap_row, x_row] = rows(oscillator, domain, wall, h);
     let (energy, growth) = gap_bound(oscillator, domain, h);
     Domain {
         step: step(&gap_row, &x_row, angle),
@@ -220,6 +223,29 @@ fn domain(
         turn_sin: angle.sin(),
         share: substeps.recip(),
         substeps,
+    }
+}
+
+/// The motion of the other displacement while a rigid wall holds the gap: it takes up the gap's acceleration, and the
+/// other displacement has its share of that. No rate of it is above those of free motion, so the step is the same.
+fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
+    let kick = Coordinates::new(oscillator).kick();
+    let [gap, other] = rows(oscillator, &oscillator.free, wall, h);
+    let shared: [f64; 6] = std::array::from_fn(|j| other[j] + kick * gap[j]);
+    let x_row = [0.0, 0.0, shared[2], shared[3], shared[4], shared[5]];
+    let angle = oscillator.omega * h;
+    Domain {
+        step: step(&[0.0; 6], &x_row, angle),
+        gap_row: [0.0; 6],
+        x_row,
+        // Twice the energy of a derivative of x per mass: on its rate and on itself.
+        energy: [0.0, 0.0, 1.0, 0.0, 0.0, (-shared[2]).max(0.0)],
+        growth: 0.0,
+        angle,
+        turn_half: (0.5 * angle).tan(),
+        turn_sin: angle.sin(),
+        share: 1.0,
+        substeps: 1.0,
     }
 }
 
@@ -252,29 +278,21 @@ fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
 /// The energy bound on derivatives of the gap, in units of the step.
 ///
 /// `y^(n)` obeys the same equations with the force times `omega^n` and no load, and its
-/// energy `2 E = sum m_i v_i^2 + x K x` grows by the force alone. So with
-/// `c^2 = sum g_i^2 / m_i`
+/// energy `2 E = v M v + x K x` grows by the force alone. So with `c^2 = g M^-1 g`
 ///
 /// ```text
-/// |z^(n+1)| <= c sqrt(2 E_n),   d sqrt(2 E_n) / dt <= omega^n sqrt(sum force_i^2 / m_i).
+/// |z^(n+1)| <= c sqrt(2 E_n),   d sqrt(2 E_n) / dt <= omega^n sqrt(force M^-1 force).
 /// ```
 ///
 /// Returns the form `c^2 2 E` on `(w^2, w v, v^2, z^2, z x, x^2)` and the growth of its
 /// root per step, less the factor `angle^n`.
 fn gap_bound(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> ([f64; 6], f64) {
-    let ([g0, g1], [m1, m2], k) = (oscillator.gap, oscillator.masses(), domain.stiffness);
-    let compliance = g0 * g0 / m1 + g1 * g1 / m2;
-    // A symmetric form on (x1, x2), written in (z, x2).
-    let in_gap = |a: f64, b: f64, c: f64| {
-        let slope = -g1 / g0;
-        [a / (g0 * g0), 2.0 * (a * slope + b) / g0, a * slope * slope + 2.0 * b * slope + c]
-    };
-    let kinetic = in_gap(m1, 0.0, m2).map(|x| x * compliance);
-    let potential = in_gap(k[0][0], k[0][1], k[1][1]).map(|x| x * compliance * h * h);
-    let [f1, f2] = oscillator.force;
-    let force = (f1 * f1 / m1 + f2 * f2 / m2).sqrt();
+    let coordinates = Coordinates::new(oscillator);
+    let compliance = coordinates.compliance();
+    let kinetic = coordinates.form(oscillator.mass).map(|x| x * compliance);
+    let potential = coordinates.form(domain.stiffness).map(|x| x * compliance * h * h);
     let form = [kinetic[0], kinetic[1], kinetic[2], potential[0], potential[1], potential[2]];
-    (form, compliance.sqrt() * force * h * h)
+    (form, compliance.sqrt() * coordinates.pull(oscillator.force) * h * h)
 }
 
 #[cfg(test)]

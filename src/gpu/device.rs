@@ -33,7 +33,7 @@ pub(super) struct EntryPoint {
 }
 
 /// Puts every lane at its start.
-pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 5, 6, 7, 8, 9] };
+pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 2, 5, 6, 7, 8, 9] };
 /// Integrates.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
 /// Queues the lanes that a variant has work for, one after the other.

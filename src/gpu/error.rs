@@ -73,6 +73,12 @@ pub enum GpuError {
         /// Bytes the adapter allows.
         allowed: u64,
     },
+    /// Walls that the settings have left out.
+    #[error("flow {flow} has an elastic or a rigid wall, and the settings say that there is none")]
+    NotCompiled {
+        /// Index of the flow.
+        flow: usize,
+    },
     /// A lane names a flow or law that was not handed in.
     #[error("lane {lane} names flow {flow} and law {law}, but there are {flows} flows and {laws} laws")]
     NoSuchCell {

@@ -55,6 +55,11 @@ pub struct Flow {
     pub reach: f64,
     /// Its growth per period, in octaves.
     pub decay: f64,
+    /// Acceleration of a gap that is held at the right and at the left wall, as [`Domain::gap_row`] from there.
+    pub pressing: [[f64; 6]; 2],
+    /// What the rates of the gap and of the second displacement change by, per displacement of the gap, where
+    /// the right and the left wall are reached that are elastic.
+    pub damper: [[f64; 2]; 2],
 }
 
 /// Whole numbers that belong to a [`Flow`].
@@ -65,18 +70,20 @@ pub struct FlowShape {
     pub steps: u32,
     /// Index of its first phasor.
     pub phasors: u32,
-    /// 1 if the mirror image of a motion is a motion.
-    pub mirror: u32,
+    /// How many displacements there are.
+    pub degrees: u32,
+    /// Code of the right and of the left wall's kind of contact.
+    pub contacts: [u32; 2],
 }
 
 /// The contact law of a cell.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Law {
-    /// Coefficient of restitution.
-    pub restitution: f64,
-    /// Leaving speed up to which a pressed contact becomes meshing.
-    pub mesh_speed: f64,
+    /// Coefficient of restitution of the right and of the left wall.
+    pub restitution: [f64; 2],
+    /// Leaving speed up to which a pressed contact lasts there.
+    pub mesh_speed: [f64; 2],
 }
 
 /// What a lane integrates.
@@ -89,6 +96,8 @@ pub struct Cell {
     pub law_index: u32,
     /// Status code of a lane that is refused before it starts, else 0.
     pub refused: u32,
+    /// 1 if the mirror image of a motion is a motion.
+    pub mirror: u32,
 }
 
 /// Settings of one dispatch.

@@ -12,6 +12,7 @@
 mod averaging;
 mod caught;
 pub(crate) mod constants;
+mod coordinates;
 mod device;
 mod dispatch_policy;
 mod error;
@@ -60,6 +61,11 @@ const FOLLOWED_MESH_SPEED: f64 = 4e-4;
 /// Events of all lanes at most, so that their count does not overflow.
 const MOST_EVENTS: u32 = 1 << 31;
 
+/// Whether an oscillator has a wall that is elastic or rigid.
+pub fn has_elastic_or_rigid_wall(oscillator: &Oscillator) -> bool {
+    constants::has_elastic_or_rigid_wall(oscillator.contacts, oscillator.walls)
+}
+
 /// Whether lanes of such a meshing speed follow chatter by short flights.
 pub fn follows_chatter(oscillator: &Oscillator, mesh_speed: f64) -> bool {
     mesh_speed <= FOLLOWED_MESH_SPEED * constants::speed(oscillator)
@@ -104,6 +110,8 @@ pub struct LaneSettings {
     pub symmetry: bool,
     /// Whether chatter may be followed by short flights; lanes do so where [`follows_chatter`] says.
     pub chatter: bool,
+    /// Whether walls may be elastic or rigid.
+    pub kinds: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
     pub exponent_from: u32,
     /// The first period at which chaos may be called, with early stops.
@@ -143,6 +151,7 @@ impl Default for LaneSettings {
             mesh: true,
             symmetry: true,
             chatter: true,
+            kinds: true,
             exponent_from: 100,
             chaos_from: 198,
             chaos_errors: 6.0,
@@ -355,7 +364,8 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::WrongAnswer`] if the device computes something else, and what it refuses.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
-        let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, chatter, .. } = *settings;
+        let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, chatter, kinds, .. } =
+            *settings;
         let keep = self.policy.keep;
         // Until they need it, lanes go on without the tangent vector where that pays.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
@@ -374,6 +384,7 @@ impl Gpu {
             mesh,
             symmetry,
             chatter,
+            kinds,
             keep,
         };
         let variants: Vec<Variant> = growths.iter().map(|&growth| variant(growth)).collect();

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
+
 use super::device::{BEGIN, Pipelines, most_slots};
 use super::guard::guarded;
 use super::layout::Cell;
@@ -78,7 +80,7 @@ impl Pool {
         tables: &Tables,
         lanes: &[(u32, Lane)],
     ) -> Result<(), GpuError> {
-        let (flows, laws) = (tables.constants.len(), tables.law_count);
+        let (flows, laws) = (tables.constants.len(), tables.is_even.len());
         for (i, &(_, Lane { flow, law, .. })) in lanes.iter().enumerate() {
             if flow as usize >= flows || law as usize >= laws {
                 return Err(GpuError::NoSuchCell { lane: i, flow, law, flows, laws });
@@ -86,6 +88,9 @@ impl Pool {
         }
         if lanes.is_empty() {
             return Ok(());
+        }
+        if let Some(flow) = tables.of_another_kind.filter(|_| !self.settings.kinds) {
+            return Err(GpuError::NotCompiled { flow });
         }
         self.make_room(gpu, lanes.len()).await?;
         // A few lanes had long dispatches; with many more these would take as many times longer.
@@ -198,7 +203,7 @@ impl Pool {
         self.buffers = Some(made);
         self.free.extend(had as u32..slots as u32);
         self.lanes.resize(slots, (0, Lane { flow: 0, law: 0, start: [0.0; 4] }));
-        self.cells.resize(slots, Cell { flow_index: 0, law_index: 0, refused: 0 });
+        self.cells.resize(slots, Cell::zeroed());
         self.starts.resize(slots, [0.0; 4]);
         Ok(())
     }
@@ -218,12 +223,15 @@ fn stretches(slots: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
 
 /// What a lane integrates, and where it starts in lane units.
 fn start(tables: &Tables, lane: &Lane) -> (Cell, [f64; 4]) {
-    let cell = Cell { flow_index: lane.flow, law_index: lane.law, refused: Status::Ok.code() };
+    let cell = Cell { flow_index: lane.flow, law_index: lane.law, refused: Status::Ok.code(), mirror: 0 };
     let refuse = |status: Status| (Cell { refused: status.code(), ..cell }, [0.0; 4]);
     match &tables.constants[lane.flow as usize] {
         None => refuse(Status::TooStiff),
         Some(_) if !lane.start.iter().all(|x| x.is_finite()) => refuse(Status::NonFinite),
-        Some(constants) => (cell, constants.to_lane(lane.start)),
+        Some(constants) => {
+            let mirror = constants.mirror_symmetric && tables.is_even[lane.law as usize];
+            (Cell { mirror: u32::from(mirror), ..cell }, constants.start(lane.start))
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::reading::SYMBOLS_PER_NUMBER;
 use super::rounds::BLOCK;
+use super::tables::CONTACTS;
 use super::unroll::unroll;
 use super::{FOLLOWED_MESH_SPEED, rules};
 use crate::record::{WORD_SYMBOLS, valid};
@@ -58,6 +59,8 @@ pub struct Variant {
     pub symmetry: bool,
     /// Whether chatter may be followed by short flights.
     pub chatter: bool,
+    /// Whether walls may be elastic or rigid.
+    pub kinds: bool,
     /// Whether lanes keep copies of all their constants, and of what strobes alone take: for software drivers.
     pub keep: bool,
 }
@@ -71,6 +74,8 @@ const BODY: &str = concat!(
     include_str!("../../shaders/domain.wgsl"),
     include_str!("../../shaders/phase.wgsl"),
     include_str!("../../shaders/gear_pair.wgsl"),
+    include_str!("../../shaders/elastic.wgsl"),
+    include_str!("../../shaders/rigid.wgsl"),
     include_str!("../../shaders/taylor.wgsl"),
     include_str!("../../shaders/flight.wgsl"),
     include_str!("../../shaders/events.wgsl"),
@@ -102,6 +107,7 @@ impl Variant {
             mesh: true,
             symmetry: true,
             chatter: true,
+            kinds: true,
             keep: false,
         }
     }
@@ -112,12 +118,15 @@ impl Variant {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let Variant { workgroup, exponent, growth, word, pattern, mesh, symmetry, chatter, keep, .. } = self;
+        let Variant {
+            workgroup, exponent, growth, word, pattern, mesh, symmetry, chatter, kinds, keep, ..
+        } = self;
         let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
         let body = unroll(BODY, &names);
         let valid = VALID.map(|(name, bits)| ("VALID", name.to_owned(), bits));
         let status = Status::ALL.map(|status| ("STATUS", status.name().to_uppercase(), status.code()));
-        let numbered = valid.into_iter().chain(status);
+        let contacts = CONTACTS.map(|(name, code)| ("CONTACT", name.to_owned(), code));
+        let numbered = valid.into_iter().chain(status).chain(contacts);
         let codes: String =
             numbered.map(|(kind, name, code)| format!("const {kind}_{name}: u32 = {code}u;\n")).collect();
         let rules = rules::declarations(self.precision);
@@ -125,7 +134,7 @@ impl Variant {
             "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
              const GROWTH: bool = {growth};\n\
              const WORD: bool = {word};\nconst PATTERN: bool = {pattern};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
-             const CHATTER: bool = {chatter};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
+             const CHATTER: bool = {chatter};\nconst KINDS: bool = {kinds};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
              const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n\
              const SYMBOLS_PER_NUMBER: u32 = {SYMBOLS_PER_NUMBER}u;\nconst BLOCK: u32 = {BLOCK}u;\n{codes}{rules}{body}"
         )

@@ -5,13 +5,16 @@ use super::guard::guarded;
 use super::layout::{self, Flow, FlowShape};
 use super::transfer::{reals, upload};
 use super::{Gpu, GpuError};
-use rattlemap_dynamics::model::{Law, Oscillator};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator};
 
 /// Flows and laws of a run, uploaded once for all its batches.
 pub struct Tables {
     /// None for a flow that lanes cannot carry.
     pub(super) constants: Vec<Option<Constants>>,
-    pub(super) law_count: usize,
+    /// Of each law, whether it is the same at both walls.
+    pub(super) is_even: Vec<bool>,
+    /// A flow with a wall that is elastic or rigid, if there is one.
+    pub(super) of_another_kind: Option<usize>,
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
     pub(super) phasors: wgpu::Buffer,
@@ -33,6 +36,18 @@ pub(crate) fn bytes(oscillator: &Oscillator, steps_per_period: Option<u32>) -> u
     let steps = Constants::steps(oscillator, steps_per_period);
     let phasors = steps.map_or(0, |steps| (u64::from(steps) + 1) * size_of::<[f64; 2]>() as u64);
     COPIES * (size_of::<Constants>() as u64 + size_of::<FlowShape>() as u64 + phasors)
+}
+
+/// Codes of the kinds of contact, with their names in the shader.
+pub(super) const CONTACTS: [(&str, u32); 3] = [("IMPACT", 0), ("RIGID", 1), ("ELASTIC", 2)];
+
+fn contact_code(contact: Contact) -> u32 {
+    let [(_, impact), (_, rigid), (_, elastic)] = CONTACTS;
+    match contact {
+        Contact::Impact => impact,
+        Contact::Rigid => rigid,
+        Contact::Elastic => elastic,
+    }
 }
 
 impl Tables {
@@ -66,20 +81,21 @@ impl Tables {
                     shapes.push(FlowShape {
                         steps: constants.steps,
                         phasors: phasors.len() as u32,
-                        mirror: u32::from(constants.mirror_symmetric),
+                        degrees: constants.degrees,
+                        contacts: constants.contacts.map(contact_code),
                     });
                     tables.push(constants.flow);
                     phasors.extend_from_slice(&constants.phasors);
                 }
                 // Its lanes are refused before they start.
                 None => {
-                    shapes.push(FlowShape { steps: 1, phasors: 0, mirror: 0 });
+                    shapes.push(FlowShape { steps: 1, ..bytemuck::Zeroable::zeroed() });
                     tables.push(bytemuck::Zeroable::zeroed());
                 }
             }
         }
         phasors.push([1.0, 0.0]);
-        let law = |law: &Law| layout::Law { restitution: law.restitution[0], mesh_speed: law.mesh_speed[0] };
+        let law = |law: &Law| layout::Law { restitution: law.restitution, mesh_speed: law.mesh_speed };
         let rows: Vec<layout::Law> = laws.iter().map(law).collect();
         let tables = reals(&tables, gpu.precision);
         let phasors = reals(&phasors, gpu.precision);
@@ -88,13 +104,16 @@ impl Tables {
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows, needed, allowed });
         }
+        let is_other = |c: &Option<Constants>| c.as_ref().is_some_and(Constants::has_elastic_or_rigid_wall);
+        let of_another_kind = constants.iter().position(is_other);
         let make = || Tables {
             flows: upload(gpu, "flows", &tables),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
             phasors: upload(gpu, "phasors", &phasors),
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
             constants,
-            law_count: laws.len(),
+            is_even: laws.iter().map(Law::is_symmetric).collect(),
+            of_another_kind,
         };
         guarded(gpu, "flows", flows, make).await
     }

@@ -4,8 +4,8 @@
 //! count attractors ([`coexistence`]); where starts are swept each belongs to a basin ([`attractors`]); two maps of one grid are compared ([`compare`]); what changed nothing is named
 //! ([`effect`]). [`run`] does all of it at once.
 
-pub mod expression;
-pub mod printable;
+pub use crate::text::{expression, printable};
+
 pub mod random;
 
 pub mod scene;

@@ -9,46 +9,41 @@ mod along;
 mod axis;
 mod builder;
 mod derived;
-mod document;
-mod error;
 mod identity;
 mod keys;
 mod list;
+mod models;
 mod overrides;
 mod parameters;
 mod points;
-mod section;
 mod settings;
 mod start;
 #[cfg(test)]
 mod tests;
 
+pub use crate::text::error::{Place, Problem, SceneError};
 pub use along::Along;
 pub use axis::{Axis, MAX_COUNT, Scale, Target};
 pub use builder::SceneBuilder;
 pub(crate) use derived::Rule;
-pub use error::{Place, Problem, SceneError};
 pub use keys::{KEYS, Key, KeyDefault, Takes};
-pub use list::{FileText, FindFile, List};
+pub use list::{Beside as FileBeside, FileText, FindFile, List};
 pub(crate) use points::Points;
 pub use settings::{AUDIT, Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 
+use crate::text::document::{self, Node};
+use crate::text::error;
+use crate::text::section::{self, Section};
 use derived::Derived;
-use document::Node;
 use parameters::Beside;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Model, Parameter};
-use rattlemap_dynamics::model::{ModelError, ParameterError};
+use rattlemap_dynamics::model::{Model, ModelError, Parameter, ParameterError};
 use rattlemap_dynamics::orbit;
-use section::Section;
 
 /// What stands outside of any table, and the tables.
 const TOP_LEVEL: [&str; 10] =
     ["title", "model", "parameters", "derived", "axis", "cells", "integration", "start", "refine", "outputs"];
-
-/// The model of scenes that name none.
-const DEFAULT_MODEL: &str = "gear-pair";
 
 /// What a scene is read for; it decides the number of axes and the files that can be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,14 +87,15 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] for the first thing that is wrong.
     pub fn parse(text: &str, name: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
-        let find: FindFile<'_> = &|_| Err("names a file, and no files are read here; list axes".to_owned());
+        let find: FindFile<'_> = &|_, _| Err("names a file, and no files are read here".to_owned());
         Scene::parse_beside(text, name, sets, purpose, find)
     }
 
-    /// The same where a list of cells may stand in a file of its own, which `find` reads: nothing here does.
+    /// The same where a list of cells, or the model, may stand in a file of its own, which `find` reads: nothing here
+    /// does.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong, in the text or in that file.
+    /// [`SceneError`] for the first thing that is wrong, in the text or in such a file.
     pub fn parse_beside(
         text: &str,
         name: &str,
@@ -127,10 +123,7 @@ impl Scene {
         for set in sets {
             overrides::apply(&mut document, set)?;
         }
-        if let Some(model) = Section::open(&document, "", &TOP_LEVEL)?.get("model") {
-            model.choice(&[(DEFAULT_MODEL, ())])?;
-        }
-        let model = GearPair::paper(0.0);
+        let model = models::read(&Section::open(&document, "", &TOP_LEVEL)?, find)?;
         if purpose == Purpose::Bifurcation {
             along::take(&mut document, &model, along)?;
         }
@@ -343,22 +336,24 @@ impl Scene {
     }
 }
 
-/// One gear pair from `NAME=VALUE` arguments alone: Table 1 with restitution `e` unless set.
+/// One cell of a model from `NAME=VALUE` arguments alone: its own values unless set.
 ///
 /// # Errors
 /// [`SceneError`] for an unknown parameter, a value out of its range, or a setting that is
-/// not a parameter; for a gear pair that has no motion.
-pub fn single_cell(e: f64, sets: &[String]) -> Result<Box<dyn Model>, SceneError> {
-    let defaults = format!("[parameters]\ne = {e:?}\n");
+/// not a parameter; for a model that has no motion.
+pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>, SceneError> {
+    let values = model.parameters().iter().enumerate();
+    let values = values.map(|(index, parameter)| format!("{} = {:?}\n", parameter.name, model.value(index)));
+    let defaults = format!("[parameters]\n{}", values.collect::<String>());
     let mut document = document::read(&defaults, "defaults")?;
     for set in sets {
         overrides::apply(&mut document, set)?;
     }
     let root = Section::open(&document, "", &["parameters"])?;
     let beside = Beside { axes: &[], list: None, derived: &Derived::default() };
-    let pair = parameters::read(&root, &GearPair::paper(0.0), beside)?;
-    Flow::validate(&*pair).map_err(|error| root.no_motion("", &error))?;
-    Ok(pair)
+    let cell = parameters::read(&root, model, beside)?;
+    Flow::validate(&*cell).map_err(|error| root.no_motion("", &error))?;
+    Ok(cell)
 }
 
 fn default_title(model: &dyn Model, points: &Points) -> String {

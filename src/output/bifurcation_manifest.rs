@@ -7,7 +7,9 @@ use serde::Serialize;
 
 use super::bifurcation::Asked;
 use super::inventory::FileEntry;
-use super::manifest::{AxisObject, DerivedObject, Head, StartObject, TimingsObject, derived, start};
+use super::manifest::{
+    AxisObject, DerivedObject, Head, ModelObject, StartObject, TimingsObject, derived, start,
+};
 use super::names;
 use super::parameters::Parameters;
 use crate::map::bifurcation::{Column, Hysteresis, hysteresis};
@@ -28,6 +30,7 @@ pub(super) struct Manifest<'a> {
     along: Option<&'a str>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     at: &'a [String],
+    model: ModelObject,
     axis: AxisObject,
     parameters: Parameters,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -88,6 +91,7 @@ impl<'a> Manifest<'a> {
             set: asked.sets,
             along: asked.along.map(|along| along.parameter.as_str()),
             at: asked.along.map_or(&[], |along| &along.at),
+            model: ModelObject::of(scene.base()),
             axis: axis.into(),
             parameters: Parameters::of_scene(scene),
             derived: derived(scene),

@@ -4,17 +4,6 @@ use super::symbols::{equation, symbol};
 use crate::map::scene::Scene;
 use rattlemap_dynamics::model::{Model, Parameter};
 
-/// The parameter that matters wherever it does not change: without it a time has no scale.
-const FREQUENCY: &str = "omega";
-
-/// What a model is taken from, by its title.
-pub fn source(model: &dyn Model) -> Option<&'static str> {
-    match model.name() {
-        "gear-pair" => Some("Study on the Nonlinear Dynamic Behavior of Rattling Vibration in Gear Systems"),
-        _ => None,
-    }
-}
-
 /// The values that tell an oscillator: of parameters without a default, the frequency, and what differs from the
 /// defaults; then that the others have theirs. What `is_swept` has no one value.
 pub(super) fn parameters(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool) -> String {
@@ -23,18 +12,19 @@ pub(super) fn parameters(model: &dyn Model, is_swept: impl Fn(&Parameter) -> boo
 
 /// The same, with what else is to be named.
 fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, derived: Vec<String>) -> String {
-    let all = model.parameters().iter().enumerate().map(|(i, p)| (p, model.value(i)));
-    let fixed: Vec<(&Parameter, f64)> = all.filter(|(parameter, _)| !is_swept(parameter)).collect();
-    // Where each is named: chosen ones first, then the frequency.
-    let place = |(parameter, value): &(&Parameter, f64)| match parameter.default {
+    let scales = model.frequency();
+    let all = model.parameters().iter().enumerate().map(|(i, p)| (p, model.value(i), scales.contains(&i)));
+    let fixed: Vec<(&Parameter, f64, bool)> = all.filter(|(parameter, ..)| !is_swept(parameter)).collect();
+    // Where each is named: chosen ones first, then the frequency, without which a time has no scale.
+    let place = |(parameter, value, scales): &(&Parameter, f64, bool)| match parameter.default {
         None => Some(0),
-        Some(_) if parameter.name == FREQUENCY => Some(1),
+        Some(_) if *scales => Some(1),
         Some(default) if default != *value => Some(2),
         Some(_) => None,
     };
     let of = |wanted| fixed.iter().filter(move |fixed| place(fixed) == Some(wanted));
     let named: Vec<String> =
-        (0..3).flat_map(of).map(|(parameter, value)| equation(&parameter.name, *value)).collect();
+        (0..3).flat_map(of).map(|(parameter, value, _)| equation(&parameter.name, *value)).collect();
     let is_all = named.len() == fixed.len();
     let named = [named, derived].concat();
     let rest = match (named.is_empty(), is_all) {

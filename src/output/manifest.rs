@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::map::scene::{Axis, Scale, Scene, Start};
+use crate::model_file::FileModel;
+use rattlemap_dynamics::model::Model;
 
 /// The manifest's name. It is the last file that a run writes: a folder that has one is complete.
 pub const MANIFEST: &str = "manifest.json";
@@ -31,6 +33,27 @@ impl Head {
             command,
             crate_version: env!("CARGO_PKG_VERSION"),
             commit: env!("RATTLEMAP_COMMIT"),
+        }
+    }
+}
+
+/// What moves. With its text a folder is enough to make its files again.
+#[derive(Serialize)]
+pub(super) struct ModelObject {
+    name: String,
+    title: String,
+    source: Option<String>,
+    /// The model's file; null where the model is none.
+    text: Option<String>,
+}
+
+impl ModelObject {
+    pub(super) fn of(model: &dyn Model) -> ModelObject {
+        ModelObject {
+            name: model.name().to_owned(),
+            title: model.title().to_owned(),
+            source: model.source().map(str::to_owned),
+            text: model.downcast_ref().map(|file: &FileModel| file.definition().text.clone()),
         }
     }
 }

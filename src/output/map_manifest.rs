@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::cells::{Cells, SOURCES};
 use super::cells_npy::ABSENT;
 use super::inventory::FileEntry;
-use super::manifest::{AxisObject, DerivedObject, Head, StartObject, derived, start};
+use super::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
 use super::map::LIST;
 use super::names;
 use super::parameters::Parameters;
@@ -75,6 +75,7 @@ pub(super) struct Manifest<'a> {
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
+    model: ModelObject,
     axes: Vec<AxisObject>,
     /// The list in the place of axes.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -294,6 +295,7 @@ pub(super) fn map<'a>(
         title: scene.title(),
         scene: scene.text(),
         set: run.sets,
+        model: ModelObject::of(scene.base()),
         axes: scene.axes().iter().map(AxisObject::from).collect(),
         list: scene.list().map(ListObject::from),
         parameters: Parameters::of_scene(scene),

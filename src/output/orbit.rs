@@ -6,7 +6,7 @@ use std::time::{Duration, Instant as Clock};
 use serde::Serialize;
 
 use super::inventory::{self, FileEntry};
-use super::manifest::{Head, MANIFEST, TimingsObject};
+use super::manifest::{Head, MANIFEST, ModelObject, TimingsObject};
 use super::orbit_json::to_json;
 use super::orbit_spectrum::Spectrum;
 use super::orbit_summary::summary;
@@ -42,6 +42,7 @@ struct Manifest<'a> {
     #[serde(flatten)]
     head: Head,
     engine: &'static str,
+    model: ModelObject,
     parameters: Parameters,
     start: Vec<f64>,
     transient_periods: u32,
@@ -130,6 +131,7 @@ pub fn write(
     let manifest = Manifest {
         head: Head::of("orbit"),
         engine: "reference f64",
+        model: ModelObject::of(model),
         parameters: Parameters::of(model),
         start: asked.start[..model.state_names().len()].to_vec(),
         transient_periods,

@@ -41,7 +41,7 @@ struct Data<'a> {
     subtitle: String,
     /// Every parameter that no axis sweeps, with its value or what it follows; and what the model is taken from.
     fixed: String,
-    source: Option<&'static str>,
+    source: Option<String>,
     axes: Vec<AxisData>,
     derived: Vec<DerivedData>,
     /// What follows the `--set` of swept and derived parameters in the command that replays a cell.
@@ -144,7 +144,7 @@ pub(super) fn write(
         title: scene.title().to_owned(),
         subtitle: subtitle(scene),
         fixed: caption::all_fixed(scene),
-        source: caption::source(scene.base()),
+        source: scene.base().source().map(str::to_owned),
         axes: scene.axes().iter().map(AxisData::from).collect(),
         derived: derived(scene),
         replay: replay::arguments(scene),

@@ -16,6 +16,10 @@ pub(crate) struct Linear {
 }
 
 impl Linear {
+    pub(crate) fn period(&self) -> f64 {
+        std::f64::consts::TAU / self.omega
+    }
+
     /// The steady state at a time; without a spring and damping the part that does not grow.
     pub(crate) fn steady(&self, t: f64) -> [f64; 2] {
         let (re, im) = (self.k - self.m * self.omega * self.omega, self.c * self.omega);

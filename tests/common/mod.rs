@@ -11,5 +11,10 @@ pub(crate) mod gpu;
 
 /// The gear pair of a run.
 pub(crate) fn pair_at(plan: &rattlemap::map::plan::Plan, id: u32) -> rattlemap_dynamics::model::GearPair {
-    *plan.model(id).downcast_ref().expect("a map of the gear pair")
+    use rattlemap_dynamics::model::Model;
+    let model = plan.model(id);
+    let mut pair = rattlemap_dynamics::model::GearPair::paper(0.0);
+    let names = model.parameters().iter().map(|parameter| &parameter.name);
+    names.for_each(|name| pair.set(name, model.get(name).unwrap()).expect("a map of the gear pair"));
+    pair
 }

@@ -2,4 +2,5 @@
 
 mod docs;
 mod layers;
+mod model_files;
 mod scene_fuzz;

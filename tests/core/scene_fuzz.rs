@@ -175,13 +175,13 @@ fn any_table_is_refused_with_a_remedy_or_valid() {
     let table = (header, prop::collection::vec(row, 0..4))
         .prop_map(|(header, rows)| format!("{header}\n{}", rows.join("\n")));
     torture(&table, |table| {
-        let find = |_: &str| Ok(FileText { name: LIST.0.to_owned(), text: table.clone() });
+        let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: table.clone() });
         match Scene::parse_beside(scene, "scene.toml", &[], Purpose::Map, &find) {
             Ok(scene) => {
                 let list = scene.list().unwrap();
                 prop_assert!(!list.is_empty() && scene.cell_count() == list.len() as u64);
                 let again = list.to_csv();
-                let find = |_: &str| Ok(FileText { name: LIST.0.to_owned(), text: again.clone() });
+                let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: again.clone() });
                 let again = Scene::parse_beside(scene.text(), "s", &[], Purpose::Map, &find).unwrap();
                 prop_assert_eq!(again.identity(), scene.identity());
             }
@@ -243,7 +243,7 @@ fn check_refusal(error: &SceneError, text: &str, sets: &[String]) -> Result<(), 
 const LIST: (&str, &str) = ("points.csv", "omega,k\n5.6,900\n7,1e4\n");
 
 fn parse(text: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
-    let find = |_: &str| Ok(FileText { name: LIST.0.to_owned(), text: LIST.1.to_owned() });
+    let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: LIST.1.to_owned() });
     Scene::parse_beside(text, "scene.toml", sets, purpose, &find)
 }
 

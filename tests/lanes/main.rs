@@ -9,5 +9,7 @@ mod counters;
 mod early_stops;
 mod engines_agree;
 mod independence;
+mod kinds;
 mod shaders;
+mod stored;
 mod work;

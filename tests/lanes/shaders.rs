@@ -100,11 +100,11 @@ fn constants_lie_as_the_host_says() {
             layout::Flow,
             *real,
             8,
-            [domains, walls, kick, h, speed, closing, steady, reach, decay]
+            [domains, walls, kick, h, speed, closing, steady, reach, decay, pressing, damper]
         );
         same_layout!(module, layout::Law, *real, 8, [restitution, mesh_speed]);
-        same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, mirror]);
-        same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index, refused]);
+        same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, degrees, contacts]);
+        same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index, refused, mirror]);
     }
 }
 

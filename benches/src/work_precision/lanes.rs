@@ -95,7 +95,7 @@ impl Device {
     /// As [`Gpu::run_on`].
     pub fn run(&mut self, tables: &Tables) -> Result<(Duration, Vec<Outcome>), GpuError> {
         // The time that meshing takes is not asked for; its place is taken by events.
-        let settings = LaneSettings { mesh: false, ..LaneSettings::only(PERIODS) };
+        let settings = LaneSettings { mesh: false, kinds: false, ..LaneSettings::only(PERIODS) };
         let clock = Instant::now();
         let records = pollster::block_on(self.gpu.run_on(tables, &self.lanes, &settings))?;
         let elapsed = clock.elapsed();

@@ -129,6 +129,10 @@ impl Model for GearPair {
         "Gear pair"
     }
 
+    fn source(&self) -> Option<&str> {
+        Some("Study on the Nonlinear Dynamic Behavior of Rattling Vibration in Gear Systems")
+    }
+
     fn parameters(&self) -> &[Parameter] {
         TABLE
     }

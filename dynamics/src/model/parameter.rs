@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use thiserror::Error;
 
 /// The values that a parameter may take. All of them are finite.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
     /// `value > 0`
     Positive,
@@ -15,9 +15,29 @@ pub enum Range {
     Unit,
     /// any finite number
     Finite,
+    /// Any other: `min <= value <= max`, where infinite ends bound nothing.
+    Between {
+        /// The least value, below `max`.
+        min: f64,
+        /// The greatest value.
+        max: f64,
+        /// Whether `min` itself is left out.
+        open: bool,
+    },
 }
 
 impl Range {
+    /// The range with these ends, each infinite where there is none; `open` leaves `min` itself out.
+    pub fn new(min: f64, max: f64, open: bool) -> Range {
+        match (min, max, open) {
+            (0.0, f64::INFINITY, true) => Range::Positive,
+            (0.0, f64::INFINITY, false) => Range::NonNegative,
+            (0.0, 1.0, false) => Range::Unit,
+            (f64::NEG_INFINITY, f64::INFINITY, _) => Range::Finite,
+            _ => Range::Between { min, max, open },
+        }
+    }
+
     /// Whether `value` lies in the range; NaN and infinities never do.
     pub fn contains(self, value: f64) -> bool {
         value.is_finite()
@@ -26,6 +46,7 @@ impl Range {
                 Range::NonNegative => value >= 0.0,
                 Range::Unit => (0.0..=1.0).contains(&value),
                 Range::Finite => true,
+                Range::Between { min, max, open } => (min..=max).contains(&value) && !(open && value == min),
             }
     }
 
@@ -36,6 +57,15 @@ impl Range {
             Range::NonNegative => "finite and at least 0",
             Range::Unit => "between 0 and 1",
             Range::Finite => "a finite number",
+            Range::Between { min, max, open } => {
+                let lower = if open { "greater than" } else { "at least" };
+                return Cow::Owned(match (min == f64::NEG_INFINITY, max == f64::INFINITY, open) {
+                    (true, _, _) => format!("finite and at most {max}"),
+                    (_, true, _) => format!("finite and {lower} {min}"),
+                    (_, _, false) => format!("between {min} and {max}"),
+                    (_, _, true) => format!("greater than {min} and at most {max}"),
+                });
+            }
         })
     }
 }
@@ -49,17 +79,29 @@ pub enum Shapes {
     Law,
     /// Both of them.
     Both,
+    /// Neither: only what is derived from it may.
+    Neither,
 }
 
 impl Shapes {
+    /// What a parameter shapes that the oscillator and the law depend on or not.
+    pub fn new(oscillator: bool, law: bool) -> Shapes {
+        match (oscillator, law) {
+            (true, true) => Shapes::Both,
+            (true, false) => Shapes::Oscillator,
+            (false, true) => Shapes::Law,
+            (false, false) => Shapes::Neither,
+        }
+    }
+
     /// Whether the oscillator depends on the parameter.
     pub fn oscillator(self) -> bool {
-        self != Shapes::Law
+        matches!(self, Shapes::Oscillator | Shapes::Both)
     }
 
     /// Whether the contact law depends on the parameter.
     pub fn law(self) -> bool {
-        self != Shapes::Oscillator
+        matches!(self, Shapes::Law | Shapes::Both)
     }
 }
 
@@ -128,4 +170,30 @@ pub enum ParameterError {
         /// What it must be.
         requirement: Cow<'static, str>,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_say_what_they_hold() {
+        let (none, least) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (range, inside, outside, words) in [
+            (Range::new(0.0, none, true), 1e-300, 0.0, "finite and greater than 0"),
+            (Range::new(0.0, none, false), 0.0, -1e-300, "finite and at least 0"),
+            (Range::new(0.0, 1.0, false), 1.0, 1.5, "between 0 and 1"),
+            (Range::new(least, none, false), -1e300, f64::NAN, "a finite number"),
+            (Range::new(-2.0, 0.5, false), -2.0, 0.75, "between -2 and 0.5"),
+            (Range::new(-2.0, 0.5, true), 0.5, -2.0, "greater than -2 and at most 0.5"),
+            (Range::new(3.0, none, true), 4.0, 3.0, "finite and greater than 3"),
+            (Range::new(3.0, none, false), 3.0, none, "finite and at least 3"),
+            (Range::new(least, 3.0, false), -1e300, least, "finite and at most 3"),
+        ] {
+            assert_eq!(range.requirement(), words);
+            assert!(range.contains(inside) && !range.contains(outside), "{words}");
+        }
+        assert_eq!(Range::new(0.0, none, true), Range::Positive);
+        assert_eq!(Range::new(0.0, 1.0, false), Range::Unit);
+    }
 }

@@ -31,6 +31,16 @@ pub trait Model: Boxed + Debug + Send + Sync + Any {
     /// The name in headings.
     fn title(&self) -> &str;
 
+    /// What the model is taken from; none where nothing is said.
+    fn source(&self) -> Option<&str> {
+        None
+    }
+
+    /// The parameters that the excitation frequency depends on, by index: without them a time has no scale.
+    fn frequency(&self) -> Vec<usize> {
+        self.index("omega").into_iter().collect()
+    }
+
     /// Every parameter, in the order of files and of indices; the same for all values.
     fn parameters(&self) -> &[Parameter];
 

@@ -262,6 +262,7 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
         chatter: follows_chatter(plan),
+        kinds: has_kinds(plan),
         exponent_from: budget.exponent_from(),
         chaos_from: budget.chaos_from(),
         chaos_errors: budget.chaos_errors() as f32,
@@ -276,10 +277,16 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
 
 /// Whether any cell of the plan may follow chatter by short flights.
 fn follows_chatter(plan: &Plan) -> bool {
-    let speeds = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed[0]);
+    let speeds = (0..plan.law_count() as u32).flat_map(|law| plan.law(law).mesh_speed);
     let least = speeds.fold(f64::INFINITY, f64::min);
     let follows = |flow| gpu::follows_chatter(&plan.oscillator(flow), least);
     (0..plan.flow_count() as u32).into_par_iter().any(follows)
+}
+
+/// Whether any cell of the plan has a wall that is elastic or rigid.
+fn has_kinds(plan: &Plan) -> bool {
+    let has = |flow| gpu::has_elastic_or_rigid_wall(&plan.oscillator(flow));
+    (0..plan.flow_count() as u32).into_par_iter().any(has)
 }
 
 /// Leaves what somebody asked for.

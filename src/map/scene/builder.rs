@@ -172,7 +172,7 @@ impl SceneBuilder {
         let text = self.text();
         let document = document::read(&text, "scene")?.placed(Place::Builder);
         let cells = self.cells.clone().unwrap_or_default();
-        let find = |_: &str| Ok(FileText { name: "cells".to_owned(), text: cells.clone() });
+        let find = |_, _: &str| Ok(FileText { name: "cells".to_owned(), text: cells.clone() });
         Scene::read(text, &document, &*self.model, purpose, &find)
     }
 
@@ -184,7 +184,7 @@ impl SceneBuilder {
             let _ = writeln!(text, "{line}");
         };
         self.title.iter().for_each(|title| line(format!("title = {}", quoted(title))));
-        line(format!("model = {}", quoted(self.model.name())));
+        line(format!("model = {}", quoted(&super::models::named(&*self.model))));
         line("\n[parameters]".to_owned());
         let mut parameters = self.parameters.clone();
         for (index, parameter) in self.model.parameters().iter().enumerate() {

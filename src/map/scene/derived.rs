@@ -1,10 +1,9 @@
 //! `[derived]`: parameters that follow others.
 
 use super::axis::{meanings, names};
-use super::document::Value;
 use super::error::SceneError;
 use super::section::{Field, Section};
-use crate::map::expression::{Expression, ExpressionError};
+use crate::map::expression::Expression;
 use rattlemap_dynamics::model::{Model, Parameter};
 
 /// Parameters that follow others, in an order in which each comes after those that it follows.
@@ -85,24 +84,11 @@ pub(super) fn read(
         {
             return Err(value.conflict(format!("`{}` derives it; drop either", field.path)));
         }
-        let expression = read_expression(&field, &names, model)?;
+        let expression = field.expression(&names, &meanings(model), "\"0.5*k1\"")?;
         let parameter = model.parameters()[index].clone();
         left.push((field, Rule { parameter, index, expression, roots: Vec::new() }));
     }
     in_order(left)
-}
-
-fn read_expression(field: &Field<'_>, names: &[&str], model: &dyn Model) -> Result<Expression, SceneError> {
-    let text = match &field.node.value {
-        Value::Text(text) => text.clone(),
-        // A number is an expression, too.
-        Value::Integer(_) | Value::Float(_) => format!("{:?}", field.number()?),
-        _ => return Err(field.wrong_type("an expression in quotes, such as \"0.5*k1\"")),
-    };
-    Expression::parse(&text, names).map_err(|error| match &error {
-        ExpressionError::Unknown { name } => field.unknown_in(name, names, &meanings(model)),
-        _ => field.unreadable(&error.to_string()),
-    })
 }
 
 /// Puts rules in an order in which they can be computed, and finds what each depends on.

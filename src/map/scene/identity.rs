@@ -1,6 +1,8 @@
 //! What makes two scenes the same to a computer: everything that a cell's record depends on.
 
-use super::{Axis, DEFAULT_MODEL, Scale, Scene, Start, Steps, list};
+use super::{Axis, Scale, Scene, Start, Steps, list, models};
+use crate::model_file::FileModel;
+use rattlemap_dynamics::model::Model;
 
 /// Values that are told one by one.
 const SHOWN_VALUES: usize = 32;
@@ -12,8 +14,15 @@ impl Scene {
         let mut list = Vec::new();
         let mut tell = |name: String, value: String| list.push((name, value));
         let model = self.base();
-        if model.name() != DEFAULT_MODEL {
+        if model.name() != models::DEFAULT {
             tell("model".into(), model.name().to_owned());
+        }
+        // The default one is among the sources whose hash is told beside this.
+        let told = model
+            .downcast_ref()
+            .filter(|file: &&FileModel| !(file.name() == models::DEFAULT && file.is_built_in()));
+        if let Some(file) = told {
+            tell("model.hash".into(), list::hash(&[&file.definition().text], std::iter::empty()));
         }
         for (i, axis) in self.axes().iter().enumerate() {
             let what = if axis.target().is_start() { "start" } else { "parameter" };

@@ -70,7 +70,7 @@ const END: Takes = Takes::Words("the parameter's range; of a start any finite nu
 #[rustfmt::skip]
 pub const KEYS: &[Key] = &[
     key("", "title", Words("from the axes"), Takes::Text(LONGEST_TITLE), "heading of figures and of the report"),
-    key("", "model", Value("\"gear-pair\""), Takes::OneOf(&["gear-pair"]), "what moves"),
+    key("", "model", Value("\"gear-pair\""), Takes::Words("a name that `rattlemap models` lists, or the path of a model's file (`.toml`), from the scene's folder"), "what moves"),
     key("axis", "parameter", KeyDefault::None, Takes::Words("a parameter of the model"), "what the axis sweeps; the first axis runs along columns"),
     key("axis", "start", KeyDefault::None, Takes::Words("a component of the start, such as v1"), "what the axis sweeps instead: cells then belong to basins"),
     key("axis", "min", KeyDefault::None, END, "first value"),

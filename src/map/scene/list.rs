@@ -21,8 +21,17 @@ pub struct FileText {
     pub text: String,
 }
 
+/// What a scene names a file for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beside {
+    /// A table of cells.
+    Cells,
+    /// A model.
+    Model,
+}
+
 /// Finds a file beside a scene, by its name in the scene; the error says why it cannot be read.
-pub type FindFile<'f> = &'f dyn Fn(&str) -> Result<FileText, String>;
+pub type FindFile<'f> = &'f dyn Fn(Beside, &str) -> Result<FileText, String>;
 
 /// A list of cells: parameters or components of the start, and a value of each per cell.
 #[derive(Clone, Debug)]
@@ -123,7 +132,7 @@ pub(super) fn read(
     }
     let field = section.require("file", "name a table, such as file = \"points.csv\"")?;
     let file = field.text()?.to_owned();
-    let found = find(&file).map_err(|reason| field.unreadable(&reason))?;
+    let found = find(Beside::Cells, &file).map_err(|reason| field.unreadable(&reason))?;
     let (columns, values) = table(&found, model)?;
     let names: Vec<&str> = columns.iter().map(|column| &*column.parameter.name).collect();
     let hash = hash(&names, values.iter().copied());

@@ -12,6 +12,7 @@ mod starts;
 mod texts;
 
 use super::*;
+use rattlemap_dynamics::model::GearPair;
 
 const GOOD: &str = r#"title = "A scene"
 model = "gear-pair"
@@ -53,6 +54,13 @@ fn refusal(old: &str, new: &str) -> String {
     parse(&GOOD.replacen(old, new, 1), &[]).expect_err(new).to_string()
 }
 
+/// The gear pair that a model's values make.
+fn pair(model: &dyn Model) -> GearPair {
+    let mut pair = GearPair::paper(0.0);
+    model.parameters().iter().for_each(|p| pair.set(&p.name, model.get(&p.name).unwrap()).unwrap());
+    pair
+}
+
 #[track_caller]
 fn assert_says(message: &str, parts: &[&str]) {
     for part in parts {
@@ -80,7 +88,7 @@ fn a_good_scene_is_read_whole() {
 fn only_the_axis_is_required() {
     let text = "[[axis]]\nparameter = 'e'\nmin = 0\nmax = 1\ncount = 2";
     let scene = parse(text, &[]).unwrap();
-    assert_eq!(*scene.base(), GearPair::paper(0.0));
+    assert_eq!(pair(scene.base()), GearPair::paper(0.0));
     assert_eq!(scene.orbit_settings(), orbit::Settings::default());
     assert_eq!(scene.outputs().quantities, [Quantity::Class, Quantity::Lyapunov]);
     assert_eq!(scene.outputs().files, [Format::Csv, Format::Png]);
@@ -104,7 +112,7 @@ fn axis_values_are_inclusive_and_stay_in_range() {
 fn a_map_takes_two_axes_in_their_order() {
     let text = format!("{}{SECOND_AXIS}", GOOD.replacen("\"csv\"", "\"npy\"", 1));
     let scene = Scene::parse(&text, "s.toml", &[], Purpose::Map).unwrap();
-    assert_eq!(*scene.cell(&[3, 1]), GearPair { omega: 6.5, ..GearPair::paper(1.0) });
+    assert_eq!(pair(&*scene.cell(&[3, 1])), GearPair { omega: 6.5, ..GearPair::paper(1.0) });
     let message = Scene::parse(GOOD, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
     assert_says(&message, &["s.toml:7:", "axis = 1 table", "`map` needs 2 axes"]);
 }

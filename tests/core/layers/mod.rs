@@ -10,7 +10,7 @@ use paths::named;
 
 /// The library's layers, lowest first. A new folder in `src` is put in its place here. Below them all lie the
 /// modules of `rattlemap-dynamics`, a package of its own.
-const LAYERS: [&str; 6] = ["record", "gpu", "map", "validate", "output", "cli"];
+const LAYERS: [&str; 8] = ["record", "gpu", "text", "model_file", "map", "validate", "output", "cli"];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -158,10 +158,9 @@ mod tests {
     fn the_first_cell_of_the_plan_is_the_cell() {
         for (pair, start) in space::all_bounded(200, 3, &()) {
             let plan = plan(&pair, start);
-            assert_eq!(
-                (*plan.model(0).downcast_ref::<GearPair>().unwrap(), plan.start(0, &[])),
-                (pair, start)
-            );
+            let (model, mut of_plan) = (plan.model(0), GearPair::paper(0.0));
+            (0..model.parameters().len()).for_each(|index| of_plan.assign(index, model.value(index)));
+            assert_eq!((of_plan, plan.start(0, &[])), (pair, start));
             assert_eq!(plan.budget(), &budget());
         }
     }

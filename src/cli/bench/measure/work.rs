@@ -55,10 +55,10 @@ fn count(device: &mut Gpu, side: u32) -> Result<Work, GpuError> {
     let plan = Plan::new(&scene);
     let ids = plan.order().to_vec();
     let undecided_periods = plan.budget().undecided_periods;
-    let settings = LaneSettings { undecided_periods, ..LaneSettings::default() };
+    let settings = LaneSettings { undecided_periods, kinds: false, ..LaneSettings::default() };
     let weights = pollster::block_on(run_lanes(device, &plan, &[], &ids, &settings))?;
     let weights: Vec<f64> = weights.iter().map(|record| f64::from(record.periods_run)).collect();
-    let settings = LaneSettings { exponent: true, ..LaneSettings::only(PERIODS) };
+    let settings = LaneSettings { exponent: true, kinds: false, ..LaneSettings::only(PERIODS) };
     let mut iterations = [0.0; 3];
     for (mean, function) in iterations.iter_mut().zip(COUNTED) {
         device.rewrite_shaders(counting(function));
@@ -69,6 +69,6 @@ fn count(device: &mut Gpu, side: u32) -> Result<Work, GpuError> {
     }
     device.rewrite_shaders(|source| source);
     let keep = !is_hardware(device.adapter());
-    let variant = Variant { keep, ..Variant::of(device.precision()) };
+    let variant = Variant { keep, kinds: false, ..Variant::of(device.precision()) };
     Ok(Work { iterations, instructions: instructions(&variant.source()) })
 }

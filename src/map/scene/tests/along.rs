@@ -19,7 +19,7 @@ count = 3
 fn along(text: &str, sets: &[&str], parameter: &str, at: &[&str]) -> Result<Scene, SceneError> {
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
     let along = Along { parameter: parameter.to_owned(), at: at.iter().map(ToString::to_string).collect() };
-    let find: FindFile<'_> = &|file| Err(format!("{file} is not here"));
+    let find: FindFile<'_> = &|_, file| Err(format!("{file} is not here"));
     Scene::parse_along(text, "s.toml", &sets, Purpose::Bifurcation, Some(&along), find)
 }
 

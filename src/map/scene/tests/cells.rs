@@ -9,7 +9,7 @@ const TABLE: &str = "e,omega\n0.5,5.6\n0.25,4\n\n 0.5 , 5.6e0 \n0.5,7\n";
 
 fn read(scene: &str, table: &str, sets: &[&str]) -> Result<Scene, SceneError> {
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-    let find = |file: &str| {
+    let find = |_, file: &str| {
         assert_eq!(file, "points.csv");
         Ok(FileText { name: "dir/points.csv".to_owned(), text: table.to_owned() })
     };
@@ -27,7 +27,7 @@ fn a_list_says_which_cells_there_are() {
     let names: Vec<&str> = list.parameters().map(|parameter| &*parameter.name).collect();
     assert_eq!((names, list.len(), list.file()), (vec!["e", "omega"], 4, "points.csv"));
     assert_eq!((scene.axes().len(), scene.cell_count()), (0, 4));
-    assert_eq!(*scene.cell(&[1]), GearPair { force: 40.0, omega: 4.0, ..GearPair::paper(0.25) });
+    assert_eq!(pair(&*scene.cell(&[1])), GearPair { force: 40.0, omega: 4.0, ..GearPair::paper(0.25) });
     assert_eq!(scene.outputs().files, [Format::Csv, Format::Npy]);
     assert_eq!(scene.title(), "Gear pair: the cells of points.csv");
     assert!(scene.fixed().all(|(name, _)| name != "e" && name != "omega"));

@@ -1,6 +1,7 @@
 //! `--set`: what it changes, and that its messages name the argument.
 
 use super::*;
+use crate::model_file::FileModel;
 
 fn set_refusal(set: &str) -> String {
     parse(GOOD, &[set]).expect_err(set).to_string()
@@ -55,10 +56,11 @@ fn bad_sets_name_themselves_instead_of_a_line() {
 
 #[test]
 fn single_cells_come_from_sets_alone() {
-    let sets = |sets: &[&str]| single_cell(0.605, &sets.iter().map(ToString::to_string).collect::<Vec<_>>());
-    assert_eq!(*sets(&[]).unwrap(), GearPair::paper(0.605));
+    let model = FileModel::built_in("gear-pair").unwrap();
+    let sets = |sets: &[&str]| single_cell(&model, &sets.iter().map(ToString::to_string).collect::<Vec<_>>());
+    assert_eq!(pair(&*sets(&[]).unwrap()), GearPair::paper(0.605));
     let other = GearPair { k: 900.0, ..GearPair::paper(0.06) };
-    assert_eq!(*sets(&["e=0.06", "parameters.k=900"]).unwrap(), other);
+    assert_eq!(pair(&*sets(&["e=0.06", "parameters.k=900"]).unwrap()), other);
     assert_says(
         &sets(&["e=1.5"]).unwrap_err().to_string(),
         &["--set e=1.5: `parameters.e = 1.5` is out of range"],

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::map::plan::Plan;
-use crate::map::scene::FileText;
+use crate::map::scene::{FileBeside, FileText};
 use rattlemap_dynamics::model::Stops;
 
 const PLANE: &str = "[parameters]\ne = 0.5\n\n[[axis]]\nstart = 'v1'\nmin = -2\nmax = 2\ncount = 5\n\n\
@@ -89,7 +89,7 @@ fn what_does_not_go_with_starts_is_said() {
     assert_says(&message, &["`axis.0.start = 'v1'`", "`bifurcation` follows one motion"]);
     let along = Along { parameter: "e".to_owned(), at: vec!["v1=1".to_owned()] };
     let plane = format!("{line}[[axis]]\nparameter = 'e'\nmin = 0\nmax = 1\ncount = 2\n");
-    let find: FindFile<'_> = &|_| unreachable!();
+    let find: FindFile<'_> = &|_, _| unreachable!();
     let read = Scene::parse_along(&plane, "s.toml", &[], Purpose::Bifurcation, Some(&along), find);
     assert_says(&read.unwrap_err().to_string(), &["`axis.0.start = 'v1'`", "starts are for `map`"]);
 }
@@ -99,7 +99,9 @@ fn a_list_may_have_columns_of_the_start() {
     let text = "[parameters]\nF = 40.0\nomega = 4.0\n\n[cells]\nfile = 'p.csv'\n";
     let read = |table: &str, sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-        let find = |_: &str| Ok::<_, String>(FileText { name: "p.csv".to_owned(), text: table.to_owned() });
+        let find = |_: FileBeside, _: &str| {
+            Ok::<_, String>(FileText { name: "p.csv".to_owned(), text: table.to_owned() })
+        };
         Scene::parse_beside(text, "s.toml", &sets, Purpose::Map, &find)
     };
     let scene = read("v2,e\n1,0.5\n-2,0.5\n3,0.25\n", &[]).unwrap();

@@ -1,10 +1,10 @@
-//! Why a scene is refused, with the place, the value and the remedy.
+//! Why a scene or a model is refused, with the place, the value and the remedy.
 
 use std::fmt;
 use std::sync::Arc;
 
 use super::document::shorten;
-use crate::map::printable;
+use super::printable;
 use rattlemap_dynamics::model::ModelError;
 use thiserror::Error;
 
@@ -41,8 +41,18 @@ pub enum Place {
     Builder,
 }
 
+impl Place {
+    /// Where it stands in its text; none where it is in none.
+    pub(crate) fn line_and_column(&self) -> Option<(usize, usize)> {
+        match self {
+            Place::Text { line, column, .. } => Some((*line, *column)),
+            _ => None,
+        }
+    }
+}
+
 /// Characters of a name or a value that a message shows.
-pub(super) const SHOWN: usize = 60;
+pub(crate) const SHOWN: usize = 60;
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -56,7 +66,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// A scene that cannot be run; its text is one line that says how to mend it, fit for a terminal.
+/// A scene, or a model beside it, that cannot be run; its text is one line that says how to mend it, fit for a terminal.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("{}", printable::line(&format!("{place}: {problem}")))]
 pub struct SceneError {
@@ -181,7 +191,7 @@ pub enum Problem {
 }
 
 /// The sentence for an unknown name: the nearest known one, if any is near, and `all` of them, listed.
-pub(super) fn suggest(name: &str, known: &[&str], all: &str) -> String {
+pub(crate) fn suggest(name: &str, known: &[&str], all: &str) -> String {
     let length = name.chars().count();
     // One slip per three letters; a name that is all slips resembles nothing.
     let most = (length / 3).max(1).min(length.saturating_sub(1));

@@ -1,4 +1,4 @@
-//! A scene's text as a tree in which every value knows where it came from.
+//! The text of a scene or a model as a tree in which every value knows where it came from.
 //!
 //! Serde would lose that knowledge as soon as a range is checked after parsing, and
 //! `--set` would have none to give.
@@ -13,24 +13,24 @@ use toml::de::{DeTable, DeValue};
 use super::error::{Place, Problem, SHOWN, SceneError};
 
 /// The fields of a table by name.
-pub(super) type Table = BTreeMap<String, Node>;
+pub(crate) type Table = BTreeMap<String, Node>;
 
 /// One value of the tree.
 #[derive(Clone, Debug)]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// Where its name stands; the value itself where it has none.
-    pub(super) name_place: Place,
+    pub(crate) name_place: Place,
     /// Where the value stands.
-    pub(super) place: Place,
+    pub(crate) place: Place,
     /// The value as it was written, shortened for messages.
-    pub(super) shown: String,
+    pub(crate) shown: String,
     /// The value.
-    pub(super) value: Value,
+    pub(crate) value: Value,
 }
 
 /// TOML's types, as far as scenes use them.
 #[derive(Clone, Debug)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Integer(i64),
     Float(f64),
     Text(String),
@@ -42,7 +42,7 @@ pub(super) enum Value {
 }
 
 /// Reads TOML text; `file` is the name that messages give it.
-pub(super) fn read(text: &str, file: &str) -> Result<Node, SceneError> {
+pub(crate) fn read(text: &str, file: &str) -> Result<Node, SceneError> {
     let source = Source::new(text, file);
     let table = DeTable::parse(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
@@ -52,14 +52,14 @@ pub(super) fn read(text: &str, file: &str) -> Result<Node, SceneError> {
     Ok(Node {
         name_place: source.place(0),
         place: source.place(0),
-        shown: "the scene".into(),
+        shown: "the file".into(),
         value: Value::Table(source.table(table.into_inner())),
     })
 }
 
 /// Reads the value of a `--set` argument. Bare words are text, so that shells need no
 /// second layer of quotes.
-pub(super) fn read_argument(value: &str, argument: &Arc<str>) -> Node {
+pub(crate) fn read_argument(value: &str, argument: &Arc<str>) -> Node {
     let parsed = match DeValue::parse(value) {
         Ok(parsed) => Source::new(value, "").value(parsed.into_inner()),
         Err(_) => value.parse().map_or_else(|_| Value::Text(value.to_owned()), Value::Float),
@@ -72,7 +72,7 @@ pub(super) fn read_argument(value: &str, argument: &Arc<str>) -> Node {
 
 impl Node {
     /// The same tree with everything in one place.
-    pub(super) fn placed(mut self, place: Place) -> Node {
+    pub(crate) fn placed(mut self, place: Place) -> Node {
         (self.place, self.name_place) = (place.clone(), place);
         self.relocate();
         self
@@ -196,7 +196,7 @@ fn begun(bytes: &[u8]) -> usize {
 }
 
 /// One line of at most [`SHOWN`] characters; no more of the text is looked at.
-pub(super) fn shorten(text: &str) -> String {
+pub(crate) fn shorten(text: &str) -> String {
     let mut line = String::new();
     let mut left = SHOWN;
     for word in text.split_whitespace() {

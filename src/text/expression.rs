@@ -1,4 +1,4 @@
-//! Expressions in parameters, as scenes write them: `0.5*k1`, `F0*omega^2`. Pure.
+//! Expressions in parameters, as scenes and models write them: `0.5*k1`, `F0*omega^2`. Pure.
 //!
 //! They are computed in f64, from left to right as they are written, with the functions of the crate `libm`: the same
 //! bits on every machine.
@@ -107,6 +107,23 @@ impl Expression {
         Ok(Expression { text: text.trim().to_owned(), term, uses })
     }
 
+    /// A number alone.
+    pub(crate) fn number(number: f64) -> Expression {
+        Expression { text: format!("{number:?}"), term: Term::Number(number), uses: Vec::new() }
+    }
+
+    /// The number, if it is one alone.
+    pub(crate) fn as_number(&self) -> Option<f64> {
+        match &self.term {
+            Term::Number(number) => Some(*number),
+            Term::Negative(of) => match **of {
+                Term::Number(number) => Some(-number),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
     /// As it was written.
     pub fn text(&self) -> &str {
         &self.text
@@ -171,6 +188,11 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
             }
         }
     })
+}
+
+/// Whether a name means something already: a function, or `pi`.
+pub fn is_reserved(name: &str) -> bool {
+    name == "pi" || arity(name).is_some()
 }
 
 fn arity(name: &str) -> Option<usize> {

@@ -1,13 +1,14 @@
-//! Reading one table of a scene: known names only, typed fields, errors with paths.
+//! Reading one table of a scene or a model: known names only, typed fields, errors with paths.
 
 use std::ops::RangeInclusive;
 
 use super::document::{Node, Table, Value, shorten};
 use super::error::{Place, Problem, SceneError, suggest};
+use super::expression::{Expression, ExpressionError};
 use rattlemap_dynamics::model::ModelError;
 
 /// A table whose field names have been checked; an absent one has no fields.
-pub(super) struct Section<'a> {
+pub(crate) struct Section<'a> {
     path: String,
     place: Place,
     table: Option<&'a Table>,
@@ -15,7 +16,7 @@ pub(super) struct Section<'a> {
 
 impl<'a> Section<'a> {
     /// Opens the table `node` that stands at `path` and may have the fields `known`.
-    pub(super) fn open(node: &'a Node, path: &str, known: &[&str]) -> Result<Self, SceneError> {
+    pub(crate) fn open(node: &'a Node, path: &str, known: &[&str]) -> Result<Self, SceneError> {
         Section::open_among(node, path, known, &known.join(", "))
     }
 
@@ -41,13 +42,19 @@ impl<'a> Section<'a> {
         Err(SceneError { place: node.name_place.clone(), problem })
     }
 
+    /// Opens a table whose field names have been looked at before; none if it is none.
+    pub(crate) fn open_any(node: &'a Node, path: &str) -> Option<Self> {
+        let Value::Table(table) = &node.value else { return None };
+        Some(Section { path: path.to_owned(), place: node.name_place.clone(), table: Some(table) })
+    }
+
     /// Opens the table `name` inside this one; if it is absent every field has its default.
-    pub(super) fn section(&self, name: &str, known: &[&str]) -> Result<Section<'a>, SceneError> {
+    pub(crate) fn section(&self, name: &str, known: &[&str]) -> Result<Section<'a>, SceneError> {
         self.section_among(name, known, &known.join(", "))
     }
 
     /// The same where `all` says what the known names mean.
-    pub(super) fn section_among(
+    pub(crate) fn section_among(
         &self,
         name: &str,
         known: &[&str],
@@ -60,40 +67,47 @@ impl<'a> Section<'a> {
     }
 
     /// The path that names the table.
-    pub(super) fn path(&self) -> &str {
+    pub(crate) fn path(&self) -> &str {
         &self.path
     }
 
     /// The fields that were given, in the order of their names.
-    pub(super) fn fields(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> {
+    pub(crate) fn fields(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> {
         let given = self.table.into_iter().flatten();
         given.map(|(name, node)| (name.as_str(), Field { path: self.path_of(name), node }))
     }
 
+    /// The same in the order in which they were written.
+    pub(crate) fn fields_as_written(&self) -> Vec<(&'a str, Field<'a>)> {
+        let mut fields: Vec<_> = self.fields().collect();
+        fields.sort_by_key(|(_, field)| field.node.name_place.line_and_column());
+        fields
+    }
+
     /// Whether the table was written at all.
-    pub(super) fn is_present(&self) -> bool {
+    pub(crate) fn is_present(&self) -> bool {
         self.table.is_some()
     }
 
     /// The field `name`, if it was given.
-    pub(super) fn get(&self, name: &str) -> Option<Field<'a>> {
+    pub(crate) fn get(&self, name: &str) -> Option<Field<'a>> {
         let node = self.table?.get(name)?;
         Some(Field { path: self.path_of(name), node })
     }
 
     /// The field `name`, which must be given; `remedy` says what to write.
-    pub(super) fn require(&self, name: &str, remedy: &str) -> Result<Field<'a>, SceneError> {
+    pub(crate) fn require(&self, name: &str, remedy: &str) -> Result<Field<'a>, SceneError> {
         self.get(name).ok_or_else(|| self.missing(name, remedy))
     }
 
     /// The error for a field that should be here.
-    pub(super) fn missing(&self, name: &str, remedy: &str) -> SceneError {
+    pub(crate) fn missing(&self, name: &str, remedy: &str) -> SceneError {
         let problem = Problem::Missing { field: self.path_of(name), remedy: remedy.to_owned() };
         SceneError { place: self.place.clone(), problem }
     }
 
     /// The error for a cell in which the model has no motion; `cell` is empty where there is one alone.
-    pub(super) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
+    pub(crate) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
         let problem = Problem::NoMotion { cell: cell.to_owned(), reason: Box::new(reason.clone()) };
         SceneError { place: self.place.clone(), problem }
     }
@@ -107,19 +121,19 @@ impl<'a> Section<'a> {
 }
 
 /// A value together with the path that names it.
-pub(super) struct Field<'a> {
-    pub(super) path: String,
-    pub(super) node: &'a Node,
+pub(crate) struct Field<'a> {
+    pub(crate) path: String,
+    pub(crate) node: &'a Node,
 }
 
 impl<'a> Field<'a> {
     /// Whether a `--set` argument says it: that wins over the text.
-    pub(super) fn is_argument(&self) -> bool {
+    pub(crate) fn is_argument(&self) -> bool {
         matches!(self.node.place, Place::Set { .. })
     }
 
     /// Any number, also NaN and infinities, which TOML can write: ranges are checked after.
-    pub(super) fn number(&self) -> Result<f64, SceneError> {
+    pub(crate) fn number(&self) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Integer(i) => Ok(i as f64),
             Value::Float(x) => Ok(x),
@@ -127,8 +141,16 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// The same, where something else that is `expected` may stand in its place.
+    pub(crate) fn number_or(&self, expected: &str) -> Result<f64, SceneError> {
+        match self.node.value {
+            Value::Integer(_) | Value::Float(_) => self.number(),
+            _ => Err(self.wrong_type(expected)),
+        }
+    }
+
     /// A whole number within `range`.
-    pub(super) fn whole(&self, range: RangeInclusive<u32>) -> Result<u32, SceneError> {
+    pub(crate) fn whole(&self, range: RangeInclusive<u32>) -> Result<u32, SceneError> {
         let requirement = format!("a whole number from {} to {}", range.start(), range.end());
         match self.node.value {
             Value::Integer(i) => u32::try_from(i)
@@ -140,15 +162,63 @@ impl<'a> Field<'a> {
     }
 
     /// Text.
-    pub(super) fn text(&self) -> Result<&'a str, SceneError> {
+    pub(crate) fn text(&self) -> Result<&'a str, SceneError> {
         match &self.node.value {
             Value::Text(text) => Ok(text),
             _ => Err(self.wrong_type("text in quotes")),
         }
     }
 
+    /// Text of one line that has at most so many characters.
+    pub(crate) fn line(&self, most: usize) -> Result<String, SceneError> {
+        self.text_without(char::is_control, "one line of text", most)
+    }
+
+    /// Text of some lines that has at most so many characters.
+    pub(crate) fn lines(&self, most: usize) -> Result<String, SceneError> {
+        self.text_without(|c| c.is_control() && c != '\n', "lines of text", most)
+    }
+
+    fn text_without(
+        &self,
+        is_refused: impl Fn(char) -> bool,
+        what: &str,
+        most: usize,
+    ) -> Result<String, SceneError> {
+        let text = self.text()?;
+        match text.chars().count() {
+            0 => Err(self.out_of_range(&format!("{what}; leave it out where there is nothing to say"))),
+            count if count > most => {
+                Err(self.out_of_range(&format!("at most {most} characters long; it has {count}, shorten it")))
+            }
+            _ if text.contains(is_refused) => {
+                Err(self.out_of_range(&format!("{what}, without control characters")))
+            }
+            _ => Ok(text.to_owned()),
+        }
+    }
+
+    /// An expression in `names`, such as `example`, or a number; `all` says what the names mean.
+    pub(crate) fn expression(
+        &self,
+        names: &[&str],
+        all: &str,
+        example: &str,
+    ) -> Result<Expression, SceneError> {
+        let text = match &self.node.value {
+            Value::Text(text) => text.clone(),
+            // A number is an expression, too.
+            Value::Integer(_) | Value::Float(_) => format!("{:?}", self.number()?),
+            _ => return Err(self.wrong_type(&format!("an expression in quotes, such as {example}"))),
+        };
+        Expression::parse(&text, names).map_err(|error| match &error {
+            ExpressionError::Unknown { name } => self.unknown_in(name, names, all),
+            _ => self.unreadable(&error.to_string()),
+        })
+    }
+
     /// `true` or `false`.
-    pub(super) fn flag(&self) -> Result<bool, SceneError> {
+    pub(crate) fn flag(&self) -> Result<bool, SceneError> {
         match self.node.value {
             Value::Flag(flag) => Ok(flag),
             _ => Err(self.wrong_type("true or false")),
@@ -156,7 +226,7 @@ impl<'a> Field<'a> {
     }
 
     /// One of the names in `choices`.
-    pub(super) fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, SceneError> {
+    pub(crate) fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, SceneError> {
         let names: Vec<&str> = choices.iter().map(|&(name, _)| name).collect();
         let Value::Text(name) = &self.node.value else {
             return Err(self.wrong_type(&format!("one of {}", names.join(", "))));
@@ -168,14 +238,14 @@ impl<'a> Field<'a> {
     }
 
     /// The elements of a list, each with the path `field.index`.
-    pub(super) fn list(&self, expected: &str) -> Result<Vec<Field<'a>>, SceneError> {
+    pub(crate) fn list(&self, expected: &str) -> Result<Vec<Field<'a>>, SceneError> {
         let Value::List(items) = &self.node.value else { return Err(self.wrong_type(expected)) };
         let element = |(i, node)| Field { path: format!("{}.{i}", self.path), node };
         Ok(items.iter().enumerate().map(element).collect())
     }
 
     /// A list of names from `choices` without repetition, at least one of them.
-    pub(super) fn choices<T: Copy + PartialEq>(&self, choices: &[(&str, T)]) -> Result<Vec<T>, SceneError> {
+    pub(crate) fn choices<T: Copy + PartialEq>(&self, choices: &[(&str, T)]) -> Result<Vec<T>, SceneError> {
         let names = choices.iter().map(|&(name, _)| name).collect::<Vec<_>>().join(", ");
         let mut chosen = Vec::new();
         for item in self.list(&format!("a list of {names}"))? {
@@ -190,44 +260,50 @@ impl<'a> Field<'a> {
         }
     }
 
-    pub(super) fn wrong_type(&self, expected: &str) -> SceneError {
+    pub(crate) fn wrong_type(&self, expected: &str) -> SceneError {
         let (field, value) = self.named();
         self.error(Problem::WrongType { field, value, expected: expected.to_owned() })
     }
 
-    pub(super) fn out_of_range(&self, requirement: &str) -> SceneError {
+    pub(crate) fn out_of_range(&self, requirement: &str) -> SceneError {
         let (field, value) = self.named();
         self.error(Problem::OutOfRange { field, value, requirement: requirement.to_owned() })
     }
 
-    pub(super) fn conflict(&self, remedy: String) -> SceneError {
+    /// The error for a list of so many `things`.
+    pub(crate) fn counted(&self, count: usize, things: &str, requirement: &str) -> SceneError {
+        let (field, value) = (self.path.clone(), format!("{count} {things}"));
+        self.error(Problem::OutOfRange { field, value, requirement: requirement.to_owned() })
+    }
+
+    pub(crate) fn conflict(&self, remedy: String) -> SceneError {
         let (field, value) = self.named();
         self.error(Problem::Conflict { field, value, remedy })
     }
 
-    pub(super) fn unknown_name(&self, name: &str, known: &[&str]) -> SceneError {
+    pub(crate) fn unknown_name(&self, name: &str, known: &[&str]) -> SceneError {
         self.unknown_among(name, known, &known.join(", "))
     }
 
     /// The same where `all` says what the known names mean.
-    pub(super) fn unknown_among(&self, name: &str, known: &[&str], all: &str) -> SceneError {
+    pub(crate) fn unknown_among(&self, name: &str, known: &[&str], all: &str) -> SceneError {
         let (field, value) = self.named();
         self.error(Problem::UnknownName { field, value, remedy: suggest(name, known, all) })
     }
 
     /// The error for a cell in which the field's value leaves no motion.
-    pub(super) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
+    pub(crate) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
         self.error(Problem::NoMotion { cell: cell.to_owned(), reason: Box::new(reason.clone()) })
     }
 
     /// The error for text that cannot be read as what it should be; `reason` says why, and how to mend it.
-    pub(super) fn unreadable(&self, reason: &str) -> SceneError {
+    pub(crate) fn unreadable(&self, reason: &str) -> SceneError {
         let (field, value) = self.named();
         self.error(Problem::UnreadableValue { field, value, reason: reason.to_owned() })
     }
 
     /// The error for a name within text that is none of the known ones.
-    pub(super) fn unknown_in(&self, name: &str, known: &[&str], all: &str) -> SceneError {
+    pub(crate) fn unknown_in(&self, name: &str, known: &[&str], all: &str) -> SceneError {
         let (field, value) = self.named();
         let remedy = format!("`{}`: {}", shorten(name), suggest(name, known, all));
         self.error(Problem::UnknownWithin { field, value, remedy })

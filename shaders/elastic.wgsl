@@ -1,0 +1,44 @@
+// Elastic walls: no impact, the motion goes on behind the wall at once.
+
+// What the wall of a side is.
+fn contact_at(side: u32) -> u32 {
+    return select(shape.contacts[1], shape.contacts[0], side == SIDE_RIGHT);
+}
+
+fn is_elastic(side: u32) -> bool {
+    return KINDS && contact_at(side) == CONTACT_ELASTIC;
+}
+
+// Free motion reaches an elastic wall. From rest on it the first derivative that is not zero decides on which side the
+// motion goes on: both fields agree there, but for the damper, whose force begins with the rate.
+fn enter_elastic(side: u32) -> Jump {
+    let closing = sign_of(side) * motion.q[1];
+    var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
+    let is_pressed = closing == 0.0 && presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, motion.q);
+    if closing > 0.0 || is_pressed {
+        jump.event = true;
+        jump.mode = MODE_SUSTAINED + side;
+        motion.q[0] = 0.0;
+        pass_damper(side, 1.0);
+    }
+    return jump;
+}
+
+// Whether a gap that has come back to its elastic wall is at rest there and pressed on: it stays behind the wall.
+fn stays_behind(side: u32) -> bool {
+    if sign_of(side) * motion.q[1] < 0.0 {
+        return false;
+    }
+    let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3]);
+    return presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, rest);
+}
+
+// Neighbours pass a wall with a damper, inwards (1) or outwards (-1). The fields on both sides differ by the damper's
+// force alone, in proportion to the rate, which cancels: no quotient, and no grazing.
+fn pass_damper(side: u32, way: Real) {
+    if EXPONENT {
+        let damper = flows[cell.flow_index].damper[side];
+        crossing.is_smooth = true;
+        crossing.jolt = array<Real, 2>(way * damper[0], way * damper[1]);
+    }
+}

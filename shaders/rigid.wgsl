@@ -1,0 +1,99 @@
+// Rigid walls: a pressed contact that has come to rest sticks until the load pulls it off.
+//
+// A gap that sticks is the wall's position, at rest; the other displacement moves on by the domain of that side, in
+// which the wall has taken up the gap's acceleration. What is watched is the acceleration that the wall takes up: its
+// series takes the place of the gap's.
+
+fn is_rigid(side: u32) -> bool {
+    return KINDS && contact_at(side) == CONTACT_RIGID;
+}
+
+fn sticks() -> bool {
+    return KINDS && tally.mode >= MODE_STUCK;
+}
+
+// Contact onset: the gap leaves its wall slowly, and is pressed back.
+fn is_onset() -> bool {
+    return tally.mode >= MODE_ONSET && !sticks();
+}
+
+// The acceleration of a gap that is held at its wall, and the motion beside it.
+fn held_pull(side: u32) -> Pull {
+    let behind = meshing_pull(side);
+    return Pull(flows[cell.flow_index].pressing[side], behind.x_row, behind.share, behind.angle);
+}
+
+// Sticks to the wall if the load presses a gap that has come to rest there; the wall takes all of its rate. Else no
+// event.
+fn stick(side: u32) -> Jump {
+    var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 0.0, kick, 0.0);
+    let taken = sign_of(side) * max(sign_of(side) * motion.q[1], Real(0.0));
+    let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3] + kick * taken);
+    if presses(held_pull(side), side, rest) {
+        jump.event = true;
+        jump.mode = MODE_STUCK + side;
+        motion.q = rest;
+    }
+    return jump;
+}
+
+// The load pulls the gap off the wall: it leaves from rest, and without an acceleration.
+fn let_go(side: u32) -> Jump {
+    motion.q[0] = walls[side];
+    motion.q[1] = 0.0;
+    if EXPONENT {
+        crossing.is_smooth = true;
+    }
+    return Jump(true, MODE_FREE, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
+}
+
+// Order of the root of the pressing acceleration where sticking begins: it may be balanced, and about to press.
+fn held_order(side: u32) -> u32 {
+    let pull = held_pull(side);
+    let pressing = acceleration(pull.gap_row, pull.share, motion.q);
+    return select(0u, 1u, abs(pressing) <= balance(pull.gap_row, pull.share, motion.q));
+}
+
+// Expands the motion beside a gap that sticks, and in place of the gap the acceleration that the wall takes up.
+fn expand_held() {
+    let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
+    let r = here.x_row;
+    let angle = here.angle;
+    var c = motion.phasor[0];
+    var s = motion.phasor[1];
+    // Term k of x, and of its rate.
+    var x = motion.q[2];
+    var v = here.share * motion.q[3];
+    var load_gap = p[5];
+    var load_x = r[5];
+    //% for k in 0..TERMS
+    {
+        x_terms[$k] = x;
+        gap_terms[$k] = (p[2] * x + p[3] * v) + (p[4] * c + load_gap);
+        let turn: Real = 1.0 / $(k+1).0;
+        let next = turn * ((r[2] * x + r[3] * v) + (r[4] * c + load_x));
+        x = turn * v;
+        v = next;
+        load_gap = 0.0;
+        load_x = 0.0;
+        let turned = -(angle * turn) * s;
+        s = (angle * turn) * c;
+        c = turned;
+    }
+    //% end
+    if tally.order == 1u {
+        gap_terms[0] = 0.0;
+    }
+}
+
+// Bound on the sixth derivative of that acceleration over the step: it is made of x, its rate and the forcing, and the
+// energy of the differentiated motion bounds the derivatives of these.
+fn held_bound() -> Real {
+    let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
+    let square = here.angle * here.angle;
+    let fifth = square * square * here.angle;
+    let growth = abs(here.x_row[4]) * fifth;
+    let x = growth + derivative_bound(0.0, 0.0, 120.0 * x_terms[5], 720.0 * x_terms[6]);
+    let v = growth * here.angle + derivative_bound(0.0, 0.0, 720.0 * x_terms[6], 5040.0 * x_terms[7]);
+    return (abs(p[2]) * x + abs(p[3]) * v) + abs(p[4]) * (fifth * here.angle);
+}

@@ -1,0 +1,42 @@
+//! `model`: which model a scene is about.
+
+use super::list::{Beside, FindFile};
+pub(super) use crate::model_file::DEFAULT;
+use crate::model_file::{BUILT_IN, FileModel};
+use crate::text::error::SceneError;
+use crate::text::section::Section;
+use rattlemap_dynamics::model::Model;
+
+/// What the name of a model's file ends with.
+const FILE: &str = ".toml";
+
+/// Reads `model`: a name that is built in, or a file beside the scene.
+pub(super) fn read(root: &Section<'_>, find: FindFile<'_>) -> Result<FileModel, SceneError> {
+    let field = root.get("model");
+    let name = match &field {
+        Some(field) => field.text()?,
+        None => DEFAULT,
+    };
+    match (FileModel::built_in(name), field) {
+        (Some(model), _) => Ok(model),
+        (None, Some(field)) if name.ends_with(FILE) => {
+            let found = find(Beside::Model, name).map_err(|reason| field.unreadable(&reason))?;
+            FileModel::parse(&found.text, &found.name)
+        }
+        (None, Some(field)) => {
+            let names: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
+            let all = format!("{}, or the path of a model's file, such as my-model{FILE}", names.join(", "));
+            Err(field.unknown_among(name, &names, &all))
+        }
+        // It is built in, as a test knows.
+        (None, None) => Err(root.missing("model", "name one")),
+    }
+}
+
+/// What a scene calls a model: by its name if that is built in or a model of the library's own, else as a file.
+pub(super) fn named(model: &dyn Model) -> String {
+    match model.downcast_ref::<FileModel>() {
+        Some(file) if !file.is_built_in() => format!("{}{FILE}", model.name()),
+        _ => model.name().to_owned(),
+    }
+}

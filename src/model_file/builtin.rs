@@ -1,0 +1,31 @@
+//! The models that are built into the program: the files of `models/`.
+
+use std::sync::LazyLock;
+
+use rattlemap_dynamics::model::Model;
+
+use super::FileModel;
+
+/// The model of scenes and commands that name none.
+pub const DEFAULT: &str = "gear-pair";
+
+/// Names and texts.
+pub const BUILT_IN: &[(&str, &str)] = &[
+    (DEFAULT, include_str!("../../models/gear_pair.toml")),
+    ("impact-oscillator", include_str!("../../models/impact_oscillator.toml")),
+    ("bilinear", include_str!("../../models/bilinear.toml")),
+    ("kahraman-singh", include_str!("../../models/kahraman_singh.toml")),
+    ("soft-impact", include_str!("../../models/soft_impact.toml")),
+    ("two-masses", include_str!("../../models/two_masses.toml")),
+    ("coco-impact", include_str!("../../models/coco_impact.toml")),
+    ("shaking-table", include_str!("../../models/shaking_table.toml")),
+];
+
+/// They are read once. A test reads each of them, so none is left out.
+static READ: LazyLock<Vec<FileModel>> = LazyLock::new(|| {
+    BUILT_IN.iter().filter_map(|(name, text)| FileModel::parse(text, &format!("{name}.toml")).ok()).collect()
+});
+
+pub(super) fn find(name: &str) -> Option<&'static FileModel> {
+    READ.iter().find(|model| model.name() == name)
+}

@@ -1,0 +1,281 @@
+//! A whole model: what its file says, and what that makes of values of its parameters.
+
+use rattlemap_dynamics::model::{
+    Contact, Domain, Law, ModelError, Oscillator, OscillatorError, Parameter, Shapes, Side,
+};
+
+use super::contact::{self, Wall, WallLaw};
+use super::entry::Names;
+use super::motion::{self, Motion};
+use super::{FileModel, parameters};
+use crate::text::document::{self, Value};
+use crate::text::error::SceneError;
+use crate::text::expression::Expression;
+use crate::text::section::{Field, Section};
+
+/// What stands outside of any table, and the tables.
+const TOP_LEVEL: [&str; 8] =
+    ["name", "title", "summary", "source", "notes", "parameters", "motion", "contact"];
+
+/// Characters of the name: it stands in scenes and in names of files.
+const LONGEST_NAME: usize = 40;
+
+/// Characters of title, summary and source: each has one line.
+const LONGEST_LINE: usize = 200;
+
+/// Characters of the notes.
+const LONGEST_NOTES: usize = 4000;
+
+/// What a model's file says.
+#[derive(Clone, Debug)]
+pub struct Definition {
+    /// The whole file.
+    pub text: String,
+    /// The name in scenes.
+    pub name: String,
+    /// The name in headings.
+    pub title: String,
+    /// One line for lists.
+    pub summary: Option<String>,
+    /// Where it comes from.
+    pub source: Option<String>,
+    /// What people should know, in some lines.
+    pub notes: Option<String>,
+    /// The table of parameters, in the order of the file.
+    pub parameters: Vec<Parameter>,
+    /// A value of each: also of those that a scene must say.
+    pub defaults: Vec<f64>,
+    /// Free motion.
+    pub motion: Motion,
+    /// The right and the left wall.
+    pub walls: [Option<Wall>; 2],
+}
+
+/// A text means one thing.
+impl PartialEq for Definition {
+    fn eq(&self, other: &Definition) -> bool {
+        self.text == other.text
+    }
+}
+
+/// Reads a model's file and looks at its motion at the defaults.
+pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
+    let document = document::read(text, file)?;
+    let root = Section::open(&document, "", &TOP_LEVEL)?;
+    let name = root.require("name", "name the model, such as name = \"my-model\"")?;
+    let name = read_name(&name)?;
+    let line = |key| root.get(key).map(|field| field.line(LONGEST_LINE)).transpose();
+    let notes = root.get("notes").map(|field| field.lines(LONGEST_NOTES)).transpose()?;
+    let written = parameters::read(&root)?;
+    let names: Vec<&str> = written.iter().map(|parameter| parameter.name.as_str()).collect();
+    let names = Names(&names);
+    let motion = motion::read(&root, names)?;
+    let walls = contact::read(&root, names)?;
+    let shapes = |index: usize| {
+        let uses = |entry: &Expression| entry.uses().contains(&index);
+        let at_walls = walls.iter().flatten();
+        Shapes::new(
+            motion.entries().any(uses) || at_walls.clone().flat_map(Wall::shaping_oscillator).any(uses),
+            at_walls.flat_map(Wall::shaping_law).any(uses),
+        )
+    };
+    let shapes: Vec<Shapes> = (0..written.len()).map(shapes).collect();
+    let model = FileModel::new(Definition {
+        text: text.to_owned(),
+        title: line("title")?.unwrap_or_else(|| name.clone()),
+        name,
+        summary: line("summary")?,
+        source: line("source")?,
+        notes,
+        defaults: written.iter().map(|parameter| parameter.default).collect(),
+        parameters: written
+            .into_iter()
+            .zip(shapes)
+            .map(|(written, shapes)| written.shaping(shapes))
+            .collect(),
+        motion,
+        walls,
+    });
+    match rattlemap_dynamics::flow::Flow::validate(&model) {
+        Ok(_) => Ok(model),
+        Err(error) => Err(no_motion(&root, &model.definition, &error)),
+    }
+}
+
+fn read_name(field: &Field<'_>) -> Result<String, SceneError> {
+    let name = field.text()?;
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let is_name = name.chars().all(is_word) && name.starts_with(|c: char| c.is_ascii_alphanumeric());
+    match is_name && name.len() <= LONGEST_NAME {
+        true => Ok(name.to_owned()),
+        false => {
+            Err(field
+                .out_of_range(&format!("1 to {LONGEST_NAME} letters, digits and hyphens, such as my-model")))
+        }
+    }
+}
+
+/// The error for a model without motion at its defaults, at the field that has to change.
+fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) -> SceneError {
+    let (table, key) = blamed(error);
+    let wall = |of: &Field<'_>, has: &dyn Fn(&str) -> bool| match (&of.node.value, table) {
+        (Value::Table(fields), Table::Wall(side)) => {
+            let is_there = |side: Side| match fields.get("side").map(|node| &node.value) {
+                Some(Value::Text(name)) => (name == "right") == (side == Side::Right),
+                _ => false,
+            };
+            side.is_none_or(is_there) && fields.keys().any(|name| has(name))
+        }
+        _ => false,
+    };
+    let contacts = root.get("contact").and_then(|field| field.list("").ok()).unwrap_or_default();
+    let contact = contacts.iter().find(|contact| wall(contact, &|name| name == key));
+    let opened = match contact {
+        Some(contact) => Section::open_any(contact.node, &contact.path),
+        None => root.get("motion").and_then(|motion| Section::open_any(motion.node, &motion.path)),
+    };
+    match opened.and_then(|section| section.get(key)) {
+        Some(field) => field.conflict(format!("at the defaults of {}, {error}", definition.name)),
+        None => root.no_motion("the defaults", error),
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Table {
+    Motion,
+    Wall(Option<Side>),
+}
+
+/// Where the number comes from that an error names.
+fn blamed(error: &ModelError) -> (Table, &str) {
+    let ModelError::Oscillator(error) = error else { return (Table::Motion, "") };
+    let quantity = match error {
+        OscillatorError::OutOfRange { quantity, .. }
+        | OscillatorError::NotSymmetric { quantity, .. }
+        | OscillatorError::NotAlongGap { quantity, .. }
+        | OscillatorError::NotSemidefinite { quantity, .. } => quantity.as_str(),
+        OscillatorError::NotDefinite { .. } => "mass",
+        OscillatorError::Walls { .. } => "position",
+    };
+    let side = match (quantity.contains("right wall"), quantity.contains("left wall")) {
+        (true, _) => Some(Side::Right),
+        (_, true) => Some(Side::Left),
+        _ => None,
+    };
+    match quantity.split(' ').next().unwrap_or_default() {
+        "entry" => (Table::Motion, "gap"),
+        "omega" => (Table::Motion, "frequency"),
+        "position" => (Table::Wall(side), "at"),
+        "load" if side.is_some() => (Table::Wall(side), "at"),
+        "mesh" => (Table::Wall(side), "mesh_speed"),
+        "restitution" => (Table::Wall(side), "restitution"),
+        key @ ("damping" | "stiffness") if side.is_some() => (Table::Wall(side), key),
+        key => (Table::Motion, key),
+    }
+}
+
+impl Definition {
+    /// The wall on a side.
+    pub fn wall(&self, side: Side) -> Option<&Wall> {
+        self.walls[side.index()].as_ref()
+    }
+
+    /// The oscillator at these values, which the caller validates.
+    pub(super) fn oscillator(&self, values: &[f64]) -> Result<Oscillator, OscillatorError> {
+        let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
+        let motion = &self.motion;
+        let free = Domain {
+            damping: matrix(&motion.damping, of),
+            stiffness: matrix(&motion.stiffness, of),
+            load: vector(&motion.load, of),
+        };
+        let gap = vector(&motion.gap, of);
+        let mut mass = matrix(&motion.mass, of);
+        if motion.degrees() == 1 {
+            // The second displacement does not exist; nothing acts on its mass.
+            mass[1][1] = 1.0;
+        }
+        let mut oscillator = Oscillator {
+            degrees: motion.degrees(),
+            mass,
+            gap,
+            walls: [f64::INFINITY, f64::NEG_INFINITY],
+            contacts: [Contact::Rigid; 2],
+            omega: of(&motion.frequency),
+            force: vector(&motion.force, of),
+            free,
+            meshing: [free; 2],
+        };
+        for side in Side::BOTH {
+            let Some(wall) = self.wall(side) else { continue };
+            let at = of(&wall.at);
+            // An infinite one would be none.
+            if !at.is_finite() {
+                let name = if side == Side::Right { "right" } else { "left" };
+                let quantity = format!("position of the {name} wall");
+                return Err(OscillatorError::OutOfRange {
+                    quantity,
+                    value: at,
+                    requirement: "a finite number",
+                });
+            }
+            let i = side.index();
+            oscillator.walls[i] = at;
+            oscillator.contacts[i] = wall.contact();
+            if let Some(behind) = &wall.behind {
+                oscillator.meshing[i] =
+                    with_spring(free, gap, at, of(&behind.stiffness), of(&behind.damping));
+            }
+        }
+        Ok(oscillator)
+    }
+
+    /// The contact law at these values.
+    pub(super) fn law(&self, values: &[f64]) -> Law {
+        let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
+        let mut law = Law::both(0.0, 0.0);
+        for (i, wall) in self.walls.iter().enumerate() {
+            if let Some(Wall { law: WallLaw::Impact { restitution, mesh_speed }, .. }) = wall {
+                law.restitution[i] = of(restitution);
+                law.mesh_speed[i] = of(mesh_speed);
+            }
+        }
+        law
+    }
+}
+
+/// Motion against a spring `stiffness (z - at)` and a damper along the gap row.
+fn with_spring(free: Domain, gap: [f64; 2], at: f64, stiffness: f64, damping: f64) -> Domain {
+    let along = |matrix: [[f64; 2]; 2], k: f64| {
+        // Symmetric to the bit.
+        let entry = |i: usize, j: usize| plus(matrix[i][j], k * (gap[i] * gap[j]));
+        [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
+    };
+    let force = stiffness * at;
+    Domain {
+        damping: along(free.damping, damping),
+        stiffness: along(free.stiffness, stiffness),
+        load: [plus(free.load[0], force * gap[0]), plus(free.load[1], force * gap[1])],
+    }
+}
+
+/// A sum. What is added to nothing keeps its sign, also if it is 0.
+fn plus(a: f64, b: f64) -> f64 {
+    if a == 0.0 { b } else { a + b }
+}
+
+fn matrix(rows: &[Vec<Expression>], of: impl Fn(&Expression) -> f64) -> [[f64; 2]; 2] {
+    let mut matrix = [[0.0; 2]; 2];
+    for (row, entries) in matrix.iter_mut().zip(rows) {
+        *row = vector(entries, &of);
+    }
+    matrix
+}
+
+fn vector(entries: &[Expression], of: impl Fn(&Expression) -> f64) -> [f64; 2] {
+    let mut vector = [0.0; 2];
+    for (number, entry) in vector.iter_mut().zip(entries) {
+        *number = of(entry);
+    }
+    vector
+}

@@ -1,0 +1,78 @@
+//! Entries of vectors and matrices: numbers, or expressions in parameters.
+
+use crate::text::error::SceneError;
+use crate::text::expression::Expression;
+use crate::text::section::{Field, Section};
+
+/// What entries may be made of: the parameters' names, in the order of their values.
+#[derive(Clone, Copy)]
+pub(super) struct Names<'a>(pub(super) &'a [&'a str]);
+
+impl Names<'_> {
+    /// Reads one entry.
+    pub(super) fn entry(self, field: &Field<'_>) -> Result<Expression, SceneError> {
+        let all = match self.0 {
+            [] => "the model has no parameters".to_owned(),
+            names => names.join(", "),
+        };
+        field.expression(self.0, &all, "\"2*zeta\"")
+    }
+
+    /// Reads a list of one entry per coordinate; `what` says what it is.
+    pub(super) fn vector(
+        self,
+        field: &Field<'_>,
+        count: usize,
+        what: &str,
+    ) -> Result<Vec<Expression>, SceneError> {
+        let requirement = format!("{what}: a list of {}, one for each coordinate", entries(count));
+        let items = field.list(&requirement)?;
+        if items.len() != count {
+            return Err(field.out_of_range(&requirement));
+        }
+        items.iter().map(|item| self.entry(item)).collect()
+    }
+
+    /// Reads a square matrix, row by row.
+    pub(super) fn matrix(self, field: &Field<'_>, count: usize) -> Result<Vec<Vec<Expression>>, SceneError> {
+        let requirement = match count {
+            1 => "a matrix of one row, such as [[\"1\"]]",
+            _ => "a matrix of two rows, such as [[\"m1\", \"0\"], [\"0\", \"m2\"]]",
+        };
+        let rows = field.list(requirement)?;
+        if rows.len() != count {
+            return Err(field.out_of_range(requirement));
+        }
+        rows.iter().map(|row| self.vector(row, count, "a row")).collect()
+    }
+
+    /// The same where zeros stand for what is left out.
+    pub(super) fn vector_or_zeros(
+        self,
+        section: &Section<'_>,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<Expression>, SceneError> {
+        match section.get(name) {
+            Some(field) => self.vector(&field, count, "amplitudes of one harmonic, or constant loads"),
+            None => Ok(vec![Expression::number(0.0); count]),
+        }
+    }
+
+    /// The same of a matrix.
+    pub(super) fn matrix_or_zeros(
+        self,
+        section: &Section<'_>,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<Vec<Expression>>, SceneError> {
+        match section.get(name) {
+            Some(field) => self.matrix(&field, count),
+            None => Ok(vec![vec![Expression::number(0.0); count]; count]),
+        }
+    }
+}
+
+fn entries(count: usize) -> &'static str {
+    if count == 1 { "one entry" } else { "two entries" }
+}

@@ -1,0 +1,150 @@
+//! A model's equations, written out from its file.
+
+use rattlemap_dynamics::model::{Contact, Side};
+
+use super::definition::Definition;
+use crate::text::expression::Expression;
+
+/// Free motion, then what lies behind each wall; indented by what belongs to what.
+pub(super) fn lines(definition: &Definition) -> Vec<String> {
+    let motion = &definition.motion;
+    let mut lines = vec![
+        format!("gap   {}", gap(definition)),
+        format!("rate  {}", row(&motion.gap, &motion.velocities, "w")),
+        format!("free, {}", between(definition)),
+    ];
+    lines.extend(equations(definition, None).map(|line| format!("    {line}")));
+    for side in Side::BOTH {
+        let Some(wall) = definition.wall(side) else { continue };
+        let name = name(side);
+        match (wall.contact(), &wall.behind) {
+            (Contact::Impact | Contact::Elastic, Some(behind)) => {
+                let spring = product(&behind.stiffness, &format!("({})", minus("z", &wall.at)));
+                let force = sum([spring, product(&behind.damping, "w")]);
+                lines.push(format!("behind the {name} wall, with N = {force}"));
+                lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
+            }
+            _ => lines
+                .push(format!("on the {name} wall: z stays {}, as long as it is pressed", text(&wall.at))),
+        }
+    }
+    lines
+}
+
+/// A side in words.
+pub(super) fn name(side: Side) -> &'static str {
+    match side {
+        Side::Right => "right",
+        Side::Left => "left",
+    }
+}
+
+fn gap(definition: &Definition) -> String {
+    row(&definition.motion.gap, &definition.motion.coordinates, "z")
+}
+
+fn row(entries: &[Expression], names: &[String], result: &str) -> String {
+    format!("{result} = {}", sum(entries.iter().zip(names).map(|(entry, name)| product(entry, name))))
+}
+
+/// Where free motion is.
+fn between(definition: &Definition) -> String {
+    let at = |side| definition.wall(side).map(|wall| text(&wall.at));
+    match (at(Side::Left), at(Side::Right)) {
+        (Some(left), Some(right)) => format!("{left} < z < {right}"),
+        (None, Some(right)) => format!("z < {right}"),
+        (Some(left), None) => format!("z > {left}"),
+        (None, None) => "everywhere".to_owned(),
+    }
+}
+
+/// One equation per coordinate, with a force along the gap row.
+fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Iterator<Item = String> + 'd {
+    let motion = &definition.motion;
+    let rate = |suffix: &str| -> Vec<String> {
+        motion.coordinates.iter().map(|name| format!("{name}{suffix}")).collect()
+    };
+    let [accelerations, rates, displacements] = ["''", "'", ""].map(rate);
+    (0..motion.degrees()).map(move |i| {
+        let terms = |entries: &[Expression], names: &[String]| -> Vec<Option<String>> {
+            entries.iter().zip(names).map(|(entry, name)| product(entry, name)).collect()
+        };
+        let along = force.and_then(|force| product(&motion.gap[i], force));
+        let left = [
+            terms(&motion.mass[i], &accelerations),
+            terms(&motion.damping[i], &rates),
+            terms(&motion.stiffness[i], &displacements),
+            vec![along],
+        ];
+        let harmonic = format!("cos({})", product(&motion.frequency, "t").unwrap_or_else(|| "0".to_owned()));
+        let right = [product(&motion.force[i], &harmonic), constant(&motion.load[i])];
+        format!("{} = {}", sum(left.into_iter().flatten()), sum(right))
+    })
+}
+
+/// Terms with their signs; 0 where there is none.
+fn sum(terms: impl IntoIterator<Item = Option<String>>) -> String {
+    let mut sum = String::new();
+    for term in terms.into_iter().flatten() {
+        match (sum.is_empty(), term.strip_prefix('-')) {
+            (true, _) => sum = term,
+            (false, Some(positive)) => sum += &format!(" - {positive}"),
+            (false, None) => sum += &format!(" + {term}"),
+        }
+    }
+    if sum.is_empty() { "0".to_owned() } else { sum }
+}
+
+/// `coefficient name`; none where the coefficient is 0.
+fn product(coefficient: &Expression, name: &str) -> Option<String> {
+    match coefficient.as_number() {
+        Some(0.0) => None,
+        Some(1.0) => Some(name.to_owned()),
+        Some(-1.0) => Some(format!("-{name}")),
+        _ => Some(format!("{} {name}", factor(coefficient))),
+    }
+}
+
+fn constant(load: &Expression) -> Option<String> {
+    (load.as_number() != Some(0.0)).then(|| text(load))
+}
+
+/// `name - entry`.
+fn minus(name: &str, entry: &Expression) -> String {
+    let entry_text = text(entry);
+    match entry_text.strip_prefix('-').filter(|positive| is_product(positive)) {
+        _ if entry.as_number() == Some(0.0) => name.to_owned(),
+        Some(positive) => format!("{name} + {positive}"),
+        None => format!("{name} - {}", factor(entry)),
+    }
+}
+
+/// An entry that something is multiplied by.
+pub(crate) fn factor(entry: &Expression) -> String {
+    let text = text(entry);
+    match is_product(text.strip_prefix('-').unwrap_or(&text)) {
+        true => text,
+        false => format!("({text})"),
+    }
+}
+
+/// Whether a text has no sum outside of parentheses; the sign of an exponent may look like one, which is no harm.
+fn is_product(text: &str) -> bool {
+    let mut depth = 0;
+    text.chars().all(|c| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            _ => {}
+        }
+        depth > 0 || !matches!(c, '+' | '-')
+    })
+}
+
+/// An entry as it was written; a number as short as it can be.
+fn text(entry: &Expression) -> String {
+    match entry.as_number() {
+        Some(number) => number.to_string(),
+        None => entry.text().to_owned(),
+    }
+}

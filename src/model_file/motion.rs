@@ -1,0 +1,150 @@
+//! `[motion]`: coordinates, matrices, forcing and the gap.
+
+use super::entry::Names;
+use super::parameters::check_name;
+use crate::text::document::Value;
+use crate::text::error::SceneError;
+use crate::text::expression::Expression;
+use crate::text::section::{Field, Section};
+
+/// Its keys.
+const KEYS: [&str; 10] = [
+    "coordinates",
+    "velocities",
+    "bodies",
+    "mass",
+    "damping",
+    "stiffness",
+    "force",
+    "load",
+    "frequency",
+    "gap",
+];
+
+/// What no key can ask for.
+const LIMITS: &str = "a model has one or two coordinates, one harmonic force and one gap row";
+
+/// Characters of the name of what moves.
+const LONGEST_BODY: usize = 40;
+
+/// Free motion and its gap.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Names of the displacements, one or two.
+    pub coordinates: Vec<String>,
+    /// Names of their rates.
+    pub velocities: Vec<String>,
+    /// What moves, one for each coordinate.
+    pub bodies: Vec<String>,
+    /// Mass matrix, row by row.
+    pub mass: Vec<Vec<Expression>>,
+    /// Damping matrix.
+    pub damping: Vec<Vec<Expression>>,
+    /// Stiffness matrix.
+    pub stiffness: Vec<Vec<Expression>>,
+    /// Amplitudes of the harmonic force.
+    pub force: Vec<Expression>,
+    /// Constant load.
+    pub load: Vec<Expression>,
+    /// Excitation frequency.
+    pub frequency: Expression,
+    /// The gap is `gap . x`.
+    pub gap: Vec<Expression>,
+}
+
+impl Motion {
+    /// Degrees of freedom.
+    pub fn degrees(&self) -> usize {
+        self.coordinates.len()
+    }
+
+    /// Names of the state's components.
+    pub fn state_names(&self) -> impl Iterator<Item = &str> {
+        self.coordinates.iter().zip(&self.velocities).flat_map(|(x, v)| [x.as_str(), v.as_str()])
+    }
+
+    /// Every entry.
+    pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
+        let matrices = [&self.mass, &self.damping, &self.stiffness].into_iter().flatten().flatten();
+        let vectors = [&self.force, &self.load, &self.gap].into_iter().flatten();
+        matrices.chain(vectors).chain([&self.frequency])
+    }
+}
+
+/// Reads `[motion]`.
+pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, SceneError> {
+    root.require("motion", "write [motion] with coordinates, mass, frequency and gap")?;
+    let section = root.section_among("motion", &KEYS, &format!("{}; {LIMITS}", KEYS.join(", ")))?;
+    let field = section.require("coordinates", "name one or two, such as coordinates = [\"x\"]")?;
+    let two = "one or two names: a model has at most two degrees of freedom";
+    let coordinates = read_names(&field, two)?;
+    if !(1..=2).contains(&coordinates.len()) {
+        return Err(field.out_of_range(two));
+    }
+    let count = coordinates.len();
+    let each = "a list of names, one for each coordinate";
+    let velocities = match section.get("velocities") {
+        Some(field) => {
+            let velocities = read_names(&field, each)?;
+            if velocities.len() != count {
+                return Err(field.out_of_range(each));
+            }
+            velocities
+        }
+        None if count == 1 => vec!["v".to_owned()],
+        None => vec!["v1".to_owned(), "v2".to_owned()],
+    };
+    let all: Vec<&String> = coordinates.iter().chain(&velocities).collect();
+    for (i, name) in all.iter().enumerate() {
+        if names.0.contains(&name.as_str()) || all[..i].contains(name) {
+            return Err(field.conflict(format!(
+                "`{name}` names something else already, a parameter, a coordinate or a velocity; rename either"
+            )));
+        }
+    }
+    let bodies = match section.get("bodies") {
+        Some(field) => {
+            let items = field.list(each)?;
+            if items.len() != count {
+                return Err(field.out_of_range(each));
+            }
+            items.iter().map(|item| item.line(LONGEST_BODY)).collect::<Result<_, _>>()?
+        }
+        None => coordinates.clone(),
+    };
+    let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
+    let gap =
+        section.require("gap", "write the row that makes the gap, such as gap = [\"1\"]: z = gap . x")?;
+    Ok(Motion {
+        mass: names.matrix(&mass, count)?,
+        damping: names.matrix_or_zeros(&section, "damping", count)?,
+        stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
+        force: names.vector_or_zeros(&section, "force", count)?,
+        load: names.vector_or_zeros(&section, "load", count)?,
+        frequency: read_frequency(&section, names)?,
+        gap: names.vector(&gap, count, "one gap row")?,
+        coordinates,
+        velocities,
+        bodies,
+    })
+}
+
+fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
+    let field = section.require("frequency", "name it, such as frequency = \"omega\"")?;
+    match field.node.value {
+        Value::List(_) => {
+            Err(field.wrong_type("one entry: the force is force cos(frequency t), one harmonic"))
+        }
+        _ => names.entry(&field),
+    }
+}
+
+fn read_names(field: &Field<'_>, expected: &str) -> Result<Vec<String>, SceneError> {
+    let mut names = Vec::new();
+    for item in field.list(expected)? {
+        let name = item.text()?;
+        check_name(name, &item)?;
+        names.push(name.to_owned());
+    }
+    Ok(names)
+}

@@ -1,0 +1,150 @@
+//! `[parameters]`: the table of a model.
+
+use std::borrow::Cow;
+
+use rattlemap_dynamics::model::{Parameter, Range, Shapes};
+
+use crate::text::document::Value;
+use crate::text::error::SceneError;
+use crate::text::expression;
+use crate::text::section::{Field, Section};
+
+/// Keys of a parameter's own table.
+const KEYS: [&str; 6] = ["default", "min", "max", "open", "meaning", "required"];
+
+/// Characters of a name: tables and figures have columns for it.
+const LONGEST_NAME: usize = 32;
+
+/// Characters of a meaning: it stands beside an axis.
+const LONGEST_MEANING: usize = 120;
+
+/// Columns that tables have beside those of parameters and states, and what stands beside states in that of an orbit.
+pub(super) const COLUMNS: [&str; 26] = [
+    "i",
+    "j",
+    "t",
+    "z",
+    "w",
+    "n",
+    "phase",
+    "class",
+    "period",
+    "lyapunov",
+    "lyapunov_error",
+    "impacts_per_period",
+    "mesh_fraction",
+    "symmetric",
+    "word",
+    "pattern",
+    "status",
+    "periods_run",
+    "source",
+    "attractor",
+    "attractors",
+    "domain",
+    "event",
+    "side",
+    "kind",
+    "moment",
+];
+
+/// A parameter as the file has it: what it shapes is found out from where it is used.
+pub(super) struct Written {
+    pub(super) name: String,
+    meaning: String,
+    pub(super) default: f64,
+    /// Whether a scene must say it.
+    is_required: bool,
+    range: Range,
+}
+
+impl Written {
+    /// The line of the model's table.
+    pub(super) fn shaping(self, shapes: Shapes) -> Parameter {
+        Parameter {
+            name: Cow::Owned(self.name),
+            meaning: Cow::Owned(self.meaning),
+            default: (!self.is_required).then_some(self.default),
+            range: self.range,
+            shapes,
+        }
+    }
+}
+
+/// Reads `[parameters]`, in the order in which it is written.
+pub(super) fn read(root: &Section<'_>) -> Result<Vec<Written>, SceneError> {
+    let Some(field) = root.get("parameters") else { return Ok(Vec::new()) };
+    let Value::Table(table) = &field.node.value else {
+        return Err(field.wrong_type("a table, [parameters]"));
+    };
+    let known: Vec<&str> = table.keys().map(String::as_str).collect();
+    let section = Section::open(field.node, "parameters", &known)?;
+    section.fields_as_written().into_iter().map(|(name, field)| read_one(name, &field)).collect()
+}
+
+fn read_one(name: &str, field: &Field<'_>) -> Result<Written, SceneError> {
+    check_name(name, field)?;
+    let Value::Table(_) = &field.node.value else {
+        let expected = "a number, its default, or a table such as { default = 1.0, min = 0.0 }";
+        let default = field.number_or(expected)?;
+        if !default.is_finite() {
+            return Err(field.out_of_range("a finite number"));
+        }
+        let (name, meaning) = (name.to_owned(), name.to_owned());
+        return Ok(Written { name, meaning, default, is_required: false, range: Range::Finite });
+    };
+    let section = Section::open(field.node, &field.path, &KEYS)?;
+    let given = section.require("default", "a parameter needs a default: write default = 1.0")?;
+    let flag = |name| section.get(name).map_or(Ok(false), |field| field.flag());
+    let open = section.get("open");
+    let is_open = flag("open")?;
+    if let (Some(field), None) = (open, section.get("min")) {
+        return Err(field.conflict("it leaves out `min` itself, and there is none".to_owned()));
+    }
+    let end = |name, none| match section.get(name) {
+        None => Ok(none),
+        Some(field) => match field.number()? {
+            end if end.is_finite() => Ok(end),
+            _ => Err(field.out_of_range("a finite number; leave it out where there is no bound")),
+        },
+    };
+    let (min, max) = (end("min", f64::NEG_INFINITY)?, end("max", f64::INFINITY)?);
+    if let (Some(field), false) = (section.get("max"), min < max) {
+        return Err(field.out_of_range(&format!("greater than min = {min}")));
+    }
+    let range = Range::new(min, max, is_open);
+    let default = given.number()?;
+    if !range.contains(default) {
+        return Err(given.out_of_range(&range.requirement()));
+    }
+    let meaning = match section.get("meaning") {
+        Some(field) => field.line(LONGEST_MEANING)?,
+        None => name.to_owned(),
+    };
+    Ok(Written { name: name.to_owned(), meaning, default, is_required: flag("required")?, range })
+}
+
+/// Refuses what cannot be a name: of a parameter, a coordinate, a velocity.
+pub(super) fn check_name(name: &str, field: &Field<'_>) -> Result<(), SceneError> {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let is_name = name.chars().all(is_word) && name.starts_with(|c: char| c.is_ascii_alphabetic());
+    if !is_name || name.len() > LONGEST_NAME {
+        return Err(field.conflict(format!(
+            "a name begins with a letter and has at most {LONGEST_NAME} letters, digits and underscores"
+        )));
+    }
+    if name == "t" || expression::is_reserved(name) {
+        let meaning = match name {
+            "t" => "is the time",
+            "pi" => "is a number",
+            _ => "is a function",
+        };
+        return Err(field.conflict(format!("`{name}` {meaning} and can be no name; choose another")));
+    }
+    if COLUMNS.contains(&name) {
+        return Err(
+            field.conflict(format!("`{name}` is a column of tables and can be no name; choose another"))
+        );
+    }
+    Ok(())
+}

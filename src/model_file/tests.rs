@@ -1,0 +1,352 @@
+//! What files say, and every kind of refusal.
+
+use rattlemap_dynamics::model::{Contact, Domain, Model, Range, Shapes, Side};
+
+use super::*;
+
+const GOOD: &str = r#"name = "stop"
+title = "One stop"
+source = "a book"
+
+[parameters]
+omega = { default = 2.0, min = 0.0, open = true, meaning = "excitation frequency" }
+zeta = { default = 0.25, min = 0, meaning = "damping ratio" }
+F = 1.5
+s = { default = 0.2, min = -1.0, max = 1.0 }
+e = { default = 0.8, min = 0.0, max = 1.0, required = true }
+k = 1000
+
+[motion]
+coordinates = ["x"]
+mass = [["1"]]
+damping = [["2*zeta"]]
+stiffness = [[1]]
+force = ["F*omega^2"]
+load = ["-0.5"]
+frequency = "omega"
+gap = [1]
+
+[[contact]]
+side = "right"
+at = "s"
+law = "impact"
+restitution = "e"
+"#;
+
+const TWO: &str = r#"name = "two"
+
+[parameters]
+m = 2.0
+k = 3.0
+c = 0.5
+d = 0.25
+
+[motion]
+coordinates = ["a", "b"]
+velocities = ["va", "vb"]
+bodies = ["rotor", "stator"]
+mass = [["m", "0.5"], ["0.5", "1"]]
+damping = [["c", "-c"], ["-c", "c + d"]]
+stiffness = [["k", "-k"], ["-k", "k+1"]]
+frequency = "1.5"
+gap = ["1", "-2"]
+
+[[contact]]
+side = "left"
+at = "-d"
+law = "elastic"
+stiffness = "10*k"
+damping = "c"
+
+[[contact]]
+side = "right"
+at = "d"
+law = "impact"
+restitution = 0.5
+mesh_speed = "c/10"
+stiffness = "100"
+"#;
+
+fn read(text: &str) -> FileModel {
+    FileModel::parse(text, "m.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The message for a model with `old` replaced by `new`.
+fn refusal_of(text: &str, old: &str, new: &str) -> String {
+    assert!(text.contains(old), "{old:?} is not in the model");
+    FileModel::parse(&text.replacen(old, new, 1), "m.toml").expect_err(new).to_string()
+}
+
+#[test]
+fn a_file_says_all_that_a_model_is() {
+    let model = read(GOOD);
+    assert_eq!((model.name(), model.title(), model.source()), ("stop", "One stop", Some("a book")));
+    assert_eq!((model.state_names(), model.bodies()), (vec!["x", "v"], vec!["x"]));
+    let names: Vec<&str> = model.parameters().iter().map(|p| &*p.name).collect();
+    assert_eq!(names, ["omega", "zeta", "F", "s", "e", "k"]);
+    let of = |name: &str| &model.parameters()[model.index(name).unwrap()];
+    assert_eq!(of("omega").meaning, "excitation frequency");
+    assert_eq!((of("F").meaning.as_ref(), of("F").default, of("F").range), ("F", Some(1.5), Range::Finite));
+    assert_eq!(of("s").range, Range::new(-1.0, 1.0, false));
+    assert_eq!((of("e").default, model.get("e"), of("e").range), (None, Ok(0.8), Range::Unit));
+    let shapes: Vec<Shapes> = model.parameters().iter().map(|p| p.shapes).collect();
+    let [oscillator, law, neither] = [Shapes::Oscillator, Shapes::Law, Shapes::Neither];
+    assert_eq!(shapes, [oscillator, oscillator, oscillator, oscillator, law, neither]);
+    assert_eq!(model.frequency(), [0]);
+    let oscillator = model.oscillator().unwrap();
+    assert_eq!((oscillator.degrees, oscillator.gap, oscillator.omega), (1, [1.0, 0.0], 2.0));
+    assert_eq!(oscillator.mass, [[1.0, 0.0], [0.0, 1.0]]);
+    assert_eq!(oscillator.force, [6.0, 0.0]);
+    assert_eq!(oscillator.walls, [0.2, f64::NEG_INFINITY]);
+    assert_eq!(oscillator.contacts[0], Contact::Rigid);
+    let free =
+        Domain { damping: [[0.5, 0.0], [0.0; 2]], stiffness: [[1.0, 0.0], [0.0; 2]], load: [-0.5, 0.0] };
+    assert_eq!(oscillator.free, free);
+    assert_eq!(model.law(), Law { restitution: [0.8, 0.0], mesh_speed: [0.0; 2] });
+    let mut other = model.clone();
+    other.set("e", 0.5).unwrap();
+    assert_ne!(model, other);
+    assert_eq!(other.law().restitution[0], 0.5);
+}
+
+#[test]
+fn two_degrees_of_freedom_and_walls_of_different_laws() {
+    let model = read(TWO);
+    assert_eq!((model.title(), model.source()), ("two", None));
+    assert_eq!((model.state_names(), model.bodies()), (vec!["a", "va", "b", "vb"], vec!["rotor", "stator"]));
+    let oscillator = model.oscillator().unwrap();
+    assert_eq!(oscillator.mass, [[2.0, 0.5], [0.5, 1.0]]);
+    assert_eq!(oscillator.contacts, [Contact::Impact, Contact::Elastic]);
+    assert_eq!(oscillator.walls, [0.25, -0.25]);
+    assert_eq!(oscillator.free.damping, [[0.5, -0.5], [-0.5, 0.75]]);
+    let [right, left] = oscillator.meshing;
+    // k g g' and k at g.
+    assert_eq!(right.stiffness, [[103.0, -203.0], [-203.0, 404.0]]);
+    assert_eq!((right.damping, right.load), (oscillator.free.damping, [25.0, -50.0]));
+    assert_eq!(left.stiffness, [[33.0, -63.0], [-63.0, 124.0]]);
+    assert_eq!(left.damping, [[1.0, -1.5], [-1.5, 2.75]]);
+    assert_eq!(left.load, [-7.5, 15.0]);
+    assert_eq!(model.law(), Law { restitution: [0.5, 0.0], mesh_speed: [0.05, 0.0] });
+    let both = &model.parameters()[model.index("c").unwrap()];
+    assert_eq!(both.shapes, Shapes::Both);
+    assert!(model.definition().wall(Side::Left).is_some());
+}
+
+#[test]
+fn what_does_not_fit_is_refused_by_name_with_the_limit() {
+    for (old, new, expected) in [
+        (
+            "[\"x\"]",
+            "[\"x\", \"y\", \"q\"]",
+            "m.toml:14:15: `motion.coordinates = [\"x\", \"y\", \"q\"]` is out of range: it must be one or two names: a model has at most two degrees of freedom",
+        ),
+        ("[\"x\"]", "[]", "at most two degrees of freedom"),
+        (
+            "gap = [1]",
+            "gap = [1]\nforce2 = [\"F\"]",
+            "m.toml:22:1: unknown field `motion.force2 = [\"F\"]`; did you mean `force`?",
+        ),
+        ("gap = [1]", "gap = [1]\nharmonics = 2", "one harmonic force and one gap row"),
+        (
+            "\"omega\"\ngap",
+            "[\"omega\", \"2*omega\"]\ngap",
+            "m.toml:20:13: `motion.frequency = [\"omega\", \"2*omega\"]` has the wrong type: it must be one entry: the force is force cos(frequency t), one harmonic",
+        ),
+        (
+            "gap = [1]",
+            "gap = [[1], [2]]",
+            "m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry",
+        ),
+        (
+            "[[contact]]",
+            "[[contact]]\nside = \"left\"\nat = -1\nlaw = \"impact\"\nrestitution = 1\n[[contact]]\nside = \"left\"\nat = -1\nlaw = \"impact\"\nrestitution = 1\n[[contact]]",
+            "`contact = 3 tables` is out of range: it must be one or two tables, [[contact]]: a model has at most two walls",
+        ),
+        (
+            "[[contact]]",
+            "[[contact]]\nside = \"right\"\nat = 1\nlaw = \"impact\"\nrestitution = 1\n[[contact]]",
+            "m.toml:29:8: `contact.1.side = \"right\"` does not fit: there is a wall on this side already",
+        ),
+        (
+            "\"impact\"",
+            "\"elastic\"",
+            "m.toml:27:15: `contact.0.restitution = \"e\"` does not fit: it belongs to law = \"impact\" alone",
+        ),
+        (
+            "\"impact\"\nrestitution = \"e\"",
+            "\"elastic\"",
+            "`contact.0.stiffness` is missing; an elastic wall needs",
+        ),
+        ("restitution = \"e\"", "", "m.toml:23:1: `contact.0.restitution` is missing"),
+        (
+            "\"impact\"",
+            "\"sticky\"",
+            "`contact.0.law = \"sticky\"` is not known; valid names: impact, elastic",
+        ),
+        (
+            "\"2*zeta\"",
+            "\"2*zta\"",
+            "m.toml:16:13: `motion.damping.0.0 = \"2*zta\"` has an unknown name, `zta`: did you mean `zeta`?",
+        ),
+        ("\"2*zeta\"", "\"2*x\"", "has an unknown name, `x`"),
+        ("\"2*zeta\"", "\"cos(t)\"", "has an unknown name, `t`"),
+        ("\"2*zeta\"", "\"2*\"", "m.toml:16:13: `motion.damping.0.0 = \"2*\"` cannot be read to its end"),
+        ("\"2*zeta\"", "true", "must be an expression in quotes"),
+        (
+            "\"2*zeta\"",
+            "\"-zeta\"",
+            "m.toml:16:11: `motion.damping = [[\"-zeta\"]]` does not fit: at the defaults of stop, damping in free motion",
+        ),
+        (
+            "[[\"1\"]]",
+            "[[\"F-1.5\"]]",
+            "m.toml:15:8: `motion.mass = [[\"F-1.5\"]]` does not fit: at the defaults of stop, mass 1 = 0",
+        ),
+        ("[[\"1\"]]", "[[\"1\", \"0\"]]", "`motion.mass.0 = [\"1\", \"0\"]` is out of range"),
+        (
+            "at = \"s\"",
+            "at = \"1/0\"",
+            "m.toml:25:6: `contact.0.at = \"1/0\"` does not fit: at the defaults of stop, position of the right wall = inf",
+        ),
+        (
+            "\"e\"\n",
+            "\"2*e\"\n",
+            "m.toml:27:15: `contact.0.restitution = \"2*e\"` does not fit: at the defaults of stop, restitution = 1.6",
+        ),
+        (
+            "\"e\"\n",
+            "\"e\"\nstiffness = \"-k\"\n",
+            "m.toml:28:13: `contact.0.stiffness = \"-k\"` does not fit",
+        ),
+        (
+            "F = 1.5",
+            "t = 1.5",
+            "m.toml:8:5: `parameters.t = 1.5` does not fit: `t` is the time and can be no name",
+        ),
+        ("F = 1.5", "pi = 1.5", "`pi` is a number and can be no name"),
+        ("F = 1.5", "sqrt = 1.5", "`sqrt` is a function and can be no name"),
+        ("F = 1.5", "class = 1.5", "`class` is a column of tables and can be no name"),
+        ("F = 1.5", "\"F 1\" = 1.5", "a name begins with a letter"),
+        (
+            "F = 1.5",
+            "F = inf",
+            "m.toml:8:5: `parameters.F = inf` is out of range: it must be a finite number",
+        ),
+        (
+            "F = 1.5",
+            "F = \"2\"",
+            "`parameters.F = \"2\"` has the wrong type: it must be a number, its default, or a table",
+        ),
+        ("F = 1.5", "F = { min = 0.0 }", "`parameters.F.default` is missing; a parameter needs a default"),
+        (
+            "F = 1.5",
+            "F = { default = -1, min = 0 }",
+            "`parameters.F.default = -1` is out of range: it must be finite and at least 0",
+        ),
+        (
+            "F = 1.5",
+            "F = { default = 1, min = 2, max = 1 }",
+            "`parameters.F.max = 1` is out of range: it must be greater than min = 2",
+        ),
+        ("F = 1.5", "F = { default = 1, open = true }", "`parameters.F.open = true` does not fit"),
+        (
+            "F = 1.5",
+            "F = { default = 1, meaning = \"a\\nb\" }",
+            "one line of text, without control characters",
+        ),
+        ("F = 1.5", "F = { default = 1, maximum = 2 }", "unknown field `parameters.F.maximum = 2`"),
+        ("F = 1.5", "x = 1.5\nF = 1.5", "`x` names something else already"),
+        ("\"stop\"", "\"a b\"", "m.toml:1:8: `name = \"a b\"` is out of range"),
+        ("name = \"stop\"", "", "m.toml:1:1: `name` is missing"),
+        ("[motion]", "[movement]", "unknown field `movement = { ... }`; valid names: name, title"),
+        ("mass = [[\"1\"]]\n", "", "m.toml:13:2: `motion.mass` is missing"),
+    ] {
+        let message = refusal_of(GOOD, old, new);
+        assert!(message.contains(expected), "{new}: expected {expected:?} in: {message}");
+    }
+    for (old, new, expected) in [
+        (
+            "\"-c\"], [\"-c\"",
+            "\"-c\"], [\"c\"",
+            "m.toml:14:11: `motion.damping = [[\"c\", \"-c\"], [\"c\", \"c + d\"]]` does not fit: at the defaults of two, damping in free motion = [[0.5, -0.5], [0.5, 0.75]]: the matrix must be symmetric",
+        ),
+        (
+            "\"0.5\"], [\"0.5\"",
+            "\"5\"], [\"5\"",
+            "m.toml:13:8: `motion.mass = [[\"m\", \"5\"], [\"5\", \"1\"]]` does not fit: at the defaults of two, mass = [[2.0, 5.0], [5.0, 1.0]]: the matrix must be positive definite",
+        ),
+        (
+            "at = \"-d\"",
+            "at = \"2*d\"",
+            "`contact.0.at = \"2*d\"` does not fit: at the defaults of two, walls at 0.25 and 0.5",
+        ),
+        (
+            "[\"va\", \"vb\"]",
+            "[\"va\"]",
+            "`motion.velocities = [\"va\"]` is out of range: it must be a list of names, one for each coordinate",
+        ),
+        ("[\"va\", \"vb\"]", "[\"va\", \"a\"]", "`a` names something else already"),
+        ("\"10*k\"", "\"10*k*log(0)\"", "m.toml:23:13: `contact.0.stiffness = \"10*k*log(0)\"` does not fit"),
+    ] {
+        let message = refusal_of(TWO, old, new);
+        assert!(message.contains(expected), "{new}: expected {expected:?} in: {message}");
+    }
+    let none =
+        FileModel::parse(&GOOD[..GOOD.find("[[contact]]").unwrap()], "m.toml").unwrap_err().to_string();
+    assert!(none.contains("`contact` is missing; write [[contact]]"), "{none}");
+}
+
+#[test]
+fn every_model_that_is_built_in_is_read_under_its_name() {
+    for (name, text) in BUILT_IN {
+        let model = FileModel::parse(text, name).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(model.name(), *name);
+        assert!(model.definition().summary.is_some() && model.source().is_some(), "{name}");
+        assert!(model.is_built_in());
+        for parameter in model.parameters() {
+            assert!(parameter.meaning != parameter.name, "{name}: {} has no meaning", parameter.name);
+            assert!(parameter.shapes != Shapes::Neither, "{name}: {} is used nowhere", parameter.name);
+        }
+    }
+    assert_eq!(FileModel::all_built_in().len(), BUILT_IN.len());
+}
+
+#[test]
+fn equations_are_written_as_the_field_writes_them() {
+    assert_eq!(
+        FileModel::built_in("gear-pair").unwrap().equations(),
+        [
+            "gap   z = x1 - x2",
+            "rate  w = v1 - v2",
+            "free, -b < z < b",
+            "    m1 x1'' + r1 x1' + k1 x1 = F cos(omega t)",
+            "    m2 x2'' + r2 x2' + k2 x2 = 0",
+            "behind the right wall, with N = k (z - b) + r w",
+            "    m1 x1'' + r1 x1' + k1 x1 + N = F cos(omega t)",
+            "    m2 x2'' + r2 x2' + k2 x2 - N = 0",
+            "behind the left wall, with N = k (z + b) + r w",
+            "    m1 x1'' + r1 x1' + k1 x1 + N = F cos(omega t)",
+            "    m2 x2'' + r2 x2' + k2 x2 - N = 0",
+        ]
+    );
+    assert_eq!(
+        read(GOOD).equations(),
+        [
+            "gap   z = x",
+            "rate  w = v",
+            "free, z < s",
+            "    x'' + 2*zeta x' + x = F*omega^2 cos(omega t) - 0.5",
+            "on the right wall: z stays s, as long as it is pressed",
+        ]
+    );
+    assert_eq!(
+        read(TWO).equations()[3..8],
+        [
+            "    m a'' + 0.5 b'' + c a' - c b' + k a - k b = 0",
+            "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b = 0",
+            "behind the right wall, with N = 100 (z - d)",
+            "    m a'' + 0.5 b'' + c a' - c b' + k a - k b + N = 0",
+            "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - 2 N = 0",
+        ]
+    );
+}

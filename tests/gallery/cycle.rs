@@ -1,0 +1,71 @@
+//! What the reference says of motion that is known to close, and what the independent integrator says of it.
+
+use nalgebra::{Complex, Matrix4, Vector4};
+
+use rattlemap::validate::independent::dop853::Solver;
+use rattlemap::validate::independent::flight::Flight;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Law, Oscillator, State};
+use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::stability::UNIT;
+
+use crate::common::apart;
+
+/// A motion over some periods.
+pub(crate) struct Followed {
+    /// Where it ends.
+    pub(crate) end: State,
+    pub(crate) events: Vec<Happening>,
+    /// What differences beside it become.
+    pub(crate) monodromy: Matrix4<f64>,
+    pub(crate) meshing_time: f64,
+}
+
+/// The reference's motion from a start at phase 0.
+pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> Followed {
+    let flow = Flow::new(oscillator);
+    let mut trajectory = Trajectory::with_tangents(&flow, law, start, UNIT);
+    let mut events = Vec::new();
+    for _ in 0..periods {
+        trajectory.advance_period(&mut events).expect("an ordinary motion");
+    }
+    let columns = trajectory.tangents().map(Vector4::from);
+    Followed {
+        end: trajectory.state(),
+        events,
+        monodromy: Matrix4::from_columns(&columns) * trajectory.log_scale().exp(),
+        meshing_time: trajectory.meshing_time(),
+    }
+}
+
+/// How far the independent integrator ends from where the reference does, and whether it meets as many events.
+pub(crate) fn off_the_integrator(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> f64 {
+    let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
+    let mut flight = Flight::new(oscillator, law, start);
+    (0..periods).for_each(|_| {
+        solver.advance(&mut flight, 0.0, oscillator.period()).expect("an ordinary motion");
+    });
+    let ours = followed(oscillator, law, start, periods);
+    assert_eq!(flight.events.len(), ours.events.len(), "{:?} {:?}", flight.events, ours.events);
+    apart(flight.state(), ours.end)
+}
+
+/// Eigenvalues of a matrix of two rows, the larger first.
+pub(crate) fn eigenvalues([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
+    let (trace, det) = (a + d, a * d - b * c);
+    let root = Complex::new(0.25 * trace * trace - det, 0.0).sqrt();
+    let [first, second] = [0.5 * trace + root, 0.5 * trace - root];
+    if first.norm() >= second.norm() { [first, second] } else { [second, first] }
+}
+
+/// The block of the first displacement.
+pub(crate) fn first_block(m: &Matrix4<f64>) -> [[f64; 2]; 2] {
+    [[m[(0, 0)], m[(0, 1)]], [m[(1, 0)], m[(1, 1)]]]
+}
+
+/// How far two pairs of multipliers are apart, by trace and determinant: no root is taken.
+pub(crate) fn multipliers_apart(ours: [[f64; 2]; 2], theirs: [[f64; 2]; 2]) -> f64 {
+    let trace = |m: [[f64; 2]; 2]| m[0][0] + m[1][1];
+    let det = |m: [[f64; 2]; 2]| m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    (trace(ours) - trace(theirs)).abs().max((det(ours) - det(theirs)).abs())
+}

@@ -1,0 +1,230 @@
+//! Models drawn at random: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written
+//! as a file and read like anybody's.
+
+use std::fmt::Write as _;
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use rattlemap::map::random::Random;
+use rattlemap::model_file::FileModel;
+use rattlemap::validate::independent::dop853::Solver;
+use rattlemap::validate::independent::flight::Flight;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Law, Model, Oscillator, State};
+use rattlemap_dynamics::orbit::{Budget, Measured, Settings, Status, measure};
+use rattlemap_dynamics::reference::Trajectory;
+
+use crate::common::apart;
+
+/// A cell that takes longer hangs.
+const HANGS: Duration = Duration::from_secs(60);
+
+pub(crate) struct Drawn {
+    pub(crate) model: FileModel,
+    pub(crate) oscillator: Oscillator,
+    pub(crate) law: Law,
+    pub(crate) start: State,
+}
+
+fn logarithmic(random: &mut Random, low: f64, high: f64) -> f64 {
+    10f64.powf(low + (high - low) * random.unit())
+}
+
+fn or_none(random: &mut Random, share: f64, low: f64, high: f64) -> f64 {
+    if random.unit() < share { 0.0 } else { logarithmic(random, low, high) }
+}
+
+fn even(random: &mut Random, reach: f64) -> f64 {
+    reach * (2.0 * random.unit() - 1.0)
+}
+
+/// A symmetric matrix with the given diagonal, definite where that is positive; coupled as often as not.
+fn matrix(random: &mut Random, degrees: usize, diagonal: [f64; 2]) -> String {
+    let [a, b] = diagonal;
+    let coupling = even(random, 0.9);
+    let coupling = if random.unit() < 0.5 { coupling * (a * b).sqrt() } else { 0.0 };
+    match degrees {
+        1 => format!("[[\"{a:?}\"]]"),
+        _ => format!("[[\"{a:?}\", \"{coupling:?}\"], [\"{coupling:?}\", \"{b:?}\"]]"),
+    }
+}
+
+fn restitution(random: &mut Random) -> f64 {
+    match random.unit() {
+        x if x < 0.2 => 0.0,
+        x if x < 0.25 => 1.0,
+        x if x < 0.3 => 1.0 - logarithmic(random, -6.0, -1.0),
+        _ => random.unit(),
+    }
+}
+
+fn contact(random: &mut Random, side: &str, at: f64) -> String {
+    let mut text = format!("[[contact]]\nside = \"{side}\"\nat = \"{at:?}\"\n");
+    let stiffness = logarithmic(random, 0.0, 4.0);
+    let damping = or_none(random, 0.3, -2.0, 1.0);
+    let kind = random.unit();
+    if kind < 0.35 {
+        let _ = writeln!(text, "law = \"elastic\"\nstiffness = \"{stiffness:?}\"\ndamping = \"{damping:?}\"");
+        return text;
+    }
+    let _ = writeln!(text, "law = \"impact\"\nrestitution = \"{:?}\"", restitution(random));
+    if kind > 0.65 {
+        let speed = or_none(random, 0.2, -4.0, 0.0);
+        let _ = writeln!(
+            text,
+            "mesh_speed = \"{speed:?}\"\nstiffness = \"{stiffness:?}\"\ndamping = \"{damping:?}\""
+        );
+    }
+    text
+}
+
+/// The model of a seed, and where its motion starts.
+pub(crate) fn drawn(seed: u64) -> Drawn {
+    let mut random = Random::new(seed);
+    let random = &mut random;
+    let degrees = if random.unit() < 0.5 { 1 } else { 2 };
+    let masses = [logarithmic(random, -1.0, 1.0), logarithmic(random, -1.0, 1.0)];
+    let mass = matrix(random, degrees, masses);
+    let stiff = [or_none(random, 0.1, -1.0, 2.0), or_none(random, 0.1, -1.0, 2.0)];
+    let stiffness = matrix(random, degrees, stiff);
+    let damp = [or_none(random, 0.1, -2.0, 0.5), or_none(random, 0.1, -2.0, 0.5)];
+    let damping = matrix(random, degrees, damp);
+    let pair = |values: [f64; 2]| match degrees {
+        1 => format!("[\"{:?}\"]", values[0]),
+        _ => format!("[\"{:?}\", \"{:?}\"]", values[0], values[1]),
+    };
+    let force = pair([even(random, 10.0), even(random, 10.0)]);
+    let load =
+        if random.unit() < 0.4 { pair([0.0; 2]) } else { pair([even(random, 3.0), even(random, 3.0)]) };
+    let gap = match random.unit() {
+        x if x < 0.3 => pair([1.0, -1.0]),
+        x if x < 0.5 && degrees == 2 => pair([0.0, 1.0 + random.unit()]),
+        _ => pair([1.0 + random.unit(), even(random, 3.0)]),
+    };
+    let omega = logarithmic(random, -0.3, 1.0);
+    let right = even(random, 1.0);
+    let left = right - logarithmic(random, -2.0, 0.5);
+    let walls = match random.unit() {
+        x if x < 0.25 => contact(random, "right", right),
+        x if x < 0.5 => contact(random, "left", left),
+        _ => contact(random, "right", right) + &contact(random, "left", left),
+    };
+    let names = if degrees == 1 { "[\"x\"]" } else { "[\"x1\", \"x2\"]" };
+    let text = format!(
+        "name = \"drawn\"\ntitle = \"Drawn\"\n[parameters]\nomega = {{ default = {omega:?}, min = 0.0, open = true }}\n\
+         [motion]\ncoordinates = {names}\nmass = {mass}\ndamping = {damping}\nstiffness = {stiffness}\nforce = {force}\n\
+         load = {load}\nfrequency = \"omega\"\ngap = {gap}\n{walls}"
+    );
+    let model = FileModel::parse(&text, "drawn.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let mut start = [0.0; 4];
+    if random.unit() < 0.5 {
+        (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));
+    }
+    Drawn { oscillator: model.oscillator().expect("valid"), law: model.law(), model, start }
+}
+
+pub(crate) const SETTINGS: Settings =
+    Settings { transient_periods: 32, observed_periods: 32, max_period: 16 };
+
+pub(crate) fn budget() -> Budget {
+    Budget {
+        settings: SETTINGS,
+        early_stop: true,
+        undecided_periods: 0,
+        exponent: true,
+        shows_exponent: true,
+    }
+}
+
+/// What the reference says, and how long it took.
+fn measured(cell: &Drawn) -> (Measured, Duration) {
+    let clock = Instant::now();
+    (measure(&Flow::new(&cell.oscillator), cell.law, cell.start, &budget()), clock.elapsed())
+}
+
+/// Every one ends in a named status, after bounded work, with numbers.
+fn end_well(seeds: std::ops::Range<u32>) {
+    let ends: Vec<(u32, Status, bool, Duration)> = seeds
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|seed| {
+            let cell = drawn(u64::from(seed));
+            let (measured, time) = measured(&cell);
+            let record =
+                rattlemap::map::engine::measured_record(&measured, &rattlemap::map::plan::Needs::EVERYTHING);
+            let superstable = record.lyapunov == f64::NEG_INFINITY && record.period > 0;
+            let numbers = [record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
+            let is_finite = (record.lyapunov.is_finite() || superstable)
+                && numbers.iter().chain(&record.strobe).all(|x| x.is_finite());
+            (seed, rattlemap::record::classify::status(&record), is_finite, time)
+        })
+        .collect();
+    for status in Status::ALL {
+        let count = ends.iter().filter(|end| end.1 == status).count();
+        if count > 0 {
+            let seeds: Vec<u32> =
+                ends.iter().filter(|end| end.1 == status).map(|end| end.0).take(8).collect();
+            println!("{count} {}, such as {seeds:?}", status.name());
+        }
+    }
+    let slowest = ends.iter().max_by_key(|end| end.3).unwrap();
+    println!("the slowest: seed {} in {:.2} s", slowest.0, slowest.3.as_secs_f64());
+    let wrong: Vec<u32> = ends.iter().filter(|end| !end.2).map(|end| end.0).collect();
+    assert!(wrong.is_empty(), "not finite: {wrong:?}");
+    assert!(slowest.3 < HANGS);
+    // They move: most are decided within so few periods.
+    let ok = ends.iter().filter(|end| end.1 == Status::Ok).count();
+    assert!(3 * ok > ends.len(), "{ok} of {}", ends.len());
+}
+
+#[test]
+fn four_hundred_models_end_well() {
+    end_well(0..400);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn twenty_thousand_models_end_well() {
+    end_well(0..20_000);
+}
+
+/// After a period the reference is where the independent integrator is, with as many events.
+fn agree(seeds: std::ops::Range<u32>) {
+    let off: Vec<(u32, f64, [usize; 2])> = seeds
+        .into_par_iter()
+        .with_max_len(1)
+        .filter_map(|seed| {
+            let cell = drawn(u64::from(seed));
+            let flow = Flow::new(&cell.oscillator);
+            let mut trajectory = Trajectory::new(&flow, cell.law, cell.start);
+            let mut events = Vec::new();
+            trajectory.advance_period(&mut events).ok()?;
+            // Many impacts forget where they began, and infinitely many are told by each side as far as it goes.
+            if events.len() > 20 {
+                return None;
+            }
+            let solver = Solver { omega: cell.oscillator.omega, tolerance: 1e-12 };
+            let mut flight = Flight::new(&cell.oscillator, cell.law, cell.start);
+            solver.advance(&mut flight, 0.0, cell.oscillator.period())?;
+            let state = trajectory.state();
+            let scale = state.iter().fold(cell.oscillator.length_scale(), |m, x| m.max(x.abs()));
+            let told = match flight.events.iter().any(|ended| ended.after_series) {
+                true => [0; 2],
+                false => [events.len(), flight.events.len()],
+            };
+            Some((seed, apart(flight.state(), state) / scale, told))
+        })
+        .collect();
+    let differ: Vec<_> =
+        off.iter().filter(|(_, off, [ours, theirs])| !(*off < 1e-6) || ours != theirs).collect();
+    let mut sizes: Vec<f64> = off.iter().map(|(_, off, _)| *off).collect();
+    sizes.sort_by(f64::total_cmp);
+    println!("{} models, median {:.1e}; differ: {differ:?}", off.len(), sizes[sizes.len() / 2]);
+    assert!(off.len() > 100 && differ.is_empty());
+}
+
+#[test]
+fn random_models_are_where_the_independent_integrator_is() {
+    agree(0..200);
+}

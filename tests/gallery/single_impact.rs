@@ -1,0 +1,212 @@
+//! One rigid stop on the right: orbits of one impact in n periods, in closed form.
+//!
+//! `x'' + c x' + x = F cos(omega t)`, `x <= sigma`, `v+ = -e v-`. Beside the steady response `x_s` the state obeys the
+//! unforced equation with the propagator `E`. An orbit leaves the stop with `V` and comes back after `n T` with `-V/e`:
+//!
+//! ```text
+//! E (sigma - x_s, V - v_s) = (sigma - x_s, -V/e - v_s)
+//! ```
+//!
+//! is linear: `sigma - x_s = a V`, `v_s = b V`. Since `x_s^2 + (v_s/omega)^2 = P^2` with the amplitude `P` of the steady
+//! response, `(sigma - a V)^2 + (b V/omega)^2 = P^2`: V against sigma is an ellipse, whose ends are folds (Budd and Dux,
+//! Phil. Trans. R. Soc. A 347 (1994) 365-389, for c = 0; Shaw and Holmes, J. Sound Vib. 90 (1983) 129-155).
+
+use crate::common::apart;
+use crate::common::closed_form::{Linear, Wall, Walled};
+use crate::cycle::{eigenvalues, first_block, followed, multipliers_apart, off_the_integrator};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{NonImpacting, State};
+use rattlemap_dynamics::reference::{EventKind, Trajectory};
+
+/// A forced oscillator with a stop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stop {
+    pub(crate) c: f64,
+    pub(crate) force: f64,
+    pub(crate) omega: f64,
+    pub(crate) sigma: f64,
+    pub(crate) e: f64,
+}
+
+/// An orbit of one impact.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Orbit {
+    /// Velocity after the impact, and the phase of the impact in radians.
+    pub(crate) leaving: f64,
+    pub(crate) phase: f64,
+    /// The state at the next phase 0.
+    pub(crate) strobe: State,
+    pub(crate) monodromy: [[f64; 2]; 2],
+}
+
+impl Stop {
+    pub(crate) fn linear(&self) -> Linear {
+        Linear { m: 1.0, c: self.c, k: 1.0, force: self.force, omega: self.omega, load: 0.0 }
+    }
+
+    pub(crate) fn walled(&self) -> Walled {
+        let stop = Wall::Rigid { at: self.sigma, e: self.e };
+        Walled { free: self.linear(), walls: [Some(stop), None] }
+    }
+
+    /// Amplitude and phase lag of the steady response.
+    fn response(&self) -> [f64; 2] {
+        let [x, v] = self.linear().steady(0.0);
+        [x.hypot(v / self.omega), (v / self.omega).atan2(x)]
+    }
+
+    /// `a`, `b` and the coefficients of the quadratic equation in V.
+    fn ellipse(&self, n: u32) -> ([f64; 2], [f64; 3]) {
+        let [[e11, e12], [e21, e22]] = self.linear().propagator(f64::from(n) * self.linear().period());
+        let right = [-e12, -1.0 / self.e - e22];
+        let det = (e11 - 1.0) * (1.0 - e22) + e12 * e21;
+        let a = (right[0] * (1.0 - e22) + e12 * right[1]) / det;
+        let b = ((e11 - 1.0) * right[1] - e21 * right[0]) / det;
+        let [amplitude, _] = self.response();
+        let square = a * a + (b / self.omega).powi(2);
+        ([a, b], [square, -2.0 * a * self.sigma, self.sigma * self.sigma - amplitude * amplitude])
+    }
+
+    /// The orbits of one impact in n periods that leave the stop, the faster one first; they may pass through it later.
+    pub(crate) fn orbits(&self, n: u32) -> Vec<Orbit> {
+        let ([a, b], [square, linear, constant]) = self.ellipse(n);
+        let root = (linear * linear - 4.0 * square * constant).sqrt();
+        // Without cancellation.
+        let q = -0.5 * (linear + root.copysign(linear));
+        let mut speeds = [q / square, constant / q];
+        speeds.sort_by(f64::total_cmp);
+        speeds.into_iter().filter(|&v| v < 0.0).map(|v| self.orbit(n, v, [a, b])).collect()
+    }
+
+    fn orbit(&self, n: u32, leaving: f64, [a, b]: [f64; 2]) -> Orbit {
+        let (linear, [_, lag]) = (self.linear(), self.response());
+        // x_s = P cos(omega t - lag), v_s = -omega P sin(omega t - lag).
+        let (cos, sin) = (self.sigma - a * leaving, -b * leaving / self.omega);
+        let phase = (sin.atan2(cos) + lag).rem_euclid(std::f64::consts::TAU);
+        let (t, span) = (phase / self.omega, f64::from(n) * linear.period());
+        let [x, v] = linear.after(t, [self.sigma, leaving], span - t);
+        let closing = -leaving / self.e;
+        let [before, after] = [closing, leaving].map(|v| linear.acceleration(t, [self.sigma, v]));
+        // S = [[-e, 0], [(f+ + e f-) / v-, -e]] on (x, v).
+        let shear = (after + self.e * before) / closing;
+        let [[e11, e12], [e21, e22]] = linear.propagator(span);
+        let monodromy =
+            [[-self.e * e11, -self.e * e12], [shear * e11 - self.e * e21, shear * e12 - self.e * e22]];
+        Orbit { leaving, phase, strobe: [x, v, 0.0, 0.0], monodromy }
+    }
+
+    /// The stop at which both orbits of one impact become one.
+    fn fold(&self, n: u32) -> f64 {
+        let ([_, b], [square, ..]) = self.ellipse(n);
+        let [amplitude, _] = self.response();
+        // The discriminant: a^2 sigma^2 = square (sigma^2 - P^2), square - a^2 = (b/omega)^2.
+        amplitude * square.sqrt() / (b / self.omega).abs()
+    }
+}
+
+/// The impact oscillator of the gallery.
+pub(crate) const STOP: Stop = Stop { c: 0.04, force: 1.0, omega: 2.0, sigma: 0.2, e: 0.8 };
+
+/// COCO's impact demo: Recipes for Continuation, Example 15.2.
+pub(crate) const COCO: Stop = Stop { c: 0.1, force: 1.0, omega: 1.0, sigma: 1.0, e: 0.8 };
+
+/// Cells with stable orbits that do not pass through the stop.
+pub(crate) fn stable() -> Vec<(Stop, u32)> {
+    let at = |omega: f64| Stop { omega, ..STOP };
+    let mut cells: Vec<(Stop, u32)> = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0].map(|omega| (at(omega), 1)).into();
+    cells.extend([3.0, 3.2, 3.4, 3.6].map(|omega| (at(omega), 2)));
+    cells.extend([4.6, 5.0, 5.4].map(|omega| (at(omega), 3)));
+    cells.push((COCO, 1));
+    cells
+}
+
+#[test]
+fn states_and_multipliers_of_the_closed_form() {
+    for (stop, n) in stable() {
+        let orbit = stop.orbits(n)[0];
+        assert!(eigenvalues(orbit.monodromy)[0].norm() < 1.0, "{stop:?}");
+        let (oscillator, law) = stop.walled().oscillator();
+        let found = followed(&oscillator, law, orbit.strobe, n);
+        let off = apart(found.end, orbit.strobe);
+        let [event] = found.events[..] else { panic!("{stop:?}: {:?}", found.events) };
+        assert_eq!(event.kind, EventKind::Impact);
+        let speed = (event.after[1] - orbit.leaving).abs();
+        let multipliers = multipliers_apart(first_block(&found.monodromy), orbit.monodromy);
+        let integrated = off_the_integrator(&oscillator, law, orbit.strobe, n);
+        println!(
+            "{stop:?}, n = {n}: state {off:.1e}, speed {speed:.1e}, multipliers {multipliers:.1e}, DOP853 {integrated:.1e}"
+        );
+        assert!(off < 1e-12 && speed < 1e-12 && multipliers < 1e-12, "{stop:?}");
+        assert!(integrated < 1e-10, "{stop:?}");
+        assert!(found.monodromy.fixed_view::<2, 2>(2, 2).iter().all(|&x| x == 0.0), "no second displacement");
+    }
+}
+
+/// The start of the demo's first continuation, as printed there: velocity and phase after the impact, and the state half a
+/// period later.
+#[test]
+fn coco_prints_this_orbit() {
+    let orbit = COCO.orbits(1)[0];
+    assert!((orbit.leaving + 1.36).abs() < 0.005 && (orbit.phase - 0.076).abs() < 0.0005, "{orbit:?}");
+    let (oscillator, law) = COCO.walled().oscillator();
+    let flow = Flow::new(&oscillator);
+    let mut trajectory = Trajectory::new(&flow, law, orbit.strobe);
+    trajectory.advance_to(std::f64::consts::PI, &mut ()).unwrap();
+    let [x, v, ..] = trajectory.state();
+    assert!((x + 0.98).abs() < 0.005 && (v + 0.29).abs() < 0.005, "({x}, {v})");
+}
+
+/// The steady response grazes the stop where its amplitude is sigma: `F^2 = sigma^2 ((1 - w^2)^2 + c^2 w^2)`.
+#[test]
+fn it_grazes_where_the_response_reaches_the_stop() {
+    for stop in [STOP, COCO, Stop { force: 0.3, c: 0.2, ..STOP }] {
+        let ratio = (stop.force / stop.sigma).powi(2);
+        let p = stop.c * stop.c - 2.0;
+        let grazing = (0.5 * (-p + (p * p - 4.0 * (1.0 - ratio)).sqrt())).sqrt();
+        // The reference's motion on the steady response meets the stop on one side alone.
+        let meets = |omega: f64| {
+            let stop = Stop { omega, ..stop };
+            let (oscillator, law) = stop.walled().oscillator();
+            let [x, v] = stop.linear().steady(0.0);
+            !followed(&oscillator, law, [x, v, 0.0, 0.0], 1).events.is_empty()
+        };
+        let (mut low, mut high) = (grazing * 0.99, grazing * 1.01);
+        assert!(meets(low) && !meets(high));
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if meets(middle) { low = middle } else { high = middle }
+        }
+        println!("{stop:?}: grazing at {grazing}, off by {:.1e}", low - grazing);
+        assert!((low - grazing).abs() < 1e-12 * grazing, "{low} {grazing}");
+        let is_clear = |share: f64| {
+            let (oscillator, _) = Stop { omega: grazing * share, ..stop }.walled().oscillator();
+            NonImpacting::new(&oscillator).is_some()
+        };
+        assert!(!is_clear(1.0 - 1e-8) && is_clear(1.0 + 1e-7));
+    }
+}
+
+/// Without damping: Budd and Dux. At the ends of the ellipse both orbits are one, and a multiplier is 1.
+#[test]
+fn the_ends_of_the_ellipse_are_folds() {
+    for (omega, n) in [(1.3, 1), (1.6, 1), (1.9, 1), (3.4, 2), (3.7, 2)] {
+        let stop = Stop { c: 0.0, omega, ..STOP };
+        let fold = stop.fold(n);
+        assert!(Stop { sigma: fold * (1.0 + 1e-10), ..stop }.orbits(n).is_empty());
+        let just = Stop { sigma: fold * (1.0 - 1e-10), ..stop };
+        let orbit = just.orbits(n)[0];
+        let from_one = |m: [[f64; 2]; 2]| {
+            let (trace, det) = (m[0][0] + m[1][1], m[0][0] * m[1][1] - m[0][1] * m[1][0]);
+            (1.0 - trace + det).abs()
+        };
+        let (oscillator, law) = just.walled().oscillator();
+        let found = followed(&oscillator, law, orbit.strobe, n);
+        assert_eq!(found.events.len(), 1, "{stop:?}");
+        let ours = first_block(&found.monodromy);
+        let off = multipliers_apart(ours, orbit.monodromy);
+        println!("n = {n}, omega = {omega}: fold at {fold}, {:.1e} from 1, off by {off:.1e}", from_one(ours));
+        assert!(off < 1e-11 && from_one(ours) < 1e-4);
+        // The other multiplier there is e^2, all that an impact loses.
+        assert!((ours[0][0] + ours[1][1] - 1.64).abs() < 1e-4);
+    }
+}
