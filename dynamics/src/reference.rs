@@ -290,6 +290,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                     self.clear_step(linear, step, until);
                     return Ok(());
                 }
+                StepVerdict::Rests | StepVerdict::Unclear if matches!(self.mode, Mode::Stuck(_)) => {
+                    return self.step_at_rest(until, observer);
+                }
                 StepVerdict::Rests => {
                     self.note_grazing();
                     self.clear_step(linear, step, until);

@@ -7,15 +7,13 @@ use crate::cli::say;
 use crate::gpu::Precision;
 use crate::map::printable::is_printable;
 use crate::map::scene::{Along, Format};
+use crate::model_file::DEFAULT as DEFAULT_MODEL;
 use crate::validate::DEFAULT_SAMPLES;
 use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
 use rattlemap_dynamics::orbit::Settings;
-
-/// Restitution where `orbit` is not told any: the paper's last periodic motion before chaos.
-pub(crate) const DEFAULT_RESTITUTION: f64 = 0.605;
 
 /// Motion of a gear pair with backlash: flights between the tooth surfaces in closed form, every
 /// contact located, cycles named by their word, and the Lyapunov exponent of each.
@@ -272,16 +270,22 @@ pub(crate) enum EngineChoice {
 /// motion is shown over one cycle, any other over its last 8 forcing periods.
 #[derive(Debug, Args)]
 #[command(after_help = "Example, the paper's meshing motion with its figures:\n  \
-    rattlemap orbit --set e=0.06 --out out/meshing")]
+    rattlemap orbit --set e=0.06 --out out/meshing\n\n\
+    And a motion of another model:\n  \
+    rattlemap orbit --model impact-oscillator --set omega=2.8")]
 pub(crate) struct Orbit {
-    /// Set a parameter; the others are the paper's Table 1, and e = 0.605. Any of m1 m2 r1 r2 k1 k2
-    /// r k F omega b e mesh_speed. May be repeated
+    /// The model: a name that `rattlemap models` lists, or a file
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_MODEL)]
+    pub(crate) model: String,
+
+    /// Set a parameter of the model; the others have its defaults. For the gear pair these are the paper's Table 1,
+    /// and e = 0.605: any of m1 m2 r1 r2 k1 k2 r k F omega b e mesh_speed. May be repeated
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     pub(crate) set: Vec<String>,
 
-    /// State at phase 0 to start from; at rest unless given
+    /// State at phase 0 to start from; at rest unless given. Of a model of one coordinate: X,V
     #[arg(long, value_name = "X1,V1,X2,V2", allow_hyphen_values = true, value_parser = state)]
-    pub(crate) start: Option<State>,
+    pub(crate) start: Option<Given>,
 
     /// Forcing periods of the first check of the motion, 2 or more. No limit: while it is undecided, checks of
     /// twice the length follow, up to 32768 periods or this many, each after up to 50 periods in which a
@@ -326,13 +330,25 @@ pub(crate) struct Orbit {
     pub(crate) force: bool,
 }
 
+/// A state as it was given: its model says how many numbers it should have.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Given {
+    state: State,
+    pub(crate) count: usize,
+}
+
 /// A state as `--start` takes it.
-fn state(text: &str) -> Result<State, String> {
+fn state(text: &str) -> Result<Given, String> {
     let numbers: Option<Vec<f64>> =
         text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
-    numbers
-        .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| "it must be four finite numbers, such as 0.1,0,-0.2,1.5".to_owned())
+    match numbers.as_deref() {
+        Some(&[x, v]) => Ok(Given { state: [x, v, 0.0, 0.0], count: 2 }),
+        Some(&[x1, v1, x2, v2]) => Ok(Given { state: [x1, v1, x2, v2], count: 4 }),
+        _ => Err(
+            "it must be four finite numbers, such as 0.1,0,-0.2,1.5, or two for a model of one coordinate"
+                .to_owned(),
+        ),
+    }
 }
 
 /// A time as `--time` takes it.
@@ -345,7 +361,7 @@ fn time(text: &str) -> Result<f64, String> {
 impl Orbit {
     /// The state to start from.
     pub(crate) fn start(&self) -> State {
-        self.start.unwrap_or(REST)
+        self.start.map_or(REST, |given| given.state)
     }
 
     /// How long to integrate: a cycle counts once it has come round twice.
@@ -406,17 +422,24 @@ impl Bifurcation {
     }
 }
 
-/// What can be swept: the models, or one of them on a page
+/// What can be asked: the models, or one of them on a page
 ///
-/// Without a name: every model in one line. With one: equations, contact law, parameters with defaults and
-/// ranges, symbols of words, classes and statuses, the source.
+/// Without a name: every model that is built in, in one line. With one, or with the file of a model of your own:
+/// equations, what happens at the walls, parameters with defaults and ranges, symbols of words, classes and statuses,
+/// the source.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  \
-    rattlemap models gear-pair")]
+#[command(after_help = "Examples:\n  \
+    rattlemap models gear-pair\n  \
+    rattlemap models my-model.toml\n  \
+    rattlemap models bilinear --file > my-model.toml")]
 pub(crate) struct Models {
     /// The model
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME|FILE")]
     pub(crate) name: Option<String>,
+
+    /// Print the model's file itself, to begin one's own with
+    #[arg(long, requires = "name")]
+    pub(crate) file: bool,
 }
 
 /// How right a finished map is: a sample of its cells, judged by what did not make them
@@ -561,7 +584,9 @@ impl CompletionTarget {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model_file::FileModel;
     use clap::CommandFactory;
+    use rattlemap_dynamics::model::Model;
 
     #[test]
     fn the_command_line_is_consistent() {
@@ -571,7 +596,8 @@ mod tests {
     #[test]
     fn help_names_the_defaults_in_use() {
         let help = Cli::command().find_subcommand_mut("orbit").unwrap().render_long_help().to_string();
-        assert!(help.contains(&format!("e = {DEFAULT_RESTITUTION}")), "{help}");
+        let restitution = FileModel::built_in(DEFAULT_MODEL).unwrap().get("e").unwrap();
+        assert!(help.contains(&format!("e = {restitution}")), "{help}");
         for parameter in rattlemap_dynamics::model::GearPair::PARAMETERS {
             assert!(help.contains(&*parameter.name), "{} is not in the help", parameter.name);
         }

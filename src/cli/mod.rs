@@ -14,6 +14,7 @@ mod error;
 mod finished_map;
 mod interrupt;
 mod map;
+mod model_choice;
 mod models;
 mod orbit;
 mod processor;

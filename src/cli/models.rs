@@ -2,69 +2,116 @@
 
 use std::fmt::Write;
 
-use anyhow::anyhow;
-use rattlemap_dynamics::model::{GearPair, Model, Parameter};
+use rattlemap_dynamics::model::{Contact, Model, Parameter, Side};
 use rattlemap_dynamics::orbit::Status;
 
-use crate::cli::arguments::{DEFAULT_RESTITUTION, Models};
+use crate::cli::arguments::Models;
 use crate::cli::error::Failure;
-use crate::cli::say;
+use crate::cli::model_choice;
+use crate::model_file::{BUILT_IN, FileModel, Wall, WallLaw, factor};
 use crate::output::print;
-
-/// A model as this command knows it.
-struct Page {
-    model: Box<dyn Model>,
-    /// One line for the list.
-    summary: &'static str,
-    /// Equations and contact law, above the parameters.
-    equations: &'static str,
-}
-
-fn pages() -> Vec<Page> {
-    vec![Page {
-        model: Box::new(GearPair::paper(DEFAULT_RESTITUTION)),
-        summary: "two gears on elastic supports that mesh through a backlash; a harmonic force on gear 1",
-        equations: GEAR_PAIR,
-    }]
-}
 
 /// Prints the list of models, or one of them on a page.
 pub(crate) fn run(ask: &Models) -> Result<(), Failure> {
-    let pages = pages();
     let Some(name) = &ask.name else {
-        for page in &pages {
-            print(&format!("{:<12} {}", page.model.name(), page.summary))?;
+        let width = BUILT_IN.iter().map(|(name, _)| name.len()).max().unwrap_or_default();
+        for model in FileModel::all_built_in() {
+            let summary = model.definition().summary.as_deref().unwrap_or(model.title());
+            print(&format!("{:<width$}  {summary}", model.name()))?;
         }
         return Ok(());
     };
-    match pages.iter().find(|page| page.model.name() == name) {
-        Some(page) => Ok(print(&page.text())?),
-        None => {
-            let names: Vec<&str> = pages.iter().map(|page| page.model.name()).collect();
-            let name = say::quoted(name);
-            Err(Failure::Usage(anyhow!("no model is called `{name}`; there is {}", names.join(", "))))
-        }
-    }
+    let model = model_choice::find(name)?;
+    let text = if ask.file { model.definition().text.clone() } else { page(&model) };
+    Ok(print(&text)?)
 }
 
-impl Page {
-    fn text(&self) -> String {
-        let mut text =
-            format!("{} ({})\n\n{}\n\nParameters\n\n", self.model.title(), self.model.name(), self.equations);
-        text += &format!("    {:<11} {:<9} {:<25} {}\n", "symbol", "default", "range", "meaning");
-        for parameter in self.model.parameters() {
-            text += &line(parameter);
-        }
-        text += &format!("\n{READING}\n\nStatus: how the integration of a cell ended\n\n");
-        for status in Status::ALL {
-            let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
-        }
-        let source = self
-            .model
-            .source()
-            .map_or(String::new(), |title| format!("\"{title}\"; numbers in brackets are its equations"));
-        text + &format!("\n{ERRORS}\n\nSource\n\n    {source}\n")
+fn page(model: &FileModel) -> String {
+    let definition = model.definition();
+    let mut text = format!("{} ({})\n", model.title(), model.name());
+    if let Some(notes) = &definition.notes {
+        let _ = writeln!(text, "\n{}", notes.trim());
     }
+    let _ = writeln!(text, "\nMotion\n");
+    model.equations().iter().for_each(|line| text += &format!("    {line}\n"));
+    let _ = writeln!(
+        text,
+        "\n    The state is {}; the forcing period is 2 pi over {}.",
+        model.state_names().join(", "),
+        definition.motion.frequency.text()
+    );
+    let _ = writeln!(text, "\nContact\n");
+    for side in Side::BOTH {
+        if let Some(wall) = definition.wall(side) {
+            text += &contact(side, wall);
+        }
+    }
+    let _ = writeln!(text, "\nParameters\n");
+    text += &format!("    {:<11} {:<9} {:<25} {}\n", "symbol", "default", "range", "meaning");
+    for parameter in model.parameters() {
+        text += &line(parameter);
+    }
+    text += &format!(
+        "\n{}\n{CLASSES}\n\nStatus: how the integration of a cell ended\n\n",
+        words(definition.walls.each_ref().map(Option::is_some))
+    );
+    for status in Status::ALL {
+        let _ = writeln!(text, "    {:<17} {}", status.name(), meaning(status));
+    }
+    let source = model.source().map_or("not told".to_owned(), |title| format!("\"{title}\""));
+    text + &format!("\n{ERRORS}\n\nSource\n\n    {source}\n")
+}
+
+/// What happens at a wall, in words.
+fn contact(side: Side, wall: &Wall) -> String {
+    let (name, at) = (if side == Side::Right { "right" } else { "left" }, wall.at.text());
+    let mut text = format!("    The {name} wall is at z = {at}. ");
+    match &wall.law {
+        WallLaw::Elastic => {
+            text += "There is no impact: motion goes on behind it at once, until z comes back.\n";
+        }
+        WallLaw::Impact { restitution, mesh_speed } => {
+            let lasts = match mesh_speed.as_number() {
+                Some(0.0) => "it has come to rest".to_owned(),
+                _ => format!("it leaves at a speed of at most {}", mesh_speed.text()),
+            };
+            let _ = writeln!(
+                text,
+                "First the law of impact: the rate after is -{} times the\n    rate before, by an impulse along the gap \
+                 row. A contact lasts if {lasts}\n    and the load presses the gap to the wall; otherwise it was an \
+                 impact, and motion stays free. w = 0 with the load\n    pulling away is grazing: nothing happens.",
+                factor(restitution)
+            );
+            text += match wall.contact() {
+                Contact::Rigid => {
+                    "    A contact that lasts rests on the wall, z and w fixed, until the load pulls it off.\n"
+                }
+                _ => {
+                    "    A contact that lasts goes on behind the wall and ends where z comes back to it, its state \
+                     continuous.\n"
+                }
+            };
+        }
+    }
+    text
+}
+
+/// Symbols of words, of the walls that there are: right, left.
+fn words([right, left]: [bool; 2]) -> String {
+    let mut text = "Words\n\n    One symbol per flight, between two events:\n".to_owned();
+    let symbols = [
+        (right, "1  contact that lasts, on the right"),
+        (right, "2  free, from the right to the right"),
+        (left && right, "3  free, from the right to the left"),
+        (left, "4  contact that lasts, on the left"),
+        (left, "5  free, from the left to the left"),
+        (left && right, "6  free, from the left to the right"),
+    ];
+    symbols
+        .into_iter()
+        .filter(|(is_there, _)| *is_there)
+        .for_each(|(_, line)| text += &format!("        {line}\n"));
+    text + READING
 }
 
 fn line(parameter: &Parameter) -> String {
@@ -90,40 +137,12 @@ fn meaning(status: Status) -> &'static str {
     }
 }
 
-const GEAR_PAIR: &str = "\
-Everything is dimensionless. The state is x1, v1, x2, v2; the gap z = x1 - x2, its rate w = v1 - v2.
-The right wall, s = +1, is at z = +b, the left one, s = -1, at z = -b. The forcing period is T = 2 pi / omega.
-
-Motion
-
-    free, |z| < b (11)
-        m1 x1'' + r1 x1' + k1 x1 = F cos(omega t)
-        m2 x2'' + r2 x2' + k2 x2 = 0
-    meshing on the right, s = +1 (12), and on the left, s = -1 (13)
-        m1 x1'' + r1 x1' + k1 x1 + [r w + k (z - s b)] = F cos(omega t)
-        m2 x2'' + r2 x2' + k2 x2 - [r w + k (z - s b)] = 0
-
-Contact
-
-    Free motion reaches wall s, with s w >= 0. First the law of impact: momentum is kept, w becomes -e w (5), (6), (22).
-    Meshing starts if then e |w| <= mesh_speed and the load presses the gap to the wall (37); otherwise it was an impact.
-    w = 0 with the load pulling away is grazing: nothing happens.
-    Meshing ends where the gap comes back to its wall from behind (38), or where pressing ceases before it is there.
-    The state is continuous at the end of meshing.
-    mesh_speed is a choice: the source does not say at which speed bouncing ends. Half of it changes most words of cells
-    that mesh, and few of their patterns; `rattlemap validate` counts how many.";
-
-const READING: &str = "\
-Words
-
-    One symbol per flight, between two events:
-        1  meshing on the right                4  meshing on the left
-        2  free, from the right to the right   5  free, from the left to the left
-        3  free, from the right to the left    6  free, from the left to the right
-    A word is the cyclic sequence of a cycle's flights in order of time, in its smallest rotation: 13554622.
+const READING: &str = "    A word is the cyclic sequence of a cycle's flights in order of time, in its smallest rotation: 13554622.
     The literature composes maps from right to left, with powers: P_{1 2^2 6 4 5^2 3} is the same cycle.
-    Its pattern, 135462, counts each run of one symbol once: how often teeth bounce before they mesh is left out.
+    Its pattern, 135462, counts each run of one symbol once: how often a contact bounces before it lasts is left out.
+";
 
+const CLASSES: &str = "\
 Class
 
     periodic    a stable cycle was confirmed; the period counts forcing periods

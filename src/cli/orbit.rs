@@ -4,19 +4,23 @@ use std::time::Instant;
 
 use anyhow::anyhow;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::model::{GearPair, Model, State};
+use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
-use super::arguments::{DEFAULT_RESTITUTION, FigureFormat, Orbit};
+use super::arguments::{FigureFormat, Orbit};
 use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
-use super::say;
+use super::{model_choice, say};
 use crate::map::scene;
 use crate::output::orbit::{Asked, Instant as At};
 use crate::output::{self, Folder};
 
 pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
-    let model = scene::single_cell(&GearPair::paper(DEFAULT_RESTITUTION), &ask.set)?;
+    let model = model_choice::find(&ask.model)?;
+    if let Some(start) = &ask.start {
+        model_choice::check_components(&model, start.count)?;
+    }
+    let model = scene::single_cell(&model, &ask.set)?;
     let flow = Flow::of(&*model)?;
     check_time(ask.time, flow.period)?;
     let interrupt = Interrupt::listen(true)?;

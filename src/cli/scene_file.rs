@@ -67,13 +67,13 @@ fn load_from(
     Scene::parse_along(&text, &name, sets, purpose, along, &find)
 }
 
-/// Reads a model beside a scene.
-fn find_model(path: &Path) -> Result<FileText, String> {
+/// Reads the file of a model; the error is the end of a sentence that names it.
+pub(crate) fn find_model(path: &Path) -> Result<FileText, String> {
     let name = path.display().to_string();
     match read_text(path, MOST_OF_MODEL, "write a shorter model") {
         Ok(text) => Ok(FileText { name, text }),
         Err(error) => Err(format!(
-            "cannot be read at {name} ({error}); give the path of a model's file, relative to the scene's folder"
+            "cannot be read at {name} ({error}); give the path of a model's file, in a scene from the scene's folder"
         )),
     }
 }

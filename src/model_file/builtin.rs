@@ -6,9 +6,12 @@ use rattlemap_dynamics::model::Model;
 
 use super::FileModel;
 
+/// The model of scenes and commands that name none.
+pub const DEFAULT: &str = "gear-pair";
+
 /// Names and texts.
 pub const BUILT_IN: &[(&str, &str)] = &[
-    ("gear-pair", include_str!("../../models/gear_pair.toml")),
+    (DEFAULT, include_str!("../../models/gear_pair.toml")),
     ("impact-oscillator", include_str!("../../models/impact_oscillator.toml")),
     ("bilinear", include_str!("../../models/bilinear.toml")),
     ("kahraman-singh", include_str!("../../models/kahraman_singh.toml")),

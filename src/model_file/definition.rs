@@ -166,6 +166,7 @@ fn blamed(error: &ModelError) -> (Table, &str) {
         "entry" => (Table::Motion, "gap"),
         "omega" => (Table::Motion, "frequency"),
         "position" => (Table::Wall(side), "at"),
+        "load" if side.is_some() => (Table::Wall(side), "at"),
         "mesh" => (Table::Wall(side), "mesh_speed"),
         "restitution" => (Table::Wall(side), "restitution"),
         key @ ("damping" | "stiffness") if side.is_some() => (Table::Wall(side), key),

@@ -120,7 +120,7 @@ fn minus(name: &str, entry: &Expression) -> String {
 }
 
 /// An entry that something is multiplied by.
-fn factor(entry: &Expression) -> String {
+pub(crate) fn factor(entry: &Expression) -> String {
     let text = text(entry);
     match is_product(text.strip_prefix('-').unwrap_or(&text)) {
         true => text,

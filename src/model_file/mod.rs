@@ -18,9 +18,10 @@ use std::sync::Arc;
 
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter};
 
-pub use builtin::BUILT_IN;
+pub use builtin::{BUILT_IN, DEFAULT};
 pub use contact::{Behind, Wall, WallLaw};
 pub use definition::Definition;
+pub(crate) use equations::factor;
 
 use crate::text::error::SceneError;
 

@@ -18,6 +18,7 @@ use super::{
     map_figure, map_manifest, names, report, unfinished,
 };
 use crate::map::scene::{Format, List, Scene};
+use crate::model_file::FileModel;
 use crate::validate::Validation;
 
 pub use super::manifest::MANIFEST;
@@ -30,6 +31,8 @@ const HTML: &str = "report.html";
 const ATTRACTORS: &str = "attractors.csv";
 /// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
 pub const LIST: &str = "list.csv";
+/// The model of a map whose model is a file of somebody's own: a copy, likewise.
+pub const MODEL: &str = "model.toml";
 /// What a validation found.
 pub const VALIDATION: &str = "validation.json";
 
@@ -46,17 +49,17 @@ static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
 
 /// Every file that a map may write, records included.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    ALL.iter().map(String::as_str).chain([LIST, RECORDS, UNFINISHED])
+    ALL.iter().map(String::as_str).chain([LIST, MODEL, RECORDS, UNFINISHED])
 }
 
 /// Removes what an earlier run left, but for its records: files must not stand beside a
-/// manifest that does not know them. A list goes if a manifest has it; any other one may be the user's own.
+/// manifest that does not know them. A list and a model go if a manifest has them; any other may be the user's own.
 ///
 /// # Errors
 /// If a file cannot be removed.
 pub fn clear(folder: &Folder) -> Result<(), OutputError> {
-    if inventory::lists(folder, LIST) {
-        folder.remove(&[LIST])?;
+    for copy in [LIST, MODEL].into_iter().filter(|copy| inventory::lists(folder, copy)) {
+        folder.remove(&[copy])?;
     }
     clear_made(folder)
 }
@@ -64,7 +67,7 @@ pub fn clear(folder: &Folder) -> Result<(), OutputError> {
 /// The same without the list.
 fn clear_made(folder: &Folder) -> Result<(), OutputError> {
     folder.remove(&ALL)?;
-    let names = ALL.iter().map(String::as_str).chain([LIST]);
+    let names = ALL.iter().map(String::as_str).chain([LIST, MODEL]);
     folder.remove(&names.map(|name| format!("{PARTIAL}{name}")).collect::<Vec<_>>())
 }
 
@@ -178,6 +181,11 @@ fn write_files(
     if let Some(list) = cells.scene().list().filter(|_| wanted(LIST)) {
         write_list(folder, list)?;
         files.push(LIST.to_owned());
+    }
+    let own = cells.scene().base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
+    if let Some(model) = own.filter(|_| wanted(MODEL)) {
+        folder.replace(MODEL, |path| Ok(fs::write(path, &model.definition().text)?))?;
+        files.push(MODEL.to_owned());
     }
     Ok(files)
 }

@@ -1,7 +1,9 @@
 //! The command that replays one cell of a map.
 
 use super::Cells;
+use super::map::MODEL;
 use crate::map::scene::{Scene, Start};
+use crate::model_file::{DEFAULT, FileModel};
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::Settings;
 
@@ -10,6 +12,9 @@ use rattlemap_dynamics::orbit::Settings;
 pub(super) fn arguments(scene: &Scene) -> String {
     let mut words = Vec::new();
     let base = scene.base();
+    if let Some(model) = base.downcast_ref::<FileModel>().and_then(model) {
+        words.push(format!(" --model {model}"));
+    }
     for (name, value) in scene.fixed() {
         let parameter = base.parameters().iter().find(|parameter| parameter.name == name);
         if parameter.is_some_and(|parameter| parameter.default != Some(value)) {
@@ -27,6 +32,15 @@ pub(super) fn arguments(scene: &Scene) -> String {
         words.push(format!(" --periods {}", settings.observed_periods));
     }
     words.concat()
+}
+
+/// How `orbit` finds a model that is not its own default: by name, or by the copy in the map's folder.
+fn model(file: &FileModel) -> Option<&str> {
+    match (file.is_built_in(), file.name()) {
+        (true, DEFAULT) => None,
+        (true, name) => Some(name),
+        (false, _) => Some(MODEL),
+    }
 }
 
 fn start(model: &dyn Model, state: State) -> String {

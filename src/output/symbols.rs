@@ -45,7 +45,9 @@ pub(super) fn symbol(name: &str) -> String {
 
 /// What stands beside a parameter's axis.
 pub(super) fn axis_label(parameter: &Parameter) -> String {
-    format!("{}, {}", parameter.meaning, symbol(&parameter.name))
+    let symbol = symbol(&parameter.name);
+    // Where nobody said what it means its name stands for that.
+    if parameter.meaning == parameter.name { symbol } else { format!("{}, {symbol}", parameter.meaning) }
 }
 
 /// A number with the typographic minus.

@@ -11,7 +11,7 @@ use rattlemap::map::attractors::{self, Attractor, Basins, NONE};
 use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::random::Random;
-use rattlemap::map::scene::{Quantity, Refine, Scene, SceneBuilder};
+use rattlemap::map::scene::{Quantity, Refine, Scene, SceneBuilder, Start};
 use rattlemap::map::schedule::{Refined, Schedule};
 use rattlemap::map::{self, Processor};
 use rattlemap::record::{Record, valid};
@@ -76,7 +76,7 @@ fn impacting(stops: &Stops) -> State {
 }
 
 fn rattling() -> Stops {
-    Stops { r: 0.1, k: 1.0, force: 1.2, omega: 2.0, ..Stops::with_restitution(0.8) }
+    Stops { r: 0.1, k: 1.0, force: 1.0, omega: 2.0, ..Stops::with_restitution(0.8) }
 }
 
 fn plane(stops: Stops, side: u32) -> SceneBuilder {
@@ -273,8 +273,9 @@ fn lanes_label_as_the_reference_does() {
 #[test]
 fn attractors_are_followed_along_a_parameter() {
     let scene = Scene::builder(rattling())
-        .axis("F", 1.15..=1.25, 6)
+        .axis("F", 0.8..=1.05, 6)
         .start_axis("v", -3.0..=3.0, 40)
+        .start(Start::State([-0.3, 9.0, 0.0, 0.0]))
         .quantities(&[Quantity::Class])
         .build()
         .unwrap();
@@ -289,7 +290,7 @@ fn attractors_are_followed_along_a_parameter() {
         // Each column by itself says the same.
         let value = scene.axes()[0].value(i);
         let line = Scene::builder(Stops { force: value, ..rattling() });
-        let line = line.start_axis("v", -3.0..=3.0, 40).start_axis("x", 0.0..=1e-9, 2);
+        let line = line.start_axis("v", -3.0..=3.0, 40).start_axis("x", -0.3..=-0.25, 2);
         let own = basins(&line.quantities(&[Quantity::Class]).build().unwrap());
         let own_free = own.attractors().iter().position(|a| a.word.as_ref().unwrap().is_empty()).unwrap();
         for (j, &label) in labels.iter().enumerate() {

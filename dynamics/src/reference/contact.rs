@@ -1,5 +1,6 @@
 //! What happens at a wall: impact, meshing, grazing, and the end of meshing.
 
+use super::sticking::LET_GO;
 use super::{Crossing, EventKind, Happening, Mode, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow};
 use crate::model::{Contact, Side};
@@ -78,11 +79,21 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Free motion reaches a wall.
     #[inline(always)]
     pub(super) fn contact(&mut self, side: Side, observer: &mut impl Observer) {
-        match self.flow.contacts[side.index()] {
+        let contact = self.flow.contacts[side.index()];
+        if contact == Contact::Impact || !self.goes_on_otherwise(contact, side, observer) {
+            self.impact(side, observer);
+        }
+    }
+
+    /// What does not follow from an impact: motion behind an elastic wall, rest on a rigid one.
+    #[inline(never)]
+    fn goes_on_otherwise(&mut self, contact: Contact, side: Side, observer: &mut impl Observer) -> bool {
+        match contact {
             Contact::Elastic => self.go_behind(side, observer),
             Contact::Rigid if self.sticks(side) => self.stick(side, observer),
-            Contact::Impact | Contact::Rigid => self.impact(side, observer),
+            Contact::Impact | Contact::Rigid => return false,
         }
+        true
     }
 
     /// The impact law, then meshing or not (22), (37).
@@ -268,12 +279,13 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// Something touches a wall within rounding. Elastic ones it may go through or not: the linearisation is
-    /// as good.
+    /// as good. A gap that a rigid wall lets go parts so slowly that it seems to rest.
     #[cold]
     pub(super) fn note_grazing(&mut self) {
         let [right, left] = self.flow.walls.map(|wall| (self.q[0] - wall).abs());
         let nearer = if right <= left { Side::Right } else { Side::Left };
-        if self.flow.contacts[nearer.index()] != Contact::Elastic {
+        let is_let_go = self.from_wall == Some((nearer, LET_GO));
+        if self.flow.contacts[nearer.index()] != Contact::Elastic && !is_let_go {
             self.near_grazing = true;
         }
     }

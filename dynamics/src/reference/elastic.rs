@@ -12,6 +12,7 @@ use crate::model::Side;
 impl<const N: usize> Trajectory<'_, N> {
     /// Free motion reaches an elastic wall. At no speed the first rate of the gap that is not zero decides
     /// whether it goes on behind it.
+    #[inline(never)]
     pub(super) fn go_behind(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
         let closing = side.sign() * self.q[1];
@@ -29,6 +30,7 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// The gap comes back to an elastic wall from behind.
+    #[inline(never)]
     pub(super) fn come_out(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
         if self.q[1] == 0.0 && self.presses(DomainKind::Meshing(side), side, &self.q) {

@@ -51,42 +51,22 @@ impl<const N: usize> Trajectory<'_, N> {
             let roomy = gap.between(order, remainder, floor + room, ceiling - room) == [true; 2];
             return StepVerdict::Clear { roomy };
         }
-        if let Mode::Stuck(side) = self.mode {
-            return self.pressing_ahead(linear, step, side);
-        }
-        // From a rigid wall a gap that is let go parts so slowly that it seems to rest.
-        if order < 3 && self.rests(&gap, order, remainder) {
+        if self.rests(&gap, order, remainder) {
             return StepVerdict::Rests;
         }
-        match self.ends(linear, step, &gap, remainder, [above, below]) {
-            StepVerdict::Unclear if order == 3 && self.rests(&gap, order, remainder) => StepVerdict::Rests,
-            verdict => verdict,
-        }
-    }
-
-    /// What ends the flight within one step.
-    #[inline(always)]
-    fn ends(
-        &self,
-        linear: &LinearFlow,
-        step: &Step,
-        gap: &Bernstein,
-        remainder: f64,
-        [above, below]: [bool; 2],
-    ) -> StepVerdict {
         match self.mode {
-            Mode::Free if below => self.wall_ahead(gap, Side::Left, remainder),
-            Mode::Free if above => self.wall_ahead(gap, Side::Right, remainder),
+            Mode::Free if below => self.wall_ahead(&gap, Side::Left, remainder),
+            Mode::Free if above => self.wall_ahead(&gap, Side::Right, remainder),
             Mode::Free => first_of(
-                self.wall_ahead(gap, Side::Right, remainder),
-                self.wall_ahead(gap, Side::Left, remainder),
+                self.wall_ahead(&gap, Side::Right, remainder),
+                self.wall_ahead(&gap, Side::Left, remainder),
             ),
-            Mode::Sustained(side) => self.judge(gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
-            // Judged before.
-            Mode::Stuck(side) => self.pressing_ahead(linear, step, side),
+            Mode::Sustained(side) => self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
+            // What presses tells, see `step_at_rest`.
+            Mode::Stuck(_) => StepVerdict::Unclear,
             Mode::Onset(side) => {
                 let ends = first_of(
-                    self.judge(gap, side, -1.0, remainder, Crossing::OnsetEnds(side)),
+                    self.judge(&gap, side, -1.0, remainder, Crossing::OnsetEnds(side)),
                     self.pressing_ahead(linear, step, side),
                 );
                 let opposite = side.mirrored();
@@ -95,7 +75,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 if self.q[1].abs() * step.h < room {
                     return ends;
                 }
-                first_of(ends, self.judge(gap, opposite, -1.0, remainder, Crossing::Through(side)))
+                first_of(ends, self.judge(&gap, opposite, -1.0, remainder, Crossing::Through(side)))
             }
         }
     }
@@ -138,7 +118,7 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// Judges whether pressing ceases inside the contact onset.
-    fn pressing_ahead(&self, linear: &LinearFlow, step: &Step, side: Side) -> StepVerdict {
+    pub(super) fn pressing_ahead(&self, linear: &LinearFlow, step: &Step, side: Side) -> StepVerdict {
         let rates = |q: &Gap, p: &Phasor| linear.acceleration_rates(q, p);
         let (q, phasor) = step.end(&self.q, &self.phasor);
         let pressing = Bernstein::new(rates(&self.q, &self.phasor), rates(&q, &phasor), step.h);

@@ -5,12 +5,12 @@
 //! that ceases to point into the wall the gap leaves it, from rest and without acceleration: state and field
 //! are continuous there, and neighbours keep their tangents.
 
-use super::{EventKind, Mode, Observer, Trajectory};
+use super::{EventKind, Mode, Observer, StepVerdict, Stop, Trajectory};
 use crate::flow::{DomainKind, Gap};
 use crate::model::Side;
 
 /// The order of the root of the distance for a gap that is let go: its acceleration is zero there, its rate is not.
-const LET_GO: usize = 3;
+pub(super) const LET_GO: usize = 3;
 
 impl<const N: usize> Trajectory<'_, N> {
     /// Whether a contact with a rigid wall lasts: it leaves slowly enough, and at rest it is pressed.
@@ -31,6 +31,7 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Neighbours meet it earlier or later and come to rest there, too. Of `S = R + (f+ - R f-) n^T / (n f-)`,
     /// with `R` the impact that takes all velocity, the approach speed cancels: what is left is the way of the
     /// other displacement, and the damping that its acceleration owes to the gap's velocity.
+    #[inline(never)]
     pub(super) fn stick(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
         let before = self.q;
@@ -54,6 +55,49 @@ impl<const N: usize> Trajectory<'_, N> {
         self.level[1] = self.flow.domain(DomainKind::Meshing(side)).taylor_level;
     }
 
+    /// One step at rest on a rigid wall, judged by what presses; its first trial is counted.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn step_at_rest(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
+        let Mode::Stuck(side) = self.mode else { return Ok(()) };
+        let linear = self.flow.domain(DomainKind::Meshing(side));
+        let mut level = self.level[1];
+        loop {
+            let made;
+            let step = match linear.step(level) {
+                Some(step) => step,
+                None => {
+                    made = linear.new_step(level);
+                    &made
+                }
+            };
+            match self.pressing_ahead(linear, step, side) {
+                StepVerdict::Clear { roomy } => {
+                    self.level[1] = level.saturating_sub(usize::from(roomy));
+                    self.clear_step(linear, step, until);
+                    return Ok(());
+                }
+                StepVerdict::Crossing(crossing, bracket) => {
+                    self.level[1] = level;
+                    return self.cross(linear, step.u, crossing, bracket, until, observer);
+                }
+                _ if self.settle_start(observer) => return self.check_events(),
+                _ if level + 1 == linear.levels => {
+                    self.check_finite()?;
+                    self.check_bounds(linear)?;
+                    self.settle_graze(linear, step.h, until, observer);
+                    return self.check_events();
+                }
+                _ => {
+                    self.work.halvings += 1;
+                    self.work.steps += 1;
+                    self.steps_in_period += 1;
+                    level += 1;
+                }
+            }
+        }
+    }
+
     /// Stands on a rigid wall from the start.
     pub(super) fn stand_on(&mut self, side: Side) {
         self.rest_on(side);
@@ -64,6 +108,7 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// The load lets go of a gap at rest on a rigid wall.
+    #[inline(never)]
     pub(super) fn let_go(&mut self, side: Side, observer: &mut impl Observer) {
         self.record(EventKind::MeshEnd, side, self.q, observer);
         self.mode = Mode::Free;

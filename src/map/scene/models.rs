@@ -1,13 +1,11 @@
 //! `model`: which model a scene is about.
 
 use super::list::{Beside, FindFile};
+pub(super) use crate::model_file::DEFAULT;
 use crate::model_file::{BUILT_IN, FileModel};
 use crate::text::error::SceneError;
 use crate::text::section::Section;
 use rattlemap_dynamics::model::Model;
-
-/// The model of scenes that name none.
-pub(super) const DEFAULT: &str = "gear-pair";
 
 /// What the name of a model's file ends with.
 const FILE: &str = ".toml";
