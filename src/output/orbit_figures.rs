@@ -84,7 +84,7 @@ pub(super) fn write_each(
         motion: Motion::new(orbit, trace),
         cycle: matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods)),
         title: heading::parameters(model),
-        subtitle: heading::character(orbit),
+        subtitle: heading::character(model, orbit),
     };
     let mut place_each = |figure: &str, height, draw: &dyn Fn(&Canvas<'_>) -> Result<(), DrawError>| {
         let is_asked =
