@@ -48,7 +48,7 @@ impl Section {
         let names = model.state_names();
         let label = |component: usize| format!("{} {}", symbol(names[component]), walls.section());
         let panels = match names.len() {
-            2 => vec![(1, format!("{}, before", label(1)))],
+            2 => vec![(1, format!("{} before events {}", symbol(names[1]), walls.section()))],
             _ => vec![(0, label(0)), (2, label(2))],
         };
         Ok(Section { walls, panels })

@@ -8,11 +8,12 @@ use std::path::Path;
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::Format;
+use rattlemap::model_file::FileModel;
 use rattlemap::output::bifurcation_figure::{self, Section};
 use rattlemap::output::orbit_figures;
 use rattlemap::output::plot_style::axes::Scale;
-use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::orbit::{Class, Event, EventKind, Orbit, Sample, Status};
+use rattlemap_dynamics::model::{GearPair, Model, Side, State};
+use rattlemap_dynamics::orbit::{self, Class, Event, EventKind, Orbit, Sample, Settings, Status};
 use rattlemap_dynamics::word::Word;
 
 /// An axis, as figures take it.
@@ -190,6 +191,45 @@ fn figures_in_svg_and_pdf_have_lines_and_text() {
         assert!(map.to_uppercase().contains("<03C9>"), "{map}");
     }
     assert!(files[0].len() < 150_000, "a line of few pixels has few points: {}", files[0].len());
+}
+
+/// One coordinate between no two walls, and a contact that does not yield.
+#[test]
+fn figures_know_one_coordinate_and_one_wall() {
+    for (name, value, wall, symbol) in
+        [("shaking-table", ("A", 1.5), "z = 0", "4"), ("impact-oscillator", ("sigma", 0.2), "z = 0.2", "2")]
+    {
+        let mut model = FileModel::built_in(name).unwrap();
+        model.set(value.0, value.1).unwrap();
+        let orbit = orbit::analyse(&model, [0.0; 4], &Settings::default()).unwrap();
+        let trace =
+            orbit::trace(&model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, 400).unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let files = orbit_figures::write(dir.path(), &model, &orbit, &trace, &[Format::Svg]).unwrap();
+        let texts: Vec<String> = files.iter().map(|file| fs::read_to_string(file).unwrap()).collect();
+        for text in &texts {
+            assert!(!text.contains("NaN") && !text.contains("inf"), "{name}");
+            assert!(!text.contains("symmetric"), "{name} has no mirror image");
+        }
+        let gap = &texts[2];
+        for part in [wall, symbol] {
+            assert!(gap.contains(&format!(">{part}</text>")), "{name}: {part}");
+        }
+        assert!(!gap.contains("depth"), "{name}: a rigid wall does not yield");
+        let walls = ["right wall", "left wall"].map(|wall| gap.contains(&format!(">{wall}</text>")));
+        assert_eq!(walls, [symbol == "2", symbol == "4"]);
+        // Nothing is drawn outside of the picture.
+        let mut numbers = texts[0].split("points=\"").skip(1).flat_map(|rest| {
+            rest.split('"').next().unwrap().split([' ', ',']).filter_map(|x| x.parse::<f64>().ok())
+        });
+        assert!(numbers.all(|x| (0.0..=1600.0).contains(&x)), "{name}");
+        // The gap of one coordinate is its displacement, so diagrams show its velocity.
+        let section = Section::of(&model).unwrap();
+        let path = dir.path().join("b.svg");
+        bifurcation_figure::write(&path, ["t", "s"], E, &columns(9, 3), &section).unwrap();
+        let diagram = fs::read_to_string(path).unwrap();
+        assert!(diagram.contains(">v before events at a wall</text>") && !diagram.contains("x\u{2082}"));
+    }
 }
 
 /// A title is anybody's text.

@@ -6,7 +6,7 @@ use crate::output::DrawError;
 use crate::output::plot_style::Canvas;
 use crate::output::plot_style::axes::{Axis, Frame};
 use crate::output::plot_style::legend::{Entry, Key, draw_head};
-use rattlemap_dynamics::model::{Side, State};
+use rattlemap_dynamics::model::{Contact, Side, State};
 
 /// Room for the walls' names beside the gap.
 const WALL_NAMES: f64 = 97.0;
@@ -22,16 +22,18 @@ impl Scene<'_> {
         let panel = canvas.panel(LEFT, top);
         let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
         let bottom = panel.bottom;
-        let split = if self.motion.meshes() { top + 0.64 * (bottom - top) } else { bottom };
-        let room = 0.25 * self.length;
+        let split = if self.presses() { top + 0.64 * (bottom - top) } else { bottom };
+        let gaps = || self.motion.points().map(|(_, state)| self.gap(state));
+        let (least, most) = gaps().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(z), b.max(z)));
+        // Symbols are written behind the walls.
+        let room = (0.25 * self.length).max(0.1 * (most - least));
         let walls = Side::BOTH
             .into_iter()
             .filter_map(|side| self.walls.position(side).map(|at| at + side.sign() * room));
-        let gaps = self.motion.points().map(|(_, state)| self.gap(state));
         let frame = Frame {
             rect: Rect { bottom: split, ..panel },
             x: self.time_axis(),
-            y: Axis::around(&format!("gap, z = {}", self.gap_in_words()), gaps.chain(walls), self.length),
+            y: Axis::around(&format!("gap, z = {}", self.gap_in_words()), gaps().chain(walls), self.length),
         };
         self.draw_walls(canvas, &frame)?;
         let at = |t: f64, state: &State| (t, self.gap(state));
@@ -43,6 +45,12 @@ impl Scene<'_> {
             self.draw_penetration(canvas, Rect { top: split + 30.0, ..panel })?;
         }
         Ok(())
+    }
+
+    /// Whether the gap lies behind a wall anywhere: a rigid one does not yield.
+    fn presses(&self) -> bool {
+        let is_soft = |side: Side| self.oscillator.contacts[side.index()] != Contact::Rigid;
+        self.motion.pieces.iter().any(|piece| piece.meshing.is_some_and(is_soft))
     }
 
     /// The word, symbol by symbol: behind its wall where a flight returns to it, else beside the flight.
