@@ -67,8 +67,15 @@ pub fn write(
             scene::Scale::Linear => Scale::Linear,
             scene::Scale::Values => Scale::Listed,
         };
+        let section = bifurcation_figure::Section::of(scene.base())?;
         folder.replace(name, |path| {
-            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], (&label, scale), columns)?)
+            Ok(bifurcation_figure::write(
+                path,
+                [scene.title(), &subtitle],
+                (&label, scale),
+                columns,
+                &section,
+            )?)
         })?;
         files.push(name);
     }

@@ -7,10 +7,12 @@ use std::path::Path;
 use super::plot_style::axes::{Axis, Frame, Scale};
 use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{Bitmap, Canvas, FAINT, Marker, RGBColor, Rect, Shape, save_figure, wall_color};
+use super::symbols::symbol;
+use super::walls::Walls;
 use super::{DrawError, FigureError};
 use crate::map::bifurcation::{Column, Direction, SectionPoint};
 use exponents::class_color;
-use rattlemap_dynamics::model::Side;
+use rattlemap_dynamics::model::{Model, ModelError, Side};
 use rattlemap_dynamics::orbit::Class;
 
 const SIZE: (u32, u32) = (1600, 1750);
@@ -28,7 +30,32 @@ const DOT: (f64, f64) = (0.7, 2.2);
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
 
-/// Draws the displacement of both gears at every section point `|z| = b`, and the largest Lyapunov exponent of each
+/// What a model's diagram shows: its section, and one panel per coordinate.
+#[derive(Clone, Debug)]
+pub struct Section {
+    walls: Walls,
+    /// Components of the state, each with the label of its panel.
+    panels: Vec<(usize, String)>,
+}
+
+impl Section {
+    /// The displacements where there are two; of one alone the velocity before an event, since it is at a wall then.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the model has no motion.
+    pub fn of(model: &dyn Model) -> Result<Section, ModelError> {
+        let walls = Walls::of(model, &model.oscillator()?);
+        let names = model.state_names();
+        let label = |component: usize| format!("{} {}", symbol(names[component]), walls.section());
+        let panels = match names.len() {
+            2 => vec![(1, format!("{}, before", label(1)))],
+            _ => vec![(0, label(0)), (2, label(2))],
+        };
+        Ok(Section { walls, panels })
+    }
+}
+
+/// Draws the displacements at every section point, and the largest Lyapunov exponent of each
 /// column, in the format that the file's name tells.
 ///
 /// One dot per point, coloured by wall; where dots pile up they darken with the
@@ -44,8 +71,9 @@ pub fn write(
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),
     columns: &[Column],
+    section: &Section,
 ) -> Result<(), FigureError> {
-    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis, columns))
+    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis, columns, section))
 }
 
 /// What colours tell apart.
@@ -98,16 +126,17 @@ fn draw(
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),
     columns: &[Column],
+    section: &Section,
 ) -> Result<(), DrawError> {
     let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
     let look = Look::of(columns);
-    let top = draw_head(canvas, title, subtitle, &legend(columns, look))? + 14.0;
+    let top = draw_head(canvas, title, subtitle, &legend(columns, look, &section.walls))? + 14.0;
     let whole = canvas.panel(LEFT, top);
-    let height = (whole.bottom - top - 2.0 * BETWEEN) / (2.0 + LOWEST);
+    let count = section.panels.len() as f64;
+    let height = (whole.bottom - top - count * BETWEEN) / (count + LOWEST);
     let x = value_axis(axis, columns);
-    for (component, label, top) in
-        [(0, "x\u{2081} at |z| = b", top), (2, "x\u{2082} at |z| = b", top + height + BETWEEN)]
-    {
+    for (i, (component, label)) in section.panels.iter().enumerate() {
+        let (component, top) = (*component, top + i as f64 * (height + BETWEEN));
         let values = columns.iter().flat_map(|c| &c.points).map(|p| p.before[component]);
         let bottom = top + height;
         let y = Axis::around(label, values, 1e-6);
@@ -122,7 +151,7 @@ fn draw(
         }
         frame.draw_axes(canvas, false)?;
     }
-    let rect = Rect { top: top + 2.0 * (height + BETWEEN), ..whole };
+    let rect = Rect { top: top + count * (height + BETWEEN), ..whole };
     let strips = if look.has_strips() { look.passes().len() } else { 0 };
     let y = exponents::axis(columns, strips, rect.bottom - rect.top);
     let frame = Frame { rect, x, y };
@@ -135,8 +164,8 @@ fn is_left_out(column: &Column) -> bool {
     matches!(column.class, Class::Undecided | Class::Failed)
 }
 
-fn legend(columns: &[Column], look: Look) -> Vec<Entry> {
-    let dot = |color, text| {
+fn legend(columns: &[Column], look: Look, walls: &Walls) -> Vec<Entry> {
+    let dot = |color, text: &str| {
         let marker = Marker { shape: Shape::Circle, color, radius: 6.0, hollow: false };
         Entry::new(Key::Marker(marker), text)
     };
@@ -149,8 +178,9 @@ fn legend(columns: &[Column], look: Look) -> Vec<Entry> {
     let mut entries = Vec::new();
     match look {
         Look::Walls => {
-            entries.push(dot(wall_color(Side::Right), "right wall, z = +b"));
-            entries.push(dot(wall_color(Side::Left), "left wall, z = \u{2212}b"));
+            for side in Side::BOTH {
+                entries.extend(walls.name(side).map(|name| dot(wall_color(side), &name)));
+            }
             entries.extend(is_periodic.then(|| dot(periodic, "\u{3bb}: periodic")));
             entries.extend(is_chaotic.then(|| dot(chaotic, "\u{3bb}: chaotic")));
         }

@@ -40,6 +40,7 @@ mod stdout;
 mod symbols;
 pub mod unfinished;
 mod validation_json;
+pub mod walls;
 mod words;
 mod words_csv;
 

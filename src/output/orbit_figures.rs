@@ -9,6 +9,7 @@ mod symbols;
 use std::path::{Path, PathBuf};
 
 use self::motion::Motion;
+
 use super::plot_style::axes::{Axis, Frame};
 use super::plot_style::legend::{Entry, Key, draw_head};
 use super::plot_style::{
@@ -16,6 +17,7 @@ use super::plot_style::{
     save_figure, wall_color,
 };
 use super::symbols::symbol;
+use super::walls::Walls;
 use super::{DrawError, FigureError, OutputError};
 use crate::map::scene::Format;
 use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
@@ -75,14 +77,17 @@ pub(super) fn write_each(
     formats: &[Format],
     mut place: impl FnMut(&'static str, &dyn Fn(&Path) -> Result<(), FigureError>) -> Result<(), OutputError>,
 ) -> Result<(), OutputError> {
+    let oscillator = model.oscillator()?;
     let scene = Scene {
         names: model.state_names().into_iter().map(symbol).collect(),
         bodies: model.bodies(),
-        oscillator: model.oscillator()?,
+        walls: Walls::of(model, &oscillator),
+        length: oscillator.length_scale(),
+        oscillator,
         motion: Motion::new(orbit, trace),
         cycle: matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods)),
         title: heading::parameters(model),
-        subtitle: heading::character(orbit),
+        subtitle: heading::character(model, orbit),
     };
     let mut place_each = |figure: &str, height, draw: &dyn Fn(&Canvas<'_>) -> Result<(), DrawError>| {
         let is_asked =
@@ -103,6 +108,9 @@ struct Scene<'a> {
     names: Vec<String>,
     bodies: Vec<&'a str>,
     oscillator: Oscillator,
+    walls: Walls,
+    /// What distances are measured by: half the walls' distance where there are two.
+    length: f64,
     motion: Motion,
     /// Forcing periods after which it comes round; none if it does not.
     cycle: Option<f64>,
@@ -289,12 +297,6 @@ impl Scene<'_> {
         entries
     }
 
-    /// Half the walls' distance.
-    fn half(&self) -> f64 {
-        let [right, left] = self.oscillator.walls;
-        0.5 * (right - left)
-    }
-
     fn time_axis(&self) -> Axis {
         let (first, last) = self.motion.points().fold((0f64, 0f64), |(a, b), (t, _)| (a.min(t), b.max(t)));
         Axis::exact(TIME_LABEL, first, if last > first { last } else { first + 1.0 })
@@ -304,7 +306,7 @@ impl Scene<'_> {
     fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
         let values = self.motion.points().flat_map(|(_, state)| components.iter().map(|i| state[*i]));
         // A tenth of the half backlash is motion that has died down.
-        Axis::around(label, values, 0.1 * self.half() * scale)
+        Axis::around(label, values, 0.1 * self.length * scale)
     }
 }
 

@@ -10,5 +10,6 @@ mod cycle;
 mod ball;
 mod clearance;
 mod elastic;
+mod engines;
 mod random;
 mod single_impact;

@@ -8,8 +8,9 @@ use std::path::Path;
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::Format;
+use rattlemap::output::bifurcation_figure::{self, Section};
+use rattlemap::output::orbit_figures;
 use rattlemap::output::plot_style::axes::Scale;
-use rattlemap::output::{bifurcation_figure, orbit_figures};
 use rattlemap_dynamics::model::{GearPair, Side, State};
 use rattlemap_dynamics::orbit::{Class, Event, EventKind, Orbit, Sample, Status};
 use rattlemap_dynamics::word::Word;
@@ -197,7 +198,7 @@ fn titles_stay_text_in_svg() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.svg");
     let title = "a < b && \"c\" </text><script>\u{7}\u{2028}10\u{207b}\u{b2}";
-    bifurcation_figure::write(&path, [title, "second\nthird"], E, &columns(9, 3)).unwrap();
+    bifurcation_figure::write(&path, [title, "second\nthird"], E, &columns(9, 3), &section()).unwrap();
     let svg = fs::read_to_string(path).unwrap();
     let expected = "a &lt; b &amp;&amp; \"c\" &lt;/text&gt;&lt;script&gt; \u{2028}10<tspan dy=";
     assert!(svg.contains(expected) && !svg.contains("<script"), "{svg:.600}");
@@ -212,9 +213,14 @@ fn titles_stay_text_in_svg() {
 fn characters_that_the_typeface_lacks_are_no_others_in_pdf() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.pdf");
-    bifurcation_figure::write(&path, ["\u{65e5}\u{672c}", "second"], E, &columns(9, 3)).unwrap();
+    bifurcation_figure::write(&path, ["\u{65e5}\u{672c}", "second"], E, &columns(9, 3), &section()).unwrap();
     let map = String::from_utf8(stream(&fs::read(path).unwrap(), "/Type /CMap")).unwrap().to_uppercase();
     assert!(map.contains("<0073>") && !map.contains("<65E5>") && !map.contains("<672C>"), "{map}");
+}
+
+/// What diagrams of the gear pair show.
+fn section() -> Section {
+    Section::of(&GearPair::paper(0.5)).unwrap()
 }
 
 fn columns(count: u32, points: u32) -> Vec<Column> {
@@ -257,7 +263,8 @@ fn lower_panel(picture: &RgbImage) -> RgbImage {
 fn bifurcation_figure_shows_both_walls() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("bifurcation.png");
-    bifurcation_figure::write(&path, ["Bifurcation", "from rest"], E, &columns(1000, 200)).unwrap();
+    bifurcation_figure::write(&path, ["Bifurcation", "from rest"], E, &columns(1000, 200), &section())
+        .unwrap();
     let picture = read(&path);
     assert_eq!(picture.dimensions(), (1600, 1750));
     assert!(ink(&picture) > 5000, "{}", ink(&picture));
@@ -273,7 +280,7 @@ fn the_panel_of_exponents_tells_chaos_from_cycles_and_has_a_band() {
     let drawn = |columns: &[Column]| {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("b.png");
-        bifurcation_figure::write(&path, [""; 2], E, columns).unwrap();
+        bifurcation_figure::write(&path, [""; 2], E, columns, &section()).unwrap();
         lower_panel(&read(&path))
     };
     let chaos = columns(40, 2);
@@ -310,7 +317,7 @@ fn two_passes_are_told_apart_by_colour_and_grey_where_they_agree() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("b.png");
         let both: Vec<Column> = pass(Direction::Up, 0.3).chain(pass(Direction::Down, lyapunov)).collect();
-        bifurcation_figure::write(&path, [""; 2], E, &both).unwrap();
+        bifurcation_figure::write(&path, [""; 2], E, &both, &section()).unwrap();
         read(&path)
     };
     let [apart, same] = [0.1, 0.3].map(drawn);
@@ -332,7 +339,7 @@ fn a_logarithmic_axis_has_its_decades() {
         .collect();
     let ticks = |scale| {
         let path = dir.path().join("b.svg");
-        bifurcation_figure::write(&path, [""; 2], ("k", scale), &decades).unwrap();
+        bifurcation_figure::write(&path, [""; 2], ("k", scale), &decades, &section()).unwrap();
         let svg = fs::read_to_string(path).unwrap();
         // A linear axis to 10,000 has a tick at 1000, too.
         ["10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
@@ -357,7 +364,7 @@ fn bifurcation_figure_survives_poor_data() {
         ("wild", &long, wild),
     ] {
         let path = dir.path().join(format!("{name}.png"));
-        bifurcation_figure::write(&path, [title, ""], E, &columns).unwrap();
+        bifurcation_figure::write(&path, [title, ""], E, &columns, &section()).unwrap();
         assert_eq!(read(&path).width(), 1600);
     }
 }
@@ -365,7 +372,7 @@ fn bifurcation_figure_survives_poor_data() {
 #[test]
 fn a_file_that_cannot_be_written_is_named() {
     let dir = tempfile::tempdir().unwrap().path().join("absent");
-    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], E, &[]).unwrap_err();
+    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], E, &[], &section()).unwrap_err();
     assert!(format!("{error:#}").contains("b.png"), "{error:#}");
     let (orbit, trace) = meshing_orbit();
     let error =

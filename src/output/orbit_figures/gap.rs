@@ -23,14 +23,15 @@ impl Scene<'_> {
         let panel = Rect { right: panel.right - WALL_NAMES, ..panel };
         let bottom = panel.bottom;
         let split = if self.motion.meshes() { top + 0.64 * (bottom - top) } else { bottom };
-        let half = self.half();
-        let [right, left] = self.oscillator.walls;
-        let walls = [right + 0.25 * half, left - 0.25 * half];
+        let room = 0.25 * self.length;
+        let walls = Side::BOTH
+            .into_iter()
+            .filter_map(|side| self.walls.position(side).map(|at| at + side.sign() * room));
         let gaps = self.motion.points().map(|(_, state)| self.gap(state));
         let frame = Frame {
             rect: Rect { bottom: split, ..panel },
             x: self.time_axis(),
-            y: Axis::around(&format!("gap, z = {}", self.gap_in_words()), gaps.chain(walls), half),
+            y: Axis::around(&format!("gap, z = {}", self.gap_in_words()), gaps.chain(walls), self.length),
         };
         self.draw_walls(canvas, &frame)?;
         let at = |t: f64, state: &State| (t, self.gap(state));
@@ -46,7 +47,9 @@ impl Scene<'_> {
 
     /// The word, symbol by symbol: behind its wall where a flight returns to it, else beside the flight.
     fn draw_symbols(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), DrawError> {
-        let [upper, lower] = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
+        let rect = frame.rect;
+        // Of a wall that there is not the edge stands for its place.
+        let [upper, lower] = self.edges(frame).map(|y| y.clamp(rect.top, rect.bottom));
         for (t, symbol) in symbols::symbols(&self.motion.events, self.cycle) {
             let nearest = self.motion.points().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
             let Some((_, state)) = nearest else { continue };
@@ -65,18 +68,26 @@ impl Scene<'_> {
     /// The walls of the gap, and what lies behind them.
     fn draw_walls(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), DrawError> {
         let rect = frame.rect;
-        let [upper, lower] = self.oscillator.walls.map(|wall| frame.at(0.0, wall).1);
-        canvas.fill(Rect { bottom: upper, ..rect }, DARK, 0.08)?;
-        canvas.fill(Rect { top: lower, ..rect }, DARK, 0.08)?;
+        let edges = self.edges(frame);
+        let [upper, lower] = edges;
+        canvas.fill(Rect { bottom: upper.max(rect.top), ..rect }, DARK, 0.08)?;
+        canvas.fill(Rect { top: lower.min(rect.bottom), ..rect }, DARK, 0.08)?;
         frame.draw_grid(canvas)?;
-        for (side, y, text) in [(Side::Right, upper, "z = +b"), (Side::Left, lower, "z = \u{2212}b")] {
+        for (side, y) in Side::BOTH.into_iter().zip(edges) {
+            let Some(text) = self.walls.place(side) else { continue };
             let color = wall_color(side);
             canvas.stroke(&[(rect.left, y), (rect.right, y)], 2.0, color)?;
             let x = rect.right + 14.0;
             canvas.text(&format!("{} wall", name(side)), (x, y - 14.0), SMALL, Align::Left, color)?;
-            canvas.text(text, (x, y + 14.0), SMALL, Align::Left, color)?;
+            canvas.text(&text, (x, y + 14.0), SMALL, Align::Left, color)?;
         }
         Ok(())
+    }
+
+    /// Where the right and the left wall are in the figure; beyond it where there is none.
+    fn edges(&self, frame: &Frame) -> [f64; 2] {
+        let edge = |side| self.walls.position(side).map(|at| frame.at(0.0, at).1);
+        [edge(Side::Right).unwrap_or(f64::NEG_INFINITY), edge(Side::Left).unwrap_or(f64::INFINITY)]
     }
 
     /// How deep the teeth press into the wall: too little to be seen in the gap itself.
@@ -90,7 +101,7 @@ impl Scene<'_> {
         let frame = Frame {
             rect,
             x: self.time_axis(),
-            y: Axis::around("depth, |z| \u{2212} b", depths, 1e-6 * self.half()),
+            y: Axis::around(self.walls.depth(), depths, 1e-6 * self.length),
         };
         frame.draw_grid(canvas)?;
         let y = frame.at(0.0, 0.0).1;

@@ -40,7 +40,7 @@ pub(crate) fn write_each(
 }
 
 fn save(path: &Path, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Result<(), FigureError> {
-    let subtitle = format!("{}  \u{b7}  {}", heading::character(orbit), spectrum.method());
+    let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
     save_figure(path, (WIDTH, 1050), |canvas| {
         let top = draw_head(canvas, &heading::parameters(model), &subtitle, &[])? + 14.0;
         let whole = canvas.panel(LEFT, top);

@@ -251,7 +251,7 @@ function choose(cell) {
   if (cell) {
     const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
     const place = 4 * (cell.j * columns + cell.i);
-    const own = map.start ?? starts?.subarray(place, place + 4);
+    const own = (map.start ?? starts?.subarray(place, place + 4))?.slice(0, map.components);
     const start = own ? ` --start ${[...own].map((x, k) => [a, b][map.axes.findIndex((axis) => axis.start === k)] ?? x).join(",")}` : "";
     const sets = map.axes.map((axis, k) => (axis.start === undefined ? ` --set ${axis.parameter}=${[a, b][k]}` : "")).join("");
     const derived = derivedValues(cell).map(([name, value]) => ` --set ${name}=${value}`).join("");
