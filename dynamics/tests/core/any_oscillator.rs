@@ -273,6 +273,11 @@ proptest! {
         let mut settled = Trajectory::new(&flow, case.law, case.start);
         prop_assume!(settled.advance_period(&mut ()) != Err(Stop::CapEvents));
         let y = settled.state();
+        // A neighbour that begins behind a wall is put on it: so near to one there is a derivative on one side alone.
+        let gap = flow.to_gap(y)[0];
+        let is_beside = |side: Side| (gap - flow.wall(side)).abs() < 1e-4 * size(y);
+        let sticks = settled.meshing().is_some_and(|side| case.oscillator.contacts[side.index()] == Contact::Rigid);
+        prop_assume!(sticks || !Side::BOTH.into_iter().any(is_beside));
         let mut carrier = settled.at(y, UNITS);
         let mut events: Vec<Happening> = Vec::new();
         prop_assume!(carrier.advance_period(&mut events) != Err(Stop::CapEvents));
