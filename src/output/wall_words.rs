@@ -160,6 +160,6 @@ mod tests {
         assert_eq!(position("sigma - 2e-3*k1"), "\u{3c3} \u{2212} 2e\u{2212}3*k\u{2081}");
         assert_eq!(position("sqrt(omega)"), "sqrt(\u{3c9})");
         assert_eq!(position("-0.5"), "\u{2212}0.5");
-        assert_eq!(position("sigma + sigma + sigma + sigma + sigma"), "");
+        assert_eq!(position("sigma + sigma + sigma + sigma + sigma + sigma + sigma + sigma"), "");
     }
 }
