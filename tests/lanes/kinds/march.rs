@@ -55,7 +55,7 @@ impl March {
             free: Matrix::zeros(),
         };
         march.free = march.generator(Mode::Free);
-        for side in 0..2 {
+        for side in [0, 1] {
             if march.beyond(&march.y.clone(), side) > 0.0 {
                 if oscillator.contacts[side] == Contact::Rigid {
                     march.put_on_wall(side);

@@ -145,7 +145,7 @@ fn multipliers_are_those_of_differences() {
 /// What was compiled without elastic and rigid walls takes none.
 #[test]
 fn walls_that_are_left_out_are_refused() {
-    let rigid = cells().into_iter().find(|cell| may_chatter(cell)).unwrap();
+    let rigid = cells().into_iter().find(may_chatter).unwrap();
     let settings = LaneSettings { kinds: false, ..LaneSettings::only(1) };
     let error = run(Precision::F32, &[rigid], &settings).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0 }), "{error}");
