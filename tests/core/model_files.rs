@@ -185,7 +185,7 @@ fn check(text: &str) -> bool {
 
 #[test]
 fn no_text_makes_reading_a_model_panic() {
-    let mut runner = TestRunner::new(ProptestConfig::with_cases(6000));
+    let mut runner = TestRunner::new(ProptestConfig::with_cases(3000));
     let texts: Vec<&str> = BUILT_IN.iter().map(|(_, text)| *text).collect();
     let [accepted, refused] = [std::cell::Cell::new(0), std::cell::Cell::new(0)];
     let strategy = (prop::sample::select(texts), changes());
@@ -196,5 +196,5 @@ fn no_text_makes_reading_a_model_panic() {
     });
     verdict.unwrap();
     // Both happen, so that both are looked at.
-    assert!(accepted.get() > 300 && refused.get() > 1500, "{accepted:?} {refused:?}");
+    assert!(accepted.get() > 150 && refused.get() > 750, "{accepted:?} {refused:?}");
 }

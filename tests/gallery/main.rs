@@ -11,5 +11,6 @@ mod ball;
 mod clearance;
 mod elastic;
 mod engines;
+mod files;
 mod random;
 mod single_impact;

@@ -181,7 +181,8 @@ function drawAxes(p) {
   }
   pen.font = "14px system-ui, sans-serif";
   pen.textAlign = "center";
-  const name = ({ meaning, symbol }) => `${meaning}, ${symbol}`;
+  // Where nobody said what a parameter means its name stands for that.
+  const name = ({ parameter, meaning, symbol }) => (meaning === parameter ? symbol : `${meaning}, ${symbol}`);
   pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
   pen.save();
   pen.translate(14, p.y + p.height / 2);
