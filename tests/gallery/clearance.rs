@@ -51,9 +51,9 @@ pub(crate) struct Symmetric {
     /// The state at phase 0.
     pub(crate) strobe: State,
     /// Of half a period and the mirror image.
-    half: Matrix4<f64>,
+    pub(crate) half: Matrix4<f64>,
     /// Whether it passes through no wall on its way.
-    is_free_between: bool,
+    pub(crate) is_free_between: bool,
 }
 
 /// Matrices on `(x1, v1, x2, v2)`, and the steady state's cosine and sine parts.

@@ -10,5 +10,7 @@ mod cycle;
 mod ball;
 mod clearance;
 mod elastic;
+mod engines;
+mod files;
 mod random;
 mod single_impact;

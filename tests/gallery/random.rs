@@ -6,16 +6,24 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use rattlemap::gpu::{Constants, Lane, LaneSettings, Precision};
+use rattlemap::map::engine::measured_record;
+use rattlemap::map::plan::{Needs, Plan};
 use rattlemap::map::random::Random;
+use rattlemap::map::scene::{Integration, Quantity, Scene, Start};
 use rattlemap::model_file::FileModel;
+use rattlemap::record::Record;
+use rattlemap::record::classify::{classify, status};
 use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::Flight;
+use rattlemap::validate::{Draw, Kind, Lanes, Rate, Sample, Stratum, Subject, differences, replay};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, Oscillator, State};
-use rattlemap_dynamics::orbit::{Budget, Measured, Settings, Status, measure};
+use rattlemap_dynamics::orbit::{Budget, Class, Measured, Settings, Status, measure};
 use rattlemap_dynamics::reference::Trajectory;
 
 use crate::common::apart;
+use crate::common::gpu::open;
 
 /// A cell that takes longer hangs.
 const HANGS: Duration = Duration::from_secs(60);
@@ -151,13 +159,12 @@ fn end_well(seeds: std::ops::Range<u32>) {
         .map(|seed| {
             let cell = drawn(u64::from(seed));
             let (measured, time) = measured(&cell);
-            let record =
-                rattlemap::map::engine::measured_record(&measured, &rattlemap::map::plan::Needs::EVERYTHING);
+            let record = measured_record(&measured, &Needs::EVERYTHING);
             let superstable = record.lyapunov == f64::NEG_INFINITY && record.period > 0;
             let numbers = [record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
             let is_finite = (record.lyapunov.is_finite() || superstable)
                 && numbers.iter().chain(&record.strobe).all(|x| x.is_finite());
-            (seed, rattlemap::record::classify::status(&record), is_finite, time)
+            (seed, status(&record), is_finite, time)
         })
         .collect();
     for status in Status::ALL {
@@ -227,4 +234,121 @@ fn agree(seeds: std::ops::Range<u32>) {
 #[test]
 fn random_models_are_where_the_independent_integrator_is() {
     agree(0..200);
+}
+
+/// Steps per forcing period beyond which a lane is left to the reference.
+const MOST_STEPS: f64 = 2000.0;
+
+/// Whether a lane has little enough to do.
+fn is_bounded(cell: &Drawn) -> bool {
+    let Some(constants) = Constants::new(&cell.oscillator, None) else { return false };
+    let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
+    f64::from(constants.steps) * finest < MOST_STEPS
+}
+
+/// A cell and its record as a map of one.
+fn examined(cell: &Drawn, precision: Precision, record: Record) -> Option<Kind> {
+    let integration = Integration {
+        transient_periods: SETTINGS.transient_periods,
+        observed_periods: SETTINGS.observed_periods,
+        max_period: SETTINGS.max_period,
+        ..Integration::default()
+    };
+    let quantities = [
+        Quantity::Class,
+        Quantity::Lyapunov,
+        Quantity::Impacts,
+        Quantity::Mesh,
+        Quantity::Symmetric,
+        Quantity::Word,
+    ];
+    let scene = Scene::builder(cell.model.clone())
+        .cells(["omega"], &[[cell.oscillator.omega]])
+        .start(Start::State(cell.start))
+        .integration(integration)
+        .quantities(&quantities)
+        .build();
+    let plan = Plan::new(&scene.expect("a valid scene"));
+    assert_eq!(plan.oscillator(plan.cell(0).flow), cell.oscillator);
+    let subject = Subject { plan: &plan, records: &[record], precision, is_lane: true };
+    let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
+    let sample = Sample { seed: 0, draws, states: Vec::new() };
+    let validation = replay(&subject, &sample, &Lanes::default(), &|_| ());
+    validation.mismatches.first().map(|mismatch| mismatch.kind)
+}
+
+/// Lanes say what the reference says, or `validate` finds out why not.
+fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
+    let cells: Vec<Drawn> = seeds.map(|seed| drawn(u64::from(seed))).filter(is_bounded).collect();
+    let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.oscillator).collect();
+    let laws: Vec<Law> = cells.iter().map(|cell| cell.law).collect();
+    let lanes: Vec<Lane> =
+        (0..).zip(&cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.start }).collect();
+    let budget = budget();
+    let settings = LaneSettings {
+        periods: budget.periods(),
+        transient_periods: SETTINGS.transient_periods,
+        max_period: SETTINGS.max_period,
+        exponent_from: budget.exponent_from(),
+        chaos_from: budget.chaos_from(),
+        chaos_errors: budget.chaos_errors() as f32,
+        ..LaneSettings::default()
+    };
+    let mut gpu = open(precision);
+    let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
+    let is_wrong = |record: &&Record| !record.strobe.iter().all(|x| x.is_finite());
+    assert_eq!(records.iter().filter(is_wrong).count(), 0, "not finite");
+    let kinds: Vec<(usize, Option<Kind>)> = cells
+        .par_iter()
+        .with_max_len(1)
+        .enumerate()
+        .filter_map(|(i, cell)| {
+            let record = records[i];
+            let truth = measured_record(&measured(cell).0, &Needs::EVERYTHING);
+            let [ours, theirs] = [record, truth].map(|record| classify(&record));
+            let is_silent = ours == Class::Undecided || ours == Class::Failed;
+            // It claims nothing.
+            if is_silent || theirs == Class::Undecided && ours == Class::Undecided {
+                return None;
+            }
+            let differs =
+                !differences(&record, &truth, precision, cell.oscillator.period(), &budget).is_empty();
+            differs.then(|| (i, examined(cell, precision, record)))
+        })
+        .collect();
+    let silent =
+        records.iter().filter(|record| !matches!(classify(record), Class::Periodic { .. } | Class::Chaotic));
+    println!(
+        "{}: {} lanes, {} silent, {} differ",
+        precision.name(),
+        cells.len(),
+        silent.count(),
+        kinds.len()
+    );
+    for kind in Kind::ALL {
+        println!("{}: {}", kind.name(), kinds.iter().filter(|(_, found)| *found == Some(kind)).count());
+    }
+    let unexplained: Vec<_> = kinds.iter().filter(|(_, kind)| *kind == Some(Kind::Unexplained)).collect();
+    for (i, _) in &unexplained {
+        let truth = measured_record(&measured(&cells[*i]).0, &Needs::EVERYTHING);
+        println!("{:?}\n{:?}", records[*i], truth);
+    }
+    assert!(!Rate::new(unexplained.len(), cells.len()).is_too_many(), "unexplained: {unexplained:?}");
+}
+
+#[test]
+fn lanes_in_f32_say_what_the_reference_says_of_random_models() {
+    lanes_agree(Precision::F32, 0..400);
+}
+
+#[test]
+fn lanes_in_f64_say_what_the_reference_says_of_random_models() {
+    lanes_agree(Precision::F64, 0..400);
+}
+
+#[test]
+#[ignore = "tens of minutes"]
+fn lanes_say_what_the_reference_says_of_twenty_thousand_models() {
+    lanes_agree(Precision::F32, 0..20_000);
+    lanes_agree(Precision::F64, 0..20_000);
 }

@@ -48,7 +48,7 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
         high,
         beyond: beyond(exponents(), 0.0, high),
     };
-    let entries = entries(&indices, &palette, shows_chaos);
+    let entries = entries(&indices, &palette, shows_chaos, cells.asks(Quantity::Symmetric));
     let has_chaos = indices.iter().any(|&index| index >= FIRST_SHADE);
     Layer {
         name: "map",
@@ -84,7 +84,7 @@ fn palette() -> Vec<Color> {
 }
 
 /// What there is on the map: low periods first, then chaos and exceptions.
-fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool) -> Vec<Entry> {
+fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, asks_symmetry: bool) -> Vec<Entry> {
     let counts = indices.par_iter().fold(
         || [0usize; 256],
         |mut counts, &index| {
@@ -95,7 +95,12 @@ fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool) -> Vec<Entry> {
     let counts = counts.reduce(|| [0; 256], |a, b| std::array::from_fn(|i| a[i] + b[i]));
     let entry = |index: usize, text: String| Entry { color: palette[index], text, cells: counts[index] };
     let has_kinds = counts[0] + counts[2] + counts[3] > 0;
-    let symmetric = if has_kinds { "period 1, symmetric" } else { "period 1" };
+    // Whether it is symmetric is known where it was asked.
+    let symmetric = match (has_kinds, asks_symmetry) {
+        (true, true) => "period 1, symmetric",
+        (true, false) => "period 1, contact",
+        (false, _) => "period 1",
+    };
     let mut list = vec![
         entry(0, "period 1, no contact".to_owned()),
         entry(1, symmetric.to_owned()),

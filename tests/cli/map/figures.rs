@@ -40,6 +40,20 @@ fn figures_of_a_map_come_in_each_format() {
     assert!(!out.join("cells.csv").exists());
 }
 
+/// Of one wall nobody asks whether motion is symmetric, and the legend does not say so.
+#[test]
+fn a_legend_claims_no_symmetry_that_was_not_asked_for() {
+    let folder = folder();
+    let scene = "model = 'impact-oscillator'\n[parameters]\nsigma = 0.5\n\
+                 [[axis]]\nparameter = 'omega'\nvalues = [1.4, 3.0]\n[[axis]]\nparameter = 'e'\nvalues = [0.7, 0.8]\n\
+                 [outputs]\nquantities = ['class', 'impacts']\nfiles = ['svg']\n";
+    fs::write(folder.path().join("one.toml"), scene).unwrap();
+    command(&folder, &["map", "one.toml", "--engine", "cpu", "--out", "o", "--quiet"]).assert().success();
+    let figure = fs::read_to_string(folder.path().join("o/map.svg")).unwrap();
+    let has = |text: &str| figure.contains(text);
+    assert!(has("period 1, no contact") && has("period 1, contact") && !has("symmetric"), "{figure}");
+}
+
 #[test]
 fn figures_of_diagrams_and_orbits_come_in_each_format() {
     let folder = folder();

@@ -1,0 +1,158 @@
+//! Cycles in closed form, as the engines find them: the reference, and lanes in f32 and f64.
+
+use nalgebra::Matrix4;
+
+use crate::ball::{ball, bounce, window};
+use crate::clearance;
+use crate::common::apart;
+use crate::common::gpu::open;
+use crate::cycle::{eigenvalues, followed};
+use crate::single_impact::stable;
+use rattlemap::gpu::{Lane, LaneSettings, Precision};
+use rattlemap::map::engine::measured_record;
+use rattlemap::map::plan::Needs;
+use rattlemap::record::Record;
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Law, Oscillator, State};
+use rattlemap_dynamics::orbit::{Budget, Settings, measure};
+use rattlemap_dynamics::stability::multipliers;
+
+/// A stable cycle that is known.
+struct Truth {
+    what: String,
+    oscillator: Oscillator,
+    law: Law,
+    period: u32,
+    /// At phase 0.
+    strobe: State,
+    /// Of the largest multiplier.
+    radius: f64,
+    impacts: f64,
+}
+
+fn truths() -> Vec<Truth> {
+    let mut list = Vec::new();
+    for (stop, period) in stable() {
+        let (orbit, (oscillator, law)) = (stop.orbits(period)[0], stop.walled().oscillator());
+        let radius = eigenvalues(orbit.monodromy)[0].norm();
+        let what = format!("one stop, omega = {}, n = {period}", stop.omega);
+        list.push(Truth { what, oscillator, law, period, strobe: orbit.strobe, radius, impacts: 1.0 });
+    }
+    for e in [0.3, 0.5, 0.8] {
+        let [born, doubles] = window(e);
+        for share in [0.2, 0.5, 0.8] {
+            let shaking = born + share * (doubles - born);
+            // From 1 on the table alone throws the ball off; below, only its bounce keeps it off.
+            let ((strobe, matrix), (oscillator, law)) = (bounce(shaking, e), ball(shaking, e).oscillator());
+            let (radius, what) = (eigenvalues(matrix)[0].norm(), format!("ball, e = {e}, G = {shaking:.3}"));
+            list.push(Truth { what, oscillator, law, period: 1, strobe, radius, impacts: 1.0 });
+        }
+    }
+    for omega in [0.7, 0.8, 1.5] {
+        let (oscillator, law) = clearance::pair(omega);
+        for orbit in clearance::symmetric(omega) {
+            let monodromy: Matrix4<f64> = orbit.half * orbit.half;
+            let [re, im] = multipliers(&monodromy).unwrap()[0];
+            let radius = re.hypot(im);
+            if orbit.is_free_between && radius < 1.0 {
+                let what = format!("two masses, omega = {omega}");
+                list.push(Truth {
+                    what,
+                    oscillator,
+                    law,
+                    period: 1,
+                    strobe: orbit.strobe,
+                    radius,
+                    impacts: 2.0,
+                });
+            }
+        }
+    }
+    list
+}
+
+const SETTINGS: Settings = Settings { transient_periods: 400, observed_periods: 128, max_period: 16 };
+
+fn budget() -> Budget {
+    Budget {
+        settings: SETTINGS,
+        early_stop: true,
+        undecided_periods: 0,
+        exponent: true,
+        shows_exponent: true,
+    }
+}
+
+fn lane_settings() -> LaneSettings {
+    let budget = budget();
+    LaneSettings {
+        periods: budget.periods(),
+        transient_periods: SETTINGS.transient_periods,
+        max_period: SETTINGS.max_period,
+        exponent_from: budget.exponent_from(),
+        chaos_from: budget.chaos_from(),
+        chaos_errors: budget.chaos_errors() as f32,
+        ..LaneSettings::default()
+    }
+}
+
+/// Near the cycle, not on it.
+fn start(truth: &Truth) -> State {
+    truth.strobe.map(|x| 1.001 * x)
+}
+
+/// How far a record's state and the logarithm of its multiplier are from the truth's, relative to the motion.
+fn off(truth: &Truth, record: &Record) -> [f64; 2] {
+    assert_eq!(record.period, truth.period, "{}: {record:?}", truth.what);
+    let impacts = truth.impacts / f64::from(truth.period);
+    assert!((record.impacts_per_period - impacts).abs() < 1e-9, "{}: {record:?}", truth.what);
+    let at = |n: u32| followed(&truth.oscillator, truth.law, truth.strobe, n).end;
+    let near = (0..truth.period).map(|n| apart(record.strobe, at(n))).fold(f64::INFINITY, f64::min);
+    let scale = truth.strobe.iter().fold(1.0f64, |m, x| m.max(x.abs()));
+    let span = f64::from(truth.period) * truth.oscillator.period();
+    [near / scale, (record.lyapunov * span - truth.radius.ln()).abs()]
+}
+
+fn worst(truths: &[Truth], records: &[Record], who: &str) -> [f64; 2] {
+    let mut worst = [0.0f64; 2];
+    for (truth, record) in truths.iter().zip(records) {
+        let off = off(truth, record);
+        println!("{who}, {}: state {:.1e}, ln |mu| {:.1e}", truth.what, off[0], off[1]);
+        worst = [worst[0].max(off[0]), worst[1].max(off[1])];
+    }
+    worst
+}
+
+#[test]
+fn the_reference_finds_them() {
+    let truths = truths();
+    let record = |truth: &Truth| {
+        let flow = Flow::new(&truth.oscillator);
+        measured_record(&measure(&flow, truth.law, start(truth), &budget()), &Needs::EVERYTHING)
+    };
+    let records: Vec<Record> = truths.iter().map(record).collect();
+    let [state, multiplier] = worst(&truths, &records, "reference");
+    assert!(state < 1e-12 && multiplier < 1e-12, "{state:e} {multiplier:e}");
+}
+
+fn lanes_find_them(precision: Precision, bars: [f64; 2]) {
+    let truths = truths();
+    let flows: Vec<Oscillator> = truths.iter().map(|truth| truth.oscillator).collect();
+    let laws: Vec<Law> = truths.iter().map(|truth| truth.law).collect();
+    let lanes: Vec<Lane> =
+        (0..).zip(&truths).map(|(i, truth)| Lane { flow: i, law: i, start: start(truth) }).collect();
+    let mut gpu = open(precision);
+    let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &lane_settings())).unwrap();
+    let [state, multiplier] = worst(&truths, &records, precision.name());
+    assert!(state < bars[0] && multiplier < bars[1], "{state:e} {multiplier:e}");
+}
+
+#[test]
+fn lanes_in_f32_find_them() {
+    lanes_find_them(Precision::F32, [1e-6, 1e-5]);
+}
+
+#[test]
+fn lanes_in_f64_find_them() {
+    lanes_find_them(Precision::F64, [1e-10, 1e-10]);
+}

@@ -1,0 +1,56 @@
+//! The files in `models/` say what the truths were written down for.
+
+use crate::ball::ball;
+use crate::clearance;
+use crate::common::closed_form::Walled;
+use crate::elastic::{backlash, bilinear, soft};
+use crate::single_impact::{COCO, STOP};
+use rattlemap::model_file::FileModel;
+use rattlemap_dynamics::model::{Contact, Domain, Law, Model, Oscillator};
+
+fn numbers(domain: &Domain) -> Vec<f64> {
+    [domain.damping.as_flattened(), domain.stiffness.as_flattened(), &domain.load].concat()
+}
+
+fn is_near(ours: &[f64], theirs: &[f64]) -> bool {
+    let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= 4.0 * f64::EPSILON * a.abs();
+    ours.len() == theirs.len() && ours.iter().zip(theirs).all(near)
+}
+
+fn agrees(name: &str, sets: &[(&str, f64)], (ours, law): (Oscillator, Law)) {
+    let mut model = FileModel::built_in(name).expect("built in");
+    sets.iter().for_each(|&(parameter, value)| model.set(parameter, value).unwrap());
+    let theirs = model.oscillator().unwrap();
+    let flat = |o: &Oscillator| {
+        [o.mass.as_flattened(), &o.gap, &o.walls, &[o.omega], &o.force, &numbers(&o.free)].concat()
+    };
+    assert!(is_near(&flat(&ours), &flat(&theirs)), "{name}: {ours:#?} {theirs:#?}");
+    assert_eq!(ours.degrees, theirs.degrees, "{name}");
+    for i in (0..2).filter(|&i| ours.walls[i].is_finite()) {
+        assert_eq!(ours.contacts[i], theirs.contacts[i], "{name}");
+        match ours.contacts[i] {
+            Contact::Elastic => {
+                assert!(is_near(&numbers(&ours.meshing[i]), &numbers(&theirs.meshing[i])), "{name}");
+            }
+            _ => assert_eq!(
+                (law.restitution[i], law.mesh_speed[i]),
+                (model.law().restitution[i], model.law().mesh_speed[i]),
+                "{name}"
+            ),
+        }
+    }
+}
+
+#[test]
+fn models_are_what_their_truths_are_of() {
+    let walled = |walled: Walled| walled.oscillator();
+    agrees("impact-oscillator", &[], walled(STOP.walled()));
+    agrees("coco-impact", &[], walled(COCO.walled()));
+    agrees("bilinear", &[("omega", 1.7), ("k", 3.0)], walled(bilinear(1.7, 1.0)));
+    agrees("soft-impact", &[("omega", 0.85)], walled(soft(0.85, 0.7)));
+    agrees("kahraman-singh", &[("omega", 0.9)], walled(backlash(0.9)));
+    agrees("shaking-table", &[("A", 1.2), ("e", 0.3)], walled(ball(1.2, 0.3)));
+    agrees("two-masses", &[("omega", 0.8)], clearance::pair(0.8));
+    // Every built-in model but the gear pair, whose truth is the paper, is among them.
+    assert_eq!(FileModel::all_built_in().len(), 8);
+}
