@@ -333,6 +333,13 @@ impl Scene<'_> {
         Ok(())
     }
 
+    /// The displacements of motion that has died down: a tenth of the half backlash. What stands for that with a single
+    /// wall, which may be far, is less certain, and a smaller share of it is taken.
+    fn died_down(&self) -> f64 {
+        let share = if self.oscillator.walls.iter().all(|wall| wall.is_finite()) { 0.1 } else { 1e-3 };
+        share * self.oscillator.length_scale()
+    }
+
     fn time_axis(&self) -> Axis {
         let (first, last) = self.motion.points().fold((0f64, 0f64), |(a, b), (t, _)| (a.min(t), b.max(t)));
         Axis::exact(TIME_LABEL, first, if last > first { last } else { first + 1.0 })
@@ -341,7 +348,6 @@ impl Scene<'_> {
     /// An axis for components of the state; `scale` is theirs relative to a displacement.
     fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
         let values = self.motion.points().flat_map(|(_, state)| components.iter().map(|i| state[*i]));
-        // A tenth of the half backlash, or of what stands for it, is motion that has died down.
-        Axis::around(label, values, 0.1 * self.oscillator.length_scale() * scale)
+        Axis::around(label, values, self.died_down() * scale)
     }
 }

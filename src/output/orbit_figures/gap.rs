@@ -63,7 +63,7 @@ impl Scene<'_> {
         let length = self.oscillator.length_scale();
         let gaps = || self.motion.points().map(|(_, state)| self.gap(state));
         let (low, high) = gaps().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(z), b.max(z)));
-        let extent = (high - low).max(0.1 * length);
+        let extent = (high - low).max(self.died_down());
         let [right, left] = self.oscillator.walls;
         let are_two = right.is_finite() && left.is_finite();
         let mut ends: Vec<f64> = Vec::new();
@@ -77,7 +77,7 @@ impl Scene<'_> {
             let near = near.into_iter().filter(|(wall, away, _)| wall.is_finite() && *away < FAR * extent);
             ends.extend(near.map(|(wall, _, sign)| wall + sign * BEYOND * extent));
         }
-        let least_span = if are_two { length } else { 0.1 * length };
+        let least_span = if are_two { length } else { self.died_down() };
         Axis::around(label, gaps().chain(ends), least_span)
     }
 
