@@ -1,8 +1,8 @@
 //! What is integrated: piecewise-linear oscillators between two walls.
 //!
 //! A [`Model`] (today [`GearPair`], and [`Stops`], which can be solved by hand) has parameters by
-//! name and hands on an [`Oscillator`]: masses, three linear domains with harmonic forcing, a gap
-//! that is linear in the displacements, its two walls, and the contact law. Flow, reference,
+//! name and hands on an [`Oscillator`]: a mass matrix, three linear domains with harmonic forcing, a gap
+//! that is linear in the displacements, its walls and what they are, and the contact law. Flow, reference,
 //! stability and words know nothing but that description; scenes, maps and files nothing but the
 //! trait.
 

@@ -378,7 +378,8 @@ impl Orbit {
 ///
 /// Integrates each value of the scene's one axis on the event-driven reference and writes
 /// bifurcation.csv (one row per event), bifurcation_columns.csv (one row per value: class, period, word, pattern,
-/// exponent and its error), bifurcation.png and manifest.json. Each value is
+/// exponent and its error), bifurcation.png and manifest.json; of a model whose walls fix a displacement
+/// bifurcation_strobe.csv, too (states at phase 0). Each value is
 /// integrated until it is decided; steps_per_period, early_stop and quantities are for maps.
 /// With start.policy=both the attractor is followed upwards and downwards, and where class, period or
 /// pattern differ is told.

@@ -41,6 +41,8 @@ pub struct Column {
     pub periods_run: u64,
     /// Every crossing of a wall: contacts and ends of meshing.
     pub points: Vec<SectionPoint>,
+    /// The state at phase 0 of every period that is shown, where walls [fix](fixed) a displacement; else none.
+    pub strobes: Vec<State>,
 }
 
 impl Column {
@@ -87,6 +89,16 @@ pub struct SectionPoint {
     pub after: State,
 }
 
+/// The displacement, by its index, that is the same at every crossing of a wall: the gap is a multiple of this one
+/// alone, in every cell. None where the gap mixes two, or there is no cell.
+///
+/// Section points of such a model differ by velocity and phase. Its displacement is shown at phase 0.
+pub fn fixed(cells: &[(f64, Box<dyn Model>)]) -> Option<usize> {
+    let gap = |model: &dyn Model| model.oscillator().map(|oscillator| oscillator.gap);
+    let fixes = |i: usize| cells.iter().all(|(_, model)| gap(&**model).is_ok_and(|gap| gap[1 - i] == 0.0));
+    (0..2).find(|&i| !cells.is_empty() && fixes(i))
+}
+
 /// How many columns a diagram of so many cells has.
 pub fn column_count(cells: usize, start: Start) -> usize {
     if start == Start::Both { 2 * cells } else { cells }
@@ -124,7 +136,8 @@ pub fn run_until(
     halt: &AtomicBool,
 ) -> Result<Option<Vec<Column>>, ModelError> {
     cells.iter().try_for_each(|(_, model)| Flow::validate(&**model).map(|_| ()))?;
-    let run = Run { cells, settings, progress, done: AtomicUsize::new(0), halt };
+    let has_strobes = fixed(cells).is_some();
+    let run = Run { cells, settings, progress, done: AtomicUsize::new(0), halt, has_strobes };
     match start {
         Start::Rest => run.side_by_side(REST),
         Start::State(state) => run.side_by_side(state),
@@ -149,6 +162,7 @@ struct Run<'a> {
     progress: &'a (dyn Fn(usize) + Sync),
     done: AtomicUsize,
     halt: &'a AtomicBool,
+    has_strobes: bool,
 }
 
 impl Run<'_> {
@@ -189,9 +203,19 @@ impl Run<'_> {
             return Ok(None);
         };
         let end = if orbit.class == Class::Failed { REST } else { orbit.strobe };
+        let strobes = if self.has_strobes { strobes(model, &orbit)? } else { Vec::new() };
         (self.progress)(self.done.fetch_add(1, Ordering::Relaxed) + 1);
-        Ok(Some((Column::of(value, orbit), end)))
+        Ok(Some((Column { strobes, ..Column::of(value, orbit) }, end)))
     }
+}
+
+/// The states of an orbit at phase 0, one for each period that its events span.
+fn strobes(model: &dyn Model, orbit: &Orbit) -> Result<Vec<State>, ModelError> {
+    let Some(later) = orbit.cycle_periods.checked_sub(1) else { return Ok(Vec::new()) };
+    let mut states = vec![orbit.strobe];
+    let trace = orbit::trace(model, orbit.strobe, orbit.strobe_meshing, later, 1)?;
+    states.extend(trace.iter().skip(1).map(|sample| sample.state));
+    Ok(states)
 }
 
 #[cfg(test)]
@@ -211,6 +235,7 @@ impl Column {
             word: None,
             periods_run: 0,
             points: Vec::new(),
+            strobes: Vec::new(),
         }
     }
 }
@@ -237,6 +262,7 @@ impl Column {
             symmetric: orbit.symmetric,
             periods_run: orbit.periods_run,
             points: orbit.events.iter().map(point).collect(),
+            strobes: Vec::new(),
             word: is_periodic.then_some(orbit.word),
         }
     }

@@ -3,25 +3,28 @@
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
+use super::bifurcation_figure::Shown;
 use super::bifurcation_manifest::Manifest;
 use super::manifest::MANIFEST;
 use super::plot_style::axes::Scale;
 use super::symbols::{axis_label, symbol};
 use super::{
-    Folder, OutputError, bifurcation_columns_csv, bifurcation_csv, bifurcation_figure, caption, inventory,
-    names,
+    Folder, OutputError, bifurcation_columns_csv, bifurcation_csv, bifurcation_figure,
+    bifurcation_strobe_csv, caption, inventory, names,
 };
-use crate::map::bifurcation::Column;
+use crate::map::bifurcation::{Column, fixed};
 use crate::map::scene::{self, Along, Format, Scene};
 
 const CSV: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
+/// Of models whose walls fix a displacement.
+const STROBE_CSV: &str = "bifurcation_strobe.csv";
 /// The figure, by format.
 static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("bifurcation"));
 
 /// Every file that a bifurcation diagram may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, CSV, COLUMNS_CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+    [MANIFEST, CSV, COLUMNS_CSV, STROBE_CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
 
 /// How a diagram was asked for, beside its scene.
@@ -51,13 +54,19 @@ pub fn write(
     let parameter = scene.axes()[0].parameter();
     let wanted = &scene.outputs().files;
     let mut files = Vec::new();
+    let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
     if wanted.contains(&Format::Csv) {
-        folder.replace(CSV, |path| {
-            bifurcation_csv::write(path, &parameter.name, &scene.base().state_names(), columns)
-        })?;
+        folder.replace(CSV, |path| bifurcation_csv::write(path, &parameter.name, &names, columns))?;
         folder.replace(COLUMNS_CSV, |path| bifurcation_columns_csv::write(path, &parameter.name, columns))?;
         files.extend([CSV, COLUMNS_CSV]);
+        if fixed.is_some() {
+            folder.replace(STROBE_CSV, |path| {
+                bifurcation_strobe_csv::write(path, &parameter.name, &names, columns)
+            })?;
+            files.push(STROBE_CSV);
+        }
     }
+    let shown = Shown::of(scene.base(), fixed);
     for (_, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
         let label = axis_label(parameter);
         let subtitle =
@@ -68,7 +77,7 @@ pub fn write(
             scene::Scale::Values => Scale::Listed,
         };
         folder.replace(name, |path| {
-            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], (&label, scale), columns)?)
+            Ok(bifurcation_figure::write(path, [scene.title(), &subtitle], (&label, scale), &shown, columns)?)
         })?;
         files.push(name);
     }

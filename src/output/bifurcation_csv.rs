@@ -41,7 +41,8 @@ pub(super) fn direction_field(columns: &[Column]) -> Option<&'static str> {
     columns.iter().any(|column| column.direction.is_some()).then_some("direction")
 }
 
-fn head(column: &Column) -> Vec<String> {
+/// The fields of each row that tell its column: value, direction, class, period, status.
+pub(super) fn head(column: &Column) -> Vec<String> {
     let period = names::period(column.class).map(|period| period.to_string());
     let direction = column.direction.map(|direction| direction.name().to_owned());
     let rest = [

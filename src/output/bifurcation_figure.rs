@@ -1,17 +1,22 @@
 //! Section points against one parameter, drawn like Fig. 5 of the paper; below them the largest Lyapunov exponent.
 
 mod exponents;
+mod shown;
 
 use std::path::Path;
 
 use super::plot_style::axes::{Axis, Frame, Scale};
 use super::plot_style::legend::{Entry, Key, draw_head};
-use super::plot_style::{Bitmap, Canvas, FAINT, Marker, RGBColor, Rect, Shape, save_figure, wall_color};
+use super::plot_style::{
+    Bitmap, Canvas, FAINT, GEAR_2, Marker, RGBColor, Rect, Shape, save_figure, wall_color,
+};
 use super::{DrawError, FigureError};
-use crate::map::bifurcation::{Column, Direction, SectionPoint};
+use crate::map::bifurcation::{Column, Direction};
 use exponents::class_color;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
+pub use shown::Shown;
+use shown::{Panel, States};
 
 const SIZE: (u32, u32) = (1600, 1750);
 const LEFT: f64 = 130.0;
@@ -27,9 +32,11 @@ const DOT: (f64, f64) = (0.7, 2.2);
 /// Columns of at most this many points are curves: their dots are large enough to join.
 const CURVE_POINTS: usize = 24;
 const CURVE_DOT: f64 = 1.3;
+/// The colour of states at phase 0, which belong to no wall.
+const STROBE: RGBColor = GEAR_2;
 
-/// Draws the displacement of both gears at every section point `|z| = b`, and the largest Lyapunov exponent of each
-/// column, in the format that the file's name tells.
+/// Draws what is [`Shown`] of every section point, a panel each, and the largest Lyapunov exponent of each column, in
+/// the format that the file's name tells.
 ///
 /// One dot per point, coloured by wall; where dots pile up they darken with the
 /// logarithm of their number, so that the density of a chaotic band shows. Of two passes the dots are
@@ -43,9 +50,10 @@ pub fn write(
     path: &Path,
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),
+    shown: &Shown,
     columns: &[Column],
 ) -> Result<(), FigureError> {
-    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis, columns))
+    save_figure(path, SIZE, |canvas| draw(canvas, [title, subtitle], axis, shown, columns))
 }
 
 /// What colours tell apart.
@@ -77,10 +85,18 @@ impl Look {
     }
 
     /// Which of the two colours of dots a point has.
-    fn place(self, column: &Column, point: &SectionPoint) -> usize {
+    fn place(self, column: &Column, side: Option<Side>) -> usize {
         match self {
-            Look::Walls => point.side as usize,
+            Look::Walls => side.map_or(0, Side::index),
             Look::Directions => usize::from(column.direction == Some(Direction::Down)),
+        }
+    }
+
+    /// The two colours of dots in a panel.
+    fn colors(self, panel: &Panel) -> [RGBColor; 2] {
+        match (self, panel.states) {
+            (Look::Walls, States::Strobes) => [STROBE; 2],
+            _ => Side::BOTH.map(wall_color),
         }
     }
 }
@@ -97,32 +113,32 @@ fn draw(
     canvas: &Canvas<'_>,
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),
+    shown: &Shown,
     columns: &[Column],
 ) -> Result<(), DrawError> {
     let left_out: Vec<f64> = columns.iter().filter(|c| is_left_out(c)).map(|c| c.value).collect();
     let look = Look::of(columns);
-    let top = draw_head(canvas, title, subtitle, &legend(columns, look))? + 14.0;
+    let top = draw_head(canvas, title, subtitle, &legend(columns, shown, look))? + 14.0;
     let whole = canvas.panel(LEFT, top);
-    let height = (whole.bottom - top - 2.0 * BETWEEN) / (2.0 + LOWEST);
+    let count = shown.panels.len() as f64;
+    let height = (whole.bottom - top - count * BETWEEN) / (count + LOWEST);
     let x = value_axis(axis, columns);
-    for (component, label, top) in
-        [(0, "x\u{2081} at |z| = b", top), (2, "x\u{2082} at |z| = b", top + height + BETWEEN)]
-    {
-        let values = columns.iter().flat_map(|c| &c.points).map(|p| p.before[component]);
+    for (i, panel) in shown.panels.iter().enumerate() {
+        let top = top + i as f64 * (height + BETWEEN);
         let bottom = top + height;
-        let y = Axis::around(label, values, 1e-6);
+        let y = quantity_axis(panel, columns);
         let mut frame = Frame { rect: Rect { top, bottom, ..whole }, x: x.clone(), y };
         // The marks must not lie on data.
         frame.y.low -= (frame.y.high - frame.y.low) * MARKS / height;
         frame.draw_grid(canvas)?;
-        draw_points(canvas, &frame, component, columns, look)?;
+        draw_points(canvas, &frame, panel, columns, look)?;
         for value in left_out.iter().filter(|v| v.is_finite()) {
             let x = frame.at(*value, 0.0).0;
             canvas.stroke(&[(x, bottom - MARKS + 2.0), (x, bottom)], 1.2, FAINT)?;
         }
         frame.draw_axes(canvas, false)?;
     }
-    let rect = Rect { top: top + 2.0 * (height + BETWEEN), ..whole };
+    let rect = Rect { top: top + count * (height + BETWEEN), ..whole };
     let strips = if look.has_strips() { look.passes().len() } else { 0 };
     let y = exponents::axis(columns, strips, rect.bottom - rect.top);
     let frame = Frame { rect, x, y };
@@ -135,8 +151,17 @@ fn is_left_out(column: &Column) -> bool {
     matches!(column.class, Class::Undecided | Class::Failed)
 }
 
-fn legend(columns: &[Column], look: Look) -> Vec<Entry> {
-    let dot = |color, text| {
+/// Holds all values of a panel.
+fn quantity_axis(panel: &Panel, columns: &[Column]) -> Axis {
+    let values = || columns.iter().flat_map(|column| panel.values(column)).map(|(value, _)| value);
+    let largest = values().filter(|value| value.is_finite()).fold(0.0, |a: f64, b| a.max(b.abs()));
+    // What differs by less is rounding; at rest, and where there is nothing, any scale will do.
+    let least_span = if largest > 0.0 { 1e-6 * largest } else { 1.0 };
+    Axis::around(&panel.label, values(), least_span)
+}
+
+fn legend(columns: &[Column], shown: &Shown, look: Look) -> Vec<Entry> {
+    let dot = |color: RGBColor, text: &str| {
         let marker = Marker { shape: Shape::Circle, color, radius: 6.0, hollow: false };
         Entry::new(Key::Marker(marker), text)
     };
@@ -149,15 +174,16 @@ fn legend(columns: &[Column], look: Look) -> Vec<Entry> {
     let mut entries = Vec::new();
     match look {
         Look::Walls => {
-            entries.push(dot(wall_color(Side::Right), "right wall, z = +b"));
-            entries.push(dot(wall_color(Side::Left), "left wall, z = \u{2212}b"));
+            let walls = Side::BOTH.into_iter().filter(|side| shown.walls.has(*side));
+            entries.extend(walls.map(|side| dot(wall_color(side), &shown.walls.entry(side))));
+            entries.extend(shown.has_strobes().then(|| dot(STROBE, "phase 0 of each period")));
             entries.extend(is_periodic.then(|| dot(periodic, "\u{3bb}: periodic")));
             entries.extend(is_chaotic.then(|| dot(chaotic, "\u{3bb}: chaotic")));
         }
         Look::Directions => {
             entries.push(dot(direction_color(Direction::Up), "followed upwards"));
             entries.push(dot(direction_color(Direction::Down), "downwards"));
-            entries.push(dot(mixed(0.5), "both"));
+            entries.push(dot(both_directions(), "both"));
             entries.extend(is_periodic.then(|| patch(periodic, 1.0, "periodic")));
             entries.extend(is_chaotic.then(|| patch(chaotic, 1.0, "chaotic")));
         }
@@ -198,7 +224,7 @@ const FINE: f64 = 2.0;
 fn draw_points(
     canvas: &Canvas<'_>,
     frame: &Frame,
-    component: usize,
+    panel: &Panel,
     columns: &[Column],
     look: Look,
 ) -> Result<(), DrawError> {
@@ -207,13 +233,14 @@ fn draw_points(
     let mut counts = vec![[0u32; 2]; width * height];
     let [fine, joined] = [DOT.0, CURVE_DOT].map(|least| dot(frame, columns, least));
     for column in columns {
-        let dot = if column.points.len() <= CURVE_POINTS { &joined } else { &fine };
-        for point in &column.points {
-            let (x, y) = frame.at(column.value, point.before[component]);
+        let values = panel.values(column);
+        let dot = if values.len() <= CURVE_POINTS { &joined } else { &fine };
+        for (value, side) in values {
+            let (x, y) = frame.at(column.value, value);
             if !(x.is_finite() && y.is_finite()) {
                 continue;
             }
-            let hue = look.place(column, point);
+            let hue = look.place(column, side);
             let (x, y) = ((FINE * (x - left)).round() as i32, (FINE * (y - top)).round() as i32);
             for (dx, dy) in dot {
                 let (column, row) = (x.saturating_add(*dx), y.saturating_add(*dy));
@@ -223,12 +250,12 @@ fn draw_points(
             }
         }
     }
-    let darkest = darkest(&counts);
+    let (darkest, colors) = (darkest(&counts), look.colors(panel));
     let mut cloud = Bitmap::clear([width, height]);
     for (i, [right, left_wall]) in counts.iter().enumerate().filter(|(_, sides)| **sides != [0, 0]) {
         let (count, share) = (f64::from(right + left_wall), f64::from(*right) / f64::from(right + left_wall));
         let opacity = SINGLE + (1.0 - SINGLE) * (count.ln() / darkest.ln()).min(1.0);
-        cloud.set(i, mixed(share), opacity);
+        cloud.set(i, mixed(colors, share), opacity);
     }
     canvas.image(frame.rect, cloud)
 }
@@ -254,9 +281,13 @@ fn darkest(counts: &[[u32; 2]]) -> f64 {
     f64::from(*totals.select_nth_unstable(rank).1).max(2.0)
 }
 
-/// The walls' colours, mixed where both meet.
-fn mixed(right: f64) -> RGBColor {
-    let [a, b] = Side::BOTH.map(wall_color);
-    let mix = |a: u8, b: u8| (right * f64::from(a) + (1.0 - right) * f64::from(b)).round() as u8;
+/// The colour of what both passes have.
+fn both_directions() -> RGBColor {
+    mixed(Side::BOTH.map(wall_color), 0.5)
+}
+
+/// Two colours, mixed where both meet: `first` is the share of the first.
+fn mixed([a, b]: [RGBColor; 2], first: f64) -> RGBColor {
+    let mix = |a: u8, b: u8| (first * f64::from(a) + (1.0 - first) * f64::from(b)).round() as u8;
     RGBColor(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }

@@ -6,6 +6,7 @@ mod bifurcation_columns_csv;
 mod bifurcation_csv;
 pub mod bifurcation_figure;
 mod bifurcation_manifest;
+mod bifurcation_strobe_csv;
 pub mod caption;
 mod cells;
 mod cells_csv;
@@ -40,6 +41,7 @@ mod stdout;
 mod symbols;
 pub mod unfinished;
 mod validation_json;
+mod wall_words;
 mod words;
 mod words_csv;
 

@@ -13,18 +13,14 @@ use super::orbit_summary::summary;
 use super::parameters::Parameters;
 use super::{Folder, OutputError, orbit_figures, orbit_tables};
 use crate::map::scene::Format;
-use rattlemap_dynamics::model::{Model, Oscillator, State};
+use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
 /// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
 /// in meshing where that is more.
 pub(super) fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let [m1, m2] = oscillator.masses();
-    let Oscillator { gap: [g1, g2], free, meshing, omega, .. } = oscillator;
-    // What a wall adds to the stiffness matrix is its own stiffness times g g'.
-    let (i, square) = if *g2 == 0.0 { (0, g1 * g1) } else { (1, g1 * g2) };
-    let added = |side: usize| (meshing[side].stiffness[0][i] - free.stiffness[0][i]) / square;
-    let ringing = (added(0).max(added(1)) * (g1 * g1 / m1 + g2 * g2 / m2)).sqrt() / omega;
+    let stiffness = Side::BOTH.map(|side| oscillator.added(side)[0]).into_iter().fold(0.0, f64::max);
+    let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
     (20.0 * ringing).clamp(400.0, 50_000.0) as usize
 }
 

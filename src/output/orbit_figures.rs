@@ -16,9 +16,10 @@ use super::plot_style::{
     save_figure, wall_color,
 };
 use super::symbols::symbol;
+use super::wall_words::{WallWords, name};
 use super::{DrawError, FigureError, OutputError};
 use crate::map::scene::Format;
-use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Contact, Model, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Sample};
 
 /// Every file that [`write`] may make.
@@ -79,10 +80,11 @@ pub(super) fn write_each(
         names: model.state_names().into_iter().map(symbol).collect(),
         bodies: model.bodies(),
         oscillator: model.oscillator()?,
+        walls: WallWords::of(model),
         motion: Motion::new(orbit, trace),
         cycle: matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods)),
         title: heading::parameters(model),
-        subtitle: heading::character(orbit),
+        subtitle: heading::character(model, orbit),
     };
     let mut place_each = |figure: &str, height, draw: &dyn Fn(&Canvas<'_>) -> Result<(), DrawError>| {
         let is_asked =
@@ -103,6 +105,7 @@ struct Scene<'a> {
     names: Vec<String>,
     bodies: Vec<&'a str>,
     oscillator: Oscillator,
+    walls: WallWords,
     motion: Motion,
     /// Forcing periods after which it comes round; none if it does not.
     cycle: Option<f64>,
@@ -123,12 +126,17 @@ impl Scene<'_> {
             let left = LEFT + i as f64 * (width + BETWEEN);
             let (x, v) = (2 * i, 2 * i + 1);
             let rect = Rect { left, right: left + width, ..whole };
+            let displacement = match symbol(body) == self.names[x] {
+                true => format!("displacement, {}", self.names[x]),
+                false => format!("displacement of {body}, {}", self.names[x]),
+            };
             let frame = Frame {
                 rect,
-                x: self.state_axis(&format!("displacement of {body}, {}", self.names[x]), &[x], 1.0),
+                x: self.state_axis(&displacement, &[x], 1.0),
                 y: self.state_axis(&format!("velocity, {}", self.names[v]), &[v], self.oscillator.omega),
             };
             frame.draw_grid(canvas)?;
+            self.draw_upright_walls(canvas, &frame, i)?;
             let at = |_: f64, state: &State| (state[x], state[v]);
             self.draw_jumps(canvas, &frame, at)?;
             self.draw_lines(canvas, &frame, (DARK, MESHING), at)?;
@@ -148,7 +156,7 @@ impl Scene<'_> {
             Side::BOTH.into_iter().filter(|s| self.motion.pieces.iter().any(|p| p.meshing == Some(*s)))
         {
             let band = Key::Patch { color: wall_color(side), opacity: BAND };
-            legend.push(Entry::new(band, &format!("meshing, {} wall", name(side))));
+            legend.push(Entry::new(band, &format!("{}, {} wall", self.lasting(), name(side))));
         }
         legend.extend(self.event_entries(true));
         let top = draw_head(canvas, &self.title, &self.subtitle, &legend)? + 14.0;
@@ -264,7 +272,8 @@ impl Scene<'_> {
     }
 
     fn meshing_entry(&self) -> Option<Entry> {
-        self.motion.meshes().then(|| Entry::new(Key::Line { color: MESHING, width: MESHING_LINE }, "meshing"))
+        let key = Key::Line { color: MESHING, width: MESHING_LINE };
+        self.motion.meshes().then(|| Entry::new(key, self.lasting()))
     }
 
     /// Legend of the events that occur; with `both`, of states before and after.
@@ -275,11 +284,13 @@ impl Scene<'_> {
             entries.push(match kind {
                 EventKind::Impact if both => Entry::new(Key::MarkerPair(marker), "impact: before, after"),
                 EventKind::Impact => Entry::new(Key::Marker(marker), "impact"),
-                EventKind::MeshStart => Entry::new(Key::Marker(marker), "meshing starts"),
-                EventKind::MeshEnd => Entry::new(Key::Marker(marker), "meshing ends"),
+                EventKind::MeshStart => {
+                    Entry::new(Key::Marker(marker), &format!("{} starts", self.lasting()))
+                }
+                EventKind::MeshEnd => Entry::new(Key::Marker(marker), &format!("{} ends", self.lasting())),
             });
         }
-        if both && !entries.is_empty() {
+        if both && self.motion.events.iter().any(|(_, event)| event.before != event.after) {
             entries.push(Entry::new(Key::Dashes { color: FAINT }, "velocity jump"));
         }
         for side in self.motion.walls() {
@@ -289,10 +300,37 @@ impl Scene<'_> {
         entries
     }
 
-    /// Half the walls' distance.
-    fn half(&self) -> f64 {
-        let [right, left] = self.oscillator.walls;
-        0.5 * (right - left)
+    /// What lasting contact is called: teeth mesh behind a wall that hits back, anything else touches.
+    fn lasting(&self) -> &'static str {
+        let hits = |side: &Side| self.contact(*side) == Some(Contact::Impact);
+        if Side::BOTH.iter().any(hits) { "meshing" } else { "contact" }
+    }
+
+    /// What a wall is; none where there is no wall.
+    fn contact(&self, side: Side) -> Option<Contact> {
+        let i = side.index();
+        self.oscillator.walls[i].is_finite().then(|| self.oscillator.contacts[i])
+    }
+
+    /// The walls that the motion touches, in the plane of a displacement that they stop alone.
+    fn draw_upright_walls(
+        &self,
+        canvas: &Canvas<'_>,
+        frame: &Frame,
+        displacement: usize,
+    ) -> Result<(), DrawError> {
+        let Rect { left, top, right, bottom } = frame.rect;
+        let gap = self.oscillator.gap;
+        if gap[1 - displacement] != 0.0 {
+            return Ok(());
+        }
+        for side in self.motion.walls() {
+            let x = frame.at(self.oscillator.walls[side.index()] / gap[displacement], 0.0).0;
+            if (left..=right).contains(&x) {
+                canvas.stroke(&[(x, top), (x, bottom)], 2.0, wall_color(side))?;
+            }
+        }
+        Ok(())
     }
 
     fn time_axis(&self) -> Axis {
@@ -303,14 +341,7 @@ impl Scene<'_> {
     /// An axis for components of the state; `scale` is theirs relative to a displacement.
     fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
         let values = self.motion.points().flat_map(|(_, state)| components.iter().map(|i| state[*i]));
-        // A tenth of the half backlash is motion that has died down.
-        Axis::around(label, values, 0.1 * self.half() * scale)
-    }
-}
-
-fn name(side: Side) -> &'static str {
-    match side {
-        Side::Right => "right",
-        Side::Left => "left",
+        // A tenth of the half backlash, or of what stands for it, is motion that has died down.
+        Axis::around(label, values, 0.1 * self.oscillator.length_scale() * scale)
     }
 }

@@ -26,7 +26,12 @@ pub(super) fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>
         periods => format!("{periods} forcing periods"),
     };
     let _ = writeln!(text, "\nevents over {span} (T = {:.DECIMALS$})", orbit.forcing_period);
-    text.push_str(&events(model, &orbit.events));
+    text.push_str(&match orbit.strobe_meshing {
+        Some(side) if orbit.events.is_empty() => {
+            format!("none: always in contact with the {} wall\n", side_name(side))
+        }
+        _ => events(model, &orbit.events),
+    });
     text
 }
 
@@ -63,7 +68,12 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     if let Some(symmetric) = orbit.symmetric {
         facts.push((
             "symmetric",
-            if symmetric { "yes" } else { "no, a symmetry-conjugate orbit coexists" }.to_owned(),
+            match (symmetric, has_mirror_images(model)) {
+                (true, _) => "yes",
+                (false, true) => "no, a symmetry-conjugate orbit coexists",
+                (false, false) => "no, as the model",
+            }
+            .to_owned(),
         ));
     }
     facts.extend([
@@ -74,6 +84,11 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let strobe = numbers(&orbit.strobe[..names.len()]).trim_start().to_owned();
     facts.push((format!("strobe {}", names.join(" ")), strobe));
     facts
+}
+
+/// Whether the mirror image of a motion, half a forcing period later, is one of the same model.
+pub(super) fn has_mirror_images(model: &dyn Model) -> bool {
+    model.law().is_symmetric() && model.oscillator().is_ok_and(|oscillator| oscillator.mirror_symmetric())
 }
 
 fn labelled(facts: Vec<(&str, String)>) -> Vec<(String, String)> {
@@ -130,6 +145,10 @@ fn numbers(state: &[f64]) -> String {
     state.iter().map(|x| format!(" {x:>9.DECIMALS$}")).collect()
 }
 
+fn side_name(side: Side) -> &'static str {
+    if side == Side::Right { "right" } else { "left" }
+}
+
 fn events(model: &dyn Model, events: &[Event]) -> String {
     if events.is_empty() {
         return "none: the walls are not reached\n".to_owned();
@@ -146,7 +165,7 @@ fn events(model: &dyn Model, events: &[Event]) -> String {
         width = 10 * count
     );
     for event in events {
-        let side = if event.side == Side::Right { "right" } else { "left" };
+        let side = side_name(event.side);
         let _ = writeln!(
             text,
             "{:<11}{side:<6} {:>10.DECIMALS$} {:>10.DECIMALS$}  {}  {}",

@@ -51,6 +51,8 @@ struct Data<'a> {
     starts: Option<Packed>,
     /// The first cell's start, where axes sweep components of it.
     start: Option<Vec<f64>>,
+    /// Components of a state.
+    components: usize,
     layers: Vec<LayerData>,
     values: serde_json::Map<String, serde_json::Value>,
     classes: [&'static str; 4],
@@ -149,6 +151,7 @@ pub(super) fn write(
         derived: derived(scene),
         replay: replay::arguments(scene),
         starts: starts(cells),
+        components: scene.base().state_names().len(),
         start: scene.sweeps_start().then(|| cells.start(0)[..scene.base().state_names().len()].to_vec()),
         layers: layers.par_iter().map(LayerData::from).collect(),
         values: values(cells, spelled)?,

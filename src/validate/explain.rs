@@ -11,6 +11,9 @@ use rattlemap_dynamics::orbit::{Class, Status};
 /// Cells, at random, that are the same within the resolution.
 const MOVED: u64 = 12;
 
+/// As many more in a map of basins: where these are mixed on every scale, an attractor may take one start in a hundred.
+const MOVED_IN_BASINS: u64 = 512;
+
 /// More of them where a transient has to last as long by chance.
 const MANY_MOVED: u64 = 48;
 
@@ -47,7 +50,8 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Lanes
         return Kind::Border;
     }
     let agrees = |answer: &Answer| cell.bars.agree(claim, answer) || is_hidden(answer);
-    let ways = [false, true].into_iter().flat_map(|shaken| (0..MOVED).map(move |k| (k, shaken)));
+    let moved = if cell.bars.labels.is_some() { MOVED_IN_BASINS } else { MOVED };
+    let ways = [false, true].into_iter().flat_map(|shaken| (0..moved).map(move |k| (k, shaken)));
     if ways.filter_map(|(k, shaken)| cell.moved_truth(k, shaken)).any(|answer| agrees(&answer)) {
         let stays = claim.valid & valid::STROBE != 0
             && claim.strobe.iter().all(|x| x.is_finite())

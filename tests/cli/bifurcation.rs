@@ -105,3 +105,45 @@ fn one_axis_of_a_plane_at_exactly_a_value_of_the_other() {
     assert_eq!((&manifest["scene"], &manifest["parameters"]["omega"]), (&plane.into(), &5.65.into()));
     rattlemap(&folder).args(["bifurcation", "line.toml", "--at", "omega=5"]).assert().code(2);
 }
+
+/// At sigma = 0.2 the stop is hit, at 2 it is out of reach of a response of 1/3.
+const ONE_STOP: &str = "model = 'impact-oscillator'\nparameters = { omega = 2.0, zeta = 0.02 }\n\
+    [[axis]]\nparameter = 'sigma'\nmin = 0.2\nmax = 2.0\ncount = 2\n[outputs]\nfiles = ['csv', 'svg']\n";
+
+#[test]
+fn where_a_wall_fixes_the_displacement_velocities_and_states_at_phase_0_are_shown() {
+    let folder = folder();
+    fs::write(folder.path().join("stop.toml"), ONE_STOP).unwrap();
+    rattlemap(&folder).args(["bifurcation", "stop.toml", "--quiet"]).assert().success();
+    let out = folder.path().join("out/stop");
+    let strobe = "bifurcation_strobe.csv";
+    assert_eq!(
+        names(&out),
+        ["bifurcation.csv", "bifurcation.svg", "bifurcation_columns.csv", strobe, "manifest.json"]
+    );
+    let listed = manifest(&out)["files"].to_string();
+    assert!(listed.contains(strobe), "{listed}");
+    let (header, strobes) = rows(&out.join(strobe));
+    assert_eq!(header, "sigma,class,period,status,x,v");
+    let of = |value: &str| strobes.iter().filter(|row| row[0] == value).collect::<Vec<_>>();
+    // A row per period of the cycle.
+    let hit = of("0.2");
+    assert_eq!(hit.len().to_string(), hit[0][2], "{hit:?}");
+    // Without contact: the steady response, F / (1 - omega^2 + 2 i zeta omega).
+    let [free] = of("2.0")[..] else { panic!("{strobes:?}") };
+    let [x, v] = [4, 5].map(|i| free[i].parse::<f64>().unwrap());
+    let (stiffness, damping) = (1.0 - 4.0, 2.0 * 0.02 * 2.0);
+    let square = stiffness * stiffness + damping * damping;
+    assert!((x - stiffness / square).abs() < 1e-13 && (v - 2.0 * damping / square).abs() < 1e-13, "{x} {v}");
+    let svg = fs::read_to_string(out.join("bifurcation.svg")).unwrap();
+    for text in
+        ["right wall, x = \u{3c3}", "velocity before contact, v", "x at phase 0", "phase 0 of each period"]
+    {
+        assert!(svg.contains(&format!(">{text}</text>")), "{text}");
+    }
+    assert!(!svg.contains("left wall") && !svg.contains("|z|"));
+    // Where the gap mixes displacements these are what the section shows, and there is no such file.
+    fs::write(folder.path().join("h.toml"), HYSTERESIS.replace("count = 21", "count = 2")).unwrap();
+    rattlemap(&folder).args(["bifurcation", "h.toml", "--quiet"]).assert().success();
+    assert_eq!(names(&folder.path().join("out/h")), DIAGRAM);
+}

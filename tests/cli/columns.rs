@@ -60,6 +60,11 @@ fn columns_are_those_of_the_files() {
     assert_eq!(header(&dir.join("out/plane/words.csv")), listed("words.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation.csv")), listed("bifurcation.csv"));
     assert_eq!(header(&dir.join("out/line/bifurcation_columns.csv")), listed("bifurcation_columns.csv"));
+    fs::write(dir.join("stop.toml"), format!("model = 'impact-oscillator'\n{}", axis("F", 0.1, 1.0)))
+        .unwrap();
+    run(dir, &["bifurcation", "stop.toml", "--quiet", "--set", "start.policy=both"]);
+    let strobe = "bifurcation_strobe.csv";
+    assert_eq!(header(&dir.join("out/stop").join(strobe)), listed(strobe));
     assert_eq!(sorted(fields(&dir.join("out/orbit/orbit.json"))), sorted(listed("orbit.json")));
     assert_eq!(header(&dir.join("out/orbit/trajectory.csv")), listed("trajectory.csv"));
     assert_eq!(header(&dir.join("out/orbit/spectrum.csv")), listed("spectrum.csv"));

@@ -1,7 +1,11 @@
 //! Models as files: the gear pair's is the gear pair, and no text makes reading panic.
 
 use proptest::prelude::*;
-use rattlemap::model_file::FileModel;
+use proptest::test_runner::TestRunner;
+use rattlemap::map::printable::line;
+use rattlemap::map::scene::Place;
+use rattlemap::model_file::{BUILT_IN, FileModel};
+use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Model};
 
 /// A number of any size, and zero of both signs.
@@ -57,4 +61,140 @@ proptest! {
         prop_assert_eq!(format!("{:?}", Model::oscillator(&file)), format!("{:?}", pair.oscillator()));
         prop_assert_eq!(format!("{:?}", file.law()), format!("{:?}", pair.law()));
     }
+}
+
+/// Values of every type, most of them out of place.
+const VALUES: [&str; 32] = [
+    "0",
+    "-0.0",
+    "1e308",
+    "1e400",
+    "inf",
+    "nan",
+    "99999999999999999999",
+    "true",
+    "\"e\"",
+    "\"x\"",
+    "\"t\"",
+    "\"sqrt\"",
+    "\"2*omega^\"",
+    "\"-k^(e - \"",
+    "\"1/0\"",
+    "\"log(-1)\"",
+    "\"right\"",
+    "\"left\"",
+    "\"elastic\"",
+    "\"impact\"",
+    "[]",
+    "[1]",
+    "[\"x\", \"y\"]",
+    "[[1]]",
+    "[[1, 0], [0, 1]]",
+    "[[1, 2], [2, 1]]",
+    "[[1, 2], [3]]",
+    "{ default = 1, min = 2 }",
+    "{ default = 1.0, min = 0, open = true }",
+    "{ min = nan }",
+    "1979-05-27",
+    "\"\u{fffd}\\u0000\"",
+];
+
+/// What becomes of one line of a text.
+#[derive(Clone, Debug)]
+enum Change {
+    Drop,
+    Repeat,
+    Value(&'static str),
+    /// Of one entry alone, in a list or in quotes.
+    Entry(&'static str),
+    Character(prop::sample::Index, char),
+    Cut,
+}
+
+fn changes() -> impl Strategy<Value = Vec<(prop::sample::Index, Change)>> {
+    let value = || prop::sample::select(VALUES.to_vec());
+    let change = prop_oneof![
+        2 => Just(Change::Drop),
+        1 => Just(Change::Repeat),
+        4 => value().prop_map(Change::Value),
+        4 => value().prop_map(Change::Entry),
+        2 => (any::<prop::sample::Index>(), any::<char>()).prop_map(|(at, c)| Change::Character(at, c)),
+        1 => Just(Change::Cut),
+    ];
+    prop::collection::vec((any::<prop::sample::Index>(), change), 1..4)
+}
+
+fn changed(text: &str, changes: &[(prop::sample::Index, Change)]) -> String {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for (at, change) in changes {
+        if lines.is_empty() {
+            break;
+        }
+        let at = at.index(lines.len());
+        match change {
+            Change::Drop => drop(lines.remove(at)),
+            Change::Repeat => lines.insert(at, lines[at].clone()),
+            Change::Cut => lines.truncate(at),
+            Change::Value(value) => {
+                if let Some((name, _)) = lines[at].split_once('=') {
+                    lines[at] = format!("{name}= {value}");
+                }
+            }
+            Change::Entry(value) => {
+                let mut parts: Vec<&str> = lines[at].split('"').collect();
+                if parts.len() > 2 {
+                    let unquoted = value.trim_matches('"');
+                    parts[1] = unquoted;
+                    lines[at] = parts.join("\"");
+                }
+            }
+            Change::Character(place, c) => {
+                let places: Vec<usize> = lines[at].char_indices().map(|(i, _)| i).collect();
+                if !places.is_empty() {
+                    lines[at].insert(places[place.index(places.len())], *c);
+                }
+            }
+        }
+    }
+    lines.join("\n")
+}
+
+/// What is accepted has a motion, and reads back as the same; what is refused is told where, in one line.
+fn check(text: &str) -> bool {
+    match FileModel::parse(text, "m.toml") {
+        Ok(model) => {
+            assert!(Flow::validate(&model).is_ok(), "{text}");
+            assert_eq!(FileModel::parse(&model.definition().text, "again").as_ref(), Ok(&model));
+            assert_eq!(model.state_names().len(), 2 * model.oscillator().unwrap().degrees);
+            assert!(!model.equations().is_empty());
+            true
+        }
+        Err(error) => {
+            let message = error.to_string();
+            let lines = text.lines().count().max(1) + 1;
+            assert!(
+                matches!(error.place, Place::Text { line, column, .. } if line <= lines && column > 0),
+                "{message}"
+            );
+            assert_eq!(line(&message), message, "one line that a terminal shows as it is");
+            assert!(message.chars().count() < 1200, "{message}");
+            false
+        }
+    }
+}
+
+#[test]
+fn no_text_makes_reading_a_model_panic() {
+    let mut runner = TestRunner::new(ProptestConfig::with_cases(3000));
+    let texts: Vec<&str> = BUILT_IN.iter().map(|(_, text)| *text).collect();
+    let [accepted, refused] = [std::cell::Cell::new(0), std::cell::Cell::new(0)];
+    let strategy = (prop::sample::select(texts), changes());
+    let verdict = runner.run(&strategy, |(text, changes)| {
+        let counter = if check(&changed(text, &changes)) { &accepted } else { &refused };
+        counter.set(counter.get() + 1);
+        Ok(())
+    });
+    verdict.unwrap();
+    // Both happen, so that both are looked at.
+    assert!(accepted.get() > 150 && refused.get() > 750, "{accepted:?} {refused:?}");
 }

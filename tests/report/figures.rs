@@ -8,10 +8,12 @@ use std::path::Path;
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::Format;
+use rattlemap::model_file::FileModel;
+use rattlemap::output::bifurcation_figure::{self, Shown};
+use rattlemap::output::orbit_figures;
 use rattlemap::output::plot_style::axes::Scale;
-use rattlemap::output::{bifurcation_figure, orbit_figures};
-use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::orbit::{Class, Event, EventKind, Orbit, Sample, Status};
+use rattlemap_dynamics::model::{GearPair, Model, REST, Side, State};
+use rattlemap_dynamics::orbit::{self, Class, Event, EventKind, Orbit, Sample, Settings, Status};
 use rattlemap_dynamics::word::Word;
 
 /// An axis, as figures take it.
@@ -20,6 +22,11 @@ const RIGHT: [u8; 3] = [0xd5, 0x5e, 0x00];
 const LEFT: [u8; 3] = [0x00, 0x72, 0xb2];
 const MESHING: [u8; 3] = [0x00, 0x9e, 0x73];
 const PERIOD: f64 = TAU / 5.6;
+
+/// What diagrams show of the gear pair.
+fn pair() -> Shown {
+    Shown::of(&GearPair::paper(0.5), None)
+}
 
 /// Two sinusoids whose gap just touches the right wall and sinks into the left one.
 fn state(turns: f64) -> State {
@@ -149,6 +156,62 @@ fn motion_without_contact_without_data_or_without_numbers_is_drawn() {
     }
 }
 
+/// Phase plane, time history and gap of the motion that a built-in model settles on, as SVG.
+fn drawn(name: &str, values: &[(&str, f64)]) -> [String; 3] {
+    let mut model = FileModel::built_in(name).unwrap();
+    values.iter().for_each(|(name, value)| model.set(name, *value).unwrap());
+    let orbit = orbit::analyse(&model, REST, &Settings::default()).unwrap();
+    assert!(matches!(orbit.class, Class::Periodic { .. }), "{name} {values:?}: {:?}", orbit.class);
+    let trace = orbit::trace(&model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, 100).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let files = orbit_figures::write(dir.path(), &model, &orbit, &trace, &[Format::Svg]).unwrap();
+    let files: Vec<String> = files.iter().map(|file| fs::read_to_string(file).unwrap()).collect();
+    assert!(files.iter().all(|svg| !svg.contains("NaN") && !svg.contains("inf")), "{name}");
+    files.try_into().unwrap()
+}
+
+fn has(svg: &str, text: &str) -> bool {
+    svg.contains(&format!(">{text}</text>"))
+}
+
+/// Lines of a wall's colour across a panel: such as have two points.
+fn wall_lines(svg: &str, color: &str) -> usize {
+    let of_wall = |line: &&str| line.starts_with("<polyline") && line.contains(color);
+    svg.lines().filter(of_wall).count()
+}
+
+#[test]
+fn orbits_of_any_model_are_drawn_with_the_walls_that_there_are() {
+    const RIGHT: &str = "#d55e00";
+    const LEFT: &str = "#0072b2";
+    let stop = "impact-oscillator";
+    // One rigid wall, at which the motion has impacts.
+    let [plane, time, gap] = drawn(stop, &[("sigma", 0.2)]);
+    assert!(has(&plane, "displacement, x") && has(&plane, "velocity, v") && has(&time, "displacement, x"));
+    assert!(has(&gap, "displacement, x") && has(&gap, "x = \u{3c3}") && has(&gap, "right wall"));
+    assert_eq!([&plane, &gap].map(|svg| [RIGHT, LEFT].map(|color| wall_lines(svg, color))), [[1, 0]; 2]);
+    for svg in [&plane, &time, &gap] {
+        assert!(!svg.contains("left wall") && !svg.contains("z =") && !svg.contains("meshing"));
+    }
+    // The same out of reach: it must not make the motion a flat line.
+    let [plane, _, gap] = drawn(stop, &[("sigma", 50.0)]);
+    assert!(has(&gap, "(above)") && has(&gap, "x = \u{3c3}") && !has(&gap, "50"));
+    assert_eq!([&plane, &gap].map(|svg| wall_lines(svg, RIGHT)), [0, 0]);
+    // A wall to which a slow motion sticks: it has no depth.
+    let [_, time, gap] = drawn(stop, &[("sigma", 0.0), ("omega", 0.3), ("e", 0.3)]);
+    assert!(has(&time, "contact, right wall") && has(&gap, "contact starts") && has(&gap, "contact ends"));
+    assert!(!gap.contains("depth"));
+    // Walls that give way at once: nothing jumps, and how deep the motion goes shows in the gap.
+    let [plane, _, gap] = drawn("kahraman-singh", &[]);
+    assert!(has(&gap, "x = +b") && has(&gap, "x = \u{2212}b") && !gap.contains("depth"));
+    assert!(has(&plane, "contact starts") && !plane.contains("jump"));
+    // Two walls of two masses.
+    let [plane, _, gap] = drawn("two-masses", &[]);
+    assert!(has(&plane, "displacement of first mass, x\u{2081}"));
+    assert!(has(&gap, "gap, z = x\u{2081} \u{2212} x\u{2082}"));
+    assert!(has(&gap, "z = \u{3b4}\u{2082}") && has(&gap, "z = \u{2212}\u{3b4}\u{2081}"));
+}
+
 /// A stream of a PDF, by what stands before it.
 fn stream(pdf: &[u8], after: &str) -> Vec<u8> {
     let find =
@@ -197,7 +260,7 @@ fn titles_stay_text_in_svg() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.svg");
     let title = "a < b && \"c\" </text><script>\u{7}\u{2028}10\u{207b}\u{b2}";
-    bifurcation_figure::write(&path, [title, "second\nthird"], E, &columns(9, 3)).unwrap();
+    bifurcation_figure::write(&path, [title, "second\nthird"], E, &pair(), &columns(9, 3)).unwrap();
     let svg = fs::read_to_string(path).unwrap();
     let expected = "a &lt; b &amp;&amp; \"c\" &lt;/text&gt;&lt;script&gt; \u{2028}10<tspan dy=";
     assert!(svg.contains(expected) && !svg.contains("<script"), "{svg:.600}");
@@ -212,7 +275,7 @@ fn titles_stay_text_in_svg() {
 fn characters_that_the_typeface_lacks_are_no_others_in_pdf() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.pdf");
-    bifurcation_figure::write(&path, ["\u{65e5}\u{672c}", "second"], E, &columns(9, 3)).unwrap();
+    bifurcation_figure::write(&path, ["\u{65e5}\u{672c}", "second"], E, &pair(), &columns(9, 3)).unwrap();
     let map = String::from_utf8(stream(&fs::read(path).unwrap(), "/Type /CMap")).unwrap().to_uppercase();
     assert!(map.contains("<0073>") && !map.contains("<65E5>") && !map.contains("<672C>"), "{map}");
 }
@@ -242,6 +305,7 @@ fn columns(count: u32, points: u32) -> Vec<Column> {
             word: None,
             periods_run: 100,
             points,
+            strobes: vec![],
         }
     };
     (0..count).map(column).collect()
@@ -257,7 +321,7 @@ fn lower_panel(picture: &RgbImage) -> RgbImage {
 fn bifurcation_figure_shows_both_walls() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("bifurcation.png");
-    bifurcation_figure::write(&path, ["Bifurcation", "from rest"], E, &columns(1000, 200)).unwrap();
+    bifurcation_figure::write(&path, ["Bifurcation", "from rest"], E, &pair(), &columns(1000, 200)).unwrap();
     let picture = read(&path);
     assert_eq!(picture.dimensions(), (1600, 1750));
     assert!(ink(&picture) > 5000, "{}", ink(&picture));
@@ -273,7 +337,7 @@ fn the_panel_of_exponents_tells_chaos_from_cycles_and_has_a_band() {
     let drawn = |columns: &[Column]| {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("b.png");
-        bifurcation_figure::write(&path, [""; 2], E, columns).unwrap();
+        bifurcation_figure::write(&path, [""; 2], E, &pair(), columns).unwrap();
         lower_panel(&read(&path))
     };
     let chaos = columns(40, 2);
@@ -310,7 +374,7 @@ fn two_passes_are_told_apart_by_colour_and_grey_where_they_agree() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("b.png");
         let both: Vec<Column> = pass(Direction::Up, 0.3).chain(pass(Direction::Down, lyapunov)).collect();
-        bifurcation_figure::write(&path, [""; 2], E, &both).unwrap();
+        bifurcation_figure::write(&path, [""; 2], E, &pair(), &both).unwrap();
         read(&path)
     };
     let [apart, same] = [0.1, 0.3].map(drawn);
@@ -332,13 +396,36 @@ fn a_logarithmic_axis_has_its_decades() {
         .collect();
     let ticks = |scale| {
         let path = dir.path().join("b.svg");
-        bifurcation_figure::write(&path, [""; 2], ("k", scale), &decades).unwrap();
+        bifurcation_figure::write(&path, [""; 2], ("k", scale), &pair(), &decades).unwrap();
         let svg = fs::read_to_string(path).unwrap();
         // A linear axis to 10,000 has a tick at 1000, too.
         ["10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
     };
     assert_eq!(ticks(Scale::Logarithmic), [true; 2]);
     assert_eq!(ticks(Scale::Linear), [false; 2]);
+}
+
+/// Motion at rest has one value for ever: its axis must not be made of rounding, nor its name lie beyond the edge.
+#[test]
+fn a_constant_has_short_labels_and_a_whole_axis_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("b.svg");
+    let still = |value: f64| {
+        let point = |column: &mut Column, x: f64| {
+            column.points.iter_mut().for_each(|point| point.before = [x, 0.0, x, 0.0]);
+        };
+        let mut columns = columns(9, 2);
+        columns.iter_mut().for_each(|column| point(column, value));
+        bifurcation_figure::write(&path, [""; 2], E, &pair(), &columns).unwrap();
+        fs::read_to_string(&path).unwrap()
+    };
+    for (value, label) in [(0.2, "0.20"), (0.0, "0.0"), (3e-8, "3.0\u{b7}10"), (4e7, "4.0\u{b7}10")] {
+        let svg = still(value);
+        let upright = svg.lines().filter(|line| line.contains("rotate(-90"));
+        let left = upright.map(|line| line.split('"').nth(1).unwrap().parse::<f64>().unwrap());
+        assert!(left.fold(f64::MAX, f64::min) >= 14.0, "{value}");
+        assert!(svg.contains(&format!(">{label}")), "{value}: {svg:.3000}");
+    }
 }
 
 #[test]
@@ -357,7 +444,7 @@ fn bifurcation_figure_survives_poor_data() {
         ("wild", &long, wild),
     ] {
         let path = dir.path().join(format!("{name}.png"));
-        bifurcation_figure::write(&path, [title, ""], E, &columns).unwrap();
+        bifurcation_figure::write(&path, [title, ""], E, &pair(), &columns).unwrap();
         assert_eq!(read(&path).width(), 1600);
     }
 }
@@ -365,7 +452,7 @@ fn bifurcation_figure_survives_poor_data() {
 #[test]
 fn a_file_that_cannot_be_written_is_named() {
     let dir = tempfile::tempdir().unwrap().path().join("absent");
-    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], E, &[]).unwrap_err();
+    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], E, &pair(), &[]).unwrap_err();
     assert!(format!("{error:#}").contains("b.png"), "{error:#}");
     let (orbit, trace) = meshing_orbit();
     let error =

@@ -94,3 +94,44 @@ impl Motion {
         EnergyBound::of(columns, growth)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::flow::{Flow, Gap, Phasor};
+    use crate::model::{Contact, Domain, GearPair, Oscillator, Side};
+
+    /// Over a Taylor step and a share of one, from anywhere on the wall.
+    #[test]
+    fn the_bound_holds_what_presses() {
+        let pair = Oscillator { contacts: [Contact::Rigid; 2], ..GearPair::paper(0.0).oscillator().unwrap() };
+        let free = Domain {
+            damping: [[2.0, -0.7], [-0.7, 0.9]],
+            stiffness: [[30.0, 4.0], [4.0, 11.0]],
+            load: [1.0, -2.0],
+        };
+        let full = Oscillator { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..pair };
+        let single = Oscillator { gap: [1.0, 0.0], force: [5.0, 0.0], ..pair };
+        let mut largest = 0.0f64;
+        for oscillator in [pair, full, single] {
+            let flow = Flow::new(&oscillator);
+            let linear = &flow.meshing[Side::Right.index()];
+            for n in 0..2000u32 {
+                let t = f64::from(n);
+                let size = 10f64.powf(-4.0 + 6.0 * (0.618 * t).fract());
+                let q: Gap = [flow.wall(Side::Right), 0.0, size * t.sin(), 5.0 * size * (1.7 * t).cos()];
+                let phasor: Phasor = [(0.9 * t).cos(), (0.9 * t).sin()];
+                for u in [1.0, 0.25] {
+                    let bound = linear.pressing_bound.remainder(&q, &phasor, u) * 14400.0;
+                    for part in 0..=16 {
+                        let tau = u * linear.unit * f64::from(part) / 16.0;
+                        let sixth = linear.pressing_derivative(&q, &phasor, tau, 6) * linear.unit.powi(6);
+                        let share = sixth.abs() / bound;
+                        assert!(share <= 1.0 + 1e-12, "{share} of the bound: {oscillator:?}, {q:?}");
+                        largest = largest.max(share);
+                    }
+                }
+            }
+        }
+        assert!(largest > 0.3, "a bound that nothing comes near: {largest}");
+    }
+}

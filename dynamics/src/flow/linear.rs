@@ -234,6 +234,15 @@ impl LinearFlow {
         (0..doublings).fold(part, |less, _| less * less + less * 2.0)
     }
 
+    /// The `n`-th derivative, a time `tau` on, of what [`acceleration`](Self::acceleration) is.
+    #[cfg(test)]
+    pub(super) fn pressing_derivative(&self, q: &Gap, phasor: &Phasor, tau: f64, n: u32) -> f64 {
+        let a = SMatrix::<f64, 7, 1>::from([q[0], q[1], q[2], q[3], phasor[0], phasor[1], 1.0]);
+        let later = a + self.departure(tau) * a;
+        let derivative = (0..n).fold(later, |a, _| self.generator * a);
+        SMatrix::<f64, 1, 7>::from(self.gap_rates[0]).dot(&derivative.transpose())
+    }
+
     /// Trace of the generator on `q`: the rate at which phase volume shrinks.
     pub fn trace(&self) -> f64 {
         self.generator.fixed_view::<4, 4>(0, 0).trace()

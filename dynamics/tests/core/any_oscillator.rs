@@ -140,8 +140,8 @@ fn walled(plain: Oscillator, at: [f64; 2], contacts: [Contact; 2], behind: [[f64
 
 /// What the motion may differ by from another computation of it: rounding, times the growth of tangents.
 fn growth<const N: usize>(trajectory: &Trajectory<'_, N>) -> f64 {
-    let largest = trajectory.tangents().iter().flatten().fold(1.0f64, |most, x| most.max(x.abs()));
-    largest * trajectory.log_scale().exp()
+    let largest = trajectory.tangents().iter().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
+    (largest * trajectory.log_scale().exp()).max(1.0)
 }
 
 fn apart(a: State, b: State) -> f64 {
@@ -175,7 +175,7 @@ fn kinds(events: &[Happening]) -> Vec<(EventKind, Side)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 600, max_global_rejects: 60_000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 400, max_global_rejects: 40_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Free, the gap lies between the walls; stuck, on its wall to the bit; behind an elastic wall, behind it.
     #[test]
@@ -273,6 +273,11 @@ proptest! {
         let mut settled = Trajectory::new(&flow, case.law, case.start);
         prop_assume!(settled.advance_period(&mut ()) != Err(Stop::CapEvents));
         let y = settled.state();
+        // A neighbour that begins behind a wall is put on it: so near to one there is a derivative on one side alone.
+        let gap = flow.to_gap(y)[0];
+        let is_beside = |side: Side| (gap - flow.wall(side)).abs() < 1e-4 * size(y);
+        let sticks = settled.meshing().is_some_and(|side| case.oscillator.contacts[side.index()] == Contact::Rigid);
+        prop_assume!(sticks || !Side::BOTH.into_iter().any(is_beside));
         let mut carrier = settled.at(y, UNITS);
         let mut events: Vec<Happening> = Vec::new();
         prop_assume!(carrier.advance_period(&mut events) != Err(Stop::CapEvents));
@@ -284,7 +289,7 @@ proptest! {
         let is_slow = |event: &Happening| event.kind != EventKind::MeshEnd && event.before[1].abs() < 0.05;
         prop_assume!(!events.iter().any(is_slow));
         const H: f64 = 1e-6;
-        let tangents = carrier.tangents();
+        let tangents = carrier.tangents().map(|u| u.map(|x| x * carrier.log_scale().exp()));
         let degrees = case.oscillator.degrees;
         for (j, tangent) in tangents.into_iter().enumerate().take(2 * degrees) {
             let mut ends = [[0.0; 4]; 4];

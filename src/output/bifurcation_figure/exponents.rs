@@ -1,6 +1,6 @@
 //! The panel of exponents: the largest Lyapunov exponent of each column, with its standard error.
 
-use super::{Look, direction_color, mixed};
+use super::{Look, both_directions, direction_color};
 use crate::map::bifurcation::{Column, Direction};
 use crate::output::DrawError;
 use crate::output::plot_style::axes::{Axis, Frame};
@@ -69,7 +69,7 @@ pub(super) fn draw(
                 let apart = (frame.at(0.0, column.lyapunov).1 - frame.at(0.0, other).1).abs();
                 let color = match column.direction {
                     None => class_color(column.class),
-                    Some(_) if apart < TOGETHER => mixed(0.5),
+                    Some(_) if apart < TOGETHER => both_directions(),
                     Some(direction) => direction_color(direction),
                 };
                 (column, color)

@@ -1,6 +1,7 @@
 //! The words above an orbit's figures.
 
 use crate::output::caption;
+use crate::output::orbit_summary::has_mirror_images;
 use crate::output::plot_style::superscript;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::{Class, Orbit};
@@ -13,9 +14,9 @@ pub(super) fn parameters(model: &dyn Model) -> String {
     format!("{}: {}", model.title(), caption::parameters(model, |_| false))
 }
 
-/// Class, word and Lyapunov exponent of the orbit.
-pub(super) fn character(orbit: &Orbit) -> String {
-    let class = match (orbit.class, orbit.symmetric) {
+/// Class, word and Lyapunov exponent of the orbit; its symmetry where motion has mirror images.
+pub(super) fn character(model: &dyn Model, orbit: &Orbit) -> String {
+    let class = match (orbit.class, orbit.symmetric.filter(|_| has_mirror_images(model))) {
         (Class::Periodic { period }, Some(true)) => format!("period {period}, symmetric"),
         (Class::Periodic { period }, Some(false)) => format!("period {period}, not symmetric"),
         (Class::Periodic { period }, None) => format!("period {period}"),
@@ -23,7 +24,7 @@ pub(super) fn character(orbit: &Orbit) -> String {
         (Class::Undecided, _) => "undecided".to_owned(),
         (Class::Failed, _) => "failed".to_owned(),
     };
-    let mut parts = vec![class, flights(&shortened(&orbit.word.time_order()), orbit.word.len())];
+    let mut parts = vec![class, flights(orbit)];
     if orbit.lyapunov.is_finite() {
         let error = orbit.lyapunov_error.map_or(String::new(), |error| format!(" \u{b1} {error:.4}"));
         parts.push(format!("\u{3bb} = {:.4}{error}", orbit.lyapunov).replace('-', "\u{2212}"));
@@ -31,8 +32,10 @@ pub(super) fn character(orbit: &Orbit) -> String {
     parts.join("  \u{b7}  ")
 }
 
-fn flights(word: &str, count: usize) -> String {
-    match count {
+fn flights(orbit: &Orbit) -> String {
+    let word = shortened(&orbit.word.time_order());
+    match orbit.word.len() {
+        0 if orbit.strobe_meshing.is_some() => "always in contact".to_owned(),
         0 => "no contact".to_owned(),
         n if n > WORD_SYMBOLS => format!("word {word} ({n} flights)"),
         _ => format!("word {word}"),

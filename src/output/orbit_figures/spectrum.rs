@@ -6,6 +6,7 @@ use super::super::orbit_spectrum::Spectrum;
 use super::super::plot_style::axes::{Axis, Frame};
 use super::super::plot_style::legend::draw_head;
 use super::super::plot_style::{Canvas, DARK, GEAR_2, Marker, Rect, Shape, save_figure};
+use super::super::wall_words::WallWords;
 use super::super::{DrawError, FigureError, OutputError};
 use super::{LEFT, LINE, WIDTH, heading};
 use crate::map::scene::Format;
@@ -40,13 +41,17 @@ pub(crate) fn write_each(
 }
 
 fn save(path: &Path, model: &dyn Model, orbit: &Orbit, spectrum: &Spectrum) -> Result<(), FigureError> {
-    let subtitle = format!("{}  \u{b7}  {}", heading::character(orbit), spectrum.method());
+    let subtitle = format!("{}  \u{b7}  {}", heading::character(model, orbit), spectrum.method());
     save_figure(path, (WIDTH, 1050), |canvas| {
         let top = draw_head(canvas, &heading::parameters(model), &subtitle, &[])? + 14.0;
         let whole = canvas.panel(LEFT, top);
         let middle = (top + whole.bottom) / 2.0;
+        let words = WallWords::of(model);
+        // A gap that is a displacement has its name.
+        let quantity = if words.gap() == "z" { "the gap" } else { words.gap() };
+        let of_gap = format!("amplitude of {quantity}");
         let panels = [
-            ("amplitude of the gap", top, middle - 15.0),
+            (of_gap.as_str(), top, middle - 15.0),
             ("amplitude of its velocity", middle + 15.0, whole.bottom),
         ];
         for (which, (label, top, bottom)) in panels.into_iter().enumerate() {

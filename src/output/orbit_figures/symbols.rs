@@ -16,7 +16,8 @@ pub(super) fn symbols(events: &[(f64, Event)], cycle: Option<f64>) -> Vec<(f64, 
     }
     let inner = events.windows(2).map(|pair| (0.5 * (pair[0].0 + pair[1].0), symbol(&pair[0].1, &pair[1].1)));
     let mut symbols: Vec<(f64, char)> = inner.collect();
-    if let (Some(end), [(first, to), .., (last, from)]) = (cycle, events) {
+    // A single event is both.
+    if let (Some(end), Some((first, to)), Some((last, from))) = (cycle, events.first(), events.last()) {
         let middle = if end - last >= *first { 0.5 * (last + end) } else { 0.5 * first };
         symbols.push((middle, symbol(from, to)));
     }
@@ -67,5 +68,9 @@ mod tests {
     fn open_ends_have_no_name() {
         assert_eq!(named(&orbit(0.06), None).len(), 7);
         assert!(symbols(&[], Some(1.0)).is_empty());
+        let orbit = orbit(0.605);
+        let alone = [(0.25, orbit.events[0])];
+        let symbol = if orbit.events[0].side == Side::Right { '2' } else { '5' };
+        assert_eq!(symbols(&alone, Some(1.0)), [(0.625, symbol)]);
     }
 }

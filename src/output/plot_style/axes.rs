@@ -6,6 +6,9 @@ use crate::output::DrawError;
 
 /// Share of its span by which an axis reaches beyond its data.
 const PADDING: f64 = 0.06;
+/// Values that differ by no more than this share of themselves are one, and the share of it that its axis spans.
+const CONSTANT: f64 = 1e-9;
+const ABOUT_CONSTANT: f64 = 0.2;
 /// Tick marks' length.
 const TICK: f64 = 7.0;
 /// The length of those without a label.
@@ -13,6 +16,13 @@ const MINOR: f64 = 4.0;
 /// The smallest type of an axis' name, and what is left free beyond its ends.
 const SMALLEST: f64 = 16.0;
 const MARGIN: f64 = 12.0;
+/// The smallest type of labels of ticks, the room that the widest may take, and where the middle of the axis' name
+/// beside them may lie at least: farther left it would be cut off.
+const SMALLEST_TICKS: f64 = 12.0;
+const TICK_ROOM: f64 = 97.0;
+const NAME_MIDDLE: f64 = 14.0;
+/// From the widest label to the middle of the axis' name.
+const NAME_AWAY: f64 = 26.0;
 /// Pixels between ticks at least: labels beside each other need more room than stacked ones.
 const APART: (f64, f64) = (90.0, 60.0);
 const APART_ON_BAR: f64 = 45.0;
@@ -68,11 +78,14 @@ impl Axis {
     /// An axis that holds all finite `values` with some room.
     ///
     /// It spans at least `least_span`, lest motion that has died down fills a panel with
-    /// its rounding errors.
+    /// its rounding errors. What is constant has round numbers beside it, in place of its last digits.
     pub fn around(label: &str, values: impl Iterator<Item = f64>, least_span: f64) -> Axis {
         let Some((low, high)) = ends(values) else {
             return Axis::exact(label, -least_span / 2.0, least_span / 2.0);
         };
+        let size = low.abs().max(high.abs());
+        let is_constant = high - low <= CONSTANT * size;
+        let least_span = if is_constant { least_span.max(ABOUT_CONSTANT * size) } else { least_span };
         let room = PADDING * (high - low) + (least_span - (high - low)).max(0.0) / 2.0;
         Axis::exact(label, low - room, high + room)
     }
@@ -175,14 +188,18 @@ impl Frame {
         let Rect { left, top, bottom, .. } = self.rect;
         canvas.outline(self.rect, 1.5)?;
         self.draw_x_axis(canvas, x_labels)?;
-        let mut widest = 0f64;
-        for Tick { at, label } in self.y_ticks(APART.1) {
+        let (ticks, from) = (self.y_ticks(APART.1), left - TICK - 6.0);
+        let widths = ticks.iter().map(|tick| canvas.text_width(&tick.label, SMALL));
+        let widest = widths.collect::<Result<Vec<_>, _>>()?.into_iter().fold(0.0, f64::max);
+        let room = (from - NAME_AWAY - NAME_MIDDLE).min(TICK_ROOM);
+        let size = (SMALL * room / widest.max(1.0)).clamp(SMALLEST_TICKS, SMALL);
+        for Tick { at, label } in ticks {
             let y = self.y_pixel(at);
             canvas.stroke(&[(left - mark_length(&label), y), (left, y)], 1.5, DARK)?;
-            canvas.text(&label, (left - TICK - 6.0, y), SMALL, Align::Right, DARK)?;
-            widest = widest.max(canvas.text_width(&label, SMALL)?);
+            canvas.text(&label, (from, y), size, Align::Right, DARK)?;
         }
-        let y_label = (left - TICK - 6.0 - widest - 26.0, (top + bottom) / 2.0);
+        let name = (from - widest * size / SMALL - NAME_AWAY).max(NAME_MIDDLE);
+        let y_label = (name, (top + bottom) / 2.0);
         let room = 2.0 * y_label.1.min(canvas.size().1 - y_label.1) - 2.0 * MARGIN;
         draw_name(canvas, &self.y.label, y_label, room, Align::Upwards)
     }
@@ -239,6 +256,17 @@ mod tests {
             let axis = Axis::around_logarithms("", values.iter().copied(), 0.8);
             assert!(axis.high - axis.low > 0.79, "{values:?}");
         }
+    }
+
+    #[test]
+    fn a_constant_has_round_numbers_beside_it() {
+        for value in [0.2, -3.0, 1e-7, 4e8] {
+            let axis = Axis::around("", [value, value * (1.0 + 1e-15)].into_iter(), 1e-6 * value.abs());
+            let span = axis.high - axis.low;
+            assert!((0.19..0.21).contains(&(span / value.abs())), "{value}: {span}");
+        }
+        let varied = Axis::around("", [1.0, 1.000_1].into_iter(), 1e-6);
+        assert!(varied.high - varied.low < 2e-4, "{varied:?}");
     }
 
     #[test]

@@ -39,17 +39,33 @@ fn linear(axis: &Axis, most: f64) -> Vec<Tick> {
     let count = (axis.high / step + 1e-9).floor() - first;
     let decimals = (-step.log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
     let largest = axis.low.abs().max(axis.high.abs());
+    let is_scientific = largest >= 1e6 || step < 1e-5;
+    let label = |at| if is_scientific { scientific(at, step) } else { decimal(at, decimals) };
     (0..=count.clamp(-1.0, 100.0) as i64)
         .map(|i| (first + i as f64) * step)
-        .map(|at| Tick { at, label: decimal(at, decimals, largest >= 1e6 || step < 1e-5) })
+        .map(|at| Tick { at, label: label(at) })
         .collect()
 }
 
 /// With the typographic minus.
-fn decimal(value: f64, decimals: usize, scientific: bool) -> String {
-    let text = if scientific { format!("{value:.3e}") } else { format!("{value:.decimals$}") };
+fn decimal(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
     let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
     text.trim_start_matches(if zero { "-" } else { "" }).replace('-', "\u{2212}")
+}
+
+/// As `4\u{b7}10\u{207b}\u{2077}`, with as many digits as a step shows.
+fn scientific(value: f64, step: f64) -> String {
+    // What is far less than a step is zero that was rounded.
+    if value.abs() < 1e-3 * step {
+        return "0".to_owned();
+    }
+    let power = |value: f64| (value.abs().log10() + 1e-9).floor();
+    let digits = (power(value) - power(step)).clamp(0.0, 12.0) as usize;
+    let written = format!("{value:.digits$e}");
+    let (part, power) = written.split_once('e').unwrap_or((&written, "0"));
+    let raised: String = power.chars().map(superscript).collect();
+    format!("{part}\u{b7}10{raised}").replace('-', "\u{2212}")
 }
 
 /// The least of a decade's ticks that is worth drawing, in pixels from the next.
@@ -152,6 +168,23 @@ mod tests {
         assert_eq!(labels(0.0, 0.031, 4.0), ["0.00", "0.01", "0.02", "0.03"]);
         assert_eq!(labels(0.0, 1.0, 10.0).len(), 11);
         assert_eq!(labels(0.0, 128.0, 10.0), ["0", "20", "40", "60", "80", "100", "120"]);
+    }
+
+    #[test]
+    fn very_small_and_very_large_values_are_short() {
+        let labels = |low, high, most| labels(&Axis::exact("", low, high), most);
+        let small = [
+            "\u{2212}4\u{b7}10\u{207b}\u{2077}",
+            "\u{2212}2\u{b7}10\u{207b}\u{2077}",
+            "0",
+            "2\u{b7}10\u{207b}\u{2077}",
+        ];
+        assert_eq!(labels(-4.1e-7, 2.2e-7, 4.0), small);
+        assert_eq!(
+            labels(0.9e-6, 1.3e-6, 3.0),
+            ["1.0\u{b7}10\u{207b}\u{2076}", "1.2\u{b7}10\u{207b}\u{2076}"]
+        );
+        assert_eq!(labels(0.0, 2.1e6, 2.0), ["0", "2\u{b7}10\u{2076}"]);
     }
 
     fn log_axis(low: f64, high: f64) -> Axis {

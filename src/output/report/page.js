@@ -181,7 +181,8 @@ function drawAxes(p) {
   }
   pen.font = "14px system-ui, sans-serif";
   pen.textAlign = "center";
-  const name = ({ meaning, symbol }) => `${meaning}, ${symbol}`;
+  // Where nobody said what a parameter means its name stands for that.
+  const name = ({ parameter, meaning, symbol }) => (meaning === parameter ? symbol : `${meaning}, ${symbol}`);
   pen.fillText(name(map.axes[0]), p.x + p.width / 2, p.y + p.height + 44, p.width + 60);
   pen.save();
   pen.translate(14, p.y + p.height / 2);
@@ -251,7 +252,7 @@ function choose(cell) {
   if (cell) {
     const [a, b] = [axisValue(map.axes[0], cell.i), axisValue(map.axes[1], cell.j)];
     const place = 4 * (cell.j * columns + cell.i);
-    const own = map.start ?? starts?.subarray(place, place + 4);
+    const own = (map.start ?? starts?.subarray(place, place + 4))?.slice(0, map.components);
     const start = own ? ` --start ${[...own].map((x, k) => [a, b][map.axes.findIndex((axis) => axis.start === k)] ?? x).join(",")}` : "";
     const sets = map.axes.map((axis, k) => (axis.start === undefined ? ` --set ${axis.parameter}=${[a, b][k]}` : "")).join("");
     const derived = derivedValues(cell).map(([name, value]) => ` --set ${name}=${value}`).join("");

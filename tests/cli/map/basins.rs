@@ -11,19 +11,19 @@ omega = 9.2
 
 [[axis]]
 start = "x1"
-min = -0.5
-max = 0.5
+min = -0.6
+max = 0.4
 count = 65
 
 [[axis]]
-start = "v2"
-min = -6.0
-max = 6.0
+start = "v1"
+min = -2.0
+max = 2.0
 count = 49
 
 [start]
 policy = "state"
-state = [9.0, 0.25, -0.1, 9.0]
+state = [9.0, 9.0, 0.0, 0.1]
 
 [refine]
 max_error = 0.05
@@ -52,7 +52,7 @@ fn basins_have_their_files_and_are_confirmed() {
     map(&folder, &["--quiet"]).success();
     let out = folder.path().join("out/s");
     let (header, cells) = rows(&out.join("cells.csv"));
-    assert!(header.starts_with("i,j,x1,v2,class,") && header.ends_with(",source,attractor"), "{header}");
+    assert!(header.starts_with("i,j,x1,v1,class,") && header.ends_with(",source,attractor"), "{header}");
     let (header, attractors) = rows(&out.join("attractors.csv"));
     let columns = "label,class,period,word,exponent,largest_multiplier,symmetric,\
                    strobe_x1,strobe_v1,strobe_x2,strobe_v2,cells,share";
@@ -69,7 +69,7 @@ fn basins_have_their_files_and_are_confirmed() {
     }
     let unlabelled = cells.iter().filter(|cell| cell.last().is_some_and(String::is_empty)).count();
     assert_eq!(left, unlabelled);
-    assert!(cells.iter().filter(|cell| cell[15] == "filled").count() > 1000);
+    assert!(cells.iter().filter(|cell| cell[14] == "filled").count() > 1000);
     let manifest: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
     assert_eq!(manifest["basins"].as_array().unwrap().len(), attractors.len());
@@ -125,6 +125,6 @@ fn a_command_replays_a_start() {
     let folder = basin();
     map(&folder, &["--quiet", "--set", "axis.0.count=3", "--set", "axis.1.count=2"]).success();
     let page = fs::read_to_string(folder.path().join("out/s/report.html")).unwrap();
-    assert!(page.contains("\"start\":[-0.5,0.25,-0.1,-6.0]"), "the first cell's own start");
-    assert!(page.contains("\"parameter\":\"v2\"") && page.contains("\"start\":3"));
+    assert!(page.contains("\"start\":[-0.6,-2.0,0.0,0.1]"), "the first cell's own start");
+    assert!(page.contains("\"parameter\":\"v1\"") && page.contains("\"start\":1"));
 }
