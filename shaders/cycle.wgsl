@@ -15,6 +15,9 @@ fn octaves_of(x: Real) -> Real {
     return Real(whole) + (2.0 / LN_2) * s * series;
 }
 
+// The growth of what has lost all of its neighbours: a gap that has stuck to a wall, with nothing beside it.
+const SUPERSTABLE: Real = -1e9;
+
 fn largest_entry(m: array<Real, 16>) -> Real {
     var size: Real = 0.0;
     for (var k = 0u; k < 16u; k++) {
@@ -71,6 +74,9 @@ fn spectral_growth() -> Real {
     if !(whole < 1e30) {
         // Beyond what can be told, and no number any more.
         return 100.0;
+    }
+    if KINDS && whole == 0.0 {
+        return SUPERSTABLE;
     }
     if !(whole > 1e-30) {
         return -100.0;

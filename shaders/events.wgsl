@@ -55,7 +55,7 @@ fn watch(tau: Real) -> Watch {
     }
     let sign = sign_of(side_of(tally.mode));
     if tally.mode < MODE_ONSET || sticks() {
-        return Watch(vec3<Real>(offsets.x + sign * z.x, sign * z.y, sign * z.z), vec3<Real>(1.0, 0.0, 0.0));
+        return Watch(vec3<Real>(offsets.x + sign * z.x, sign * z.y, sign * z.z), vec3<Real>(HUGE, 0.0, 0.0));
     }
     return Watch(vec3<Real>(offsets.x - sign * z.x, -sign * z.y, -sign * z.z), sign * pressing_jet(tau));
 }

@@ -8,6 +8,9 @@ use rattlemap_dynamics::word::Word;
 /// Symbols that the shader keeps in one number.
 pub(super) const SYMBOLS_PER_NUMBER: usize = 10;
 
+/// Growth per period below this is that of a cycle whose multipliers are zero: shaders have no infinity.
+const SUPERSTABLE: f64 = -1e6;
+
 /// A lane that has ended, as the device tells it.
 #[derive(Clone, Copy, Debug)]
 pub struct Ended {
@@ -53,6 +56,9 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
     if is_valid(valid::LYAPUNOV) {
         let period = constants.flow.h * f64::from(constants.steps);
         (record.lyapunov, record.lyapunov_error) = (reading.growth / period, reading.growth_error / period);
+        if reading.growth < SUPERSTABLE {
+            record.lyapunov = f64::NEG_INFINITY;
+        }
     }
     if is_valid(valid::WORD) {
         match spelled(finding.word, finding.word_length) {

@@ -223,8 +223,10 @@ fn agree(seeds: std::ops::Range<u32>) {
             Some((seed, apart(flight.state(), state) / scale, told))
         })
         .collect();
-    let differ: Vec<_> =
-        off.iter().filter(|(_, off, [ours, theirs])| !(*off < 1e-6) || ours != theirs).collect();
+    let differ: Vec<_> = off
+        .iter()
+        .filter(|(_, off, [ours, theirs])| off.is_nan() || *off >= 1e-6 || ours != theirs)
+        .collect();
     let mut sizes: Vec<f64> = off.iter().map(|(_, off, _)| *off).collect();
     sizes.sort_by(f64::total_cmp);
     println!("{} models, median {:.1e}; differ: {differ:?}", off.len(), sizes[sizes.len() / 2]);

@@ -3,8 +3,17 @@
 use crate::common::linear::{Linear, with_wall};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, Side, State};
-use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse_flow};
+use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse_flow, measure};
 use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
+
+/// What a cell of a map may take.
+const BUDGET: Budget = Budget {
+    settings: Settings { transient_periods: 400, observed_periods: 128, max_period: 64 },
+    early_stop: true,
+    undecided_periods: 1024,
+    exponent: true,
+    shows_exponent: true,
+};
 
 /// A ball of weight 1 on a table shaken so that its acceleration is `gamma cos(omega t)` times the weight, seen
 /// from the table, which is the right wall at 0: `z'' = 1 + gamma cos(omega t)` points into it.
@@ -74,6 +83,8 @@ fn a_ball_that_does_not_bounce_leaves_a_shaken_table_and_sticks_to_it() {
         assert_eq!((orbit.word.time_order().as_str(), orbit.impacts_per_period), ("12", 0.0), "{orbit:?}");
         let flies = (lands - leaves) / std::f64::consts::TAU;
         assert!(near(orbit.mesh_fraction, 1.0 - flies, 1e-12), "{orbit:?}");
+        let cell = measure(&flow, Law::both(0.0, 0.0), [-0.3, 0.0, 0.0, 0.0], &BUDGET);
+        assert_eq!((cell.period, cell.status, cell.word), (Some(1), Status::Ok, Some(orbit.word)));
         // Whatever a neighbour does, it leaves with the table: all is forgotten.
         assert_eq!(orbit.floquet, Some(vec![[0.0; 2]; 2]));
         assert_eq!(orbit.lyapunov, f64::NEG_INFINITY);

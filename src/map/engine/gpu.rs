@@ -11,6 +11,7 @@ use crate::gpu::{self, Constants, Ended, GpuError, Lane, LaneSettings, Pool, Tab
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::map::scene::Steps;
 use crate::record::{Record, valid};
+use rattlemap_dynamics::model::Contact;
 
 /// First batches: enough to keep a hardware device busy, or a software one for a second.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
@@ -250,6 +251,7 @@ impl Numbering {
 pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
     let budget = plan.budget();
     let default = LaneSettings::default();
+    let [chatter, kinds] = branches(plan);
     LaneSettings {
         periods: budget.periods(),
         transient_periods: budget.settings.transient_periods,
@@ -261,8 +263,8 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
         pattern: plan.needs().pattern,
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
-        chatter: follows_chatter(plan),
-        kinds: has_kinds(plan),
+        chatter,
+        kinds,
         exponent_from: budget.exponent_from(),
         chaos_from: budget.chaos_from(),
         chaos_errors: budget.chaos_errors() as f32,
@@ -275,18 +277,21 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
     }
 }
 
-/// Whether any cell of the plan may follow chatter by short flights.
-fn follows_chatter(plan: &Plan) -> bool {
-    let speeds = (0..plan.law_count() as u32).flat_map(|law| plan.law(law).mesh_speed);
-    let least = speeds.fold(f64::INFINITY, f64::min);
-    let follows = |flow| gpu::follows_chatter(&plan.oscillator(flow), least);
-    (0..plan.flow_count() as u32).into_par_iter().any(follows)
-}
-
-/// Whether any cell of the plan has a wall that is elastic or rigid.
-fn has_kinds(plan: &Plan) -> bool {
-    let has = |flow| gpu::has_elastic_or_rigid_wall(&plan.oscillator(flow));
-    (0..plan.flow_count() as u32).into_par_iter().any(has)
+/// Whether any cell of the plan may follow chatter by short flights, and whether any has a wall that is elastic or rigid.
+fn branches(plan: &Plan) -> [bool; 2] {
+    let laws = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed);
+    let least =
+        laws.fold([f64::INFINITY; 2], |least, speeds| [0, 1].map(|side| speeds[side].min(least[side])));
+    let of = |flow| {
+        let oscillator = plan.oscillator(flow);
+        let follows = (0..2).any(|side| {
+            let bounces = oscillator.walls[side].is_finite() && oscillator.contacts[side] != Contact::Elastic;
+            bounces && gpu::follows_chatter(&oscillator, least[side])
+        });
+        [follows, gpu::has_elastic_or_rigid_wall(&oscillator)]
+    };
+    let flows = (0..plan.flow_count() as u32).into_par_iter().map(of);
+    flows.reduce(|| [false; 2], |a, b| [a[0] || b[0], a[1] || b[1]])
 }
 
 /// Leaves what somebody asked for.

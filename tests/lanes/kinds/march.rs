@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State};
 
 /// Steps per period: what crosses a wall and comes back within one is missed.
-const STEPS: u32 = 3000;
+const STEPS: u32 = 1000;
 
 /// What leaves a wall may seem to lie beyond it by so much.
 const ROUNDING: f64 = 1e-14;
@@ -33,6 +33,7 @@ pub(super) struct March {
     /// Time spent in contact.
     pub(super) contact: f64,
     steps: Vec<(Mode, Matrix)>,
+    free: Matrix,
 }
 
 const SIGN: [f64; 2] = [1.0, -1.0];
@@ -51,8 +52,10 @@ impl March {
             impacts: 0,
             contact: 0.0,
             steps: Vec::new(),
+            free: Matrix::zeros(),
         };
-        for side in 0..2 {
+        march.free = march.generator(Mode::Free);
+        for side in [0, 1] {
             if march.beyond(&march.y.clone(), side) > 0.0 {
                 if oscillator.contacts[side] == Contact::Rigid {
                     march.put_on_wall(side);
@@ -113,7 +116,8 @@ impl March {
 
     /// Acceleration of the gap into a wall, in the free field or behind it.
     fn pressing(&self, y: &Vector, mode: Mode, side: usize) -> f64 {
-        SIGN[side] * self.gap.dot(&(self.generator(mode) * y).fixed_rows::<2>(2))
+        let field = if mode == Mode::Free { self.free } else { self.generator(mode) };
+        SIGN[side] * self.gap.dot(&(field * y).fixed_rows::<2>(2))
     }
 
     /// Positive while the present mode goes on.
