@@ -73,7 +73,7 @@ const BODY: &str = concat!(
     include_str!("../../shaders/layout.wgsl"),
     include_str!("../../shaders/domain.wgsl"),
     include_str!("../../shaders/phase.wgsl"),
-    include_str!("../../shaders/gear_pair.wgsl"),
+    include_str!("../../shaders/contact.wgsl"),
     include_str!("../../shaders/elastic.wgsl"),
     include_str!("../../shaders/rigid.wgsl"),
     include_str!("../../shaders/taylor.wgsl"),
