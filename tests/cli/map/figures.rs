@@ -46,7 +46,7 @@ fn a_legend_claims_no_symmetry_that_was_not_asked_for() {
     let folder = folder();
     let scene = "model = 'impact-oscillator'\n[parameters]\nsigma = 0.5\n\
                  [[axis]]\nparameter = 'omega'\nvalues = [1.4, 3.0]\n[[axis]]\nparameter = 'e'\nvalues = [0.7, 0.8]\n\
-                 [outputs]\nquantities = ['class', 'impacts']\nfiles = ['svg']\n";
+                 [outputs]\nquantities = ['class', 'impacts', 'mesh']\nfiles = ['svg']\n";
     fs::write(folder.path().join("one.toml"), scene).unwrap();
     command(&folder, &["map", "one.toml", "--engine", "cpu", "--out", "o", "--quiet"]).assert().success();
     let figure = fs::read_to_string(folder.path().join("o/map.svg")).unwrap();
