@@ -38,6 +38,7 @@ fn my_model() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("my-bilinear.toml"), toml(0)).unwrap();
     fs::write(folder.path().join("my-map.toml"), toml(1)).unwrap();
+    fs::write(folder.path().join("my-basin.toml"), toml(2)).unwrap();
     folder
 }
 
@@ -102,13 +103,12 @@ fn unknown_model_is_refused_with_the_names() {
     let error = String::from_utf8(run.get_output().stderr.clone()).unwrap();
     assert!(error.contains("cannot be read at no/such.toml"), "{error}");
     let folder = my_model();
-    fs::write(folder.path().join("my-bilinear.toml"), toml(0).replace("[[\"0.1\"]]", "[[\"-0.1\"]]"))
-        .unwrap();
+    fs::write(folder.path().join("my-bilinear.toml"), toml(0).replace("[[0.1]]", "[[-0.1]]")).unwrap();
     for arguments in [&["map", "my-map.toml"][..], &["models", "my-bilinear.toml"]] {
         let run = rattlemap(folder.path(), arguments).code(2).stdout("");
         let error = String::from_utf8(run.get_output().stderr.clone()).unwrap();
         assert!(
-            error.starts_with("error: my-bilinear.toml:11:11: `motion.damping = [[\"-0.1\"]]` does"),
+            error.starts_with("error: my-bilinear.toml:5:18: `motion.damping = [[-0.1]]` does"),
             "{error}"
         );
     }
@@ -116,7 +116,7 @@ fn unknown_model_is_refused_with_the_names() {
 
 /// The page's commands, and what else can be asked of a map. The folder is enough once the model's file is gone.
 #[test]
-fn a_model_of_ones_own_has_maps_diagrams_and_orbits() {
+fn a_model_of_ones_own_has_maps_basins_diagrams_and_orbits() {
     let folder = my_model();
     let at = |name: &str| folder.path().join(name);
     assert!(stdout_in(folder.path(), &["models", "my-bilinear.toml"]).contains("N = k (z - d)"));
@@ -132,6 +132,10 @@ fn a_model_of_ones_own_has_maps_diagrams_and_orbits() {
     assert_eq!(fs::read_to_string(at("out/my-map/model.toml")).unwrap(), toml(0));
     let report = fs::read_to_string(at("out/my-map/report.html")).unwrap();
     assert!(report.contains(" --model model.toml"));
+
+    rattlemap(folder.path(), &["map", "my-basin.toml", "--engine", "cpu", "--quiet"]).code(0);
+    let attractors = fs::read_to_string(at("out/my-basin/attractors.csv")).unwrap();
+    assert_eq!(attractors.lines().count(), 1 + 2, "{attractors}");
 
     let line = ["bifurcation", "my-map.toml", "--along", "omega", "--at", "d=0.5", "--quiet"];
     rattlemap(folder.path(), &line).code(0);
@@ -157,7 +161,7 @@ fn a_model_of_ones_own_has_maps_diagrams_and_orbits() {
     // Another text is another model; without its file nothing is begun anew, and the folder stands by itself.
     let resume = [&map[..], &["--resume"]].concat();
     rattlemap(folder.path(), &resume).code(0);
-    fs::write(at("my-bilinear.toml"), toml(0).replace("\"0.1\"", "\"0.2\"")).unwrap();
+    fs::write(at("my-bilinear.toml"), toml(0).replace("0.1", "0.2")).unwrap();
     let run = rattlemap(folder.path(), &resume).code(2);
     let error = String::from_utf8(run.get_output().stderr.clone()).unwrap();
     assert!(error.contains("model.hash"), "{error}");
