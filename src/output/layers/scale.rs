@@ -15,13 +15,16 @@ pub(super) fn nice_bound(sizes: impl Iterator<Item = f64>) -> f64 {
     if bound <= 0.0 {
         return 1.0;
     }
-    let decade = 10f64.powf(bound.log10().floor());
+    // Tenths as quotients: 6 * 0.1 is no 0.6.
+    let exponent = bound.log10().floor();
+    let (over, under) =
+        if exponent < 0.0 { (1.0, 10f64.powf(-exponent)) } else { (10f64.powf(exponent), 1.0) };
     let steps = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
     steps
-        .map(|step| step * decade)
+        .map(|step| step * over / under)
         .into_iter()
         .find(|end| *end >= bound * (1.0 - 1e-9))
-        .unwrap_or(10.0 * decade)
+        .unwrap_or(10.0 * over / under)
 }
 
 #[cfg(test)]
@@ -33,6 +36,7 @@ mod tests {
         assert_eq!(nice_bound([].into_iter()), 1.0);
         assert_eq!(nice_bound([0.0, 0.0].into_iter()), 1.0);
         assert_eq!(nice_bound((0..100).map(f64::from)), 100.0);
+        assert_eq!(nice_bound([0.055, 0.55].into_iter()), 0.6);
         assert_eq!(nice_bound((0..1000).map(|i| if i == 0 { 1e9 } else { 0.23 })), 0.25);
     }
 }
