@@ -215,6 +215,10 @@ fn beside(comparison: &Comparison, scene: &Scene) -> Option<String> {
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     let cycles = (!parts.is_empty()).then(|| format!("of cycles of one period differ: {}", parts.join(", ")));
     let attractors = tally("cells differ in the number of attractors", comparison.attractors);
-    let lines: Vec<String> = cycles.into_iter().chain(attractors).collect();
+    // Labels go by share in each map, so equal ones say nothing.
+    let basins = scene.is_basin().then(|| {
+        "to which attractor a start leads is not compared: see attractors.csv of both for twins of one period".to_owned()
+    });
+    let lines: Vec<String> = cycles.into_iter().chain(attractors).chain(basins).collect();
     (!lines.is_empty()).then(|| lines.join("\n"))
 }

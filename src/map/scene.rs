@@ -352,7 +352,14 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
     let root = Section::open(&document, "", &["parameters"])?;
     let beside = Beside { axes: &[], list: None, derived: &Derived::default() };
     let cell = parameters::read(&root, model, beside)?;
-    Flow::validate(&*cell).map_err(|error| root.no_motion("", &error))?;
+    Flow::validate(&*cell).map_err(|error| {
+        // Defaults are fine: it is what was set that has to change.
+        let error = root.no_motion("", &error);
+        match sets {
+            [] => error,
+            _ => SceneError { place: Place::Set { argument: sets.join(" --set ").into() }, ..error },
+        }
+    })?;
     Ok(cell)
 }
 

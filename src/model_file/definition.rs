@@ -163,7 +163,7 @@ fn blamed(error: &ModelError) -> (Table, &str) {
         _ => None,
     };
     match quantity.split(' ').next().unwrap_or_default() {
-        "entry" => (Table::Motion, "gap"),
+        "entry" | "the" => (Table::Motion, "gap"),
         "omega" => (Table::Motion, "frequency"),
         "position" => (Table::Wall(side), "at"),
         "load" if side.is_some() => (Table::Wall(side), "at"),

@@ -202,6 +202,16 @@ fn what_does_not_fit_is_refused_by_name_with_the_limit() {
             "[[\"F-1.5\"]]",
             "m.toml:15:8: `motion.mass = [[\"F-1.5\"]]` does not fit: at the defaults of stop, mass 1 = 0",
         ),
+        (
+            "gap = [1]",
+            "gap = [\"F-1.5\"]",
+            "m.toml:21:7: `motion.gap = [\"F-1.5\"]` does not fit: at the defaults of stop, the largest entry of the gap row = 0",
+        ),
+        (
+            "\"impact\"\nrestitution = \"e\"\n",
+            "\"elastic\"\nstiffness = -0.5\n",
+            "m.toml:27:13: `contact.0.stiffness = -0.5` does not fit: at the defaults of stop, stiffness added in contact with the right wall = -0.5: it must be at least 0 where the wall is elastic",
+        ),
         ("[[\"1\"]]", "[[\"1\", \"0\"]]", "`motion.mass.0 = [\"1\", \"0\"]` is out of range"),
         (
             "at = \"s\"",

@@ -192,3 +192,17 @@ fn a_start_has_the_models_components() {
         "{error}"
     );
 }
+
+/// The defaults are fine, so the place is what was set.
+#[test]
+fn motion_that_is_set_out_of_its_limits_names_what_was_set() {
+    let folder = my_model();
+    let orbit = ["orbit", "--model", "my-bilinear.toml", "--set", "d=1", "--set", "k=-0.5"];
+    let run = rattlemap(folder.path(), &orbit).code(2);
+    let stderr = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    assert_eq!(
+        stderr,
+        "error: --set d=1 --set k=-0.5: stiffness added in contact with the right wall = -0.5: it must be at least 0 \
+         where the wall is elastic; change the parameters\n"
+    );
+}

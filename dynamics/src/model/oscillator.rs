@@ -255,6 +255,10 @@ impl Oscillator {
             let is_along = |(i, j): (usize, usize)| {
                 (matrix[i][j] - before[i][j] - added * g[i] * g[j]).abs() <= ROUNDING * size
             };
+            // An inverse spring, or a damper that drives.
+            let quantity = || format!("{name} added in {place}");
+            let least = -ROUNDING * size / (g[0] * g[0] + g[1] * g[1]);
+            require(added >= least, quantity, added, "at least 0 where the wall is elastic")?;
             if !(added >= 0.0 && pairs.into_iter().all(is_along)) {
                 let quantity = format!("{name} in {place}");
                 return Err(OscillatorError::NotAlongGap { quantity, matrix });

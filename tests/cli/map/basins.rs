@@ -128,3 +128,15 @@ fn a_command_replays_a_start() {
     assert!(page.contains("\"start\":[-0.6,-2.0,0.0,0.1]"), "the first cell's own start");
     assert!(page.contains("\"parameter\":\"v1\"") && page.contains("\"start\":1"));
 }
+
+/// Twins have one class and one period: that no cell differs must not pass for equal basins.
+#[test]
+fn comparing_basins_says_what_is_not_compared() {
+    let folder = basin();
+    let sizes = ["--set", "axis.0.count=5", "--set", "axis.1.count=4", "--engine", "cpu", "--quiet"];
+    map(&folder, &sizes).success();
+    let compare = ["compare", "out/s", "out/s"];
+    let run = Command::cargo_bin("rattlemap").unwrap().current_dir(&folder).args(compare).assert().success();
+    let said = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("no cell of 20 differs") && said.contains("is not compared"), "{said}");
+}
