@@ -270,11 +270,12 @@ impl<'a> Cell<'a> {
             // At the end of its range a parameter stays where it is.
             let _ = model.set_at(index, value * (1.0 + self.resolution * (2.0 * random.unit() - 1.0)));
         }
-        // Leaving speeds carry the rounding of the whole motion's velocity.
+        // Leaving speeds carry the rounding of the whole motion's velocity, at both walls alike: what is symmetric stays so.
+        let draw = 2.0 * Random::new(!(self.seed ^ k)).unit() - 1.0;
         let mut law = model.law();
         for speed in &mut law.mesh_speed {
             let share = self.resolution * units[1].max(*speed) / speed.max(f64::MIN_POSITIVE);
-            *speed *= 1.0 + share.min(MOST_OF_MESH_SPEED) * (2.0 * random.unit() - 1.0);
+            *speed *= 1.0 + share.min(MOST_OF_MESH_SPEED) * draw;
         }
         let units = self.units(&self.start);
         let mut start = self.start;

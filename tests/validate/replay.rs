@@ -406,13 +406,16 @@ fn a_judge_that_decides_nothing_contradicts_nothing() {
     assert_eq!(kinds, [Kind::Budget], "{:?}", found.mismatches);
 }
 
+/// In the rule of a contact that lasts.
+const MESHES: &str = "leaving <= mesh_speed(side) &&";
+
 /// Chatter meshes one impact sooner in one series of a hundred.
 #[test]
 fn a_threshold_that_is_off_by_a_hundredth_is_found() {
     let plan = planned([0.2, 0.6], [1.0, 2.5], 20, &[]);
     let rewrite = |source: String| {
-        assert!(source.contains("leaving <= law.mesh_speed * h"));
-        source.replace("leaving <= law.mesh_speed * h", "leaving <= Real(1.01) * law.mesh_speed * h")
+        assert!(source.contains(MESHES));
+        source.replace(MESHES, "leaving <= Real(1.01) * mesh_speed(side) &&")
     };
     for precision in Precision::ALL {
         let (found, _) = by_lanes(&plan, precision, Some(rewrite));
