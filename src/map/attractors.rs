@@ -2,7 +2,7 @@
 //!
 //! All chaotic starts share one attractor: nothing in a record tells two chaotic attractors apart. Contact-free motion
 //! is one, however far it still is from it. Periodic starts are told apart by their cycles, which Newton's method finds
-//! on the reference ([`catalogue`]); symmetry-conjugate orbits are different attractors here. Undecided and failed starts
+//! on the reference (`catalogue`); symmetry-conjugate orbits are different attractors here. Undecided and failed starts
 //! belong to none.
 //!
 //! Attractors are numbered by share; equal shares by period, then by strobe state. What is found depends on the records

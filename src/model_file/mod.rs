@@ -21,6 +21,7 @@ use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter};
 pub use builtin::{BUILT_IN, DEFAULT};
 pub use contact::{Behind, Wall, WallLaw};
 pub use definition::Definition;
+#[cfg(feature = "cli")]
 pub(crate) use equations::factor;
 
 use crate::text::error::SceneError;

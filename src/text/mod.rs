@@ -1,4 +1,4 @@
-//! What people write: TOML in which every value knows its place ([`document`]), tables of known fields ([`section`]),
+//! What people write: TOML in which every value knows its place (`document`), tables of known fields (`section`),
 //! errors that name file, line, field, value and remedy ([`error`]), formulas ([`expression`]), and what of a text a
 //! terminal may see ([`printable`]). Pure.
 
