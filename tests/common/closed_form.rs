@@ -48,10 +48,24 @@ impl Linear {
         let (from, to) = (self.steady(t), self.steady(t + tau));
         let [[a, b], [c, d]] = self.propagator(tau);
         let q = [y[0] - from[0], y[1] - from[1]];
-        // Without a spring a load makes a parabola.
-        let fall = if self.k == 0.0 { self.load / self.m } else { 0.0 };
-        assert!(self.k > 0.0 || self.c == 0.0 || self.load == 0.0, "not needed");
-        [a * q[0] + b * q[1] + to[0] + 0.5 * fall * tau * tau, c * q[0] + d * q[1] + to[1] + fall * tau]
+        let [fallen, speed] = self.fall(tau);
+        [a * q[0] + b * q[1] + to[0] + fallen, c * q[0] + d * q[1] + to[1] + speed]
+    }
+
+    /// What a load does from rest where there is no spring: a parabola, or a fall that a damper slows down.
+    fn fall(&self, tau: f64) -> [f64; 2] {
+        match (self.k == 0.0, self.c == 0.0) {
+            (false, _) => [0.0; 2],
+            (true, true) => {
+                let fall = self.load / self.m;
+                [0.5 * fall * tau * tau, fall * tau]
+            }
+            (true, false) => {
+                let (last, lag) = (self.load / self.c, self.m / self.c);
+                let gained = -(-tau / lag).exp_m1();
+                [last * (tau - lag * gained), last * gained]
+            }
+        }
     }
 
     pub(crate) fn acceleration(&self, t: f64, [x, v]: [f64; 2]) -> f64 {

@@ -5,8 +5,10 @@ use nalgebra::Matrix4;
 use crate::ball::{ball, bounce, window};
 use crate::clearance;
 use crate::common::apart;
+use crate::common::closed_form::Walled;
 use crate::common::gpu::open;
 use crate::cycle::{eigenvalues, followed};
+use crate::elastic::{backlash, bilinear, soft};
 use crate::single_impact::stable;
 use rattlemap::gpu::{Lane, LaneSettings, Precision};
 use rattlemap::map::engine::measured_record;
@@ -68,7 +70,33 @@ fn truths() -> Vec<Truth> {
             }
         }
     }
+    let springs = [
+        ("bilinear", bilinear(1.7, 1.0), [0.0, 0.0]),
+        ("soft impacts", soft(0.85, 0.7), [0.0, 0.0]),
+        // Between the folds teeth stay together or part.
+        ("backlash, together", backlash(0.78), [1.1, 0.0]),
+        ("backlash, parting", backlash(0.78), [0.8, 0.0]),
+        ("backlash", backlash(1.1), [0.8, 0.0]),
+    ];
+    for (what, walled, start) in springs {
+        let ([x, v], period) = settled(&walled, start);
+        let (oscillator, law) = walled.oscillator();
+        // Both multipliers are one pair, and their product is what the damper takes of the phase volume.
+        let radius = (-0.5 * walled.free.c * f64::from(period) * walled.free.period()).exp();
+        let (what, strobe) = (what.to_owned(), [x, v, 0.0, 0.0]);
+        list.push(Truth { what, oscillator, law, period, strobe, radius, impacts: 0.0 });
+    }
     list
+}
+
+/// A state to which the closed forms come back, and after how many periods; the reference says where to look.
+fn settled(walled: &Walled, [x, v]: [f64; 2]) -> ([f64; 2], u32) {
+    let (oscillator, law) = walled.oscillator();
+    let [x, v, ..] = followed(&oscillator, law, [x, v, 0.0, 0.0], 1200).end;
+    let back = |period: u32| walled.run([x, v], period).0;
+    let closes = |period: &u32| (x - back(*period)[0]).hypot(v - back(*period)[1]) < 1e-13;
+    let period = (1..=8).find(closes).expect("a cycle");
+    (back(period), period)
 }
 
 const SETTINGS: Settings = Settings { transient_periods: 400, observed_periods: 128, max_period: 16 };
