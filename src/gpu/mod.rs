@@ -53,6 +53,7 @@ use crate::record::Record;
 use crate::record::limits::MOST_STEPS;
 use dispatch_policy::DispatchPolicy;
 use rattlemap_dynamics::model::{Law, Oscillator, State};
+use rattlemap_dynamics::orbit::Budget;
 
 /// Largest meshing speed with which lanes follow chatter by short flights, relative to half the walls' distance times
 /// the rate of free motion: above it too few of them are left to pay for.
@@ -167,6 +168,22 @@ impl Default for LaneSettings {
 }
 
 impl LaneSettings {
+    /// What a budget says of how long lanes are integrated, and when they may stop.
+    pub fn within(budget: &Budget) -> Self {
+        LaneSettings {
+            periods: budget.periods(),
+            transient_periods: budget.settings.transient_periods,
+            max_period: budget.settings.max_period,
+            early_stop: budget.early_stop,
+            undecided_periods: budget.undecided_periods,
+            exponent: budget.exponent,
+            exponent_from: budget.exponent_from(),
+            chaos_from: budget.chaos_from(),
+            chaos_errors: budget.chaos_errors() as f32,
+            ..LaneSettings::default()
+        }
+    }
+
     /// So many periods from the start and nothing else: no cycle is searched for, no exponent
     /// taken, and no lane ends early.
     pub fn only(periods: u32) -> Self {

@@ -111,19 +111,6 @@ fn budget() -> Budget {
     }
 }
 
-fn lane_settings() -> LaneSettings {
-    let budget = budget();
-    LaneSettings {
-        periods: budget.periods(),
-        transient_periods: SETTINGS.transient_periods,
-        max_period: SETTINGS.max_period,
-        exponent_from: budget.exponent_from(),
-        chaos_from: budget.chaos_from(),
-        chaos_errors: budget.chaos_errors() as f32,
-        ..LaneSettings::default()
-    }
-}
-
 /// Near the cycle, not on it.
 fn start(truth: &Truth) -> State {
     truth.strobe.map(|x| 1.001 * x)
@@ -170,7 +157,8 @@ fn lanes_find_them(precision: Precision, bars: [f64; 2]) {
     let lanes: Vec<Lane> =
         (0..).zip(&truths).map(|(i, truth)| Lane { flow: i, law: i, start: start(truth) }).collect();
     let mut gpu = open(precision);
-    let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &lane_settings())).unwrap();
+    let records =
+        pollster::block_on(gpu.run(&flows, &laws, &lanes, &LaneSettings::within(&budget()))).unwrap();
     let [state, multiplier] = worst(&truths, &records, precision.name());
     assert!(state < bars[0] && multiplier < bars[1], "{state:e} {multiplier:e}");
 }

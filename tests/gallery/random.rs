@@ -286,16 +286,7 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
     let laws: Vec<Law> = cells.iter().map(|cell| cell.law).collect();
     let lanes: Vec<Lane> =
         (0..).zip(&cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.start }).collect();
-    let budget = budget();
-    let settings = LaneSettings {
-        periods: budget.periods(),
-        transient_periods: SETTINGS.transient_periods,
-        max_period: SETTINGS.max_period,
-        exponent_from: budget.exponent_from(),
-        chaos_from: budget.chaos_from(),
-        chaos_errors: budget.chaos_errors() as f32,
-        ..LaneSettings::default()
-    };
+    let settings = LaneSettings::within(&budget());
     let mut gpu = open(precision);
     let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
     let is_wrong = |record: &&Record| !record.strobe.iter().all(|x| x.is_finite());
@@ -314,7 +305,7 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
                 return None;
             }
             let differs =
-                !differences(&record, &truth, precision, cell.oscillator.period(), &budget).is_empty();
+                !differences(&record, &truth, precision, cell.oscillator.period(), &budget()).is_empty();
             differs.then(|| (i, examined(cell, precision, record)))
         })
         .collect();

@@ -158,16 +158,7 @@ pub(super) fn budget() -> Budget {
 }
 
 pub(super) fn lane_settings() -> LaneSettings {
-    let budget = budget();
-    LaneSettings {
-        periods: budget.periods(),
-        transient_periods: SETTINGS.transient_periods,
-        max_period: SETTINGS.max_period,
-        exponent_from: budget.exponent_from(),
-        chaos_from: budget.chaos_from(),
-        chaos_errors: budget.chaos_errors() as f32,
-        ..LaneSettings::default()
-    }
+    LaneSettings::within(&budget())
 }
 
 /// As the CPU engine does it.

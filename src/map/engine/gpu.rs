@@ -250,24 +250,15 @@ impl Numbering {
 /// How lanes of a plan are run.
 pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
     let budget = plan.budget();
-    let default = LaneSettings::default();
+    let default = LaneSettings::within(budget);
     let [chatter, kinds] = branches(plan);
     LaneSettings {
-        periods: budget.periods(),
-        transient_periods: budget.settings.transient_periods,
-        max_period: budget.settings.max_period,
-        early_stop: budget.early_stop,
-        undecided_periods: budget.undecided_periods,
-        exponent: budget.exponent,
         word: plan.needs().word,
         pattern: plan.needs().pattern,
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
         chatter,
         kinds,
-        exponent_from: budget.exponent_from(),
-        chaos_from: budget.chaos_from(),
-        chaos_errors: budget.chaos_errors() as f32,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
         steps_per_period: match plan.steps_per_period() {
             Steps::Auto => None,
