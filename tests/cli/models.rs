@@ -135,7 +135,7 @@ fn a_model_of_ones_own_has_maps_basins_diagrams_and_orbits() {
 
     rattlemap(folder.path(), &["map", "my-basin.toml", "--engine", "cpu", "--quiet"]).code(0);
     let attractors = fs::read_to_string(at("out/my-basin/attractors.csv")).unwrap();
-    assert_eq!(attractors.lines().count(), 1 + 2, "{attractors}");
+    assert_eq!(attractors.lines().count(), 1 + 3, "{attractors}");
 
     let line = ["bifurcation", "my-map.toml", "--along", "omega", "--at", "d=0.5", "--quiet"];
     rattlemap(folder.path(), &line).code(0);

@@ -249,7 +249,12 @@ fn is_bounded(cell: &Drawn) -> bool {
 }
 
 /// A cell and its record as a map of one.
-fn examined(cell: &Drawn, precision: Precision, record: Record) -> Option<Kind> {
+fn examined(
+    cell: &Drawn,
+    precision: Precision,
+    record: Record,
+    lanes: impl FnOnce(&Subject<'_>, &Sample) -> Lanes,
+) -> Option<Kind> {
     let integration = Integration {
         transient_periods: SETTINGS.transient_periods,
         observed_periods: SETTINGS.observed_periods,
@@ -275,7 +280,7 @@ fn examined(cell: &Drawn, precision: Precision, record: Record) -> Option<Kind> 
     let subject = Subject { plan: &plan, records: &[record], precision, is_lane: true };
     let draws = vec![Draw { stratum: Stratum::Uniform, runs: 1, ids: vec![0] }];
     let sample = Sample { seed: 0, draws, states: Vec::new() };
-    let validation = replay(&subject, &sample, &Lanes::default(), &|_| ());
+    let validation = replay(&subject, &sample, &lanes(&subject, &sample), &|_| ());
     validation.mismatches.first().map(|mismatch| mismatch.kind)
 }
 
@@ -291,7 +296,7 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
     let records = pollster::block_on(gpu.run(&flows, &laws, &lanes, &settings)).unwrap();
     let is_wrong = |record: &&Record| !record.strobe.iter().all(|x| x.is_finite());
     assert_eq!(records.iter().filter(is_wrong).count(), 0, "not finite");
-    let kinds: Vec<(usize, Option<Kind>)> = cells
+    let mut kinds: Vec<(usize, Option<Kind>)> = cells
         .par_iter()
         .with_max_len(1)
         .enumerate()
@@ -306,9 +311,16 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
             }
             let differs =
                 !differences(&record, &truth, precision, cell.oscillator.period(), &budget()).is_empty();
-            differs.then(|| (i, examined(cell, precision, record)))
+            differs.then(|| (i, examined(cell, precision, record, |_, _| Lanes::default())))
         })
         .collect();
+    // What the reference alone does not explain, lanes that are run again may, those in f64 above all.
+    let mut double = (precision == Precision::F32).then(|| open(Precision::F64));
+    for (i, kind) in kinds.iter_mut().filter(|(_, kind)| *kind == Some(Kind::Unexplained)) {
+        *kind = examined(&cells[*i], precision, records[*i], |subject, sample| {
+            pollster::block_on(Lanes::run(subject, sample, Some(&mut gpu), double.as_deref_mut())).unwrap()
+        });
+    }
     let silent =
         records.iter().filter(|record| !matches!(classify(record), Class::Periodic { .. } | Class::Chaotic));
     println!(
@@ -324,6 +336,11 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
     let unexplained: Vec<_> = kinds.iter().filter(|(_, kind)| *kind == Some(Kind::Unexplained)).collect();
     for (i, _) in &unexplained {
         let truth = measured_record(&measured(&cells[*i]).0, &Needs::EVERYTHING);
+        println!("{}\nfrom {:?}", cells[*i].model.definition().text, cells[*i].start);
+        println!(
+            "{i}: {:?}",
+            differences(&records[*i], &truth, precision, cells[*i].oscillator.period(), &budget())
+        );
         println!("{:?}\n{:?}", records[*i], truth);
     }
     assert!(!Rate::new(unexplained.len(), cells.len()).is_too_many(), "unexplained: {unexplained:?}");
@@ -339,9 +356,15 @@ fn lanes_in_f64_say_what_the_reference_says_of_random_models() {
     lanes_agree(Precision::F64, 0..400);
 }
 
+// Not green: what is left unexplained of them is told in results/gallery/README.md.
 #[test]
-#[ignore = "tens of minutes"]
-fn lanes_say_what_the_reference_says_of_twenty_thousand_models() {
+#[ignore = "two minutes"]
+fn lanes_in_f32_say_what_the_reference_says_of_twenty_thousand_models() {
     lanes_agree(Precision::F32, 0..20_000);
+}
+
+#[test]
+#[ignore = "two minutes"]
+fn lanes_in_f64_say_what_the_reference_says_of_twenty_thousand_models() {
     lanes_agree(Precision::F64, 0..20_000);
 }
