@@ -124,7 +124,7 @@ fn a_model_of_ones_own_has_maps_basins_diagrams_and_orbits() {
     rattlemap(folder.path(), &map).code(0);
     let csv = fs::read_to_string(at("out/my-map/cells.csv")).unwrap();
     assert!(csv.starts_with("i,j,omega,d,class,period"), "{csv}");
-    assert_eq!(csv.lines().count(), 1 + 16 * 12);
+    assert_eq!(csv.lines().count(), 1 + 96 * 72);
     assert!(!csv.contains("failed"), "{csv}");
     let manifest = json(&at("out/my-map/manifest.json"));
     assert_eq!(manifest["model"]["name"], "my-bilinear");
