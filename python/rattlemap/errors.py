@@ -1,11 +1,23 @@
-"""What goes wrong, as exceptions. Texts are those of the program: what, where, and what to do about it."""
+"""What goes wrong, as exceptions: their texts are those of the program."""
 
-from __future__ import annotations
+__all__ = ["EngineError", "FolderError", "ModelError", "RattlemapError", "SceneError"]
 
 
 class RattlemapError(Exception):
-    """Everything that rattlemap raises on its own account."""
+    """The base of all exceptions of this package."""
+
+
+class SceneError(RattlemapError, ValueError):
+    """What is asked is wrong: an unknown name, a value out of its range, axes that do not fit."""
+
+
+class ModelError(RattlemapError, ValueError):
+    """A model's file is wrong, or the model has no motion at the values that it is given."""
+
+
+class EngineError(RattlemapError, RuntimeError):
+    """The engine that is asked for is not there, or failed on the way."""
 
 
 class FolderError(RattlemapError, ValueError):
-    """A folder that cannot be opened: it is not finished, not whole, or not of a map."""
+    """A folder cannot be opened: it is not finished, not whole, or not of a map."""

@@ -1,5 +1,6 @@
 //! The command line: what can be asked, and its help.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -36,7 +37,15 @@ pub(crate) struct Cli {
 /// # Errors
 /// The exit code.
 pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
-    P::try_parse().map_err(|mut error| {
+    parsed_from(std::env::args_os()).map_err(ExitCode::from)
+}
+
+/// The same of these arguments, the program's name first.
+///
+/// # Errors
+/// The exit code.
+pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
+    P::try_parse_from(arguments).map_err(|mut error| {
         if error.use_stderr() {
             quote(&mut error);
             // Plain: what it quotes must not pass for colours.
@@ -45,7 +54,7 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
             // A closed stdout has no reader.
             let _ = error.print();
         }
-        ExitCode::from(error.exit_code() as u8)
+        error.exit_code() as u8
     })
 }
 
