@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use crate::cli::say;
 use crate::gpu::Precision;
+use crate::map::engine_choice::{Ask, Who};
 use crate::map::printable::is_printable;
 use crate::map::scene::{Along, Format};
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
@@ -255,6 +256,18 @@ pub(crate) struct EngineOptions {
     /// where it has double precision; the CPU is f64
     #[arg(long, value_name = "PRECISION", value_parser = precision)]
     pub(crate) precision: Option<Precision>,
+}
+
+impl EngineOptions {
+    /// The same for the library.
+    pub(crate) fn ask(&self) -> Ask {
+        let engine = match self.engine {
+            EngineChoice::Auto => Who::Auto,
+            EngineChoice::Gpu => Who::Gpu,
+            EngineChoice::Cpu => Who::Cpu,
+        };
+        Ask { engine, precision: self.precision }
+    }
 }
 
 fn precision(text: &str) -> Result<Precision, String> {

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::map::engine_choice::ChoiceError;
 use crate::map::plan::NoMotion;
 use crate::map::scene::SceneError;
 use crate::output::{FolderError, OutputError, RecordFileError};
@@ -74,6 +75,12 @@ impl From<ModelError> for Failure {
 impl From<NoMotion> for Failure {
     fn from(error: NoMotion) -> Self {
         Failure::Usage(error.into())
+    }
+}
+
+impl From<ChoiceError> for Failure {
+    fn from(error: ChoiceError) -> Self {
+        if error.is_in_the_request() { Failure::Usage(error.into()) } else { Failure::Run(error.into()) }
     }
 }
 

@@ -8,7 +8,6 @@ mod check;
 mod compare;
 mod completions;
 mod devices;
-mod engine_choice;
 mod environment;
 mod error;
 mod finished_map;
