@@ -3,6 +3,7 @@
 mod program;
 
 use pyo3::prelude::*;
+use rattlemap::output::Identity;
 
 #[pymodule]
 mod _native {
@@ -13,6 +14,8 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("__version__", env!("CARGO_PKG_VERSION"))
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("SOURCES", Identity::own_sources())?;
+        module.add("TARGET", Identity::own_target())
     }
 }
