@@ -5,7 +5,7 @@
 #
 # As root or as a user; nothing in /etc is read or written. Prints `ready` once the node takes jobs, and runs until its
 # standard input ends: a test that dies takes its node along. Then jobs are cancelled and all is stopped. Commands of Slurm
-# find it by SLURM_CONF=FOLDER/slurm.conf. Exit code 3, with the reason, where the node cannot be had.
+# find it by SLURM_CONF=FOLDER/slurm.conf. Exit code 3 where Slurm or munge is not installed, 1 where they do not start.
 set -euo pipefail
 export LC_ALL=C PATH="$PATH:/usr/sbin:/sbin"
 
@@ -16,18 +16,23 @@ user="$(id -un)"
 
 unable() {
     echo "no Slurm node: $*" >&2
-    exit 3
+    exit "${code:-1}"
 }
 for program in munged slurmctld slurmd sbatch; do
-    command -v "$program" >/dev/null || unable "$program is missing (Debian, Ubuntu: apt-get install slurm-wlm munge)"
+    command -v "$program" >/dev/null || code=3 unable "$program is missing (Debian, Ubuntu: apt-get install slurm-wlm munge)"
 done
 
 mkdir -p "$folder"/{munge,state,spool}
 chmod 700 "$folder/munge" "$folder/state" "$folder/spool"
 head -c 1024 /dev/urandom >"$folder/munge/key"
 chmod 400 "$folder/munge/key"
-# More processors than there are may be promised, and nobody is asked who owns this machine: that is config_overrides. No
-# control groups, no accounting; jobs are looked at often, because tests wait for them.
+# From 23.02 on slurmd can do without control groups, but has to be told; before it looks only which kind there is.
+version="$(slurmd -V)"
+[[ "${version##* }" =~ ^([0-9]+)\.([0-9]+) ]] || unable "which version is this: $version?"
+if ((BASH_REMATCH[1] >= 23)); then echo "CgroupPlugin=disabled" >"$folder/cgroup.conf"; fi
+echo "NodeName=node Name=gpu Type=card Count=$cpus" >"$folder/gres.conf"
+# More processors than there are may be promised (config_overrides), and cards that are names only. No control groups, no
+# accounting; jobs are looked at often, because tests wait for them.
 cat >"$SLURM_CONF" <<CONF
 ClusterName=test
 SlurmctldHost=localhost(127.0.0.1)
@@ -53,7 +58,8 @@ StateSaveLocation=$folder/state
 SlurmdSpoolDir=$folder/spool
 SlurmctldPidFile=$folder/slurmctld.pid
 SlurmdPidFile=$folder/slurmd.pid
-NodeName=node NodeHostname=localhost NodeAddr=127.0.0.1 CPUs=$cpus
+GresTypes=gpu
+NodeName=node NodeHostname=localhost NodeAddr=127.0.0.1 CPUs=$cpus Gres=gpu:card:$cpus Feature=card
 PartitionName=all Nodes=node Default=YES MaxTime=INFINITE State=UP
 CONF
 
