@@ -17,6 +17,8 @@ pub mod shard;
 pub mod size;
 
 pub mod engine;
+#[cfg(feature = "gpu")]
+pub mod engine_choice;
 pub mod sweep;
 
 pub mod attractors;
