@@ -14,6 +14,7 @@ mod scene;
 mod waiting;
 
 use pyo3::prelude::*;
+use rattlemap::output::Identity;
 
 #[pymodule]
 mod _native {
@@ -32,7 +33,7 @@ mod _native {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        module.add("sources", rattlemap::output::Identity::own_sources())?;
-        module.add("target", rattlemap::output::Identity::own_target())
+        module.add("SOURCES", Identity::own_sources())?;
+        module.add("TARGET", Identity::own_target())
     }
 }
