@@ -133,6 +133,8 @@ def arrange(fields: Iterable[str], manifest: Mapping[str, Any], column: Callable
     axes = manifest.get("axes") or []
     codes = manifest["codes"]
     coords: dict[str, Any]
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
     if axes:
         first, second = (axis["parameter"] for axis in axes)
         columns, rows = (int(axis["count"]) for axis in axes)
@@ -250,6 +252,7 @@ def diagram(axis: str, columns: pd.DataFrame, points: pd.DataFrame, manifest: Ma
     data = {str(name): table_column(str(name), columns[name]) for name in columns.columns}
     value, direction = data.pop(axis), data.pop("direction", None)
     coords: dict[str, Any]
+    dims: tuple[str, ...]
     if direction is None:
         dims, place, coords = (axis,), np.argsort(value, kind="stable"), {axis: np.sort(value)}
     else:

@@ -76,7 +76,7 @@ class FolderBackend(BackendEntrypoint):
     description = "Finished folders of rattlemap"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")
 
-    def open_dataset(  # type: ignore[override]
+    def open_dataset(
         self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
     ) -> xr.Dataset:
         folder = Path(os.fspath(filename_or_obj))
