@@ -15,7 +15,6 @@ mod map;
 mod measure_gpu;
 mod models;
 mod orbit_tables;
-mod python;
 mod systems;
 mod text;
 mod your_gears;
