@@ -1,10 +1,12 @@
 //! The command line: what can be asked, and its help.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::cli::say;
 use crate::gpu::Precision;
+use crate::map::engine_choice::{Ask, Who};
 use crate::map::printable::is_printable;
 use crate::map::scene::{Along, Format};
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
@@ -36,7 +38,15 @@ pub(crate) struct Cli {
 /// # Errors
 /// The exit code.
 pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
-    P::try_parse().map_err(|mut error| {
+    parsed_from(std::env::args_os()).map_err(ExitCode::from)
+}
+
+/// The same of these arguments, the program's name first.
+///
+/// # Errors
+/// The exit code.
+pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
+    P::try_parse_from(arguments).map_err(|mut error| {
         if error.use_stderr() {
             quote(&mut error);
             // Plain: what it quotes must not pass for colours.
@@ -45,7 +55,7 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
             // A closed stdout has no reader.
             let _ = error.print();
         }
-        ExitCode::from(error.exit_code() as u8)
+        error.exit_code() as u8
     })
 }
 
@@ -246,6 +256,18 @@ pub(crate) struct EngineOptions {
     /// where it has double precision; the CPU is f64
     #[arg(long, value_name = "PRECISION", value_parser = precision)]
     pub(crate) precision: Option<Precision>,
+}
+
+impl EngineOptions {
+    /// The same for the library.
+    pub(crate) fn ask(&self) -> Ask {
+        let engine = match self.engine {
+            EngineChoice::Auto => Who::Auto,
+            EngineChoice::Gpu => Who::Gpu,
+            EngineChoice::Cpu => Who::Cpu,
+        };
+        Ask { engine, precision: self.precision }
+    }
 }
 
 fn precision(text: &str) -> Result<Precision, String> {

@@ -1,13 +1,13 @@
 //! `rattlemap devices`: what there is to compute on, and what a map would take.
 
 use crate::gpu::{self, AdapterChoice, AdapterReport};
+use crate::map::engine_choice::{self, Ask};
 use crate::map::plan::Plan;
 use crate::map::scene::{Purpose, Scene};
 use crate::output::{OutputError, print};
 
-use crate::cli::arguments::{EngineChoice, EngineOptions};
 use crate::cli::error::Failure;
-use crate::cli::{engine_choice, processor, say};
+use crate::cli::{processor, say};
 
 /// What engines are tried on.
 const MAIN_MAP: &str = include_str!("../../scenes/e_omega.toml");
@@ -29,8 +29,7 @@ pub(crate) fn run() -> Result<(), Failure> {
     }
     let scene = Scene::parse(MAIN_MAP, "e_omega", &[], Purpose::Map)?;
     let plan = Plan::new(&scene);
-    let auto = EngineOptions { engine: EngineChoice::Auto, precision: None };
-    let chosen = engine_choice::open(&plan, &auto)?;
+    let chosen = pollster::block_on(engine_choice::open(&plan, &Ask::default()))?;
     let (engine, precision) = (chosen.engine.name(), chosen.engine.precision());
     print(&format!("auto takes {engine} ({precision}) for the main map: {}", say::quoted(chosen.why)))?;
     Ok(())

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::map::engine_choice::ChoiceError;
 use crate::map::plan::NoMotion;
 use crate::map::scene::SceneError;
 use crate::output::{FolderError, OutputError, RecordFileError};
@@ -32,12 +33,17 @@ pub(crate) const SIGNALLED: i32 = 128;
 impl Failure {
     /// Says on stderr what went wrong, causes included, and returns the exit code.
     pub fn report(&self) -> ExitCode {
+        ExitCode::from(self.told())
+    }
+
+    /// The same with the exit code as a number.
+    pub(crate) fn told(&self) -> u8 {
         say::note(format_args!("error: {self}"));
-        ExitCode::from(match self {
+        match self {
             Failure::Usage(_) => 2,
             Failure::Run(_) => 1,
             Failure::Interrupted { signal, .. } => (SIGNALLED + signal) as u8,
-        })
+        }
     }
 }
 
@@ -69,6 +75,12 @@ impl From<ModelError> for Failure {
 impl From<NoMotion> for Failure {
     fn from(error: NoMotion) -> Self {
         Failure::Usage(error.into())
+    }
+}
+
+impl From<ChoiceError> for Failure {
+    fn from(error: ChoiceError) -> Self {
+        if error.is_in_the_request() { Failure::Usage(error.into()) } else { Failure::Run(error.into()) }
     }
 }
 

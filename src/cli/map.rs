@@ -15,6 +15,7 @@ use crate::map::attractors;
 use crate::map::coexistence;
 use crate::map::effect;
 use crate::map::engine::Engine;
+use crate::map::engine_choice::{self, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
 use crate::map::schedule::{Refined, Schedule};
@@ -28,7 +29,6 @@ use rattlemap_dynamics::orbit::{Class, Status};
 
 use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
 use crate::cli::capacity;
-use crate::cli::engine_choice::{self, Chosen};
 use crate::cli::error::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
@@ -42,7 +42,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let run = scene_file::map_with_figures(&ask.run, kept.as_deref())?;
     let ask = &Map { run, ..ask.clone() };
     let scene = scene_file::load(&ask.run.scene, &ask.run.set, kept.as_deref())?;
-    engine_choice::check(&ask.engine)?;
+    engine_choice::check(&ask.engine.ask())?;
     let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
     let plan = Plan::new(&scene);
     plan.check()?;
@@ -53,8 +53,9 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let folder = open_folder(ask)?;
     interrupt.ends_at_once(stopped::before_anything(ask, &plan), folder.leaver());
     let clock = Instant::now();
-    let Chosen { mut engine, why } = engine_choice::open(&plan, &engine_of(ask, folder.path()))
-        .map_err(|failure| stopped::before_it_began(failure, ask, &folder, &plan))?;
+    let asked = engine_of(ask, folder.path()).ask();
+    let Chosen { mut engine, why } = pollster::block_on(engine_choice::open(&plan, &asked))
+        .map_err(|error| stopped::before_it_began(error.into(), ask, &folder, &plan))?;
     let opening = clock.elapsed();
     interrupt.wait_for(None);
     if !ask.run.quiet && !why.is_empty() {

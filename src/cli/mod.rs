@@ -8,7 +8,6 @@ mod check;
 mod compare;
 mod completions;
 mod devices;
-mod engine_choice;
 mod environment;
 mod error;
 mod finished_map;
@@ -23,9 +22,10 @@ mod say;
 mod scene_file;
 mod validate;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
-use arguments::{Bench, Cli, Command};
+use arguments::{Bench, Cli, Command, parsed_from};
 
 pub use arguments::parsed;
 pub use environment::missing_variable;
@@ -36,7 +36,12 @@ pub use say::note;
 
 /// Runs the command that the process was started with, and says how it ended.
 pub fn run() -> ExitCode {
-    let cli = match parsed::<Cli>() {
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// Runs the command of these arguments, the program's name first, and returns the exit code.
+pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match parsed_from::<Cli>(arguments) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
@@ -52,5 +57,5 @@ pub fn run() -> ExitCode {
         Command::Completions(ask) => completions::run(&ask),
         Command::Bench(Bench::Engines(ask)) => bench::run(&ask),
     };
-    done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
+    done.map_or_else(|failure| failure.told(), |()| 0)
 }

@@ -16,6 +16,8 @@ pub mod schedule;
 pub mod size;
 
 pub mod engine;
+#[cfg(feature = "gpu")]
+pub mod engine_choice;
 pub mod sweep;
 
 pub mod attractors;

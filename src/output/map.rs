@@ -1,6 +1,6 @@
 //! The folder of a map: tables, figures, report and manifest.
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::Path;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
@@ -213,9 +213,9 @@ fn write_tables(
     );
     let words = write_if(asks(Format::Npy) && has_words, WORDS, &|path| rows.write(path));
     let attractors = match cells.basins() {
-        Some(basins) => {
-            write_if(asks(Format::Csv), ATTRACTORS, &|path| attractors_csv::write(path, cells, basins))?
-        }
+        Some(basins) => write_if(asks(Format::Csv), ATTRACTORS, &|path| {
+            attractors_csv::write(File::create(path)?, cells, basins)
+        })?,
         None => None,
     };
     Ok([csv?, npy?, words?, attractors].into_iter().flatten().collect())

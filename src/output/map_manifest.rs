@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::cell_columns::ABSENT;
 use super::cells::{Cells, SOURCES};
-use super::cells_npy::ABSENT;
 use super::inventory::FileEntry;
 use super::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
 use super::map::LIST;

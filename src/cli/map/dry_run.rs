@@ -10,10 +10,10 @@ use super::forecast::Forecast;
 use super::{engine_of, order, unit};
 use crate::cli::arguments::Map;
 use crate::cli::capacity::{Free, bytes};
-use crate::cli::engine_choice::{self, Chosen};
 use crate::cli::error::Failure;
 use crate::cli::processor;
 use crate::map::engine::Engine;
+use crate::map::engine_choice::{self, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::map::schedule::Schedule;
@@ -40,7 +40,8 @@ pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(
     let out = ask.run.out();
     check_folder(ask, &out)?;
     let clock = Instant::now();
-    let Chosen { mut engine, why } = engine_choice::open(plan, &engine_of(ask, &out))?;
+    let Chosen { mut engine, why } =
+        pollster::block_on(engine_choice::open(plan, &engine_of(ask, &out).ask()))?;
     let opening = clock.elapsed().as_secs_f64();
     let kept = if ask.resume { kept(&out, scene, plan, &engine)? } else { 0 };
     let left = plan.run_count().saturating_sub(kept);

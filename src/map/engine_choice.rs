@@ -1,14 +1,13 @@
 //! Which engine runs a map: the one that was asked for, or the fastest at hand.
 
-use std::time::{Duration, Instant};
+use std::str::FromStr;
+
+use thiserror::Error;
+use web_time::{Duration, Instant};
 
 use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
 use crate::map::engine::{Cpu, Engine, EngineError, Gpu};
 use crate::map::plan::{Cell, Plan};
-use anyhow::anyhow;
-
-use crate::cli::arguments::{EngineChoice, EngineOptions};
-use crate::cli::error::Failure;
 
 /// How long engines are tried that cannot be told apart otherwise.
 const TRIAL: Duration = Duration::from_millis(200);
@@ -21,62 +20,137 @@ const TRIAL_PERIODS: u32 = 64;
 /// seconds.
 const WORTH_A_TRIAL: Duration = Duration::from_secs(60);
 
+/// What is asked for: who computes, and how. The default leaves all of it open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Ask {
+    /// Who computes.
+    pub engine: Who,
+    /// None leaves it open: f32 on a graphics device, f64 on the processor.
+    pub precision: Option<Precision>,
+}
+
+/// Engines by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Who {
+    /// A hardware GPU if there is one, else the CPU; a software GPU where that is faster on long maps.
+    #[default]
+    Auto,
+    /// Lanes on a graphics device.
+    Gpu,
+    /// The event-driven reference on all processor cores, in f64.
+    Cpu,
+}
+
 /// An engine, and why it was taken.
-pub(crate) struct Chosen<'p> {
-    pub(crate) engine: Engine<'p>,
+pub struct Chosen<'p> {
+    /// Ready to take up cells of the plan.
+    pub engine: Engine<'p>,
     /// Empty where there was nothing to choose.
-    pub(crate) why: String,
+    pub why: String,
+}
+
+/// Why there is no engine.
+#[derive(Debug, Error)]
+pub enum ChoiceError {
+    /// No such engine is known.
+    #[error("the engine {name:?} is none of auto, gpu and cpu")]
+    UnknownEngine {
+        /// What was asked for.
+        name: String,
+    },
+    /// The reference computes in f64 alone.
+    #[error(
+        "--precision f32: the CPU engine computes in f64; leave --precision out, or ask for --engine gpu"
+    )]
+    CpuInF32,
+    /// No adapter fits.
+    #[error(transparent)]
+    NoAdapter(GpuError),
+    /// What was asked for is there, and fails.
+    #[error(transparent)]
+    Device(GpuError),
+    /// The engine fails as it is made ready.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+}
+
+impl ChoiceError {
+    /// Whether what was asked for is at fault, and another request may do; else a device fails.
+    pub fn is_in_the_request(&self) -> bool {
+        match self {
+            ChoiceError::UnknownEngine { .. } | ChoiceError::CpuInF32 | ChoiceError::NoAdapter(_) => true,
+            ChoiceError::Device(_) | ChoiceError::Engine(_) => false,
+        }
+    }
+}
+
+impl From<GpuError> for ChoiceError {
+    fn from(error: GpuError) -> ChoiceError {
+        match error {
+            GpuError::NoAdapter { .. } => ChoiceError::NoAdapter(error),
+            _ => ChoiceError::Device(error),
+        }
+    }
+}
+
+impl FromStr for Who {
+    type Err = ChoiceError;
+
+    fn from_str(name: &str) -> Result<Who, ChoiceError> {
+        match name {
+            "auto" => Ok(Who::Auto),
+            "gpu" => Ok(Who::Gpu),
+            "cpu" => Ok(Who::Cpu),
+            _ => Err(ChoiceError::UnknownEngine { name: name.to_owned() }),
+        }
+    }
 }
 
 /// Refuses what no engine can do, before anything else is done.
-pub(crate) fn check(asked: &EngineOptions) -> Result<(), Failure> {
-    match (asked.engine, asked.precision) {
-        (EngineChoice::Cpu, Some(Precision::F32)) => Err(Failure::Usage(anyhow!(
-            "--precision f32: the CPU engine computes in f64; leave --precision out, or ask for --engine gpu"
-        ))),
+///
+/// # Errors
+/// [`ChoiceError::CpuInF32`].
+pub fn check(ask: &Ask) -> Result<(), ChoiceError> {
+    match (ask.engine, ask.precision) {
+        (Who::Cpu, Some(Precision::F32)) => Err(ChoiceError::CpuInF32),
         _ => Ok(()),
     }
 }
 
 /// Opens the engine that is asked for; `auto` takes a hardware GPU if there is one, else the CPU, or for
 /// long maps the faster of it and a software GPU on a few cells of the plan.
-pub(crate) fn open<'p>(plan: &'p Plan, asked: &EngineOptions) -> Result<Chosen<'p>, Failure> {
-    check(asked)?;
-    let precision = asked.precision.unwrap_or(Precision::F32);
+///
+/// # Errors
+/// [`ChoiceError`], with nothing computed.
+pub async fn open<'p>(plan: &'p Plan, ask: &Ask) -> Result<Chosen<'p>, ChoiceError> {
+    check(ask)?;
+    let precision = ask.precision.unwrap_or(Precision::F32);
     let plain = |engine| Chosen { engine, why: String::new() };
-    match asked.engine {
-        EngineChoice::Cpu => Ok(plain(Engine::Cpu(Cpu::new(plan)))),
-        EngineChoice::Gpu => open_gpu(plan, precision).map(plain),
-        EngineChoice::Auto => choose(plan, asked.precision),
+    match ask.engine {
+        Who::Cpu => Ok(plain(Engine::Cpu(Cpu::new(plan)))),
+        Who::Gpu => open_gpu(plan, precision).await.map(plain),
+        Who::Auto => choose(plan, ask.precision).await,
     }
 }
 
-fn open_gpu(plan: &Plan, precision: Precision) -> Result<Engine<'_>, Failure> {
-    let engine = pollster::block_on(Gpu::new(plan, open_device(precision)?))
-        .map_err(|error| Failure::Run(error.into()))?;
-    Ok(Engine::Gpu(Box::new(engine)))
+async fn open_gpu(plan: &Plan, precision: Precision) -> Result<Engine<'_>, ChoiceError> {
+    Ok(Engine::Gpu(Box::new(Gpu::new(plan, open_device(precision).await?).await?)))
 }
 
-fn open_device(precision: Precision) -> Result<gpu::Gpu, Failure> {
-    pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::from_environment())).map_err(|error| {
-        match error {
-            GpuError::NoAdapter { .. } => Failure::Usage(error.into()),
-            // What was asked for is there, and fails.
-            _ => Failure::Run(error.into()),
-        }
-    })
+async fn open_device(precision: Precision) -> Result<gpu::Gpu, ChoiceError> {
+    Ok(gpu::Gpu::open(precision, &AdapterChoice::from_environment()).await?)
 }
 
-fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, Failure> {
+async fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, ChoiceError> {
     let wanted = precision.unwrap_or(Precision::F32);
     let choice = AdapterChoice::from_environment();
-    let adapters = pollster::block_on(gpu::adapters());
+    let adapters = gpu::adapters().await;
     let fits =
         |adapter: &&AdapterReport| choice.allows(&adapter.info) && adapter.precisions.contains(&wanted);
     let best = adapters.iter().find(fits);
     if choice.name.is_some() && best.is_none() || precision == Some(Precision::F32) {
         let why = "the CPU engine has no f32".to_owned();
-        return open_gpu(plan, wanted).map(|engine| Chosen { engine, why });
+        return open_gpu(plan, wanted).await.map(|engine| Chosen { engine, why });
     }
     let cpu = |why| Chosen { engine: Engine::Cpu(Cpu::new(plan)), why };
     match best {
@@ -86,26 +160,25 @@ fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, Failu
             Ok(cpu(format!("no graphics adapter with {}{narrowed}", wanted.name())))
         }
         // The reference needs no driver.
-        Some(best) if gpu::is_hardware(&best.info) => Ok(open_gpu(plan, wanted).map_or_else(
-            |failure| cpu(failure.to_string()),
+        Some(best) if gpu::is_hardware(&best.info) => Ok(open_gpu(plan, wanted).await.map_or_else(
+            |error| cpu(error.to_string()),
             |engine| Chosen { engine, why: "a hardware GPU".to_owned() },
         )),
-        Some(_) => Ok(faster(plan, wanted).unwrap_or_else(|failure| cpu(failure.to_string()))),
+        Some(_) => Ok(faster(plan, wanted).await.unwrap_or_else(|error| cpu(error.to_string()))),
     }
 }
 
 /// The CPU where it has soon done the map, else the faster of it and a software GPU.
-fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, Failure> {
+async fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, ChoiceError> {
     let trial = plan.shortened(TRIAL_PERIODS);
-    let on_cpu =
-        rate(&trial, &mut Engine::Cpu(Cpu::new(&trial))).map_err(|error| Failure::Run(error.into()))?;
+    let on_cpu = rate(&trial, &mut Engine::Cpu(Cpu::new(&trial))).await?;
     if !is_worth_a_trial(plan, on_cpu) {
         let why = format!(
             "no hardware GPU, and soon done: {on_cpu:.0} cells/s on trial, {TRIAL_PERIODS} periods each"
         );
         return Ok(Chosen { engine: Engine::Cpu(Cpu::new(plan)), why });
     }
-    on_trial(plan, &trial, precision, on_cpu)
+    on_trial(plan, &trial, precision, on_cpu).await
 }
 
 /// Whether the CPU has enough to do, which does so many cells of a trial in a second.
@@ -117,25 +190,24 @@ fn is_worth_a_trial(plan: &Plan, on_cpu: f64) -> bool {
 }
 
 /// The faster of the CPU, whose rate is known, and a software GPU on the same cells, for a few periods each.
-fn on_trial<'p>(
+async fn on_trial<'p>(
     plan: &'p Plan,
     trial: &Plan,
     precision: Precision,
     on_cpu: f64,
-) -> Result<Chosen<'p>, Failure> {
-    let failed = |error: EngineError| Failure::Run(error.into());
-    let device = open_device(precision)?;
-    let mut lanes = Engine::Gpu(Box::new(pollster::block_on(Gpu::new(trial, device)).map_err(failed)?));
+) -> Result<Chosen<'p>, ChoiceError> {
+    let device = open_device(precision).await?;
+    let mut lanes = Engine::Gpu(Box::new(Gpu::new(trial, device).await?));
     // The first batch compiles the shader.
-    pollster::block_on(lanes.run(&spread(trial, 0, 1))).map_err(failed)?;
-    let on_gpu = rate(trial, &mut lanes).map_err(failed)?;
+    lanes.run(&spread(trial, 0, 1)).await?;
+    let on_gpu = rate(trial, &mut lanes).await?;
     let name = precision.name();
     let why = format!(
         "on trial {on_cpu:.0} cells/s on cpu (f64), {on_gpu:.0} cells/s on gpu ({name}), {TRIAL_PERIODS} periods each"
     );
     let engine = match lanes {
         Engine::Gpu(lanes) if on_gpu > on_cpu => {
-            Engine::Gpu(Box::new(pollster::block_on(Gpu::new(plan, lanes.into_device())).map_err(failed)?))
+            Engine::Gpu(Box::new(Gpu::new(plan, lanes.into_device()).await?))
         }
         _ => Engine::Cpu(Cpu::new(plan)),
     };
@@ -143,11 +215,11 @@ fn on_trial<'p>(
 }
 
 /// Cells per second on cells spread over the plan.
-fn rate(plan: &Plan, engine: &mut Engine<'_>) -> Result<f64, EngineError> {
+async fn rate(plan: &Plan, engine: &mut Engine<'_>) -> Result<f64, EngineError> {
     let clock = Instant::now();
     let mut cells = 0;
     while clock.elapsed() < TRIAL {
-        pollster::block_on(engine.run(&spread(plan, cells, TRIAL_CELLS)))?;
+        engine.run(&spread(plan, cells, TRIAL_CELLS)).await?;
         cells += TRIAL_CELLS;
     }
     Ok(cells as f64 / clock.elapsed().as_secs_f64())
@@ -185,14 +257,23 @@ mod tests {
         assert!(is_worth_a_trial(&brute, 66.0 * 8.25));
     }
 
+    #[test]
+    fn what_is_at_fault_is_told() {
+        assert!(ChoiceError::CpuInF32.is_in_the_request());
+        assert!("gpu2".parse::<Who>().unwrap_err().to_string().contains("none of auto, gpu and cpu"));
+        let no = GpuError::NoAdapter { wanted: "at all".into(), remedy: "r".into(), found: "none".into() };
+        assert!(ChoiceError::from(no).is_in_the_request());
+        assert!(!ChoiceError::from(GpuError::Lost { message: "gone".into() }).is_in_the_request());
+    }
+
     /// A long budget does not lengthen it.
     #[test]
     fn a_trial_takes_the_faster() {
         let plan = plan(&["integration.transient_periods=100000"]);
         let trial = plan.shortened(TRIAL_PERIODS);
         for (on_cpu, name) in [(1e9, "cpu"), (1e-3, "gpu")] {
-            let chosen =
-                on_trial(&plan, &trial, Precision::F32, on_cpu).unwrap_or_else(|_| panic!("no adapter"));
+            let chosen = pollster::block_on(on_trial(&plan, &trial, Precision::F32, on_cpu))
+                .unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(chosen.engine.name(), name, "{}", chosen.why);
             assert!(
                 chosen.why.contains("cells/s on cpu (f64)") && chosen.why.contains("cells/s on gpu (f32)")
