@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::map::engine_choice::Who;
 use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::map::size::Size;
@@ -31,6 +32,22 @@ pub(crate) fn check(
     let disk = free_disk(out).map(|free| free.saturating_add(replaced(out)));
     let free = Free { memory: free_memory(), disk };
     judge(scene, shard, engine, &free).map(|()| free)
+}
+
+/// Refuses a map that does not fit this machine's memory or, where it is written to a folder, the disk.
+///
+/// # Errors
+/// [`Failure::Usage`] with what it needs and what is free.
+pub fn fits(scene: &Scene, engine: Who, out: Option<&Path>) -> Result<(), Failure> {
+    let engine = match engine {
+        Who::Auto => EngineChoice::Auto,
+        Who::Gpu => EngineChoice::Gpu,
+        Who::Cpu => EngineChoice::Cpu,
+    };
+    match out {
+        Some(out) => check(scene, None, engine, out).map(|_| ()),
+        None => judge(scene, None, engine, &Free { memory: free_memory(), disk: None }),
+    }
 }
 
 /// Refuses a finished map that this machine cannot read, before anything is allocated for it. It is read by the CPU,

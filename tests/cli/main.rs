@@ -15,7 +15,6 @@ mod map;
 mod measure_gpu;
 mod models;
 mod orbit_tables;
-mod python;
 #[cfg(target_os = "linux")]
 mod slurm;
 mod systems;
