@@ -7,7 +7,9 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::cells::Cells;
-use super::map_manifest::{BasinObject, RefinementObject, Run, basins, statuses, tally};
+use super::map_manifest::{
+    AdapterObject, BasinObject, CardObject, RefinementObject, Run, basins, statuses, tally,
+};
 use super::{OutputError, names};
 use crate::map::plan::count_classes;
 
@@ -19,6 +21,10 @@ struct MapObject<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adapter: Option<AdapterObject<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cards: Vec<CardObject<'a>>,
     cells: usize,
     /// One per cell and start.
     runs: usize,
@@ -71,6 +77,8 @@ pub fn print(
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        adapter: run.adapter.as_ref().map(AdapterObject::from),
+        cards: run.cards.iter().map(CardObject::from).collect(),
         cells: cells.counts().iter().product(),
         runs: cells.runs(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
