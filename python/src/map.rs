@@ -34,7 +34,7 @@ pub(crate) fn ask(engine: &str, precision: Option<&str>) -> Result<Ask, Problem>
         let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
         known.ok_or_else(|| Problem::engine(format!("the precision {name:?} is none of f32 and f64")))
     };
-    let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()? };
+    let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()?, adapter: None };
     engine_choice::check(&ask)?;
     Ok(ask)
 }
@@ -94,7 +94,7 @@ fn compute(
     plan.check()?;
     let folder = out.map(open_folder).transpose()?;
     let clock = Instant::now();
-    let Chosen { mut engine, why } = pollster::block_on(engine_choice::open(&plan, ask))?;
+    let Chosen { mut engine, why, .. } = pollster::block_on(engine_choice::open(&plan, ask))?;
     let opening = clock.elapsed();
     if watch.is_halted() {
         return Ok(None);
@@ -141,6 +141,8 @@ fn compute(
         engine: engine.name(),
         precision: engine.precision(),
         device: &device,
+        adapter: engine.adapter(),
+        cards: engine.cards(),
         processor: &processor,
         opening,
         elapsed,

@@ -362,6 +362,9 @@ impl Gathered {
             engine: &first.engine,
             precision: &first.precision,
             device: &first.device,
+            // Each part's manifest has its own.
+            adapter: None,
+            cards: Vec::new(),
             processor: &processor,
             opening: parts.sum(|part| part.manifest.timings.open),
             elapsed: parts.elapsed(),
