@@ -13,6 +13,7 @@ mod error;
 mod finished_map;
 mod interrupt;
 mod map;
+mod merge;
 mod model_choice;
 mod models;
 mod orbit;
@@ -50,6 +51,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let done = match cli.command {
         Command::Map(ask) => map::run(&ask),
+        Command::Merge(ask) => merge::run(&ask),
         Command::Orbit(ask) => orbit::run(&ask),
         Command::Bifurcation(ask) => bifurcation::run(&ask),
         Command::Models(ask) => models::run(&ask),
