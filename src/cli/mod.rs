@@ -13,6 +13,7 @@ mod error;
 mod finished_map;
 mod interrupt;
 mod map;
+mod merge;
 mod model_choice;
 mod models;
 mod orbit;
@@ -31,6 +32,7 @@ pub use arguments::parsed;
 pub use capacity::fits;
 pub use environment::missing_variable;
 pub use error::{Failure, fail_if};
+pub use map::open_engine;
 pub use model_choice::{check_components, find as find_model};
 pub use processor::{MISFIT, cores, described as described_processor, is_fit, name as processor_name};
 pub use progress::Progress;
@@ -50,6 +52,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let done = match cli.command {
         Command::Map(ask) => map::run(&ask),
+        Command::Merge(ask) => merge::run(&ask),
         Command::Orbit(ask) => orbit::run(&ask),
         Command::Bifurcation(ask) => bifurcation::run(&ask),
         Command::Models(ask) => models::run(&ask),
