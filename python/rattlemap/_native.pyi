@@ -84,6 +84,18 @@ def map(
     progress: _Tell = ...,
 ) -> MadeMap: ...
 
+def shard(
+    scene: Scene,
+    index: int,
+    count: int,
+    engine: str,
+    precision: str | None,
+    out: str,
+    resume: bool = ...,
+    progress: _Tell = ...,
+) -> list[str]: ...
+def merge(parts: list[str], out: str, force: bool = ..., progress: _Tell = ...) -> list[str]: ...
+
 class MadeDiagram(TypedDict):
     manifest: str
     columns: str
