@@ -28,7 +28,7 @@ mod _native {
         orbit::{Orbit, orbit},
         program::{main, missing_variable},
         scene::Scene,
-        shard::{merge, of_map},
+        shard::{check_shards, merge, of_map},
     };
 
     use super::*;

@@ -18,10 +18,25 @@ use crate::scene::Scene;
 use crate::waiting::{self, Watch};
 
 /// What a map came to.
-struct Made {
-    map: in_memory::Map,
-    why: String,
-    files: Vec<String>,
+pub(crate) struct Made {
+    pub(crate) map: in_memory::Map,
+    /// Why that engine.
+    pub(crate) why: String,
+    pub(crate) files: Vec<String>,
+}
+
+impl Made {
+    /// What Python gets.
+    pub(crate) fn told(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let told = PyDict::new(py);
+        told.set_item("manifest", self.map.manifest)?;
+        told.set_item("columns", columns(py, self.map.columns)?)?;
+        told.set_item("texts", self.map.texts)?;
+        told.set_item("attractors", self.map.attractors)?;
+        told.set_item("why", self.why)?;
+        told.set_item("files", self.files)?;
+        Ok(told)
+    }
 }
 
 /// Computes a map.
@@ -46,15 +61,7 @@ pub(crate) fn map<'py>(
         out: out.map(|path| Out { path, force, resume }),
     };
     task.check()?;
-    let made = waiting::run(py, progress, move |watch| compute(&task, watch))?;
-    let told = PyDict::new(py);
-    told.set_item("manifest", made.map.manifest)?;
-    told.set_item("columns", columns(py, made.map.columns)?)?;
-    told.set_item("texts", made.map.texts)?;
-    told.set_item("attractors", made.map.attractors)?;
-    told.set_item("why", made.why)?;
-    told.set_item("files", made.files)?;
-    Ok(told)
+    waiting::run(py, progress, move |watch| compute(&task, watch))?.told(py)
 }
 
 /// None if it was told to end before the last cell.

@@ -4,23 +4,46 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rattlemap::cli;
-use rattlemap::map::engine_choice::Who;
+use rattlemap::map::engine_choice::{Ask, Who};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::shard::Shard;
 use rattlemap::output::merge::{MergeError, Parts, Progress};
 use rattlemap::output::shard::{self, Finished};
-use rattlemap::output::{self, Folder};
+use rattlemap::output::Folder;
+use rayon::ThreadPoolBuilder;
 
 use crate::engines::{Out, Task, ask};
+use crate::map::Made;
 use crate::problem::Problem;
 use crate::scene::Scene;
 use crate::waiting::{self, Watch};
 
-/// Computes the shard `index`, from 1, of `count` into the folder `out`, which then is what `map --shard` makes; goes on
-/// with what is kept there where `resume` says so. Returns the names of its files.
+/// Refuses a map that cannot be dealt out to so many shards, or whose engine is left open.
 #[pyfunction]
-#[pyo3(signature = (scene, index, count, engine, precision, out, resume=false, progress=None))]
+pub(crate) fn check_shards(scene: &Scene, count: u32, engine: &str, precision: Option<&str>) -> PyResult<()> {
+    let (shard, _) = asked(1, count, engine, precision)?;
+    let plan = Plan::new(&scene.scene);
+    Ok(shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?)
+}
+
+/// A shard, and who is to compute it.
+fn asked(index: u32, count: u32, engine: &str, precision: Option<&str>) -> Result<(Shard, Ask), Problem> {
+    let shard = Shard::new(index, count)
+        .map_err(|error| Problem::scene(format!("--shard {index}/{count}: {error}")))?;
+    let ask = ask(engine, precision)?;
+    match ask.engine {
+        Who::Auto => Err(Problem::engine(cli::open_engine(shard))),
+        _ => Ok((shard, ask)),
+    }
+}
+
+/// Computes the shard `index`, from 1, of `count` into the folder `out`, which then is what `map --shard` makes; goes on
+/// with what is kept there where `resume` says so. The processor's part takes so many threads, or all. Returns the names
+/// of its files.
+#[pyfunction]
+#[pyo3(signature = (scene, index, count, engine, precision, out, resume=false, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 #[pyo3(name = "shard")]
 pub(crate) fn of_map<'py>(
@@ -32,14 +55,10 @@ pub(crate) fn of_map<'py>(
     precision: Option<&str>,
     out: PathBuf,
     resume: bool,
+    threads: Option<usize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Vec<String>> {
-    let shard = Shard::new(index, count)
-        .map_err(|error| Problem::scene(format!("--shard {index}/{count}: {error}")))?;
-    let ask = ask(engine, precision)?;
-    if ask.engine == Who::Auto {
-        return Err(Problem::engine(cli::open_engine(shard)).into());
-    }
+    let (shard, ask) = asked(index, count, engine, precision)?;
     let task = Task {
         scene: Arc::clone(&scene.scene),
         sets: scene.sets.clone(),
@@ -48,7 +67,10 @@ pub(crate) fn of_map<'py>(
         out: Some(Out { path: out, force: false, resume }),
     };
     task.check()?;
-    waiting::run(py, progress, move |watch| compute(&task, shard, watch))
+    // 0 is what the machine has.
+    let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+    let pool = pool.map_err(|error| Problem::engine(format!("no threads to compute with: {error}")))?;
+    waiting::run(py, progress, move |watch| pool.install(|| compute(&task, shard, watch)))
 }
 
 fn compute(task: &Task, shard: Shard, watch: &Watch) -> Result<Option<Vec<String>>, Problem> {
@@ -64,37 +86,38 @@ fn compute(task: &Task, shard: Shard, watch: &Watch) -> Result<Option<Vec<String
     Ok(Some(shard::write(&folder, &finished)?))
 }
 
-/// Makes the map of all its shards in the folder `out`, in any order: `rattlemap merge`. Returns the names of its files.
+/// Makes the map of all its shards, in any order: `rattlemap merge`. The records go to the folder `out`, and where `writes`
+/// says so all that a map's folder has.
 #[pyfunction]
-#[pyo3(signature = (parts, out, force=false, progress=None))]
+#[pyo3(signature = (parts, out, force=false, writes=true, progress=None))]
 pub(crate) fn merge<'py>(
     py: Python<'py>,
     parts: Vec<PathBuf>,
     out: PathBuf,
     force: bool,
+    writes: bool,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Vec<String>> {
-    waiting::run(py, progress, move |watch| gather(&parts, out, force, watch))
+) -> PyResult<Bound<'py, PyDict>> {
+    let out = Out { path: out, force, resume: false };
+    waiting::run(py, progress, move |watch| gather(&parts, out, writes, watch))?.told(py)
 }
 
-fn gather(
-    parts: &[PathBuf],
-    out: PathBuf,
-    force: bool,
-    watch: &Watch,
-) -> Result<Option<Vec<String>>, Problem> {
+fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Option<Made>, Problem> {
     let parts = Parts::open(parts)?;
-    parts.refuse(&out)?;
-    cli::fits(parts.scene(), None, Who::Cpu, Some(&out))?;
+    parts.refuse(&out.path)?;
+    cli::fits(parts.scene(), None, Who::Cpu, Some(&out.path))?;
     // A run that ended before it kept anything has left nothing else.
-    let folder = Folder::open(&out, force || !Folder::holds_results(&out))?;
-    folder.refuse_links(output::map::names())?;
+    let force = out.force || !Folder::holds_results(&out.path);
+    let folder = Out { force, ..out }.open()?;
     let go_on = |Progress { done, of }| {
         watch.tell(done, of);
         !watch.is_halted()
     };
-    match parts.gather(&folder, go_on) {
-        Err(MergeError::Stopped) => Ok(None),
-        gathered => Ok(Some(gathered?.write(&folder)?.files)),
-    }
+    let gathered = match parts.gather(&folder, go_on) {
+        Err(MergeError::Stopped) => return Ok(None),
+        gathered => gathered?,
+    };
+    let map = gathered.told()?;
+    let files = if writes { gathered.write(&folder)?.files } else { Vec::new() };
+    Ok(Some(Made { map, why: String::new(), files }))
 }
