@@ -7,7 +7,7 @@
 # file once: jobs keep what they were submitted with. Relative paths start where submit.sh is called, and all paths must
 # be seen by every node. Empty values are the cluster's, or the program's, own.
 
-# The map. Shards are compared by the merge: one engine, one precision, one model of card.
+# The map. All shards are of one engine, one precision and one model of card, or the merge refuses them.
 scene=scenes/e_omega.toml
 out=out/e_omega     # the map; the shards' folders lie beside it ($out.shard-I-of-N), as do the logs ($out.slurm)
 shards=8            # tasks; a multiple of what runs at once. Small ones wait less and lose less
@@ -26,7 +26,8 @@ time=01:00:00       # a task that is not done by then is gone on with when submi
 at_once=            # tasks that run at a time, at most
 task_options=()     # more for sbatch: (--exclusive)
 
-# What the merge gets: one processor, no card.
+# What the merge gets; it takes no card.
+merge_cpus=2
 merge_memory=2G
 merge_time=00:30:00
 merge_options=()

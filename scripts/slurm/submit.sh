@@ -4,10 +4,9 @@
 #     scripts/slurm/submit.sh [SETTINGS]
 #
 # SETTINGS is settings.sh beside this script unless given: there is everything that a person edits. When a task failed or
-# met its time limit, or some nodes went down: call it again with the same settings. Shards that are finished are left
-# out; one of them is looked at again, which shows that scene, program and cards are still theirs. While jobs of the last
-# call are in the queue, nothing is submitted. Each shard keeps its folder, $out.shard-I-of-N, and its log,
-# $out.slurm/shard-I.log, to which every start is appended.
+# met its time limit: call it again with the same settings. Shards that are finished are left out, others go on where they
+# were. While jobs of the last call are in the queue, nothing is submitted. Each shard has a folder, $out.shard-I-of-N, and
+# a log, $out.slurm/shard-I.log, to which every start is appended.
 #
 # Exit code 0: submitted, or finished already; 1: Slurm refused; 2: the settings are wrong, or the jobs are still there.
 set -euo pipefail
@@ -26,7 +25,7 @@ settings="${1:-$here/settings.sh}"
 command -v sbatch >/dev/null || fail 2 "sbatch is missing: this is for a login node of a Slurm cluster"
 
 scene='' out='' shards='' engine='' precision='' adapter='' program=rattlemap
-cpus='' gpus='' constraint='' memory='' time='' at_once='' merge_memory='' merge_time='' partition='' account=''
+cpus='' gpus='' constraint='' memory='' time='' at_once='' merge_cpus='' merge_memory='' merge_time='' partition='' account=''
 map_options=() task_options=() merge_options=() job_options=()
 # shellcheck disable=SC2317 # Jobs call it.
 prepare() { :; }
@@ -55,19 +54,20 @@ if [[ -e "$out/manifest.json" ]]; then
 fi
 
 logs="$out.slurm"
+if [[ ! -e "$logs/merge.log" && -n "$(ls -A "$out" 2>/dev/null)" ]]; then
+    fail 2 "$out holds something that no merge of these shards has left; choose another out, or remove it"
+fi
 mkdir -p "$logs"
 if [[ -s "$logs/jobs" ]]; then
     left="$(squeue --noheader --jobs="$(<"$logs/jobs")" --format='%i %T' 2>/dev/null || true)"
     [[ -z "$left" ]] || fail 2 "jobs of the last call are in the queue: ${left//$'\n'/, }; wait for them, or scancel them"
 fi
 
-# What is missing, and one that is not.
-missing=() finished=()
-for ((index = 1; index <= shards; index++)); do
-    if [[ -e "$out.shard-$index-of-$shards/manifest.json" ]]; then finished+=("$index"); else missing+=("$index"); fi
+missing=()
+for ((shard = 1; shard <= shards; shard++)); do
+    [[ -e "$out.shard-$shard-of-$shards/manifest.json" ]] || missing+=("$shard")
 done
-tasks=("${missing[@]}" "${finished[@]:0:1}")
-array="$(IFS=,; echo "${tasks[*]}")"
+array="$(IFS=,; echo "${missing[*]}")"
 ((${#missing[@]} < shards)) || array="1-$shards"
 
 # Arguments of sbatch for each setting that says something.
@@ -78,41 +78,44 @@ readarray -d '' -t per_task < <(
     from --cpus-per-task "$cpus" && from --gpus-per-task "$gpus" && from --constraint "$constraint"
     from --mem "$memory" && from --time "$time"
 )
-readarray -d '' -t per_merge < <(from --mem "$merge_memory" && from --time "$merge_time")
-map=("$scene" --engine "$engine")
-[[ -z "$precision" ]] || map+=(--precision "$precision")
-[[ -z "$adapter" ]] || map+=(--adapter "$adapter")
-map+=("${map_options[@]}")
+readarray -d '' -t per_merge < <(from --cpus-per-task "$merge_cpus" && from --mem "$merge_memory" && from --time "$merge_time")
+options=(--engine "$engine")
+[[ -z "$precision" ]] || options+=(--precision "$precision")
+[[ -z "$adapter" ]] || options+=(--adapter "$adapter")
+job=("$here/job.sh" "$(declare -f prepare)" "$shards" "$out" "$program" "$scene" "${options[@]}" "${map_options[@]}")
 name="$(basename "$out")"
 # Slurm reads % in names of logs.
 log="${logs//%/%%}"
-prepare="$(declare -f prepare)"
 
-# SIGTERM half a minute before the time limit, to the program and not to steps, of which there are none.
-array_job="$(
-    sbatch "${both[@]}" "${per_task[@]}" --array="$array${at_once:+%$at_once}" --job-name="$name" --requeue \
-        --signal=B:TERM@30 --output="$log/shard-%a.log" "${task_options[@]}" \
-        "$here/shard.sh" "$prepare" "$shards" "$out" "$program" "${map[@]}"
-)" || fail 1 "Slurm did not take the array job; nothing is submitted"
-# Of federated clusters the answer is ID;CLUSTER.
-array_job="${array_job%%;*}"
+jobs=() after=()
+if ((${#missing[@]})); then
+    # SIGTERM half a minute before the time limit, to the program and not to steps, of which there are none.
+    array_job="$(
+        sbatch "${both[@]}" "${per_task[@]}" --array="$array${at_once:+%$at_once}" --job-name="$name" --requeue \
+            --signal=B:TERM@30 --output="$log/shard-%a.log" "${task_options[@]}" "${job[@]}"
+    )" || fail 1 "Slurm did not take the array job; nothing is submitted"
+    # Of federated clusters the answer is ID;CLUSTER.
+    jobs+=("${array_job%%;*}")
+    # The merge could do nothing without one of them: it leaves the queue when one fails.
+    after=(--dependency="afterok:${jobs[0]}" --kill-on-invalid-dep=yes)
+fi
 merge_job="$(
-    sbatch "${both[@]}" "${per_merge[@]}" --dependency="afterok:$array_job" --kill-on-invalid-dep=yes \
-        --job-name="$name-merge" --requeue --output="$log/merge.log" "${merge_options[@]}" \
-        "$here/merge.sh" "$prepare" "$shards" "$out" "$program"
+    sbatch "${both[@]}" "${per_merge[@]}" "${after[@]}" --job-name="$name-merge" --requeue \
+        --output="$log/merge.log" "${merge_options[@]}" "${job[@]}"
 )" || {
-    scancel "$array_job"
-    fail 1 "Slurm did not take the merge; the array job $array_job is cancelled"
+    ((${#jobs[@]} == 0)) || scancel "${jobs[@]}"
+    fail 1 "Slurm did not take the merge; nothing is submitted"
 }
-merge_job="${merge_job%%;*}"
-echo "$array_job,$merge_job" >"$logs/jobs"
+jobs+=("${merge_job%%;*}")
+list="$(IFS=,; echo "${jobs[*]}")"
+echo "$list" >"$logs/jobs"
 
 if ((${#missing[@]})); then
-    echo "array job $array_job: ${#missing[@]} of $shards shards of $scene (tasks $array)"
+    echo "array job ${jobs[0]}: ${#missing[@]} of $shards shards of $scene (tasks $array)"
+    echo "merge job ${jobs[1]}: $out, once all of them are done; if one fails, Slurm cancels it: then call this again"
 else
-    echo "array job $array_job: all $shards shards of $scene are there, one is looked at again (task $array)"
+    echo "merge job ${jobs[0]}: $out; all $shards shards are finished"
 fi
-echo "merge job $merge_job: $out, once all of them are done; if one fails, Slurm cancels it: then call this again"
-echo "watch:  squeue --jobs=$array_job,$merge_job"
-printf 'logs:   tail %q/shard-*.log %q/merge.log\n' "$logs" "$logs"
-echo "cancel: scancel $array_job $merge_job"
+echo "watch:  squeue --jobs=$list"
+printf 'logs:   tail %q/*.log\n' "$logs"
+echo "cancel: scancel ${jobs[*]}"

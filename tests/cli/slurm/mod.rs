@@ -54,7 +54,7 @@ impl Work {
         let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/slurm");
         let copy = self.at("my scripts");
         fs::create_dir_all(&copy).unwrap();
-        for name in ["submit.sh", "shard.sh", "merge.sh"] {
+        for name in ["submit.sh", "job.sh"] {
             fs::copy(scripts.join(name), copy.join(name)).unwrap();
         }
         let program = assert_cmd::cargo::cargo_bin("rattlemap");
@@ -197,7 +197,7 @@ fn an_array_job_and_a_merge_make_the_map_of_one_run() {
     let first = work.at("out/100 % rattle.shard-1-of-8");
     let bytes = |name: &str| fs::read(first.join(name)).unwrap();
     let before = ["manifest.json", "records.bin"].map(bytes);
-    work.submitted("1 of 8 shards of my scene.toml (tasks 2,1)");
+    work.submitted("1 of 8 shards of my scene.toml (tasks 2)");
     let one = [
         "map",
         "my scene.toml",

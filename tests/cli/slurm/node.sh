@@ -30,9 +30,11 @@ chmod 400 "$folder/munge/key"
 version="$(slurmd -V)"
 [[ "${version##* }" =~ ^([0-9]+)\.([0-9]+) ]] || unable "which version is this: $version?"
 if ((BASH_REMATCH[1] >= 23)); then echo "CgroupPlugin=disabled" >"$folder/cgroup.conf"; fi
-echo "NodeName=node Name=gpu Type=card Count=$cpus" >"$folder/gres.conf"
-# More processors than there are may be promised (config_overrides), and cards that are names only. No control groups, no
-# accounting; jobs are looked at often, because tests wait for them.
+# Cards that nothing computes on.
+for ((card = 0; card < cpus; card++)); do ln -s /dev/null "$folder/card$card"; done
+echo "NodeName=node Name=gpu Type=card File=$folder/card[0-$((cpus - 1))]" >"$folder/gres.conf"
+# More processors than there are may be promised (config_overrides). No control groups, no accounting; jobs are looked at
+# often, because tests wait for them.
 cat >"$SLURM_CONF" <<CONF
 ClusterName=test
 SlurmctldHost=localhost(127.0.0.1)
@@ -59,7 +61,7 @@ SlurmdSpoolDir=$folder/spool
 SlurmctldPidFile=$folder/slurmctld.pid
 SlurmdPidFile=$folder/slurmd.pid
 GresTypes=gpu
-NodeName=node NodeHostname=localhost NodeAddr=127.0.0.1 CPUs=$cpus Gres=gpu:card:$cpus Feature=card
+NodeName=node NodeHostname=localhost NodeAddr=127.0.0.1 CPUs=$cpus RealMemory=4000 Gres=gpu:card:$cpus Feature=card
 PartitionName=all Nodes=node Default=YES MaxTime=INFINITE State=UP
 CONF
 
