@@ -1,6 +1,6 @@
 """What goes wrong, as exceptions: their texts are those of the program."""
 
-__all__ = ["EngineError", "ModelError", "RattlemapError", "SceneError"]
+__all__ = ["EngineError", "FolderError", "ModelError", "RattlemapError", "SceneError"]
 
 
 class RattlemapError(Exception):
@@ -17,3 +17,7 @@ class ModelError(RattlemapError, ValueError):
 
 class EngineError(RattlemapError, RuntimeError):
     """The engine that is asked for is not there, or failed on the way."""
+
+
+class FolderError(RattlemapError, ValueError):
+    """A folder cannot be opened: it is not finished, not whole, or not of a map."""

@@ -51,6 +51,16 @@ pub fn without_effect<'p>(
     axes.filter(|&(i, _)| changes_nothing(i)).map(|(_, axis)| axis.parameter()).collect()
 }
 
+/// Their names, within the rounding of records of this precision: `f64`, else single.
+///
+/// # Panics
+/// As [`without_effect`].
+pub fn names(plan: &Plan, records: &[Record], precision: &str) -> Vec<String> {
+    let rounding = ROUNDING[usize::from(precision == "f64")];
+    let found = without_effect(plan, records, rounding);
+    found.into_iter().map(|parameter| parameter.name.to_string()).collect()
+}
+
 fn is_same(a: &Record, b: &Record, rounding: f64) -> bool {
     let near = |a: f64, b: f64| a == b || (a - b).abs() <= rounding * a.abs().max(b.abs());
     let both = |bit: u32, same: bool| a.valid & bit == b.valid & bit && (a.valid & bit == 0 || same);

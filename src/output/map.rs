@@ -23,7 +23,7 @@ use crate::model_file::FileModel;
 use crate::validate::Validation;
 
 pub use super::manifest::MANIFEST;
-pub use super::map_manifest::{Made, Run};
+pub use super::map_manifest::{Made, Merged, Run};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
@@ -165,7 +165,7 @@ pub fn repair(
 }
 
 /// Whether a name is wanted.
-type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
+pub(super) type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
 
 /// Writes the files that the scene asks for, as far as they are wanted.
 fn write_files(
@@ -182,11 +182,22 @@ fn write_files(
     );
     let mut files = tables?;
     files.extend(pictures?);
-    if let Some(list) = cells.scene().list().filter(|_| wanted(LIST)) {
+    files.extend(write_copies(folder, cells.scene(), wanted)?);
+    Ok(files)
+}
+
+/// Writes the list and the model of a scene that has them, as far as they are wanted.
+pub(super) fn write_copies(
+    folder: &Folder,
+    scene: &Scene,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    let mut files = Vec::new();
+    if let Some(list) = scene.list().filter(|_| wanted(LIST)) {
         write_list(folder, list)?;
         files.push(LIST.to_owned());
     }
-    let own = cells.scene().base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
+    let own = scene.base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
     if let Some(model) = own.filter(|_| wanted(MODEL)) {
         folder.replace(MODEL, |path| Ok(fs::write(path, &model.definition().text)?))?;
         files.push(MODEL.to_owned());

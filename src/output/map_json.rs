@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::cells::Cells;
 use super::map_manifest::{BasinObject, RefinementObject, Run, basins, statuses, tally};
@@ -19,6 +20,9 @@ struct MapObject<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    /// Of so many it was merged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shards: Option<u32>,
     cells: usize,
     /// One per cell and start.
     runs: usize,
@@ -65,12 +69,24 @@ pub fn print(
     run: &Run<'_>,
     writing: Duration,
 ) -> Result<(), OutputError> {
+    super::print(&serde_json::to_string_pretty(&object(folder, files, cells, run, writing)?)?)
+}
+
+/// The same as an object.
+pub(super) fn object(
+    folder: &Path,
+    files: &[String],
+    cells: &Cells<'_>,
+    run: &Run<'_>,
+    writing: Duration,
+) -> Result<Value, OutputError> {
     let object = MapObject {
         folder: folder.to_string_lossy().into_owned(),
         files,
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        shards: run.merged.map(|merged| merged.shards),
         cells: cells.counts().iter().product(),
         runs: cells.runs(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
@@ -87,5 +103,5 @@ pub fn print(
             write: writing.as_secs_f64(),
         },
     };
-    super::print(&serde_json::to_string_pretty(&object)?)
+    Ok(serde_json::to_value(object)?)
 }

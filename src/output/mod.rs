@@ -25,6 +25,7 @@ pub mod map;
 mod map_figure;
 pub mod map_json;
 mod map_manifest;
+pub mod merge;
 mod names;
 pub mod orbit;
 pub mod orbit_figures;
@@ -39,6 +40,7 @@ mod replay;
 mod report;
 #[cfg(test)]
 mod seen;
+pub mod shard;
 mod stdout;
 mod symbols;
 pub mod unfinished;
