@@ -74,7 +74,8 @@ fn the_package_passes_its_tests() {
     };
     let nowhere = tempfile::tempdir().unwrap();
     // What a test asks of this machine and does not find it tells as skipped; of others it tells the time.
-    let arguments = ["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "--durations=10", "--durations-min=1"];
+    let arguments =
+        ["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "--durations=10", "--durations-min=1"];
     let mut tests = Command::new(python);
     tests.args(arguments).arg(source("tests")).current_dir(nowhere.path()).stdin(Stdio::null());
     tests.env("PYTHONPATH", package()).env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "Agg");

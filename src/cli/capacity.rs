@@ -45,8 +45,8 @@ pub fn fits(scene: &Scene, engine: Who, out: Option<&Path>) -> Result<(), Failur
         Who::Cpu => EngineChoice::Cpu,
     };
     match out {
-        Some(out) => check(scene, engine, out).map(|_| ()),
-        None => judge(scene, engine, &Free { memory: free_memory(), disk: None }),
+        Some(out) => check(scene, None, engine, out).map(|_| ()),
+        None => judge(scene, None, engine, &Free { memory: free_memory(), disk: None }),
     }
 }
 

@@ -1,114 +1,77 @@
-//! `scale`: parts of a large map, put together.
+//! `scale`: shards of a large map, written and merged.
 
-use std::time::{Duration, Instant};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 use anyhow::Context;
 use rattlemap::cli::{Failure, note};
-use rattlemap::map::plan::Plan;
-use rattlemap::map::scene::{Quantity, Scene, Start};
-use rattlemap::map::{self, Processor, effect};
-use rattlemap::model::GearPair;
-use rattlemap::output::{Cells, Folder, Identity, Order, RecordFile};
-use rattlemap::record::Record;
-use rattlemap_bench::scale::{Memory, Stretched};
+use rattlemap::output::RECORDS;
+use rattlemap_bench::scale::{self, Ask, Size, Taken};
+use serde::Serialize;
 
 use crate::arguments::Scale;
 
+/// Cells along each axis of the map that is integrated.
+const SMALL: u32 = 192;
+
 pub(crate) fn run(ask: &Scale) -> Result<(), Failure> {
-    let [columns, rows] = if ask.run.quick { [40, 30] } else { [ask.columns as usize, ask.rows as usize] };
-    let side = if ask.run.quick { 4 } else { 96 };
-    let scene = |counts: [usize; 2]| {
-        let builder = Scene::builder(GearPair::paper(0.5)).start(Start::Rest);
-        let builder =
-            builder.axis("e", 0.0..=1.0, counts[0] as u32).axis("omega", 1.0..=12.0, counts[1] as u32);
-        let builder = if ask.all {
-            builder.quantities(&[
-                Quantity::Class,
-                Quantity::Lyapunov,
-                Quantity::Impacts,
-                Quantity::Mesh,
-                Quantity::Symmetric,
-                Quantity::Word,
-                Quantity::Pattern,
-            ])
-        } else {
-            builder
-        };
-        builder.build()
+    let quick = ask.run.quick;
+    let measured = Ask {
+        counts: if quick { [50, 40] } else { [ask.columns, ask.rows] },
+        small: if quick { 5 } else { SMALL },
+        shards: if quick { 3 } else { ask.shards },
+        all: ask.all,
     };
-    let small = map::run(&scene([side, side]).map_err(anyhow::Error::from)?, Processor::Cpu)
-        .map_err(anyhow::Error::from)?;
-    let scene = scene([columns, rows]).map_err(anyhow::Error::from)?;
-    let stretched = Stretched::new(&small, [columns, rows]);
     let dir = ask.run.out("scale");
-    let folder = Folder::open(&dir, ask.run.force)?;
-    let tell = |phase: &str, clock: Instant, memory: Memory| {
-        let seconds = clock.elapsed().as_secs_f64();
-        note(format_args!(
-            "{phase:<12} {seconds:>8.2} s {:>8.1} MB",
-            memory.peak().unwrap_or(0) as f64 / 1e6
-        ));
-    };
-    let (clock, memory) = (Instant::now(), Memory::begin());
-    let plan = Plan::new(&scene);
-    plan.check().map_err(anyhow::Error::from)?;
-    tell("plan", clock, memory);
-    let (clock, memory) = (Instant::now(), Memory::begin());
-    let identity = Identity::new("cpu", "f64", "d", scene.identity());
-    let runs = plan.run_count();
-    let parts: Vec<_> = (0..ask.shards as usize).map(|n| dir.join(format!("part-{n}.bin"))).collect();
-    for (n, path) in parts.iter().enumerate() {
-        let places = (runs * n / parts.len())..(runs * (n + 1) / parts.len());
-        let mut file = RecordFile::create(path, &identity).context("records")?;
-        let ids: Vec<u32> = places.map(|place| plan.run_at(place)).collect();
-        for ids in ids.chunks(1 << 17) {
-            let batch: Vec<(u32, Record)> = ids.iter().map(|&id| (id, stretched.record(id))).collect();
-            file.append(&batch).context("records")?;
+    let cells: u64 = measured.counts.iter().map(|&count| u64::from(count)).product();
+    let outer = rattlemap::output::Folder::open(&dir, ask.run.force)?;
+    let (shards, mut taken) = scale::write_shards(measured, &dir).context("the shards")?;
+    let (mut rounds, out) = (Vec::new(), dir.join("map"));
+    let mut files = Vec::new();
+    for _ in 0..ask.rounds {
+        let (phases, names) = scale::merge(&shards, &out).context("the merge")?;
+        rounds.push(phases);
+        files = names;
+    }
+    taken.extend(medians(&rounds));
+    let size = |file: String, bytes: u64| Size { file, bytes, per_cell: bytes as f64 / cells as f64 };
+    let bytes = |path: &Path| path.metadata().map_or(0, |data| data.len());
+    let of_shards = shards.iter().map(|shard| bytes(&shard.join(RECORDS))).sum();
+    let mut sizes = vec![size(format!("{RECORDS} of {} shards", shards.len()), of_shards)];
+    sizes.extend(files.iter().map(|name| size(name.clone(), bytes(&out.join(name)))));
+    sizes.push(size(RECORDS.to_owned(), bytes(&out.join(RECORDS))));
+    write(&outer.path().join("scale.csv"), &taken)?;
+    write(&outer.path().join("files.csv"), &sizes)?;
+    if !ask.run.quiet {
+        for Taken { phase, seconds, peak_bytes } in &taken {
+            let peak = peak_bytes.map_or(String::new(), |bytes| format!("{:>9.1} MB", bytes as f64 / 1e6));
+            note(format_args!("{phase:<24} {seconds:>8.2} s {peak}"));
+        }
+        for Size { file, bytes, per_cell } in &sizes {
+            note(format_args!("{file:<24} {:>8.1} MB {per_cell:>7.2} bytes per cell", *bytes as f64 / 1e6));
         }
     }
-    tell("parts", clock, memory);
-    let (clock, memory) = (Instant::now(), Memory::begin());
-    let mut records = vec![Record::default(); runs];
-    for path in &parts {
-        let take = |batch: &[(u32, Record)]| {
-            batch.iter().for_each(|&(id, record)| records[id as usize] = record);
-            true
-        };
-        RecordFile::read(path, &identity, Order::Any, take).context("records")?;
-    }
-    tell("read", clock, memory);
-    let (clock, memory) = (Instant::now(), Memory::begin());
-    let without_effect = effect::without_effect(&plan, &records, 1e-6);
-    let without_effect = without_effect.iter().map(|parameter| parameter.name.to_string()).collect();
-    tell("effect", clock, memory);
-    let (clock, memory) = (Instant::now(), Memory::begin());
-    let cells = Cells::new(&scene, &plan, &records);
-    let made = rattlemap::output::map::Run {
-        sets: &[],
-        engine: "cpu",
-        precision: "f64",
-        device: "d",
-        processor: "",
-        elapsed: Duration::ZERO,
-        opening: Duration::ZERO,
-        elapsed_before: Duration::ZERO,
-        resumed_cells: 0,
-        lane_grid: None,
-        refined: None,
-        without_effect,
-    };
-    let files = rattlemap::output::map::write(&folder, &cells, &made)?;
-    tell("tables", clock, memory);
-    for name in &files {
-        let bytes = dir.join(name).metadata().map_or(0, |data| data.len());
-        note(format_args!("{name:<20} {:>10.1} MB", bytes as f64 / 1e6));
-    }
-    let sizes: Vec<u64> = parts.iter().map(|path| path.metadata().map_or(0, |data| data.len())).collect();
-    note(format_args!(
-        "parts {} to {} bytes, {:.1} per run",
-        sizes.iter().min().unwrap_or(&0),
-        sizes.iter().max().unwrap_or(&0),
-        sizes.iter().sum::<u64>() as f64 / runs as f64
-    ));
     Ok(())
+}
+
+/// By phase the median of seconds, and the largest memory of all rounds.
+fn medians(rounds: &[Vec<Taken>]) -> Vec<Taken> {
+    let mut by_phase: BTreeMap<usize, Vec<&Taken>> = BTreeMap::new();
+    for round in rounds {
+        round.iter().enumerate().for_each(|(nth, taken)| by_phase.entry(nth).or_default().push(taken));
+    }
+    let median = |mut all: Vec<&Taken>| {
+        all.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        let peak_bytes = all.iter().filter_map(|taken| taken.peak_bytes).max();
+        Taken { peak_bytes, ..all[all.len() / 2].clone() }
+    };
+    by_phase.into_values().map(median).collect()
+}
+
+fn write<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), Failure> {
+    let written = csv::Writer::from_path(path).and_then(|mut table| {
+        rows.iter().try_for_each(|row| table.serialize(row))?;
+        Ok(table.flush()?)
+    });
+    Ok(written.with_context(|| format!("{}", path.display()))?)
 }

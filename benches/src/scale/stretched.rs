@@ -3,8 +3,12 @@
 use rattlemap::map::Map;
 use rattlemap::record::Record;
 
-/// Numbers differ from those of the small map by this much of themselves.
-const CHANGE: f64 = 1e-3;
+/// Numbers differ from those of the small map by this much of themselves: no more than the first digit is left.
+const CHANGE: f64 = 0.1;
+
+/// One cell in so many is like another cell of the small map, at most so many of its cells away.
+const STRAY: f64 = 16.0;
+const AWAY: f64 = 3.0;
 
 /// Records of a map of `counts` cells, made of those of a small one.
 #[derive(Clone, Debug)]
@@ -21,24 +25,25 @@ impl<'m> Stretched<'m> {
 
     /// The record of a cell.
     pub fn record(&self, id: u32) -> Record {
-        let [columns, rows] = self.small.counts();
-        let (i, j) = (id as usize % self.counts[0], id as usize / self.counts[0]);
-        let (i, j) = (i * columns / self.counts[0], j * rows / self.counts[1]);
-        let mut record = self.small.records()[j * columns + i];
+        let small = self.small.counts();
         let mut random = u64::from(id);
-        // Those of a lane in single precision.
-        let mut change =
-            |value: &mut f64| *value *= 1.0 + f64::from((CHANGE * (unit(&mut random) - 0.5)) as f32);
-        change(&mut record.lyapunov);
-        change(&mut record.lyapunov_error);
-        change(&mut record.mesh_fraction);
+        let is_stray = STRAY * unit(&mut random) < 1.0;
+        let at = [id as usize % self.counts[0], id as usize / self.counts[0]];
+        let [i, j] = [0, 1].map(|axis| {
+            let away = if is_stray { AWAY * (2.0 * unit(&mut random) - 1.0) } else { 0.0 };
+            let place = (at[axis] * small[axis]) as f64 / self.counts[axis] as f64 + away;
+            (place.max(0.0) as usize).min(small[axis] - 1)
+        });
+        let mut record = self.small.records()[j * small[0] + i];
+        let mut changed = |value: f64| value * (1.0 + CHANGE * (unit(&mut random) - 0.5));
+        record.lyapunov = changed(record.lyapunov);
+        record.lyapunov_error = changed(record.lyapunov_error);
+        record.mesh_fraction = changed(record.mesh_fraction);
         if record.period == 0 {
-            change(&mut record.impacts_per_period);
+            record.impacts_per_period = changed(record.impacts_per_period);
         }
-        for x in &mut record.strobe {
-            change(x);
-            *x = f64::from(*x as f32);
-        }
+        // In single precision, as of most lanes.
+        record.strobe = record.strobe.map(|x| f64::from(changed(x) as f32));
         record
     }
 }
