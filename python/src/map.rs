@@ -148,6 +148,7 @@ fn compute(
         resumed_cells,
         lane_grid: engine.steps_per_period(),
         refined: refined.clone(),
+        merged: None,
         without_effect: idle.iter().map(|parameter| parameter.name.to_string()).collect(),
     };
     let files = match &folder {
