@@ -30,7 +30,7 @@ pub(crate) fn ask(engine: &str, precision: Option<&str>) -> Result<Ask, Problem>
         let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
         known.ok_or_else(|| Problem::engine(format!("the precision {name:?} is none of f32 and f64")))
     };
-    let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()? };
+    let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()?, adapter: None };
     engine_choice::check(&ask)?;
     Ok(ask)
 }
@@ -86,6 +86,8 @@ impl Integrated<'_> {
             engine: self.engine.name(),
             precision: self.engine.precision(),
             device,
+            adapter: self.engine.adapter(),
+            cards: self.engine.cards(),
             processor,
             opening: self.opening,
             elapsed: self.elapsed,
@@ -114,7 +116,7 @@ impl Task {
         watch: &Watch,
     ) -> Result<Option<Integrated<'p>>, Problem> {
         let clock = Instant::now();
-        let Chosen { mut engine, why } = pollster::block_on(engine_choice::open(plan, &self.ask))?;
+        let Chosen { mut engine, why, .. } = pollster::block_on(engine_choice::open(plan, &self.ask))?;
         let opening = clock.elapsed();
         if watch.is_halted() {
             return Ok(None);

@@ -9,9 +9,9 @@ use rattlemap::cli;
 use rattlemap::map::engine_choice::{Ask, Who};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::shard::Shard;
+use rattlemap::output::Folder;
 use rattlemap::output::merge::{MergeError, Parts, Progress};
 use rattlemap::output::shard::{self, Finished};
-use rattlemap::output::Folder;
 use rayon::ThreadPoolBuilder;
 
 use crate::engines::{Out, Task, ask};
