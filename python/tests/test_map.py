@@ -69,6 +69,10 @@ def test_lanes_are_the_programs(program: Program, tmp_path: Path) -> None:
     program("map", tmp_path / "scene.toml", "--engine", "gpu", "--quiet", "--out", tmp_path / "own")
     assert (made.attrs["engine"], made.attrs["precision"]) == ("gpu", "f32")
     assert_same(made, rm.open(tmp_path / "own"))
+    number = json.loads(made.attrs["adapter"])["number"]
+    with pytest.raises(rm.EngineError, match="--adapter 99"):
+        rm.map(rm.gear_pair(), **axes, engine="gpu", adapter=99)
+    assert_same(rm.map(rm.gear_pair(), **axes, engine="gpu", adapter=number), made)
 
 
 def test_adaptive_maps_and_several_starts(program: Program, tmp_path: Path) -> None:
