@@ -84,6 +84,20 @@ def map(
     progress: _Tell = ...,
 ) -> MadeMap: ...
 
+def shard(
+    scene: Scene,
+    index: int,
+    count: int,
+    engine: str,
+    precision: str | None,
+    out: str,
+    resume: bool = ...,
+    threads: int | None = ...,
+    progress: _Tell = ...,
+) -> list[str]: ...
+def check_shards(scene: Scene, count: int, engine: str, precision: str | None) -> None: ...
+def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Tell = ...) -> MadeMap: ...
+
 class MadeDiagram(TypedDict):
     manifest: str
     columns: str
