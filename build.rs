@@ -9,7 +9,7 @@ use std::{env, fs};
 use sha2::{Digest, Sha256};
 
 /// What decides the bits of a record, or the order of work that records are replayed in.
-const DECIDING: [&str; 19] = [
+const DECIDING: [&str; 20] = [
     "dynamics/src",
     "models/gear_pair.toml",
     "shaders",
@@ -26,6 +26,7 @@ const DECIDING: [&str; 19] = [
     "src/map/scene/points.rs",
     "src/map/schedule.rs",
     "src/map/schedule",
+    "src/map/shard.rs",
     "src/model_file",
     "src/text/expression.rs",
     "src/text/expression",

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change is taken: formatting, lints, docs, dependencies, checks for other systems, tests.
-# Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, and Rust's targets.
+# Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, Rust's targets, and Slurm, whose
+# daemons run in the tests' own folders only.
 # With --all the tests run, too, that take minutes each, and all of the program is checked for macOS. Ends with the time of
 # each phase and the ten slowest tests.
 set -euo pipefail
@@ -51,6 +52,26 @@ has_vulkan() {
     compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null
 }
 
+# Packages of Debian and its kin. False where there is no installing them; `why` says the reason.
+why=
+apt_install() {
+    local as_root=()
+    if ! command -v apt-get >/dev/null; then
+        why="no apt-get to install one"
+        return 1
+    fi
+    if [[ "$(id -u)" -ne 0 ]]; then
+        if ! command -v sudo >/dev/null; then
+            why="neither root nor sudo to install one"
+            return 1
+        fi
+        as_root=(sudo)
+    fi
+    why="apt-get could not install one"
+    "${as_root[@]}" apt-get update -qq &&
+        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
+}
+
 require_vulkan() {
     case "$(uname -s)" in
         Linux) ;;
@@ -64,18 +85,24 @@ require_vulkan() {
         return
     fi
     local remedy="install a Vulkan driver and its loader (Debian, Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1; Fedora: dnf install mesa-vulkan-drivers vulkan-loader; Arch: pacman -S vulkan-swrast vulkan-icd-loader)"
-    command -v apt-get >/dev/null || fail "no Vulkan driver found; $remedy"
-    local as_root=()
-    if [[ "$(id -u)" -ne 0 ]]; then
-        command -v sudo >/dev/null || fail "no Vulkan driver found, and neither root nor sudo to install one; $remedy"
-        as_root=(sudo)
-    fi
     say "graphics: no Vulkan driver; installing mesa-vulkan-drivers and libvulkan1"
-    "${as_root[@]}" apt-get update -qq || fail "apt-get update failed; $remedy"
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-        apt-get install -y -qq --no-install-recommends mesa-vulkan-drivers libvulkan1 ||
-        fail "apt-get could not install the driver; $remedy"
+    apt_install mesa-vulkan-drivers libvulkan1 || fail "no Vulkan driver found, and $why; $remedy"
     has_vulkan || fail "still no Vulkan driver after installing one; check VK_DRIVER_FILES and VK_ICD_FILENAMES"
+}
+
+# For tests of scripts/slurm, which say so where it is missing. Its daemons live in /usr/sbin.
+require_slurm() {
+    [[ "$(uname -s)" == Linux ]] || return 0
+    local program missing=''
+    for program in sbatch slurmctld slurmd munged; do
+        (PATH="$PATH:/usr/sbin:/sbin" && command -v "$program") >/dev/null || missing="$program"
+    done
+    if [[ -z "$missing" ]]; then
+        say "batch system: Slurm is there"
+        return
+    fi
+    say "batch system: no $missing; installing slurm-wlm and munge"
+    apt_install slurm-wlm munge || say "tests of scripts/slurm will be skipped: $why"
 }
 
 # Runs a command under a title, and notes how long it took.
@@ -156,6 +183,7 @@ trap 'rm -f "$log"' EXIT
 
 require_tools
 require_vulkan
+require_slurm
 phase "format" cargo fmt --all --check
 phase "lints" cargo clippy --workspace --all-targets -- -D warnings
 phase "docs, warnings denied" docs

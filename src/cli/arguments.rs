@@ -1,5 +1,6 @@
 //! The command line: what can be asked, and its help.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -8,7 +9,9 @@ use crate::gpu::Precision;
 use crate::map::engine_choice::{Ask, Wanted, Who};
 use crate::map::printable::is_printable;
 use crate::map::scene::{Along, Format};
+use crate::map::shard::Shard;
 use crate::model_file::DEFAULT as DEFAULT_MODEL;
+use crate::text::shell::quoted;
 use crate::validate::DEFAULT_SAMPLES;
 use clap::error::ContextValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -37,7 +40,15 @@ pub(crate) struct Cli {
 /// # Errors
 /// The exit code.
 pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
-    P::try_parse().map_err(|mut error| {
+    parsed_from(std::env::args_os()).map_err(ExitCode::from)
+}
+
+/// The same of these arguments, the program's name first.
+///
+/// # Errors
+/// The exit code.
+pub(crate) fn parsed_from<P: Parser>(arguments: impl IntoIterator<Item = OsString>) -> Result<P, u8> {
+    P::try_parse_from(arguments).map_err(|mut error| {
         if error.use_stderr() {
             quote(&mut error);
             // Plain: what it quotes must not pass for colours.
@@ -46,7 +57,7 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
             // A closed stdout has no reader.
             let _ = error.print();
         }
-        ExitCode::from(error.exit_code() as u8)
+        error.exit_code() as u8
     })
 }
 
@@ -72,6 +83,7 @@ fn quote(error: &mut clap::Error) {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Map(Map),
+    Merge(Merge),
     Orbit(Orbit),
     Bifurcation(Bifurcation),
     Models(Models),
@@ -155,7 +167,9 @@ impl BenchOptions {
 /// there, and every table and figure comes out byte for byte as if nothing had happened.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Example, the main map with fewer cells:\n  \
-    rattlemap map scenes/e_omega.toml --set axis.0.count=128 --set axis.1.count=128")]
+    rattlemap map scenes/e_omega.toml --set axis.0.count=128 --set axis.1.count=128\n\n\
+    The first of four shards of it, for one of four machines:\n  \
+    rattlemap map scenes/e_omega.toml --engine cpu --shard 1/4")]
 pub(crate) struct Map {
     #[command(flatten)]
     pub(crate) run: SceneOptions,
@@ -163,9 +177,17 @@ pub(crate) struct Map {
     #[command(flatten)]
     pub(crate) engine: EngineOptions,
 
-    /// Go on with an interrupted run of the same scene
+    /// Go on with an interrupted run of the same scene; where nothing was kept yet, begin. A shard that is finished is left
+    /// as it is
     #[arg(long, conflicts_with = "force")]
     pub(crate) resume: bool,
+
+    /// Compute a part of the map alone, for one of N machines: shard I of N, counted from 1, into a folder of its own
+    /// (out/<scene's name>.shard-I-of-N) with its records and no tables. `rattlemap merge` makes the map of all N. The
+    /// engine must be named, the same for all. Shards are spread over the map and cost about the same; adaptive maps
+    /// have none
+    #[arg(long, value_name = "I/N")]
+    pub(crate) shard: Option<Shard>,
 
     /// Say what the map would take and write nothing: cells, engine, memory, disk, and the time that it would
     /// take, from some of its cells that are computed and thrown away
@@ -176,6 +198,59 @@ pub(crate) struct Map {
     /// seconds, and what was resumed. With --dry-run, what is foreseen as one object
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl Map {
+    /// The folder to write to: a shard has one beside the map's.
+    pub(crate) fn out(&self) -> PathBuf {
+        let Some(shard) = self.shard.filter(|_| self.run.out.is_none()) else { return self.run.out() };
+        let mut name = self.run.scene.file_stem().unwrap_or_default().to_owned();
+        name.push(format!(".shard-{}-of-{}", shard.index(), shard.count()));
+        Path::new("out").join(name)
+    }
+}
+
+/// The map of all its shards: as one run would have made it
+///
+/// Reads the folders that `rattlemap map SCENE --shard I/N` has made, in any order and from any machine, and writes the
+/// map: records, tables, figures, report and manifest, the same as of one run but for times and devices. Shards must be
+/// of one run: the same scene, engine, precision and version, on graphics cards of one model and driver. What is missing or
+/// unfinished is named, with the command that makes it. No scene file is needed. Shards are only read, and can be deleted
+/// once the map is there.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example, a map in two shards:\n  \
+    rattlemap map scenes/e_omega.toml --engine cpu --shard 1/2\n  \
+    rattlemap map scenes/e_omega.toml --engine cpu --shard 2/2\n  \
+    rattlemap merge out/e_omega out/e_omega.shard-*-of-2")]
+pub(crate) struct Merge {
+    /// The folder to write the map to
+    #[arg(value_name = "OUT")]
+    pub(crate) out: PathBuf,
+
+    /// The folders of all shards
+    #[arg(value_name = "PART", required = true)]
+    pub(crate) parts: Vec<PathBuf>,
+
+    /// Replace the files of an earlier run in OUT; without it a folder that is not empty is refused
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Also print one JSON object on stdout when the map is done, as `map --json` does
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Say nothing unless something is wrong
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl Merge {
+    /// The command that does it again.
+    pub(crate) fn again(&self) -> String {
+        let parts = [&self.out].into_iter().chain(&self.parts);
+        let words: Vec<String> = parts.map(|path| quoted(&path.display().to_string())).collect();
+        format!("rattlemap merge {} --force", words.join(" "))
+    }
 }
 
 /// A scene, where its results go, and what to change about it.

@@ -121,7 +121,7 @@ fn measure(
     };
     let choice = if engine.threads().is_some() { EngineChoice::Cpu } else { EngineChoice::Gpu };
     let misfit = |scene: &Scene| {
-        capacity::check(scene, choice, scratch.path()).err().map(|failure| failure.to_string())
+        capacity::check(scene, None, choice, scratch.path()).err().map(|failure| failure.to_string())
     };
     let sides = if ask.run.quick { &QUICK_SIDES[..] } else { &SIDES };
     let runs = if ask.run.quick { LEAST_RUNS } else { RUNS };

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use crate::map::engine_choice::Who;
 use crate::map::scene::Scene;
+use crate::map::shard::Shard;
 use crate::map::size::Size;
 use crate::output::map;
 use anyhow::anyhow;
@@ -21,10 +23,31 @@ pub(crate) struct Free {
 
 /// What there is, for a map that fits it. Refuses one that does not fit memory or disk, with figures; what the system does
 /// not tell is taken to be enough.
-pub(crate) fn check(scene: &Scene, engine: EngineChoice, out: &Path) -> Result<Free, Failure> {
+pub(crate) fn check(
+    scene: &Scene,
+    shard: Option<Shard>,
+    engine: EngineChoice,
+    out: &Path,
+) -> Result<Free, Failure> {
     let disk = free_disk(out).map(|free| free.saturating_add(replaced(out)));
     let free = Free { memory: free_memory(), disk };
-    judge(scene, engine, &free).map(|()| free)
+    judge(scene, shard, engine, &free).map(|()| free)
+}
+
+/// Refuses a map that does not fit this machine's memory or, where it is written to a folder, the disk.
+///
+/// # Errors
+/// [`Failure::Usage`] with what it needs and what is free.
+pub fn fits(scene: &Scene, engine: Who, out: Option<&Path>) -> Result<(), Failure> {
+    let engine = match engine {
+        Who::Auto => EngineChoice::Auto,
+        Who::Gpu => EngineChoice::Gpu,
+        Who::Cpu => EngineChoice::Cpu,
+    };
+    match out {
+        Some(out) => check(scene, None, engine, out).map(|_| ()),
+        None => judge(scene, None, engine, &Free { memory: free_memory(), disk: None }),
+    }
 }
 
 /// Refuses a finished map that this machine cannot read, before anything is allocated for it. It is read by the CPU,
@@ -39,12 +62,12 @@ fn replaced(out: &Path) -> u64 {
     map::names().filter_map(|name| out.join(name).symlink_metadata().ok()).map(|data| data.len()).sum()
 }
 
-fn judge(scene: &Scene, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
+fn judge(scene: &Scene, shard: Option<Shard>, engine: EngineChoice, free: &Free) -> Result<(), Failure> {
     let remedy = match scene.list() {
         Some(_) => "shorten the list of cells",
         None => "lower axis.0.count or axis.1.count",
     };
-    judge_size(scene, engine, free, Size::of(scene), remedy)
+    judge_size(scene, engine, free, Size::of_shard(scene, shard), remedy)
 }
 
 fn judge_size(
@@ -129,14 +152,16 @@ mod tests {
     fn constants_of_lanes_count_where_lanes_may_run() {
         let scene = Scene::parse(SLOW, "s", &[], Purpose::Map).unwrap();
         let free = Free { memory: Some(2_000_000_000), disk: None };
-        assert!(judge(&scene, EngineChoice::Cpu, &free).is_ok());
+        assert!(judge(&scene, None, EngineChoice::Cpu, &free).is_ok());
         for engine in [EngineChoice::Gpu, EngineChoice::Auto] {
-            let Err(failure) = judge(&scene, engine, &free) else { panic!("{engine:?} was let through") };
+            let Err(failure) = judge(&scene, None, engine, &free) else {
+                panic!("{engine:?} was let through")
+            };
             let text = failure.to_string();
             assert!(text.contains("GB of memory, and 2.0 GB are free"), "{text}");
             assert!(text.contains("or ask for --engine cpu"), "{text}");
         }
-        assert!(judge(&scene, EngineChoice::Gpu, &Free { memory: None, disk: None }).is_ok());
+        assert!(judge(&scene, None, EngineChoice::Gpu, &Free { memory: None, disk: None }).is_ok());
     }
 
     /// Tables and figures take more room than records, and what they replace makes room.
@@ -149,7 +174,7 @@ mod tests {
         let [records, all] = [disk("[\"png\"]"), disk("[\"csv\",\"npy\",\"png\",\"html\"]")];
         assert!(all > 3 * records, "{all} {records}");
         let scene = Scene::parse(SLOW, "s", &[], Purpose::Map).unwrap();
-        let with = |disk| judge(&scene, EngineChoice::Cpu, &Free { memory: None, disk: Some(disk) });
+        let with = |disk| judge(&scene, None, EngineChoice::Cpu, &Free { memory: None, disk: Some(disk) });
         assert!(with(Size::of(&scene).disk).is_ok());
         let text = with(records).unwrap_err().to_string();
         assert!(text.contains("of disk, and") && text.contains("--out"), "{text}");

@@ -82,6 +82,15 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
         )));
     }
     folder.refuse_links(output::map::names())?;
+    let part = Manifest::read_part(dir)?;
+    if let Some(shard) = part.shard() {
+        return Err(Failure::Run(anyhow!(
+            "{}: nothing of shard {shard} can be made of the rest; `{}` keeps what is good of its records, computes \
+             the others and writes its files anew",
+            told(dir, &findings.iter().filter(|finding| finding.is_lost()).collect::<Vec<_>>()),
+            part.remake_command(dir)
+        )));
+    }
     let manifest = Manifest::read(dir)?;
     let lost: Vec<&str> =
         findings.iter().filter(|finding| finding.is_lost()).map(|finding| finding.name.as_str()).collect();

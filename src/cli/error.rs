@@ -33,12 +33,17 @@ pub(crate) const SIGNALLED: i32 = 128;
 impl Failure {
     /// Says on stderr what went wrong, causes included, and returns the exit code.
     pub fn report(&self) -> ExitCode {
+        ExitCode::from(self.told())
+    }
+
+    /// The same with the exit code as a number.
+    pub(crate) fn told(&self) -> u8 {
         say::note(format_args!("error: {self}"));
-        ExitCode::from(match self {
+        match self {
             Failure::Usage(_) => 2,
             Failure::Run(_) => 1,
             Failure::Interrupted { signal, .. } => (SIGNALLED + signal) as u8,
-        })
+        }
     }
 }
 

@@ -6,19 +6,21 @@ use std::path::{Path, PathBuf};
 use crate::map::plan::Plan;
 use crate::map::scene::{FileBeside, FileText, Purpose, Scene};
 use crate::map::schedule::{Refined, Schedule};
+use crate::map::shard::Shard;
 use crate::map::sweep;
 use crate::output::inventory::{self, FileEntry, Finding};
 use crate::output::manifest::{FORMAT, MANIFEST};
 use crate::output::map::LIST;
 use crate::output::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::record::Record;
+use crate::text::shell::quoted;
 use anyhow::{Context, anyhow};
 use serde::Deserialize;
 use serde_json::Value;
 
 use crate::cli::capacity;
 use crate::cli::error::Failure;
-use crate::cli::map::{order, quoted, unit};
+use crate::cli::map::{order, unit};
 use crate::cli::say;
 use crate::cli::scene_file::{MOST_OF_COPY, read_table};
 
@@ -35,6 +37,7 @@ pub(crate) struct Manifest {
     scene: String,
     set: Vec<String>,
     model: Option<ModelObject>,
+    shard: Option<Shard>,
     pub(crate) files: Vec<FileEntry>,
 }
 
@@ -101,7 +104,31 @@ impl Manifest {
 
     /// The same of a map that any version made which wrote this format: for those who compute nothing.
     pub(crate) fn read_of_any_version(dir: &Path) -> Result<Manifest, Failure> {
+        let manifest = Manifest::read_part(dir)?;
+        match manifest.shard {
+            None => Ok(manifest),
+            Some(shard) => Err(Failure::Usage(anyhow!(
+                "{}: this is shard {shard} of a map, which has neither tables nor figures; `rattlemap merge OUT PART...` \
+                 makes the map of all {} shards",
+                dir.display(),
+                shard.count()
+            ))),
+        }
+    }
+
+    /// The same of a map or a shard of one.
+    pub(crate) fn read_part(dir: &Path) -> Result<Manifest, Failure> {
         Manifest::of(dir).map_err(Failure::Usage)
+    }
+
+    /// The part of the map that it is; none where it is the whole.
+    pub(crate) fn shard(&self) -> Option<Shard> {
+        self.shard
+    }
+
+    /// Whether a run of this scene with these settings writes the same manifest, but for what it measures.
+    pub(crate) fn is_of(&self, scene: &Scene, sets: &[String]) -> bool {
+        self.scene == scene.text() && self.set == sets
     }
 
     fn of(dir: &Path) -> anyhow::Result<Manifest> {
@@ -146,7 +173,11 @@ impl Manifest {
         let how = if is_readable { "--resume" } else { "--force" };
         let sets: String = self.set.iter().map(|set| format!(" --set {}", quoted(set))).collect();
         let out = quoted(&dir.display().to_string());
-        format!("rattlemap map SCENE --out {out}{sets} {how}")
+        let Manifest { engine, precision, .. } = self;
+        let part = self.shard.map_or(String::new(), |shard| {
+            format!(" --engine {} --precision {} --shard {shard}", quoted(engine), quoted(precision))
+        });
+        format!("rattlemap map SCENE --out {out}{part}{sets} {how}")
     }
 }
 

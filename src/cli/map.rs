@@ -3,6 +3,7 @@
 mod dry_run;
 mod forecast;
 mod resume_command;
+mod shard;
 mod stopped;
 mod summary;
 
@@ -19,8 +20,10 @@ use crate::map::engine_choice::{self, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
 use crate::map::schedule::{Refined, Schedule};
+use crate::map::shard::Shard;
 use crate::map::sweep::{self, SweepError};
 use crate::output::map::LIST;
+use crate::output::shard::Tally;
 use crate::output::{self, Cells, Folder, Identity, Order, RECORDS, RecordFile, RecordFileError, unfinished};
 use crate::record::Record;
 use crate::record::classify::status;
@@ -33,21 +36,27 @@ use crate::cli::error::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
-pub(crate) use resume_command::quoted;
 use summary::summary;
 
 /// Asks, checks, computes, writes.
 pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
-    let kept = ask.resume.then(|| ask.run.out().join(LIST));
+    shard::require_engine(ask)?;
+    let kept = ask.resume.then(|| ask.out().join(LIST));
     let run = scene_file::map_with_figures(&ask.run, kept.as_deref())?;
     let ask = &Map { run, ..ask.clone() };
     let scene = scene_file::load(&ask.run.scene, &ask.run.set, kept.as_deref())?;
     engine_choice::check(&ask.engine.ask())?;
-    let free = capacity::check(&scene, ask.engine.engine, &ask.run.out())?;
+    let free = capacity::check(&scene, ask.shard, ask.engine.engine, &ask.out())?;
     let plan = Plan::new(&scene);
+    if let Some(shard) = ask.shard {
+        shard.check(&plan).map_err(|error| Failure::Usage(anyhow!("--shard {error}")))?;
+    }
     plan.check()?;
     if ask.dry_run {
         return dry_run::run(ask, &scene, &plan, free);
+    }
+    if shard::is_done(ask, &scene) {
+        return shard::say_done(ask, &plan);
     }
     let interrupt = Interrupt::listen(ask.run.quiet)?;
     let folder = open_folder(ask)?;
@@ -75,7 +84,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     if let (false, Some(raised)) = (ask.run.quiet, raised_steps(&scene, lane_grid)) {
         say::note(raised);
     }
-    let mut work = Work::new(&plan);
+    let mut work = Work::new(&plan, ask.shard);
     let mut kept = open_records(ask, &folder, &scene, &mut work, &engine)?;
     let resumed_cells = kept.file.count();
     let total = work.schedule.expected();
@@ -85,6 +94,10 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     };
     integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
     interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.file.count()), || {});
+    if let Some(shard) = ask.shard {
+        let ended = shard::Ended { shard, opening, resumed: resumed_cells, kept: &kept, tally: &work.tally };
+        return shard::finish(ask, &scene, &plan, &engine, &ended, &progress);
+    }
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
     let Kept { elapsed_before, clock, .. } = kept;
@@ -112,14 +125,8 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         resumed_cells,
         lane_grid,
         refined: refined.clone(),
-        without_effect: effect::without_effect(
-            &plan,
-            &records,
-            effect::ROUNDING[usize::from(precision == "f64")],
-        )
-        .iter()
-        .map(|parameter| parameter.name.to_string())
-        .collect(),
+        without_effect: effect::names(&plan, &records, precision),
+        merged: None,
     };
     let written = Instant::now();
     let files = output::map::write(&folder, &cells, &run)?;
@@ -149,7 +156,7 @@ pub(crate) fn filled_from(refined: Option<&Refined>) -> &[u32] {
 
 /// A new folder, an earlier run's with `--force`, an interrupted one's with `--resume`.
 fn open_folder(ask: &Map) -> Result<Folder, Failure> {
-    let out = ask.run.out();
+    let out = ask.out();
     // A run that ended before it kept anything has left nothing else.
     if ask.resume && !out.join(RECORDS).is_file() && Folder::holds_results(&out) {
         return Err(RecordFileError::NothingToResume { folder: out }.into());
@@ -188,11 +195,15 @@ fn open_records<'f>(
     engine: &Engine<'_>,
 ) -> Result<Kept<'f>, Failure> {
     let path = folder.path().join(RECORDS);
-    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
+    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
+        .of_shard(ask.shard);
     let (file, elapsed_before) = if ask.resume && path.is_file() {
-        let Work { plan, schedule, records } = work;
+        let Work { plan, schedule, records, tally } = work;
         let (plan, order) = (*plan, order(schedule));
-        let take = |batch: &[(u32, Record)]| plan.admits(batch) && sweep::replay(schedule, records, batch);
+        let take = |batch: &[(u32, Record)]| {
+            tally.take(plan, batch);
+            plan.admits(batch) && sweep::replay(schedule, records, batch)
+        };
         let file = RecordFile::resume(&path, &identity, order, take)?;
         if let Some(damage) = file.damage() {
             let (path, count, unit) = (path.display(), file.count(), unit(work.plan));
@@ -255,13 +266,17 @@ impl Kept<'_> {
 struct Work<'p> {
     plan: &'p Plan,
     schedule: Schedule,
-    /// By run.
+    /// By run; none of a shard whose cells need no others.
     records: Vec<Record>,
+    /// Of a shard.
+    tally: Tally,
 }
 
 impl<'p> Work<'p> {
-    fn new(plan: &'p Plan) -> Work<'p> {
-        Work { plan, schedule: Schedule::new(plan), records: vec![Record::default(); plan.run_count()] }
+    fn new(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
+        let schedule = Schedule::of(plan, shard);
+        let count = if shard.is_none() || schedule.reads_records() { plan.run_count() } else { 0 };
+        Work { plan, schedule, records: vec![Record::default(); count], tally: Tally::default() }
     }
 }
 
@@ -274,10 +289,11 @@ fn integrate(
     progress: &Progress,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let Work { plan, schedule, records } = work;
+    let Work { plan, schedule, records, tally } = work;
     let mut warning = Warning::new(kept.file.count(), ask.run.quiet);
     let keep = |batch: &[(u32, Record)], known| {
         kept.keep(batch)?;
+        tally.take(plan, batch);
         warning.heed(batch, unit(plan));
         progress.report(kept.file.count(), known);
         Ok(())

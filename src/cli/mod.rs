@@ -13,6 +13,7 @@ mod error;
 mod finished_map;
 mod interrupt;
 mod map;
+mod merge;
 mod model_choice;
 mod models;
 mod orbit;
@@ -22,25 +23,35 @@ mod say;
 mod scene_file;
 mod validate;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
-use arguments::{Bench, Cli, Command};
+use arguments::{Bench, Cli, Command, parsed_from};
 
 pub use arguments::parsed;
+pub use capacity::fits;
 pub use environment::missing_variable;
 pub use error::{Failure, fail_if};
-pub use processor::{MISFIT, cores, is_fit, name as processor_name};
+pub use model_choice::{check_components, find as find_model};
+pub use processor::{MISFIT, cores, described as described_processor, is_fit, name as processor_name};
 pub use progress::Progress;
 pub use say::note;
+pub use scene_file::load_along as load_scene;
 
 /// Runs the command that the process was started with, and says how it ended.
 pub fn run() -> ExitCode {
-    let cli = match parsed::<Cli>() {
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// Runs the command of these arguments, the program's name first, and returns the exit code.
+pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match parsed_from::<Cli>(arguments) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
     let done = match cli.command {
         Command::Map(ask) => map::run(&ask),
+        Command::Merge(ask) => merge::run(&ask),
         Command::Orbit(ask) => orbit::run(&ask),
         Command::Bifurcation(ask) => bifurcation::run(&ask),
         Command::Models(ask) => models::run(&ask),
@@ -51,5 +62,5 @@ pub fn run() -> ExitCode {
         Command::Completions(ask) => completions::run(&ask),
         Command::Bench(Bench::Engines(ask)) => bench::run(&ask),
     };
-    done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
+    done.map_or_else(|failure| failure.told(), |()| 0)
 }

@@ -16,7 +16,7 @@ const FILE_MARKS: [&str; 3] = [".toml", "/", "\\"];
 ///
 /// # Errors
 /// [`Failure::Usage`] if there is none, or its file cannot be read or is wrong.
-pub(crate) fn find(name: &str) -> Result<FileModel, Failure> {
+pub fn find(name: &str) -> Result<FileModel, Failure> {
     if let Some(model) = FileModel::built_in(name) {
         return Ok(model);
     }
@@ -38,7 +38,7 @@ pub(crate) fn find(name: &str) -> Result<FileModel, Failure> {
 ///
 /// # Errors
 /// [`Failure::Usage`] if there are not as many.
-pub(crate) fn check_components(model: &dyn Model, count: usize) -> Result<(), Failure> {
+pub fn check_components(model: &dyn Model, count: usize) -> Result<(), Failure> {
     let names = model.state_names();
     let number = if names.len() == 2 { "two" } else { "four" };
     match count == names.len() {

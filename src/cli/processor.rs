@@ -40,7 +40,7 @@ pub fn name() -> Option<String> {
 }
 
 /// Name and cores, in words.
-pub(crate) fn described() -> String {
+pub fn described() -> String {
     let cores = cores();
     let named = name().filter(|name| !name.is_empty());
     named.map_or_else(|| format!("{cores} cores"), |name| format!("{name}, {cores} cores"))

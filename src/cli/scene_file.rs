@@ -29,11 +29,12 @@ pub(crate) fn load(path: &Path, sets: &[String], kept: Option<&Path>) -> Result<
     load_from(path, sets, Purpose::Map, None, kept)
 }
 
-/// The same of any purpose, where a diagram may run along one of several axes.
+/// The scene in the file at `path`, of any purpose; a diagram may run along one of several axes. Messages call it by that
+/// path.
 ///
 /// # Errors
-/// As [`load`].
-pub(crate) fn load_along(
+/// [`SceneError`] if the file cannot be read, or for the first thing wrong in it.
+pub fn load_along(
     path: &Path,
     sets: &[String],
     purpose: Purpose,

@@ -19,9 +19,9 @@ use rayon::prelude::*;
 use super::engine::Flows;
 use super::plan::Plan;
 use super::seen::{Seen, distance};
-use crate::record::Record;
 use crate::record::classify::classify;
 use crate::record::distance::farther;
+use crate::record::{Record, Records};
 use catalogue::{Catalogue, Found};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, State};
@@ -111,11 +111,11 @@ impl Cut {
 ///
 /// # Panics
 /// If there are not as many records as cells.
-pub fn basins(plan: &Plan, records: &[Record], filled_from: &[u32]) -> Option<Basins> {
+pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32]) -> Option<Basins> {
     if !plan.is_basin() {
         return None;
     }
-    assert_eq!(plan.cell_count(), records.len(), "one record per cell");
+    assert_eq!(plan.cell_count(), records.count(), "one record per cell");
     let cut = Cut::of(plan);
     let is_own = |id: usize| filled_from.get(id).is_none_or(|&from| from as usize == id);
     let flows = Flows::new(plan);
@@ -133,7 +133,7 @@ pub fn basins(plan: &Plan, records: &[Record], filled_from: &[u32]) -> Option<Ba
     let numbers = follow(groups.iter().map(|(catalogue, _)| catalogue));
     let cycles = numbers.iter().flatten().map(|&n| n + 1).max().unwrap_or(0);
     let chaos = cycles;
-    let mut own = vec![None; records.len()];
+    let mut own = vec![None; records.count()];
     for (group, (_, found)) in groups.iter().enumerate() {
         for &(id, found) in found {
             own[id] = match found {
@@ -144,7 +144,7 @@ pub fn basins(plan: &Plan, records: &[Record], filled_from: &[u32]) -> Option<Ba
         }
     }
     let of = |id: usize| filled_from.get(id).map_or(own[id], |&from| own[from as usize]);
-    let cells: Vec<Option<usize>> = (0..records.len()).map(of).collect();
+    let cells: Vec<Option<usize>> = (0..records.count()).map(of).collect();
     let mut counts = vec![0usize; cycles + 1];
     cells.iter().flatten().for_each(|&n| counts[n] += 1);
     let catalogues: Vec<&Catalogue> = groups.iter().map(|(catalogue, _)| catalogue).collect();
@@ -267,16 +267,16 @@ fn lexicographic(a: &State, b: &State) -> std::cmp::Ordering {
 }
 
 /// What attractors are read from.
-struct Shown<'a> {
+struct Shown<'a, R: ?Sized> {
     plan: &'a Plan,
-    records: &'a [Record],
+    records: &'a R,
     cut: Cut,
     flows: &'a Flows<'a>,
     catalogues: &'a [&'a Catalogue],
     numbers: &'a [Vec<usize>],
 }
 
-impl Shown<'_> {
+impl<R: Records + ?Sized> Shown<'_, R> {
     /// A cycle by its number, read where its basin is largest.
     fn cycle(&self, cells: &[Option<usize>], number: usize) -> Attractor {
         let mut counts = vec![0usize; self.cut.groups()];
@@ -308,7 +308,7 @@ impl Shown<'_> {
 
     fn chaos(&self, own: &[Option<usize>], number: usize) -> Attractor {
         let ids: Vec<usize> = (0..own.len()).filter(|&id| own[id] == Some(number)).collect();
-        let sum: f64 = ids.iter().map(|&id| self.records[id].lyapunov).sum();
+        let sum: f64 = ids.iter().map(|&id| self.records.record(id).lyapunov).sum();
         Attractor {
             class: Class::Chaotic,
             strobe: None,

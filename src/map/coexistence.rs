@@ -17,8 +17,8 @@ use rayon::prelude::*;
 use super::seen::Seen;
 use crate::map::engine::Flows;
 use crate::map::plan::Plan;
-use crate::record::Record;
 use crate::record::classify::classify;
+use crate::record::{Record, Records};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
 use rattlemap_dynamics::orbit::Class;
@@ -29,18 +29,18 @@ pub use super::seen::SAME;
 ///
 /// # Panics
 /// If there are not as many records as runs.
-pub fn attractors(plan: &Plan, records: &[Record]) -> Option<Vec<u8>> {
-    assert_eq!(plan.run_count(), records.len(), "one record per run");
+pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<u8>> {
+    assert_eq!(plan.run_count(), records.count(), "one record per run");
     if plan.start_count() == 1 {
         return None;
     }
     let cells = plan.cell_count();
     let flows = Flows::new(plan);
     let count = |id: usize| {
-        let runs = records[id..].iter().step_by(cells);
+        let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
         let mut found = Found::new(plan.law(cell.law));
-        flows.with(cell.flow, |flow| runs.for_each(|record| found.take(flow, record)));
+        flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
         found.count()
     };
     Some((0..cells).into_par_iter().map(count).collect())

@@ -5,7 +5,7 @@
 
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
-use crate::record::{Record, valid};
+use crate::record::{Record, Records, valid};
 use rattlemap_dynamics::model::Parameter;
 
 /// Relative differences that rounding makes of a number, in an engine of single precision and of double.
@@ -18,8 +18,12 @@ pub const ROUNDING: [f64; 2] = [1e-3, 1e-6];
 ///
 /// # Panics
 /// If there are not as many records as runs.
-pub fn without_effect<'p>(plan: &'p Plan, records: &[Record], rounding: f64) -> Vec<&'p Parameter> {
-    assert_eq!(plan.run_count(), records.len(), "one record per run");
+pub fn without_effect<'p>(
+    plan: &'p Plan,
+    records: &(impl Records + ?Sized),
+    rounding: f64,
+) -> Vec<&'p Parameter> {
+    assert_eq!(plan.run_count(), records.count(), "one record per run");
     if plan.policy().follows() {
         return Vec::new();
     }
@@ -27,13 +31,13 @@ pub fn without_effect<'p>(plan: &'p Plan, records: &[Record], rounding: f64) -> 
     let changes_nothing = |axis: usize| {
         let mut compared = 0;
         let [step, other_step] = if axis == 0 { [1, counts[0]] } else { [counts[0], 1] };
-        for map in records.chunks(plan.cell_count()) {
+        for map in (0..records.count()).step_by(plan.cell_count()) {
             for line in 0..counts[1 - axis] {
-                let cells = map.iter().skip(line * other_step).step_by(step).take(counts[axis]);
+                let cells = (0..counts[axis]).map(|n| records.record(map + line * other_step + n * step));
                 let mut integrated = cells.filter(|record| record.valid & valid::FILLED == 0);
                 let Some(first) = integrated.next() else { continue };
                 for record in integrated {
-                    if !is_same(first, record, rounding) {
+                    if !is_same(&first, &record, rounding) {
                         return false;
                     }
                     compared += 1;
@@ -45,6 +49,16 @@ pub fn without_effect<'p>(plan: &'p Plan, records: &[Record], rounding: f64) -> 
     // A start may change nothing and is no parameter.
     let axes = plan.axes().iter().enumerate().filter(|(_, axis)| !axis.target().is_start());
     axes.filter(|&(i, _)| changes_nothing(i)).map(|(_, axis)| axis.parameter()).collect()
+}
+
+/// Their names, within the rounding of records of this precision: `f64`, else single.
+///
+/// # Panics
+/// As [`without_effect`].
+pub fn names(plan: &Plan, records: &[Record], precision: &str) -> Vec<String> {
+    let rounding = ROUNDING[usize::from(precision == "f64")];
+    let found = without_effect(plan, records, rounding);
+    found.into_iter().map(|parameter| parameter.name.to_string()).collect()
 }
 
 fn is_same(a: &Record, b: &Record, rounding: f64) -> bool {

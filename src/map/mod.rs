@@ -12,6 +12,7 @@ pub mod scene;
 
 pub mod plan;
 pub mod schedule;
+pub mod shard;
 #[cfg(feature = "gpu")]
 pub mod size;
 

@@ -24,7 +24,7 @@ use thiserror::Error;
 pub(crate) use start::followed;
 
 use crate::map::scene::{Axis, Points, Quantity, Refine, Scene, Start, Steps};
-use crate::record::Record;
+use crate::record::{Record, Records};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Class};
@@ -247,9 +247,13 @@ impl Plan {
     /// The state in which the run `id` starts at phase 0. `records`, by run, are read only
     /// where cells follow their neighbours: there the neighbour's last strobe state, or rest
     /// where the neighbour failed or has no record yet.
-    pub fn start(&self, id: u32, records: &[Record]) -> State {
+    pub fn start(&self, id: u32, records: &(impl Records + ?Sized)) -> State {
+        let of = |before: u32| {
+            let before = before as usize;
+            (before < records.count()).then(|| records.record(before))
+        };
         match self.before(id) {
-            Some(before) => followed(records.get(before as usize)),
+            Some(before) => followed(of(before).as_ref()),
             None => self.own_start(id),
         }
     }

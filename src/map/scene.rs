@@ -119,7 +119,32 @@ impl Scene {
         along: Option<&Along>,
         find: FindFile<'_>,
     ) -> Result<Scene, SceneError> {
-        let mut document = document::read(text, name)?;
+        Scene::parse_document(text, document::read(text, name)?, sets, purpose, along, find)
+    }
+
+    /// The same of a text that a program has written for somebody: errors do not tell lines that nobody has seen.
+    ///
+    /// # Errors
+    /// As [`Scene::parse_along`].
+    pub fn parse_written(
+        text: &str,
+        sets: &[String],
+        purpose: Purpose,
+        along: Option<&Along>,
+        find: FindFile<'_>,
+    ) -> Result<Scene, SceneError> {
+        let document = document::read(text, "scene")?.placed(Place::Builder);
+        Scene::parse_document(text, document, sets, purpose, along, find)
+    }
+
+    fn parse_document(
+        text: &str,
+        mut document: Node,
+        sets: &[String],
+        purpose: Purpose,
+        along: Option<&Along>,
+        find: FindFile<'_>,
+    ) -> Result<Scene, SceneError> {
         for set in sets {
             overrides::apply(&mut document, set)?;
         }

@@ -34,6 +34,7 @@ use adaptive::Adaptive;
 use follow::Follow;
 
 use crate::map::plan::{Cell, Plan};
+use crate::map::shard::Shard;
 use crate::record::Record;
 
 /// The order of work on a map: which cells are asked for, and which of them have their records.
@@ -91,16 +92,26 @@ pub struct Refined {
 impl Schedule {
     /// The schedule of a plan.
     pub fn new(plan: &Plan) -> Schedule {
+        Schedule::of(plan, None)
+    }
+
+    /// The schedule of a part of a plan, or of all of it.
+    ///
+    /// # Panics
+    /// If there is a part of an adaptive map, which [`Shard::check`] refuses.
+    pub fn of(plan: &Plan, shard: Option<Shard>) -> Schedule {
+        assert!(shard.is_none() || plan.refine().is_none(), "an adaptive map is not dealt out");
         let mut sequence = Vec::new();
         let rule = match plan.refine() {
             Some(refine) => Rule::Adaptive(Box::new(Adaptive::new(plan, refine, &mut sequence))),
             None if plan.policy().follows() => {
-                let follow = Follow::new(plan);
+                let follow = Follow::new(plan, shard);
                 sequence = follow.row();
                 Rule::Follow(follow)
             }
             None => {
-                sequence = (0..plan.run_count()).map(|place| plan.run_at(place)).collect();
+                let all = || (0..plan.run_count()).map(|place| plan.run_at(place)).collect();
+                sequence = shard.map_or_else(all, |shard| shard.runs(plan));
                 Rule::Whole
             }
         };
@@ -151,7 +162,13 @@ impl Schedule {
         }
     }
 
-    /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included.
+    /// Whether it reads the records of other cells: else there need be none when one is taken up.
+    pub fn reads_records(&self) -> bool {
+        !matches!(self.rule, Rule::Whole)
+    }
+
+    /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included, if it reads
+    /// them.
     pub fn take(&mut self, id: u32, records: &[Record]) {
         self.states[id as usize] = State::Come;
         self.come += 1;

@@ -3,11 +3,15 @@
 use crate::gpu;
 use crate::map::plan::{Parts, keeps_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
+use crate::map::shard::Shard;
 use crate::record::Record;
 
 /// Bytes per cell in memory beside its record: its place in the order, and what the outputs
 /// make of it.
 const MEMORY_BESIDE: u64 = 64;
+
+/// Of these what a shard has for all runs of the map: their order, and which of them have come.
+const OF_ALL: u64 = 5;
 
 /// The same of a cell of a list: its values, their text, and which flow and law it has.
 const LIST_ROW: u64 = 200;
@@ -58,6 +62,23 @@ pub struct Size {
 }
 
 impl Size {
+    /// The size of a part of a scene's map, or of all of it: a part keeps its records on disk alone, unless cells follow
+    /// their neighbours, and makes neither tables nor figures. All of the map are its cells and runs, and the flows
+    /// that lanes read.
+    pub fn of_shard(scene: &Scene, shard: Option<Shard>) -> Size {
+        let whole = Size::of(scene);
+        let Some(shard) = shard else { return whole };
+        let own = whole.runs.div_ceil(u64::from(shard.count()));
+        let records = if scene.start().follows() { whole.runs } else { 0 };
+        let rows = scene.list().map_or(0, |list| list.len() as u64);
+        let memory = (whole.runs * OF_ALL).saturating_add(records * size_of::<Record>() as u64);
+        Size {
+            memory: memory.saturating_add(own * MEMORY_BESIDE).saturating_add(rows * LIST_ROW),
+            disk: own.saturating_mul(record_on_disk(scene)),
+            ..whole
+        }
+    }
+
     /// The size of a scene's map.
     pub fn of(scene: &Scene) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());

@@ -33,7 +33,7 @@ pub enum SweepError {
 }
 
 /// Runs the cells that a schedule asks for, puts their records into `records` (by
-/// run) and hands them to `keep` about once a second, with the number of runs that are foreseen by
+/// run; empty where neither the schedule reads them nor anybody else) and hands them to `keep` about once a second, with the number of runs that are foreseen by
 /// now. It ends before, and soon, once `halt` is raised. True if the map is finished.
 ///
 /// So many cells are under way that some end in about a second; records do not depend on it. If there are too many
@@ -76,7 +76,7 @@ pub async fn run(
                 under_way -= ended.len();
                 schedule.foresee(ended);
                 for &(id, record) in ended {
-                    records[id as usize] = record;
+                    put(records, id, record);
                     schedule.take(id, records);
                 }
                 unkept.extend_from_slice(ended);
@@ -103,11 +103,17 @@ pub fn replay(schedule: &mut Schedule, records: &mut [Record], kept: &[(u32, Rec
     kept.iter().all(|&(id, record)| {
         let is_waited_for = schedule.waits_for(id);
         if is_waited_for {
-            records[id as usize] = record;
+            put(records, id, record);
             schedule.take(id, records);
         }
         is_waited_for
     })
+}
+
+fn put(records: &mut [Record], id: u32, record: Record) {
+    if let Some(place) = records.get_mut(id as usize) {
+        *place = record;
+    }
 }
 
 /// How many cells are under way.

@@ -1,6 +1,6 @@
 //! `attractors.csv`: what the starts of a map of basins lead to.
 
-use std::path::Path;
+use std::io;
 
 use super::WriteError;
 use super::cells::Cells;
@@ -27,13 +27,13 @@ pub(super) fn named(label: usize, attractor: &Attractor) -> String {
     format!("{label}: {kind}{word}")
 }
 
-/// Writes the table to `path`: an attractor per row, the largest basin first. Where a parameter is swept, a last field
-/// has its value there.
+/// Writes the table: an attractor per row, the largest basin first. Where a parameter is swept, a last field has its value
+/// there.
 ///
 /// # Errors
-/// If the file cannot be written.
-pub(super) fn write(path: &Path, cells: &Cells<'_>, basins: &Basins) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+/// If it cannot be written.
+pub(super) fn write(to: impl io::Write, cells: &Cells<'_>, basins: &Basins) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(to);
     let scene = cells.scene();
     let names = scene.base().state_names();
     let states = names.iter().map(|name| format!("strobe_{name}"));

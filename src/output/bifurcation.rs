@@ -1,5 +1,6 @@
 //! The folder of a bifurcation diagram: tables, figure and manifest.
 
+use std::fs::File;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
@@ -56,8 +57,12 @@ pub fn write(
     let mut files = Vec::new();
     let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
     if wanted.contains(&Format::Csv) {
-        folder.replace(CSV, |path| bifurcation_csv::write(path, &parameter.name, &names, columns))?;
-        folder.replace(COLUMNS_CSV, |path| bifurcation_columns_csv::write(path, &parameter.name, columns))?;
+        folder.replace(CSV, |path| {
+            bifurcation_csv::write(File::create(path)?, &parameter.name, &names, columns)
+        })?;
+        folder.replace(COLUMNS_CSV, |path| {
+            bifurcation_columns_csv::write(File::create(path)?, &parameter.name, columns)
+        })?;
         files.extend([CSV, COLUMNS_CSV]);
         if fixed.is_some() {
             folder.replace(STROBE_CSV, |path| {

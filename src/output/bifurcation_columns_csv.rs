@@ -1,6 +1,6 @@
 //! What the motion is at each value of the axis, as a table: one row per column of the diagram.
 
-use std::path::Path;
+use std::io;
 
 use super::WriteError;
 use super::bifurcation_csv::direction_field;
@@ -24,12 +24,12 @@ const FIELDS: [&str; 11] = [
     "periods_run",
 ];
 
-/// Writes the columns to `path`; the first field is named after the swept parameter.
+/// Writes the columns; the first field is named after the swept parameter.
 ///
 /// # Errors
-/// If the file cannot be written.
-pub(super) fn write(path: &Path, axis: &str, columns: &[Column]) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+/// If the table cannot be written.
+pub(super) fn write(to: impl io::Write, axis: &str, columns: &[Column]) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(to);
     table.write_record([axis].into_iter().chain(direction_field(columns)).chain(FIELDS))?;
     for column in columns {
         let direction = column.direction.map(|direction| direction.name().to_owned());
@@ -80,10 +80,9 @@ mod tests {
     }
 
     fn written(columns: &[Column]) -> String {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("t.csv");
-        write(&path, "e", columns).unwrap();
-        std::fs::read_to_string(path).unwrap()
+        let mut text = Vec::new();
+        write(&mut text, "e", columns).unwrap();
+        String::from_utf8(text).unwrap()
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Section points as a table: one row per point.
 
-use std::path::Path;
+use std::io;
 
 use super::{WriteError, names};
 use crate::map::bifurcation::{Column, SectionPoint};
@@ -9,16 +9,21 @@ use rattlemap_dynamics::model::State;
 /// Point fields after `class`, `period` and `status`; the state before and after follows.
 const POINT_FIELDS: [&str; 3] = ["side", "kind", "t_mod_period"];
 
-/// Writes the columns to `path`; the first field is named after the swept parameter, the last
+/// Writes the columns; the first field is named after the swept parameter, the last
 /// ones after the components of the state.
 ///
 /// A column without points (no contact at all) still has one row, with empty point fields,
 /// so that no value of the axis is missing from the table.
 ///
 /// # Errors
-/// If the file cannot be written.
-pub(super) fn write(path: &Path, axis: &str, names: &[&str], columns: &[Column]) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+/// If the table cannot be written.
+pub(super) fn write(
+    to: impl io::Write,
+    axis: &str,
+    names: &[&str],
+    columns: &[Column],
+) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(to);
     let before: Vec<String> = names.iter().map(|name| format!("{name}_before")).collect();
     let states = before.iter().map(String::as_str).chain(names.iter().copied());
     let first = [axis].into_iter().chain(direction_field(columns)).chain(["class", "period", "status"]);
@@ -84,18 +89,18 @@ mod tests {
             column(0.25, Class::Periodic { period: 2 }, vec![point, point]),
             column(1.0, Class::Chaotic, vec![]),
         ];
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("t.csv");
-        write(&path, "e", &["x1", "v1", "x2", "v2"], &columns).unwrap();
+        let mut text = Vec::new();
+        write(&mut text, "e", &["x1", "v1", "x2", "v2"], &columns).unwrap();
         let row = "0.25,periodic,2,ok,-1,mesh_start,0.1,1.0,-2.0,1.5,1e-7,1.0,0.30000000000000004,1.5,";
         let expected = format!(
             "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2\n\
              {row}\n{row}\n1.0,chaotic,,ok,,,,,,,,,,,\n"
         );
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
         let up = Column { direction: Some(Direction::Up), ..columns[1].clone() };
-        write(&path, "e", &["x1", "v1"], &[up]).unwrap();
-        let text = std::fs::read_to_string(path).unwrap();
+        let mut text = Vec::new();
+        write(&mut text, "e", &["x1", "v1"], &[up]).unwrap();
+        let text = String::from_utf8(text).unwrap();
         assert!(
             text.starts_with("e,direction,class,") && text.ends_with("\n1.0,up,chaotic,,ok,,,,,,,\n"),
             "{text}"

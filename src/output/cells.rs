@@ -5,7 +5,7 @@ use crate::map::plan::Plan;
 use crate::map::scene::{Continuous, Quantity, Scene};
 use crate::map::schedule::Refined;
 use crate::record::classify::{classify, status};
-use crate::record::{Record, Spelling, valid};
+use crate::record::{Record, Records, Spelling, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -46,7 +46,7 @@ pub(super) struct Row {
 pub struct Cells<'a> {
     scene: &'a Scene,
     plan: &'a Plan,
-    records: &'a [Record],
+    records: &'a dyn Records,
     attractors: Option<&'a [u8]>,
     basins: Option<&'a Basins>,
     refined: Option<&'a Refined>,
@@ -57,8 +57,8 @@ impl<'a> Cells<'a> {
     ///
     /// # Panics
     /// If there are not as many records as runs.
-    pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a [Record]) -> Cells<'a> {
-        assert_eq!(plan.run_count(), records.len(), "one record per run");
+    pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a dyn Records) -> Cells<'a> {
+        assert_eq!(plan.run_count(), records.count(), "one record per run");
         Cells { scene, plan, records, attractors: None, basins: None, refined: None }
     }
 
@@ -109,26 +109,26 @@ impl<'a> Cells<'a> {
 
     /// The class of every cell, by id.
     pub fn classes(&self) -> impl Iterator<Item = Class> + '_ {
-        self.first_runs().iter().map(classify)
+        self.first_runs().map(|record| classify(&record))
     }
 
     /// The status of every cell, by id.
     pub fn statuses(&self) -> impl Iterator<Item = Status> + '_ {
-        self.first_runs().iter().map(status)
+        self.first_runs().map(|record| status(&record))
     }
 
     /// Forcing periods integrated, over all runs.
     pub fn periods(&self) -> u64 {
-        self.records.iter().map(|record| u64::from(record.periods_run)).sum()
+        (0..self.runs()).map(|id| u64::from(self.record(id).periods_run)).sum()
     }
 
     /// Runs, one per cell and start.
     pub fn runs(&self) -> usize {
-        self.records.len()
+        self.records.count()
     }
 
-    fn first_runs(&self) -> &'a [Record] {
-        &self.records[..self.plan.cell_count()]
+    fn first_runs(&self) -> impl Iterator<Item = Record> + '_ {
+        (0..self.plan.cell_count()).map(|id| self.record(id))
     }
 
     /// Attractors found per cell, by id, if they were counted.
@@ -159,23 +159,23 @@ impl<'a> Cells<'a> {
         self.scene.outputs().quantities.contains(&quantity)
     }
 
-    pub(super) fn record(&self, id: usize) -> &'a Record {
-        &self.records[id]
+    pub(super) fn record(&self, id: usize) -> Record {
+        self.records.record(id)
     }
 
     /// The word of the cell `id`, if it was asked for and there is one.
     pub(super) fn word(&self, id: usize) -> Option<Spelling> {
-        if self.asks(Quantity::Word) { self.records[id].spelling() } else { None }
+        if self.asks(Quantity::Word) { self.record(id).spelling() } else { None }
     }
 
     /// The pattern of the cell `id`, likewise.
     pub(super) fn pattern(&self, id: usize) -> Option<Spelling> {
-        if self.asks(Quantity::Pattern) { self.records[id].pattern() } else { None }
+        if self.asks(Quantity::Pattern) { self.record(id).pattern() } else { None }
     }
 
     /// The row of the run `id`, less its word.
     pub(super) fn row(&self, id: usize) -> Row {
-        let record = &self.records[id];
+        let record = &self.record(id);
         let indices = self.plan.indices(id as u32);
         let class = classify(record);
         let periodic = matches!(class, Class::Periodic { .. });
@@ -209,6 +209,69 @@ impl<'a> Cells<'a> {
                 .basins
                 .and_then(|basins| basins.labels().get(id).copied())
                 .filter(|&label| label != NONE),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::scene::Purpose;
+    use crate::output::{layers, words};
+    use crate::record::RecordStore;
+    use proptest::prelude::*;
+    use rattlemap_dynamics::word::Word;
+
+    const CELLS: usize = 12;
+
+    fn scene(quantities: &[&str]) -> Scene {
+        let axis = |name| format!("[[axis]]\nparameter = '{name}'\nmin = 0.2\nmax = 0.8\n");
+        let text = format!(
+            "{}count = 4\n{}count = 3\n[outputs]\nquantities = {quantities:?}\n",
+            axis("e"),
+            axis("omega")
+        );
+        Scene::parse(&text, "s", &[], Purpose::Map).unwrap()
+    }
+
+    /// Of any bits, as far as engines set them.
+    fn record() -> impl Strategy<Value = Record> {
+        let number = || prop_oneof![any::<f64>(), -1.0..1.0f64, Just(f64::NEG_INFINITY), Just(0.0)];
+        let numbers = [number(), number(), number(), number()];
+        let small = (0u32..65, any::<u32>(), 0u32..12, 0u32..2, 0u32..512);
+        let words = ["[1-6]{0,70}", "[1-6]{0,6}"];
+        (numbers, small, words).prop_map(|(numbers, small, words)| {
+            let [lyapunov, lyapunov_error, impacts_per_period, mesh_fraction] = numbers;
+            let (period, periods_run, status, symmetric, bits) = small;
+            let mut record = Record { lyapunov, lyapunov_error, ..Record::default() };
+            record.set_word(&Word::cyclic(words[0].as_bytes()));
+            record.set_pattern(&Word::cyclic(words[1].as_bytes()));
+            let seen = Record { impacts_per_period, mesh_fraction, symmetric, ..record };
+            Record { period, periods_run, status, valid: bits, ..seen }
+        })
+    }
+
+    proptest! {
+        /// What tables and figures show is the same, however records are kept.
+        #[test]
+        fn rows_are_the_same_from_a_store(
+            quantities in prop::sample::subsequence(
+                vec!["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"], 1..=7),
+            records in prop::collection::vec(record(), CELLS),
+        ) {
+            let scene = scene(&quantities);
+            let plan = Plan::new(&scene);
+            let mut store = RecordStore::new(CELLS, false);
+            records.iter().enumerate().for_each(|(id, record)| store.put(id, record));
+            let (a, b) = (Cells::new(&scene, &plan, &records), Cells::new(&scene, &plan, &store));
+            for id in 0..CELLS {
+                // NaN, too, is as it was.
+                prop_assert_eq!(format!("{:?}", a.row(id)), format!("{:?}", b.row(id)));
+                prop_assert_eq!((a.word(id), a.pattern(id)), (b.word(id), b.pattern(id)));
+            }
+            prop_assert_eq!(a.periods(), b.periods());
+            let shown = |cells: &Cells<'_>| layers::of(cells, &words::read(cells)).into_iter().map(|layer| layer.indices);
+            prop_assert!(shown(&a).eq(shown(&b)));
         }
     }
 }

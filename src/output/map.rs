@@ -1,6 +1,6 @@
 //! The folder of a map: tables, figures, report and manifest.
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::Path;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
@@ -22,7 +22,7 @@ use crate::model_file::FileModel;
 use crate::validate::Validation;
 
 pub use super::manifest::MANIFEST;
-pub use super::map_manifest::{Made, Run};
+pub use super::map_manifest::{Made, Merged, Run};
 
 const CSV: &str = "cells.csv";
 const NPY: &str = "cells.npy";
@@ -161,7 +161,7 @@ pub fn repair(
 }
 
 /// Whether a name is wanted.
-type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
+pub(super) type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
 
 /// Writes the files that the scene asks for, as far as they are wanted.
 fn write_files(
@@ -178,11 +178,22 @@ fn write_files(
     );
     let mut files = tables?;
     files.extend(pictures?);
-    if let Some(list) = cells.scene().list().filter(|_| wanted(LIST)) {
+    files.extend(write_copies(folder, cells.scene(), wanted)?);
+    Ok(files)
+}
+
+/// Writes the list and the model of a scene that has them, as far as they are wanted.
+pub(super) fn write_copies(
+    folder: &Folder,
+    scene: &Scene,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    let mut files = Vec::new();
+    if let Some(list) = scene.list().filter(|_| wanted(LIST)) {
         write_list(folder, list)?;
         files.push(LIST.to_owned());
     }
-    let own = cells.scene().base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
+    let own = scene.base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
     if let Some(model) = own.filter(|_| wanted(MODEL)) {
         folder.replace(MODEL, |path| Ok(fs::write(path, &model.definition().text)?))?;
         files.push(MODEL.to_owned());
@@ -213,9 +224,9 @@ fn write_tables(
     );
     let words = write_if(asks(Format::Npy) && has_words, WORDS, &|path| rows.write(path));
     let attractors = match cells.basins() {
-        Some(basins) => {
-            write_if(asks(Format::Csv), ATTRACTORS, &|path| attractors_csv::write(path, cells, basins))?
-        }
+        Some(basins) => write_if(asks(Format::Csv), ATTRACTORS, &|path| {
+            attractors_csv::write(File::create(path)?, cells, basins)
+        })?,
         None => None,
     };
     Ok([csv?, npy?, words?, attractors].into_iter().flatten().collect())

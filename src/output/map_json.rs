@@ -5,11 +5,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::cells::Cells;
-use super::map_manifest::{
-    AdapterObject, BasinObject, CardObject, RefinementObject, Run, basins, statuses, tally,
-};
+use super::map_manifest::{AdaptersObject, BasinObject, RefinementObject, Run, basins, statuses, tally};
 use super::{OutputError, names};
 use crate::map::plan::count_classes;
 
@@ -21,10 +20,11 @@ struct MapObject<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
+    /// Of so many it was merged.
     #[serde(skip_serializing_if = "Option::is_none")]
-    adapter: Option<AdapterObject<'a>>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    cards: Vec<CardObject<'a>>,
+    shards: Option<u32>,
     cells: usize,
     /// One per cell and start.
     runs: usize,
@@ -71,14 +71,25 @@ pub fn print(
     run: &Run<'_>,
     writing: Duration,
 ) -> Result<(), OutputError> {
+    super::print(&serde_json::to_string_pretty(&object(folder, files, cells, run, writing)?)?)
+}
+
+/// The same as an object.
+pub(super) fn object(
+    folder: &Path,
+    files: &[String],
+    cells: &Cells<'_>,
+    run: &Run<'_>,
+    writing: Duration,
+) -> Result<Value, OutputError> {
     let object = MapObject {
         folder: folder.to_string_lossy().into_owned(),
         files,
         engine: run.engine,
         precision: run.precision,
         device: run.device,
-        adapter: run.adapter.as_ref().map(AdapterObject::from),
-        cards: run.cards.iter().map(CardObject::from).collect(),
+        adapters: AdaptersObject::of(run),
+        shards: run.merged.map(|merged| merged.shards),
         cells: cells.counts().iter().product(),
         runs: cells.runs(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
@@ -95,5 +106,5 @@ pub fn print(
             write: writing.as_secs_f64(),
         },
     };
-    super::print(&serde_json::to_string_pretty(&object)?)
+    Ok(serde_json::to_value(object)?)
 }

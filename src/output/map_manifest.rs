@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::cell_columns::ABSENT;
 use super::cells::{Cells, SOURCES};
-use super::cells_npy::ABSENT;
 use super::inventory::FileEntry;
 use super::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
 use super::map::LIST;
@@ -63,6 +63,19 @@ pub struct Run<'a> {
     pub refined: Option<Refined>,
     /// Swept parameters that changed nothing that was measured.
     pub without_effect: Vec<String>,
+    /// Of what it was merged, if it was.
+    pub merged: Option<Merged<'a>>,
+}
+
+/// Shards of which a map was merged, and what computed their records.
+#[derive(Clone, Copy, Debug)]
+pub struct Merged<'a> {
+    /// How many.
+    pub shards: u32,
+    /// A hash of the sources that decide what records hold.
+    pub sources: &'a str,
+    /// What these were compiled for.
+    pub target: &'a str,
 }
 
 /// It names neither the machine's paths nor its users.
@@ -73,15 +86,16 @@ pub(super) struct Manifest<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    adapter: Option<AdapterObject<'a>>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    cards: Vec<CardObject<'a>>,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
     /// Of the host.
     processor: &'a str,
     /// A hash of the sources that decide what records hold, and what they were compiled for.
-    sources: &'static str,
-    target: &'static str,
+    sources: &'a str,
+    target: &'a str,
+    /// Of so many it was merged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shards: Option<u32>,
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
@@ -117,9 +131,27 @@ pub(super) struct Manifest<'a> {
     files: &'a [FileEntry],
 }
 
+/// On which adapters a map was computed: one or several.
+#[derive(Serialize)]
+pub(super) struct AdaptersObject<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adapter: Option<AdapterObject<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cards: Vec<CardObject<'a>>,
+}
+
+impl<'a> AdaptersObject<'a> {
+    pub(super) fn of(run: &'a Run<'_>) -> AdaptersObject<'a> {
+        AdaptersObject {
+            adapter: run.adapter.as_ref().map(AdapterObject::from),
+            cards: run.cards.iter().map(CardObject::from).collect(),
+        }
+    }
+}
+
 /// Which of a machine's adapters: its number as `rattlemap devices` lists them, and its place on the bus where it has one.
 #[derive(Serialize)]
-pub(super) struct AdapterObject<'a> {
+struct AdapterObject<'a> {
     number: usize,
     pci: Option<&'a str>,
 }
@@ -132,7 +164,7 @@ impl<'a> From<&'a AdapterId> for AdapterObject<'a> {
 
 /// What one of several cards did: cells of this run alone, and why it was lost if it was.
 #[derive(Serialize)]
-pub(super) struct CardObject<'a> {
+struct CardObject<'a> {
     number: usize,
     name: &'a str,
     pci: Option<&'a str>,
@@ -173,7 +205,7 @@ pub(super) fn basins(cells: &Cells<'_>) -> Option<Vec<BasinObject>> {
 
 /// Which cells there are, where they are listed.
 #[derive(Serialize)]
-struct ListObject {
+pub(super) struct ListObject {
     /// The copy in the folder, which has the same values.
     file: &'static str,
     columns: Vec<String>,
@@ -195,14 +227,14 @@ impl From<&List> for ListObject {
 
 /// Seconds by phase; `integrate` of all runs that the map took, the others of the last. Validation adds its own.
 #[derive(Serialize)]
-struct TimingsObject {
-    open: f64,
-    integrate: f64,
-    write: f64,
+pub(super) struct TimingsObject {
+    pub(super) open: f64,
+    pub(super) integrate: f64,
+    pub(super) write: f64,
 }
 
 #[derive(Serialize)]
-struct IntegrationObject {
+pub(super) struct IntegrationObject {
     /// As the scene asks; null for as many as the motion needs.
     steps_per_period: Option<u32>,
     /// As lanes took them, over all flows; null on the CPU.
@@ -331,11 +363,11 @@ pub(super) fn map<'a>(
         engine: run.engine,
         precision: run.precision,
         device: run.device,
-        adapter: run.adapter.as_ref().map(AdapterObject::from),
-        cards: run.cards.iter().map(CardObject::from).collect(),
+        adapters: AdaptersObject::of(run),
         processor: run.processor,
-        sources: Identity::own_sources(),
-        target: Identity::own_target(),
+        sources: run.merged.map_or(Identity::own_sources(), |merged| merged.sources),
+        target: run.merged.map_or(Identity::own_target(), |merged| merged.target),
+        shards: run.merged.map(|merged| merged.shards),
         title: scene.title(),
         scene: scene.text(),
         set: run.sets,
@@ -367,7 +399,7 @@ pub(super) fn map<'a>(
     }
 }
 
-fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> IntegrationObject {
+pub(super) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> IntegrationObject {
     let settings = scene.integration();
     IntegrationObject {
         steps_per_period: match settings.steps_per_period {

@@ -10,10 +10,11 @@ use super::manifest::{Head, MANIFEST, ModelObject, TimingsObject};
 use super::orbit_json::to_json;
 use super::orbit_spectrum::Spectrum;
 use super::orbit_summary::summary;
+pub use super::orbit_tables::Moment;
 use super::parameters::Parameters;
 use super::{Folder, OutputError, orbit_figures, orbit_tables};
 use crate::map::scene::Format;
-use rattlemap_dynamics::model::{Model, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Model, ModelError, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
 /// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
@@ -145,10 +146,28 @@ pub fn write(
 }
 
 fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {
-    let (periods, oscillator) = (orbit.cycle_periods, model.oscillator()?);
-    let samples = TABLED.div_ceil(periods.max(1) as usize).max(LEAST_TABLED);
-    let trace = trace(model, orbit.strobe, orbit.strobe_meshing, periods, samples)?;
-    folder.replace(TRAJECTORY, |path| {
-        orbit_tables::write_trajectory(path, &model.state_names(), &oscillator, orbit, &trace, samples)
-    })
+    let samples = TABLED.div_ceil(orbit.cycle_periods.max(1) as usize).max(LEAST_TABLED);
+    let moments = moments(model, orbit, samples)?;
+    folder.replace(TRAJECTORY, |path| orbit_tables::write_trajectory(path, &model.state_names(), &moments))
+}
+
+/// An orbit's motion over the periods that its events span: so many samples in a forcing period, and every event.
+///
+/// # Errors
+/// [`ModelError`] if the model is not valid.
+pub fn moments(
+    model: &dyn Model,
+    orbit: &Orbit,
+    samples_per_period: usize,
+) -> Result<Vec<Moment>, ModelError> {
+    let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples_per_period)?;
+    Ok(orbit_tables::moments(&model.oscillator()?, orbit, &trace, samples_per_period))
+}
+
+/// What `orbit --json` prints.
+///
+/// # Errors
+/// [`OutputError`] if it cannot be put into JSON.
+pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> Result<String, OutputError> {
+    Ok(to_json(model, orbit, instant)?)
 }

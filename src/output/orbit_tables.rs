@@ -7,48 +7,75 @@ use super::{WriteError, names};
 use rattlemap_dynamics::model::{Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
 
-/// Writes the motion to `path`: samples, and two rows for every event among them, the state before and after.
+/// One moment of a motion: a sample, or the state before or after an event.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// Time since phase 0 of the cycle.
+    pub t: f64,
+    /// Of the forcing, in turns.
+    pub phase: f64,
+    /// The gap and its velocity.
+    pub gap: [f64; 2],
+    /// The state, as many components as the model has.
+    pub state: State,
+    /// `free`, `meshing_right` or `meshing_left`.
+    pub domain: &'static str,
+    /// Of an event its kind, its side and whether this is `before` or `after`.
+    pub event: Option<(&'static str, i8, &'static str)>,
+}
+
+/// The motion moment by moment: samples, and two moments for every event among them.
 ///
 /// `trace` has so many samples in a forcing period, the first at phase 0, and goes as far as the events.
-///
-/// # Errors
-/// If the file cannot be written.
-pub(super) fn write_trajectory(
-    path: &Path,
-    state_names: &[&str],
+pub(super) fn moments(
     oscillator: &Oscillator,
     orbit: &Orbit,
     trace: &[Sample],
     samples_per_period: usize,
-) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
-    let head = ["t", "phase", "z", "w"].into_iter().chain(state_names.iter().copied());
-    table.write_record(head.chain(["domain", "event", "side", "moment"]))?;
-    let mut row = |t: f64, phase: f64, state: &State, domain: Option<Side>, marks: [String; 3]| {
-        let gaps = [0, 1].map(|velocity| gap(oscillator, state, velocity));
-        let numbers = [t, phase].into_iter().chain(gaps).chain(state[..state_names.len()].iter().copied());
-        let texts = numbers.map(|x| format!("{x:?}")).chain([domain_name(domain).to_owned()]);
-        table.write_record(texts.chain(marks))
+) -> Vec<Moment> {
+    let mut moments = Vec::with_capacity(trace.len() + 2 * orbit.events.len());
+    let mut add = |t, phase, state: &State, domain, event| {
+        let gap = [0, 1].map(|velocity| gap(oscillator, state, velocity));
+        moments.push(Moment { t, phase, gap, state: *state, domain: domain_name(domain), event });
     };
     let mut events = orbit.events.iter().peekable();
     let (mut domain, mut last) = (orbit.strobe_meshing, f64::NEG_INFINITY);
     for (i, sample) in trace.iter().enumerate() {
         while let Some(event) = events.next_if(|event| event.t <= sample.t) {
             let phase = event.t_mod_period / orbit.forcing_period;
-            let marks = |moment: &str| {
-                [names::kind(event.kind).to_owned(), names::side(event.side).to_string(), moment.to_owned()]
-            };
-            row(event.t, phase, &event.before, domain, marks("before"))?;
+            let mark = |moment| Some((names::kind(event.kind), names::side(event.side), moment));
+            add(event.t, phase, &event.before, domain, mark("before"));
             domain = domain_after(event);
-            row(event.t, phase, &event.after, domain, marks("after"))?;
+            add(event.t, phase, &event.after, domain, mark("after"));
             last = event.t;
         }
         // A sample on an event says nothing new.
         if sample.t > last {
             let phase = (i % samples_per_period) as f64 / samples_per_period as f64;
             domain = sample.meshing;
-            row(sample.t, phase, &sample.state, domain, Default::default())?;
+            add(sample.t, phase, &sample.state, domain, None);
         }
+    }
+    moments
+}
+
+/// Writes a motion to `path`, a row for each moment.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write_trajectory(
+    path: &Path,
+    state_names: &[&str],
+    moments: &[Moment],
+) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_path(path)?;
+    let head = ["t", "phase", "z", "w"].into_iter().chain(state_names.iter().copied());
+    table.write_record(head.chain(["domain", "event", "side", "moment"]))?;
+    for Moment { t, phase, gap, state, domain, event } in moments {
+        let numbers = [*t, *phase].into_iter().chain(*gap).chain(state[..state_names.len()].iter().copied());
+        let texts = numbers.map(|x| format!("{x:?}")).chain([(*domain).to_owned()]);
+        let marks = event.map(|(kind, side, moment)| [kind.to_owned(), side.to_string(), moment.to_owned()]);
+        table.write_record(texts.chain(marks.unwrap_or_default()))?;
     }
     Ok(table.flush()?)
 }

@@ -119,6 +119,37 @@ impl RecordFile {
         Ok(RecordFile { file, path: path.to_owned(), count: 0, next_number: 0, damage: None })
     }
 
+    /// Starts a file that gets its name with [`RecordFile::put_in_place`] alone: one that has it meanwhile stays.
+    ///
+    /// # Errors
+    /// [`RecordFileError::Io`] if it cannot be written.
+    pub fn create_aside(path: &Path, identity: &Identity) -> Result<RecordFile, RecordFileError> {
+        RecordFile::create(&partial(path), identity)
+    }
+
+    /// Removes a file that was started aside.
+    pub fn discard(self) {
+        let RecordFile { file, path, .. } = self;
+        drop(file);
+        // Best effort: whoever discards it has an error to tell.
+        let _ = fs::remove_file(path);
+    }
+
+    /// Gives a file that was started aside its name, all on the disk.
+    ///
+    /// # Errors
+    /// [`RecordFileError::Io`] if it cannot be renamed.
+    pub fn put_in_place(self, path: &Path) -> Result<(), RecordFileError> {
+        let RecordFile { file, path: aside, .. } = self;
+        let placed = refuse_link(path).and_then(|()| {
+            file.sync_all()?;
+            // Windows renames no file that is open.
+            drop(file);
+            fs::rename(&aside, path)
+        });
+        placed.map_err(|reason| RecordFileError::Io { path: path.to_owned(), reason })
+    }
+
     /// Opens the file of an interrupted run; `take` gets every batch that is good, ids with their
     /// records, and says whether the run asks for them. What is damaged is taken out of the file. One in
     /// which nothing was kept yet is started anew.

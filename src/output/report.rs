@@ -226,8 +226,8 @@ fn derived(scene: &Scene) -> Vec<DerivedData> {
 /// Starts that a cell's record does not tell, in full: the command that replays it needs them.
 fn starts(cells: &Cells<'_>) -> Option<Packed> {
     let [columns, rows] = cells.counts();
-    let all: Vec<[f64; 4]> = (0..columns * rows).map(|id| cells.start(id)).collect();
-    cells.scene().start().follows().then(|| packed("f64", &all))
+    let all = || (0..columns * rows).map(|id| cells.start(id)).collect::<Vec<[f64; 4]>>();
+    cells.scene().start().follows().then(|| packed("f64", &all()))
 }
 
 /// What the page reads out for a cell, one array per quantity that the scene asks for.

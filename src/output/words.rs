@@ -68,7 +68,7 @@ impl Words {
         let mut list: Vec<(Spelling, usize)> = Vec::new();
         let mut numbers = Vec::with_capacity(columns * rows);
         for id in 0..columns * rows {
-            let record = cells.record(id);
+            let record = &cells.record(id);
             let number = match seen.get(&(field.packed)(record)) {
                 _ if record.valid & field.bit == 0 => None,
                 Some(&number) => Some(number),

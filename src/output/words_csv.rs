@@ -50,6 +50,12 @@ impl<'s> Rows<'s> {
         self.pattern.as_ref().map_or(0, |column| column.row(id))
     }
 
+    /// The texts by row.
+    pub(super) fn texts(&self) -> Vec<String> {
+        let spelled = self.list.iter().map(|spelling| spelling.in_table());
+        std::iter::once(String::new()).chain(spelled).collect()
+    }
+
     /// Writes the table to `path`.
     ///
     /// # Errors

@@ -4,10 +4,12 @@ pub mod classify;
 pub mod distance;
 pub mod limits;
 mod spelling;
+mod store;
 
 #[cfg(feature = "gpu")]
 pub(crate) use spelling::joined;
 pub use spelling::{Spelling, word_hash};
+pub use store::{RecordStore, Records};
 
 use bytemuck::{Pod, Zeroable};
 

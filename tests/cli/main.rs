@@ -17,7 +17,8 @@ mod map;
 mod measure_gpu;
 mod models;
 mod orbit_tables;
-mod python;
+#[cfg(target_os = "linux")]
+mod slurm;
 mod systems;
 mod text;
 mod your_gears;

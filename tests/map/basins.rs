@@ -205,7 +205,7 @@ fn adaptive_basins_depend_on_no_order_and_are_those_of_the_whole_map() {
         assert!(records == others);
         assert!(ours.labels() == of(&others, &other).labels());
     }
-    let whole = attractors::basins(&plan, &WHOLE, &[]).unwrap();
+    let whole = attractors::basins(&plan, &**WHOLE, &[]).unwrap();
     let filled = first.filled;
     assert!(filled > 1000 && first.integrated + filled == WHOLE.len(), "{first:?}");
     // The same attractors, whatever their numbers.

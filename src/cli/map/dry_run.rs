@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use serde_json::{Value, json};
 
 use super::forecast::Forecast;
-use super::{engine_of, order, unit};
+use super::{engine_of, order, shard, unit};
 use crate::cli::arguments::Map;
 use crate::cli::capacity::{Free, bytes};
 use crate::cli::error::Failure;
@@ -17,6 +17,7 @@ use crate::map::engine_choice::{self, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::map::schedule::Schedule;
+use crate::map::shard::Shard;
 use crate::map::size::Size;
 use crate::output::{self, Folder, Identity, RECORDS, RecordFile, RecordFileError};
 
@@ -24,6 +25,8 @@ use crate::output::{self, Folder, Identity, RECORDS, RecordFile, RecordFileError
 struct Foreseen<'a> {
     scene: &'a Scene,
     plan: &'a Plan,
+    /// A part of the map, and how many runs it has.
+    shard: Option<(Shard, usize)>,
     engine: &'a Engine<'a>,
     why: String,
     /// Runs that an interrupted run has kept.
@@ -37,20 +40,32 @@ struct Foreseen<'a> {
 
 /// Checks what a run would check, times some cells and says what all of them take.
 pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(), Failure> {
-    let out = ask.run.out();
+    let out = ask.out();
     check_folder(ask, &out)?;
     let clock = Instant::now();
     let Chosen { mut engine, why, .. } =
         pollster::block_on(engine_choice::open(plan, &engine_of(ask, &out).ask()))?;
     let opening = clock.elapsed().as_secs_f64();
-    let kept = if ask.resume { kept(&out, scene, plan, &engine)? } else { 0 };
-    let left = plan.run_count().saturating_sub(kept);
+    let kept = if ask.resume { kept(ask, &out, scene, plan, &engine)? } else { 0 };
+    let runs = shard::runs(ask, plan);
+    let left = runs.saturating_sub(kept);
     let forecast = match left {
         0 => Forecast { seconds: 0.0, interval: Some([0.0; 2]), sampled: 0 },
         left => Forecast::of(plan, &mut engine, left).map_err(|error| Failure::Run(anyhow!("{error}")))?,
     };
-    let size = Size::of(scene);
-    let foreseen = Foreseen { scene, plan, engine: &engine, why, kept, size, free, opening, forecast };
+    let size = Size::of_shard(scene, ask.shard);
+    let foreseen = Foreseen {
+        scene,
+        shard: ask.shard.map(|shard| (shard, runs)),
+        plan,
+        engine: &engine,
+        why,
+        kept,
+        size,
+        free,
+        opening,
+        forecast,
+    };
     let text = if ask.json {
         serde_json::to_string_pretty(&foreseen.object(&out)).map_err(output::OutputError::from)?
     } else {
@@ -68,13 +83,15 @@ fn check_folder(ask: &Map, out: &Path) -> Result<(), Failure> {
 }
 
 /// How many runs are kept of those that are asked for.
-fn kept(out: &Path, scene: &Scene, plan: &Plan, engine: &Engine<'_>) -> Result<usize, Failure> {
+fn kept(ask: &Map, out: &Path, scene: &Scene, plan: &Plan, engine: &Engine<'_>) -> Result<usize, Failure> {
     let path = out.join(RECORDS);
     if !path.is_file() {
         return Ok(0);
     }
-    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity());
-    Ok(RecordFile::read(&path, &identity, order(&Schedule::new(plan)), |batch| plan.admits(batch))?.count)
+    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
+        .of_shard(ask.shard);
+    let order = order(&Schedule::of(plan, ask.shard));
+    Ok(RecordFile::read(&path, &identity, order, |batch| plan.admits(batch))?.count)
 }
 
 impl Foreseen<'_> {
@@ -102,8 +119,11 @@ impl Foreseen<'_> {
         let grid = if plan.is_list() { String::new() } else { format!("{} = ", counts.join(" x ")) };
         let starts = match plan.start_count() {
             1 => String::new(),
-            starts => format!(", {starts} starts each: {} runs", size.runs),
+            starts => format!(", {starts} starts each: {} runs", plan.run_count()),
         };
+        let of_shard = self.shard.map_or(String::new(), |(shard, runs)| {
+            format!("; {runs} {} of them in shard {shard}", unit(plan))
+        });
         let kept =
             if *kept > 0 { format!("; {kept} {} are kept already", unit(plan)) } else { String::new() };
         let of = |free: Option<u64>| free.map_or(String::new(), |free| format!("; {} are free", bytes(free)));
@@ -113,7 +133,7 @@ impl Foreseen<'_> {
         let why = if self.why.is_empty() { String::new() } else { format!(": {}", self.why) };
         let place = crate::cli::say::path(out);
         [
-            format!("cells    {grid}{}{starts}{kept}", size.cells),
+            format!("cells    {grid}{}{starts}{of_shard}{kept}", plan.cell_count()),
             format!("engine   {} ({}) on {}{why}", engine.name(), engine.precision(), self.device()),
             format!("memory   about {}{device}{}", bytes(self.host()), of(free.memory)),
             format!("disk     about {}{} for {place}", bytes(size.disk), of(free.disk)),
@@ -134,7 +154,8 @@ impl Foreseen<'_> {
         json!({
             "folder": out.to_string_lossy(),
             "cells": scene.cell_count(),
-            "runs": plan.run_count(),
+            "runs": self.shard.map_or(plan.run_count(), |(_, runs)| runs),
+            "shard": self.shard.map(|(shard, _)| shard),
             "kept": self.kept,
             "engine": engine.name(),
             "precision": engine.precision(),

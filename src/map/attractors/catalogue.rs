@@ -7,8 +7,8 @@
 use rayon::prelude::*;
 
 use crate::map::seen::{SAME, Seen, distance};
-use crate::record::Record;
 use crate::record::classify::classify;
+use crate::record::{Record, Records};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, NonImpacting, State};
 use rattlemap_dynamics::orbit::Class;
@@ -69,20 +69,26 @@ impl Catalogue {
         &self.cycles
     }
 
-    /// What records show, one after the other; they may show cycles that were not known.
-    pub(crate) fn learn(&mut self, flow: &Flow, law: Law, records: &[&Record]) -> Vec<Found> {
-        let mut all = Vec::with_capacity(records.len());
-        let first = if self.cycles.is_empty() { FIRST_BLOCK } else { LARGEST_BLOCK };
-        let (mut left, mut size) = (records, first);
-        while !left.is_empty() {
-            let (block, later) = left.split_at(left.len().min(size));
-            (left, size) = (later, (2 * size).min(LARGEST_BLOCK));
+    /// What so many records show, one after the other, by their place; they may show cycles that were not known.
+    pub(crate) fn learn(
+        &mut self,
+        flow: &Flow,
+        law: Law,
+        count: usize,
+        record: impl Fn(usize) -> Record + Sync,
+    ) -> Vec<Found> {
+        let mut all = Vec::with_capacity(count);
+        let mut size = if self.cycles.is_empty() { FIRST_BLOCK } else { LARGEST_BLOCK };
+        while all.len() < count {
+            let block = all.len()..count.min(all.len() + size);
+            size = (2 * size).min(LARGEST_BLOCK);
             let known = &*self;
-            let look = |record: &&Record| {
+            let look = |nth: usize| {
+                let record = &record(nth);
                 let new = |period| (period, known.refined(flow, law, record, period));
                 known.look(record).map_err(new)
             };
-            let looked: Vec<_> = block.par_iter().map(look).collect();
+            let looked: Vec<_> = block.into_par_iter().map(look).collect();
             all.extend(looked.into_iter().map(|looked| match looked {
                 Ok(found) => found,
                 Err((_, Some(seen))) => Found::Cycle(self.add(flow, seen)),
@@ -184,14 +190,18 @@ impl Catalogue {
 }
 
 /// What every one of these records shows, and the cycles that they are on.
-pub(super) fn learn(flow: &Flow, law: Law, records: &[Record], ids: &[usize]) -> (Catalogue, Vec<Found>) {
+pub(super) fn learn(
+    flow: &Flow,
+    law: Law,
+    records: &(impl Records + ?Sized),
+    ids: &[usize],
+) -> (Catalogue, Vec<Found>) {
     let mut catalogue = Catalogue::of(flow);
-    let own: Vec<&Record> = ids.iter().map(|&id| &records[id]).collect();
-    let mut all = catalogue.learn(flow, law, &own);
+    let mut all = catalogue.learn(flow, law, ids.len(), |nth| records.record(ids[nth]));
     // What is left takes the nearest cycle, or is one of its own.
     for (found, &id) in all.iter_mut().zip(ids) {
         if let Found::Unresolved(period) = *found {
-            let state = records[id].strobe;
+            let state = records.record(id).strobe;
             let known = catalogue.nearest(&state, period);
             *found = Found::Cycle(match known {
                 Some(nth) => nth,

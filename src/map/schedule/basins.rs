@@ -35,16 +35,15 @@ impl Basins {
 
     /// Labels of records that are taken up next: side by side, for some of them take Newton's method.
     pub(super) fn foresee(&mut self, records: &[(u32, Record)]) {
-        let (ids, records): (Vec<u32>, Vec<&Record>) =
-            records.iter().map(|(id, record)| (*id, record)).unzip();
-        let found = self.catalogue.learn(&self.flow, self.law, &records);
-        self.foreseen.extend(ids.into_iter().zip(found.into_iter().map(label)));
+        let found = self.catalogue.learn(&self.flow, self.law, records.len(), |nth| records[nth].1);
+        let ids = records.iter().map(|(id, _)| *id);
+        self.foreseen.extend(ids.zip(found.into_iter().map(label)));
     }
 
     pub(super) fn label(&mut self, id: u32, record: &Record) -> Label {
         let foreseen = self.foreseen.remove(&id);
         foreseen.unwrap_or_else(|| {
-            let found = self.catalogue.learn(&self.flow, self.law, &[record]);
+            let found = self.catalogue.learn(&self.flow, self.law, 1, |_| *record);
             found.into_iter().next().map_or(Label::default(), label)
         })
     }

@@ -2,40 +2,44 @@
 
 use crate::map::plan::{Plan, followed};
 use crate::map::scene::Start;
+use crate::map::shard::Shard;
 use crate::record::Record;
 use rattlemap_dynamics::model::{REST, State};
 
 /// Where a map that follows its neighbours stands.
 pub(super) struct Follow {
-    columns: usize,
+    /// Cells of a row of the map, and those of them that are followed.
+    width: usize,
+    columns: Vec<u32>,
     rows: usize,
     is_down: bool,
     /// Rows before the one under way.
     done: usize,
-    /// Starts of the row under way, by column.
+    /// Starts of the row under way, by place.
     starts: Vec<State>,
 }
 
 impl Follow {
-    pub(super) fn new(plan: &Plan) -> Follow {
-        let [columns, rows] = plan.counts();
-        let is_down = plan.policy() == Start::Down;
-        Follow { columns, rows, is_down, done: 0, starts: vec![REST; columns] }
+    pub(super) fn new(plan: &Plan, shard: Option<Shard>) -> Follow {
+        let [width, rows] = plan.counts();
+        let columns = shard.map_or_else(|| (0..width as u32).collect(), |shard| shard.columns(plan));
+        let (is_down, starts) = (plan.policy() == Start::Down, vec![REST; columns.len()]);
+        Follow { width, columns, rows, is_down, done: 0, starts }
     }
 
     pub(super) fn cell_count(&self) -> usize {
-        self.columns * self.rows
+        self.columns.len() * self.rows
     }
 
     /// The cells of the row under way, by column.
     pub(super) fn row(&self) -> Vec<u32> {
         let j = if self.is_down { self.rows - 1 - self.done } else { self.done };
-        (j * self.columns..(j + 1) * self.columns).map(|id| id as u32).collect()
+        self.columns.iter().map(|column| (j * self.width) as u32 + column).collect()
     }
 
-    /// Where the cell in a column of the row under way starts.
-    pub(super) fn start(&self, column: usize) -> State {
-        self.starts[column]
+    /// Where a cell of the row under way starts, by its place there.
+    pub(super) fn start(&self, place: usize) -> State {
+        self.starts[place]
     }
 
     /// The next row, now that this one has its records; none after the last.

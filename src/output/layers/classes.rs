@@ -39,7 +39,7 @@ pub(super) fn layer(cells: &Cells<'_>) -> Layer {
             FIRST_SHADE + (share * f64::from(SHADES - 1)).round() as u8
         }
     };
-    let indices: Vec<u8> = ids(cells).map(|id| place(cells.record(id))).collect();
+    let indices: Vec<u8> = ids(cells).map(|id| place(&cells.record(id))).collect();
     let palette = palette();
     let bar = Bar {
         label: "chaos: largest Lyapunov exponent, \u{3bb}",

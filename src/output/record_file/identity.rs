@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::RecordFileError;
 use super::reader::Reader;
+use crate::map::scene::Scene;
+use crate::map::shard::Shard;
 use crate::record::RECORD_VERSION;
 
 /// Whose records a file holds: they may be continued by the same alone.
@@ -23,6 +25,9 @@ pub struct Identity {
     precision: String,
     device: String,
     scene: Vec<(String, String)>,
+    /// Which part of the map; absent where it is the whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    shard: Option<Shard>,
 }
 
 impl Identity {
@@ -37,7 +42,14 @@ impl Identity {
             precision: precision.to_owned(),
             device: device.to_owned(),
             scene,
+            shard: None,
         }
+    }
+
+    /// The same run of a part of the map, or of all of it.
+    #[must_use]
+    pub fn of_shard(self, shard: Option<Shard>) -> Identity {
+        Identity { shard, ..self }
     }
 
     /// The same run of a program of other sources, or for another processor.
@@ -80,7 +92,27 @@ impl Identity {
         &self.precision
     }
 
-    fn named(&self) -> Vec<(&str, &str)> {
+    /// Engine, precision, device, sources and target, as manifests tell them, too.
+    pub(in crate::output) fn told(&self) -> [&str; 5] {
+        [&self.engine, &self.precision, &self.device, &self.sources, &self.target].map(String::as_str)
+    }
+
+    /// Whether it is of a run of this scene.
+    pub fn is_of(&self, scene: &Scene) -> bool {
+        self.scene == scene.identity()
+    }
+
+    /// What it runs on.
+    pub fn device(&self) -> &str {
+        &self.device
+    }
+
+    /// Which part of the map it is; none where it is the whole.
+    pub fn shard(&self) -> Option<Shard> {
+        self.shard
+    }
+
+    fn named(&self) -> Vec<(&str, String)> {
         let own = [
             ("sources", &self.sources),
             ("target", &self.target),
@@ -88,28 +120,32 @@ impl Identity {
             ("precision", &self.precision),
             ("device", &self.device),
         ];
-        let own = own.map(|(name, value)| (name, value.as_str()));
-        own.into_iter()
-            .chain(self.scene.iter().map(|(name, value)| (name.as_str(), value.as_str())))
-            .collect()
+        let shard = self.shard.map(|shard| ("shard", shard.to_string()));
+        let own = own.map(|(name, value)| (name, value.clone()));
+        let scene = self.scene.iter().map(|(name, value)| (name.as_str(), value.clone()));
+        own.into_iter().chain(shard).chain(scene).collect()
     }
 
     /// What differs from the identity that is `asked` for, in words; empty if nothing.
-    pub(super) fn differences(&self, asked: &Identity) -> String {
-        let (mine, theirs) = (self.named(), asked.named());
-        let value = |list: &[(&str, &str)], name: &str| {
-            list.iter()
-                .find(|(n, _)| *n == name)
-                .map_or("absent".to_owned(), |(_, value)| (*value).to_owned())
+    pub fn differences(&self, asked: &Identity) -> String {
+        self.differing(asked, |mine, theirs| format!("was {mine}, now {theirs}"))
+    }
+
+    /// What differs from another identity, with both values as `tell` puts them; empty if nothing.
+    pub fn differing(&self, other: &Identity, tell: impl Fn(&str, &str) -> String) -> String {
+        let (mine, theirs) = (self.named(), other.named());
+        let value = |list: &[(&str, String)], name: &str| {
+            list.iter().find(|(n, _)| *n == name).map_or("absent".to_owned(), |(_, value)| value.clone())
         };
         let mut names: Vec<&str> = mine.iter().map(|(name, _)| *name).collect();
         names.extend(theirs.iter().map(|(name, _)| *name).filter(|name| value(&mine, name) == "absent"));
         let differing = names.into_iter().filter(|name| value(&mine, name) != value(&theirs, name));
-        let sentence = |name| format!("`{name}` was {}, now {}", value(&mine, name), value(&theirs, name));
+        let sentence = |name| format!("`{name}` {}", tell(&value(&mine, name), &value(&theirs, name)));
         let mut differences: Vec<String> = differing.map(sentence).collect();
-        if self.record_version != asked.record_version {
-            let [was, now] = [self.record_version, asked.record_version];
-            differences.insert(0, format!("`record version` was {was}, now {now}"));
+        if self.record_version != other.record_version {
+            let [mine, theirs] =
+                [self.record_version, other.record_version].map(|version| version.to_string());
+            differences.insert(0, format!("`record version` {}", tell(&mine, &theirs)));
         }
         differences.join(", ")
     }

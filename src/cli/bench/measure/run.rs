@@ -217,6 +217,7 @@ impl<'a> Bench<'a> {
             lane_grid: None,
             refined: None,
             without_effect: Vec::new(),
+            merged: None,
         };
         map::write(self.folder, &cells, &made)?;
         run.times.write = clock.elapsed().as_secs_f64();

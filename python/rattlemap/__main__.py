@@ -1,0 +1,5 @@
+"""`python -m rattlemap`: the program."""
+
+from .program import main
+
+main()

@@ -1,0 +1,228 @@
+"""Finished folders as Datasets."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+import xarray as xr
+from xarray.backends import BackendArray, BackendEntrypoint
+from xarray.core import indexing
+
+from . import decode
+from .errors import FolderError
+
+#: The format of folders that is read here: ``format`` of their manifests.
+FORMAT = 2
+
+_MANIFEST, _CELLS, _WORDS, _RECORDS = "manifest.json", "cells.npy", "words.csv", "records.bin"
+_ATTRACTORS, _POINTS, _COLUMNS = "attractors.csv", "bifurcation.csv", "bifurcation_columns.csv"
+
+
+def open(folder: str | os.PathLike[str]) -> xr.Dataset:  # noqa: A001
+    """Open the folder of a finished map, basin map, list of cells or bifurcation diagram.
+
+    Nothing but the manifest and the axes is read at first. Numbers are views of the mapped file ``cells.npy``; codes and
+    rows of words become text when they are looked at, for those cells that are looked at.
+
+    Parameters
+    ----------
+    folder
+        What ``rattlemap map`` or ``rattlemap bifurcation`` wrote.
+
+    Returns
+    -------
+    xarray.Dataset
+        A map has the dimensions (second axis, first axis), its coordinates are the axes' values. Variables are the
+        columns of ``cells.npy``: ``class``, ``status`` and ``source`` text of fixed width; ``word`` and ``pattern``
+        Python strings that begin with ``w``, empty where there is none; ``period`` 0 and ``symmetric`` -1 where absent;
+        floats NaN where absent. All quantities are dimensionless, as in the model.
+
+        A list of cells has the one dimension ``cell``, its parameters are coordinates. Basins have ``attractor``, the
+        label of the attractor (-1 without one), and the attractors' table over the dimension ``label``. A diagram has
+        the dimension of its parameter, and its section points over ``point``.
+
+        The manifest is in ``attrs``: text and numbers as they are, lists and objects as JSON.
+
+    Raises
+    ------
+    FolderError
+        If the folder is not there, not finished, a shard's, of another format, without ``cells.npy``, or damaged.
+
+    Notes
+    -----
+    Arrays are read-only views until xarray copies them; Windows lets nobody remove a folder whose Dataset is in use.
+    ``xarray.open_dataset(folder, engine="rattlemap", chunks={})`` opens maps with dask arrays.
+
+    Examples
+    --------
+    >>> ds = rattlemap.open("out/e_omega")
+    >>> ds["lyapunov"].sel(e=0.6, method="nearest").plot()
+    >>> (ds["class"] == "chaotic").mean().item()
+    """
+    return xr.open_dataset(os.fspath(folder), engine=FolderBackend)
+
+
+class FolderBackend(BackendEntrypoint):
+    """The same for ``xarray.open_dataset(folder, engine="rattlemap")``."""
+
+    description = "Finished folders of rattlemap"
+    open_dataset_parameters = ("filename_or_obj", "drop_variables")
+
+    def open_dataset(
+        self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
+    ) -> xr.Dataset:
+        folder = Path(os.fspath(filename_or_obj))
+        manifest = _manifest(folder)
+        ds = _diagram(folder, manifest) if manifest["command"] == "bifurcation" else _map(folder, manifest)
+        ds.encoding["source"] = str(folder)
+        left_out = [drop_variables] if isinstance(drop_variables, str) else [*(drop_variables or ())]
+        return ds.drop_vars(left_out, errors="ignore")
+
+    def guess_can_open(self, filename_or_obj: Any) -> bool:
+        if not isinstance(filename_or_obj, (str, os.PathLike)):
+            return False
+        manifest = Path(os.fspath(filename_or_obj)) / _MANIFEST
+        try:
+            return json.loads(manifest.read_text(encoding="utf-8")).get("command") in ("map", "bifurcation")
+        except (OSError, ValueError, AttributeError):
+            return False
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a finished map or diagram."""
+    path = folder / _MANIFEST
+    if not folder.is_dir():
+        raise FolderError(f"{folder}: there is no such folder; name the folder of a finished map")
+    if not path.is_file():
+        advice = (
+            "the run is unfinished: go on with `rattlemap map SCENE --resume`"
+            if (folder / _RECORDS).is_file()
+            else "it is not the folder of a map: `rattlemap map SCENE` makes one"
+        )
+        raise FolderError(f"{folder}: there is no {_MANIFEST}; {advice}")
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        command = manifest["command"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise FolderError(f"{path}: this is not the manifest of a map ({error!r})") from error
+    if command not in ("map", "bifurcation"):
+        raise FolderError(f"{folder}: this is the folder of `{command}`, not of a map or a diagram; pandas reads its tables")
+    if manifest.get("format") != FORMAT:
+        raise FolderError(
+            f"{path}: the folder is of format {manifest.get('format', 'unknown')}, and this version reads format {FORMAT}; "
+            "make it again with --force"
+        )
+    if manifest.get("shard") is not None:
+        raise FolderError(
+            f"{folder}: this is a part of a map, a shard's records; `rattlemap merge OUT PART...` makes the map of all parts"
+        )
+    return dict(manifest)
+
+
+def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Path:
+    """A file of the folder; else how it is made."""
+    path = folder / name
+    if path.is_file():
+        return path
+    if any(entry["name"] == name for entry in manifest["files"]):
+        raise FolderError(f"{folder}: {name} is missing; `rattlemap check {folder} --repair` makes it anew")
+    command = manifest["command"]
+    again = "--resume" if command == "map" else "--force"
+    raise FolderError(
+        f"{folder}: there is no {name}, for the scene's outputs.files do not have {kind!r}; add it and write the files anew: "
+        f"`rattlemap {command} SCENE --out {folder} {again}`"
+    )
+
+
+def _table(path: Path) -> pd.DataFrame:
+    """A table, every field as text: decode gives types."""
+    return pd.read_csv(path, dtype=str, keep_default_na=False)
+
+
+def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
+    path = _require(folder, manifest, _CELLS, "npy")
+    cells = _Cells(path, int(manifest["cells"]))
+    array = cells.array
+    fields = array.dtype.names or ()
+    if any(name in fields for name in decode.SPELLED):
+        _require(folder, manifest, _WORDS, "npy")
+
+    def read(name: str, shape: tuple[int, ...], table: str | None) -> indexing.LazilyIndexedArray:
+        codes = manifest["codes"].get(table)
+        return indexing.LazilyIndexedArray(_Column(cells, name, shape, table, codes))
+
+    ds = decode.arrange(fields, manifest, array.__getitem__, read)
+    if "attractor" in fields:
+        # Written with cells.csv.
+        attractors = folder / _ATTRACTORS
+        if attractors.is_file() or any(entry["name"] == _ATTRACTORS for entry in manifest["files"]):
+            ds = decode.with_attractors(ds, _table(_require(folder, manifest, _ATTRACTORS, "csv")))
+    return ds
+
+
+def _diagram(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
+    columns, points = (_table(_require(folder, manifest, name, "csv")) for name in (_COLUMNS, _POINTS))
+    return decode.diagram(manifest["axis"]["parameter"], columns, points, manifest)
+
+
+class _Cells:
+    """``cells.npy``, mapped, and the texts of its words; a copy in another process maps the file itself."""
+
+    def __init__(self, path: Path, count: int) -> None:
+        self.path = path.absolute()
+        self.count = count
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path, "count": self.count}
+
+    @cached_property
+    def array(self) -> npt.NDArray[Any]:
+        try:
+            array: npt.NDArray[Any] = np.load(self.path, mmap_mode="r", allow_pickle=False)
+        except (ValueError, OSError, EOFError) as error:
+            raise self._damaged(self.path.name, str(error)) from error
+        if array.shape != (self.count,) or array.dtype.names is None:
+            raise self._damaged(self.path.name, f"it has the shape {array.shape}, not ({self.count},)")
+        return array
+
+    @cached_property
+    def texts(self) -> npt.NDArray[Any]:
+        return decode.texts_of(_table(self.path.with_name(_WORDS))["text"])
+
+    def _damaged(self, name: str, why: str) -> FolderError:
+        folder = self.path.parent
+        return FolderError(f"{folder}: {name} is damaged: {why}; `rattlemap check {folder} --repair` makes it anew")
+
+    def decoded(self, table: str, codes: dict[str, int] | None, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        try:
+            return decode.look_up(self.texts if codes is None else decode.names_of(codes), rows)
+        except IndexError as error:
+            raise self._damaged(_WORDS, str(error)) from error
+
+
+class _Column(BackendArray):
+    """A column of ``cells.npy`` over its axes; text once it is looked at."""
+
+    def __init__(
+        self, cells: _Cells, name: str, shape: tuple[int, ...], table: str | None, codes: dict[str, int] | None
+    ) -> None:
+        self.cells, self.name, self.shape, self.table, self.codes = cells, name, shape, table, codes
+        if table is None:
+            self.dtype = cells.array.dtype[name]
+        else:
+            self.dtype = np.dtype(object) if codes is None else decode.names_of(codes).dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> npt.NDArray[Any]:
+        raw = indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._raw)
+        return raw if self.table is None else self.cells.decoded(self.table, self.codes, raw)
+
+    def _raw(self, key: tuple[Any, ...]) -> npt.NDArray[Any]:
+        return np.asarray(self.cells.array[self.name].reshape(self.shape)[key])

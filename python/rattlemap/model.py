@@ -1,0 +1,155 @@
+"""Models: which oscillator moves, with which parameters."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+from . import _native
+from .asking import assignments
+
+
+class Model:
+    """An oscillator with walls, and values of its parameters. It does not change: :meth:`replace` gives another one.
+
+    :func:`gear_pair` and :func:`load_model` make it. All quantities are dimensionless.
+    """
+
+    __slots__ = ("_model",)
+
+    def __init__(self, model: _native.Model) -> None:
+        self._model = model
+
+    @property
+    def name(self) -> str:
+        """What scenes and the program call it."""
+        return self._model.name
+
+    @property
+    def title(self) -> str:
+        """What it is, in a few words."""
+        return self._model.title
+
+    @property
+    def text(self) -> str:
+        """The file that it is read from, TOML."""
+        return self._model.text
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The value of every parameter, in the order of the model's table: a copy."""
+        return self._model.parameters
+
+    @property
+    def state_names(self) -> list[str]:
+        """The components of a state: displacement and velocity of each body, such as ``x1, v1, x2, v2``."""
+        return self._model.state_names
+
+    @property
+    def equations(self) -> list[str]:
+        """The equations of motion, a line each."""
+        return self._model.equations
+
+    @property
+    def help(self) -> str:
+        """Every parameter with its value, its meaning and its range, a line each."""
+        values = self.parameters
+        lines = [f"{name} = {values[name]!r}: {meaning}; {range_}" for name, meaning, range_ in self._model.meanings]
+        return "\n".join(lines)
+
+    def replace(self, **parameters: float) -> Model:
+        """The same model with other values of some parameters.
+
+        Parameters
+        ----------
+        **parameters
+            By name; :attr:`help` has their ranges.
+
+        Raises
+        ------
+        SceneError
+            For an unknown name, a value out of its range, or values with which there is no motion.
+
+        Examples
+        --------
+        >>> rm.gear_pair().replace(F=60).parameters["F"]
+        60.0
+        """
+        return Model(self._model.replace(assignments(parameters)))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Model):
+            return NotImplemented
+        return self.text == other.text and self.parameters == other.parameters
+
+    def __hash__(self) -> int:
+        return hash((self.text, tuple(self.parameters.items())))
+
+    def __repr__(self) -> str:
+        changed = "".join(f", {name}={value!r}" for name, value in self._model.changed.items())
+        return f"Model({self.name!r}{changed})"
+
+    def __reduce__(self) -> tuple[Callable[..., Model], tuple[Any, ...]]:
+        return _rebuilt, (self.text, self._model.file, self._model.changed)
+
+
+def _rebuilt(text: str, file: str, changed: dict[str, float]) -> Model:
+    return Model(_native.Model(text, file).replace(assignments(changed)))
+
+
+def gear_pair(**parameters: float) -> Model:
+    """The gear pair with backlash: two gears, light load, teeth that impact and mesh.
+
+    Parameters
+    ----------
+    **parameters
+        Any of ``m1 m2 r1 r2 k1 k2 r k F omega b e mesh_speed``, dimensionless: masses, dampings, stiffnesses, damping
+        and stiffness of meshing, amplitude and frequency of the forcing, half the backlash, restitution, meshing speed.
+        The others have the paper's values. ``rm.gear_pair().help`` has meanings and ranges.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    SceneError
+        For an unknown name, a value out of its range, or values with which there is no motion.
+
+    Examples
+    --------
+    >>> rm.gear_pair(F=50, e=0.6)
+    Model('gear-pair', e=0.6)
+    """
+    return load_model("gear-pair", **parameters)
+
+
+def load_model(model: str | os.PathLike[str], /, **parameters: float) -> Model:
+    """A model that is built in, or one that stands in a file.
+
+    Parameters
+    ----------
+    model
+        A name that ``rattlemap models`` lists, or the path of a model's file (``docs/models.md`` tells what it can say).
+    **parameters
+        Values by name; the others have the file's own.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    ModelError
+        If there is no such model, or its file is wrong.
+    SceneError
+        For an unknown parameter, a value out of its range, or values with which there is no motion.
+
+    Examples
+    --------
+    >>> rm.load_model("impact-oscillator", omega=2.8)
+    Model('impact-oscillator', omega=2.8)
+    """
+    found = _native.Model.find(os.fspath(model))
+    return Model(found.replace(assignments(parameters)) if parameters else found)

@@ -1,0 +1,118 @@
+//! Models: built in, or read from files.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rattlemap::cli;
+use rattlemap::map::scene::single_cell;
+use rattlemap::model::Model as _;
+use rattlemap::model_file::FileModel;
+
+use crate::problem::Problem;
+
+/// A model with values of its parameters.
+#[pyclass(frozen, module = "rattlemap._native")]
+pub(crate) struct Model {
+    pub(crate) model: FileModel,
+    /// What messages call its file.
+    file: String,
+}
+
+impl Model {
+    /// The same with parameters set by `NAME=VALUE`.
+    pub(crate) fn with(&self, sets: &[String]) -> Result<FileModel, Problem> {
+        let cell = single_cell(&self.model, sets)?;
+        let model = cell.downcast_ref::<FileModel>().cloned();
+        model.ok_or_else(|| Problem::model("the model is not read from a file"))
+    }
+}
+
+#[pymethods]
+impl Model {
+    /// The model of this text, which messages call `file`.
+    #[new]
+    fn new(text: &str, file: String) -> Result<Model, Problem> {
+        let model = FileModel::parse(text, &file).map_err(Problem::model)?;
+        Ok(Model { model, file })
+    }
+
+    /// The model that is built in under a name, or stands in a file.
+    #[staticmethod]
+    fn find(name: String) -> Result<Model, Problem> {
+        let model = cli::find_model(&name).map_err(Problem::model)?;
+        Ok(Model { model, file: name })
+    }
+
+    /// The same with parameters set by `NAME=VALUE`.
+    fn replace(&self, sets: Vec<String>) -> Result<Model, Problem> {
+        Ok(Model { model: self.with(&sets)?, file: self.file.clone() })
+    }
+
+    #[getter]
+    fn file(&self) -> &str {
+        &self.file
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        self.model.name()
+    }
+
+    #[getter]
+    fn title(&self) -> &str {
+        self.model.title()
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        &self.model.definition().text
+    }
+
+    #[getter]
+    fn is_built_in(&self) -> bool {
+        self.model.is_built_in()
+    }
+
+    #[getter]
+    fn state_names(&self) -> Vec<&str> {
+        self.model.state_names()
+    }
+
+    #[getter]
+    fn equations(&self) -> Vec<String> {
+        self.model.equations()
+    }
+
+    /// Values by name, in the order of the model's table.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let values = PyDict::new(py);
+        for (index, parameter) in self.model.parameters().iter().enumerate() {
+            values.set_item(&*parameter.name, self.model.value(index))?;
+        }
+        Ok(values)
+    }
+
+    /// Those that are not the file's own.
+    #[getter]
+    fn changed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let values = PyDict::new(py);
+        for (index, parameter) in self.model.parameters().iter().enumerate() {
+            let value = self.model.value(index);
+            if parameter.default != Some(value) {
+                values.set_item(&*parameter.name, value)?;
+            }
+        }
+        Ok(values)
+    }
+
+    /// Meaning and range of each parameter.
+    #[getter]
+    fn meanings(&self) -> Vec<(String, String, String)> {
+        let parameters = self.model.parameters().iter();
+        let told = parameters.map(|parameter| {
+            let range = parameter.range.requirement().into_owned();
+            (parameter.name.to_string(), parameter.meaning.to_string(), range)
+        });
+        told.collect()
+    }
+}

@@ -1,0 +1,24 @@
+//! The program, in the interpreter's process.
+
+use std::ffi::OsString;
+use std::io::{Write, stdout};
+
+use pyo3::prelude::*;
+use rattlemap::cli;
+
+/// Runs a command, the program's name first, and returns its exit code.
+#[pyfunction]
+pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| {
+        let code = cli::run_with(arguments);
+        // Nobody else does: the process is the interpreter's.
+        let _ = stdout().flush();
+        code
+    })
+}
+
+/// The variable of the environment that the program sets for itself, and its value.
+#[pyfunction]
+pub(crate) fn missing_variable() -> Option<(&'static str, &'static str)> {
+    cli::missing_variable()
+}

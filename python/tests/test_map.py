@@ -1,0 +1,209 @@
+"""rattlemap.map: the program's map, however it is asked for; how it ends before its time."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rattlemap as rm
+from compare import assert_same
+from conftest import SCENES, Program, small
+
+ALL = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]
+SMALL = {"e": (0.0, 1.0, 12), "omega": (1.0, 12.0, 9)}
+
+
+def test_a_map_is_the_programs(map_folder: Path) -> None:
+    folder = rm.open(map_folder)
+    made = rm.map(rm.gear_pair(F=50), e=(0, 1, 24), omega=(1, 12, 18), engine="cpu", quantities=ALL, undecided_periods=1584)
+    title = {"title": folder.attrs["title"], "quantities": folder.attrs["quantities"]}
+    made.attrs.update(title)
+    assert_same(made, folder)
+    # As the scene file has it.
+    sets = ["axis.0.count=24", "axis.1.count=18", "outputs.files=['csv', 'npy']"]
+    again = rm.map(scene=SCENES / "e_omega.toml", set=sets, engine="cpu")
+    assert_same(again, folder)
+
+
+def test_what_is_written_is_what_the_program_writes(program: Program, tmp_path: Path) -> None:
+    model = rm.gear_pair(F=60)
+    made = rm.map(model, **SMALL, engine="cpu", start="up", max_period=16, k=90, out=tmp_path / "made")
+    (tmp_path / "scene.toml").write_text(made.attrs["scene"])
+    program("map", tmp_path / "scene.toml", "--engine", "cpu", "--quiet", "--out", tmp_path / "own")
+    names = {path.name for path in (tmp_path / "own").iterdir()}
+    assert {path.name for path in (tmp_path / "made").iterdir()} == names
+    for name in names - {"manifest.json", "records.bin"}:
+        assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "own" / name).read_bytes(), name
+    assert_same(made, rm.open(tmp_path / "own"))
+    assert {"F = 60.0", "k = 90.0", "max_period = 16", 'policy = "up"'} <= {*made.attrs["scene"].splitlines()}
+    with pytest.raises(rm.FolderError, match="the folder is not empty"):
+        rm.map(model, **SMALL, engine="cpu", out=tmp_path / "made")
+
+
+def test_an_array_is_taken_to_the_bit() -> None:
+    values = np.linspace(0.1, 0.9, 7)
+    made = rm.map(rm.gear_pair(), omega=[2.0, 5.6, np.nextafter(5.6, 6)], e=values, engine="cpu")
+    assert made["e"].values.tobytes() == values.tobytes()
+    assert made["omega"].values.tolist() == [2.0, 5.6, np.nextafter(5.6, 6)]
+    assert made["lyapunov"].dims == ("e", "omega")
+    # The program's own axis, and one that differs from it in a last digit.
+    own = np.minimum(0.1 + 0.8 * np.arange(7.0) / 6, 0.9)
+    scene = rm.map(rm.gear_pair(), e=own, omega=(2, 6, 2), engine="cpu").attrs["scene"]
+    assert "count = 7" in scene and "values" not in scene
+    own[3] = np.nextafter(own[3], 1)
+    assert "values" in rm.map(rm.gear_pair(), e=own, omega=(2, 6, 2), engine="cpu").attrs["scene"]
+
+
+def test_lanes_are_the_programs(program: Program, tmp_path: Path) -> None:
+    made = rm.map(rm.gear_pair(), **SMALL, engine="gpu", out=tmp_path / "made")
+    (tmp_path / "scene.toml").write_text(made.attrs["scene"])
+    program("map", tmp_path / "scene.toml", "--engine", "gpu", "--quiet", "--out", tmp_path / "own")
+    assert (made.attrs["engine"], made.attrs["precision"]) == ("gpu", "f32")
+    assert_same(made, rm.open(tmp_path / "own"))
+
+
+def test_adaptive_maps_and_several_starts(program: Program, tmp_path: Path) -> None:
+    for name, settings in (
+        ("adaptive", {"refine.minimum_grid": 4, "refine.audit": 5}),
+        ("starts", {"start.count": 3, "start.seed": 7}),
+    ):
+        made = rm.map(rm.gear_pair(), e=(0, 1, 17), omega=(1, 12, 17), engine="cpu", settings=settings)
+        (tmp_path / f"{name}.toml").write_text(made.attrs["scene"])
+        program("map", tmp_path / f"{name}.toml", "--engine", "cpu", "--quiet", "--out", tmp_path / name)
+        assert_same(made, rm.open(tmp_path / name))
+    assert "attractors" in made
+
+
+def test_a_model_of_ones_own(program: Program, tmp_path: Path) -> None:
+    text = (SCENES.parent / "models/impact_oscillator.toml").read_text()
+    (tmp_path / "mine.toml").write_text(text.replace('name = "impact-oscillator"', 'name = "mine"'))
+    model = rm.load_model(tmp_path / "mine.toml", omega=2.8)
+    assert pickle.loads(pickle.dumps(model)) == model and model.parameters["omega"] == 2.8
+    first, second = [name for name in model.parameters if name != "omega"][:2]
+    low = {name: model.parameters[name] for name in (first, second)}
+    axes = {name: (0.5 * value, value, 5) for name, value in low.items() if value > 0} or {"omega": (2, 3, 5)}
+    while len(axes) < 2:
+        axes["omega"] = (2, 3, 5)
+    made = rm.map(model, **axes, engine="cpu", out=tmp_path / "made")
+    assert (tmp_path / "made/model.toml").read_text() == model.text
+    (tmp_path / "scene.toml").write_text(made.attrs["scene"])
+    program("map", tmp_path / "scene.toml", "--engine", "cpu", "--quiet", "--out", tmp_path / "own")
+    assert_same(made, rm.open(tmp_path / "own"))
+
+
+def test_columns_are_not_copied() -> None:
+    values = rm.map(rm.gear_pair(), **SMALL, engine="cpu")["lyapunov"].values
+    owner = values
+    while isinstance(owner, np.ndarray):
+        last, owner = owner, owner.base
+    assert type(owner).__name__ == "PySliceContainer" and not last.flags.owndata
+
+
+def test_what_is_wrong_is_told_in_the_programs_words(program: Program, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(
+        "[[axis]]\nparameter = 'e'\nmin = 0\nmax = 1.5\ncount = 4\n[[axis]]\nparameter = 'omega'\nmin = 1\nmax = 2\ncount = 4\n"
+    )
+    said = program("map", tmp_path / "scene.toml", fails=True).stderr
+    words = "is out of range: it must be between 0 and 1, as `e` is"
+    assert words in said
+    with pytest.raises(rm.SceneError, match=words):
+        rm.map(rm.gear_pair(), e=(0, 1.5, 4), omega=(1, 2, 4))
+    with pytest.raises(rm.SceneError, match="did you mean `omega`"):
+        rm.map(rm.gear_pair(), e=(0, 1, 4), omegaa=(1, 2, 4))
+    with pytest.raises(rm.SceneError, match="unknown field `parameters.G"):
+        rm.map(rm.gear_pair(), **SMALL, G=3)
+    with pytest.raises(rm.SceneError, match="two axes must be given, and these are: e;"):
+        rm.map(rm.gear_pair(), e=(0, 1, 4))
+    with pytest.raises(rm.SceneError, match="did you mean `max_period`"):
+        rm.map(rm.gear_pair(), **SMALL, settings={"integration.max_periods": 3})
+    with pytest.raises(rm.EngineError, match="the CPU engine computes in f64"):
+        rm.map(rm.gear_pair(), **SMALL, engine="cpu", precision="f32")
+    with pytest.raises(rm.SceneError, match="of memory, and"):
+        rm.map(rm.gear_pair(), e=(0, 1, 60_000), omega=(1, 12, 60_000), engine="cpu")
+    for kind in (rm.SceneError, rm.ModelError, rm.FolderError):
+        assert issubclass(kind, rm.RattlemapError) and issubclass(kind, ValueError)
+    assert issubclass(rm.EngineError, rm.RattlemapError) and issubclass(rm.EngineError, RuntimeError)
+
+
+#: A map that takes minutes, for those that end it before.
+LONG = "rm.gear_pair(), e=(0, 1, 400), omega=(1, 12, 400), engine='cpu', early_stop=False, transient_periods=20_000"
+
+
+def test_ctrl_c_is_heeded_within_a_second_and_what_has_ended_is_kept(tmp_path: Path) -> None:
+    code = f"""
+        import _thread, threading, time
+        import rattlemap as rm
+        begun = []
+        def interrupt():
+            time.sleep(2.5)
+            begun.append(time.monotonic())
+            _thread.interrupt_main()
+        threading.Thread(target=interrupt).start()
+        try:
+            rm.map({LONG}, out={str(tmp_path / "out")!r}, progress=False)
+        except KeyboardInterrupt:
+            print(time.monotonic() - begun[0])
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1.0
+    assert (tmp_path / "out/records.bin").stat().st_size > 1000
+
+
+def test_an_interrupted_map_goes_on(tmp_path: Path) -> None:
+    axes = {"e": (0.0, 1.0, 24), "omega": (1.0, 12.0, 24)}
+
+    class Enough(Exception):
+        pass
+
+    def tell(done: int, total: int) -> None:
+        if 0 < done < total:
+            raise Enough
+
+    setting = {"engine": "cpu", "early_stop": False, "transient_periods": 1500, "out": tmp_path / "out"}
+    with pytest.raises(Enough):
+        rm.map(rm.gear_pair(), **axes, **setting, progress=tell)
+    with pytest.raises(rm.FolderError, match="unfinished"):
+        rm.open(tmp_path / "out")
+    setting["resume"] = True
+    made = rm.map(rm.gear_pair(), **axes, **setting)
+    assert 0 < made.attrs["resumed_cells"] < 576
+    whole = rm.map(rm.gear_pair(), **axes, **{**setting, "out": None, "resume": False})
+    whole.attrs["resumed_cells"] = made.attrs["resumed_cells"]
+    assert_same(made, whole)
+
+
+def test_other_threads_run_meanwhile_and_progress_is_told() -> None:
+    told: list[tuple[int, int]] = []
+    ticks, is_over = 0, threading.Event()
+
+    def tick() -> None:
+        nonlocal ticks
+        while not is_over.is_set():
+            ticks += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    try:
+        rm.map(
+            rm.gear_pair(),
+            e=(0, 1, 30),
+            omega=(1, 12, 30),
+            engine="cpu",
+            early_stop=False,
+            transient_periods=600,
+            progress=lambda done, total: told.append((done, total)),
+        )
+    finally:
+        is_over.set()
+        thread.join()
+    assert ticks > 100
+    assert told[-1] == (900, 900) and told == sorted(told)

@@ -1,0 +1,34 @@
+"""Models: built in and in files, with values that the program checks."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import pytest
+import rattlemap as rm
+
+
+def test_a_model_has_names_and_values() -> None:
+    model = rm.gear_pair(F=60)
+    assert model.parameters["F"] == 60.0 and model.parameters["m1"] == 2.0
+    assert model.state_names == ["x1", "v1", "x2", "v2"]
+    assert model.name in repr(model) and "F=60.0" in repr(model)
+    assert "e = 0.605: coefficient of restitution; between 0 and 1" in model.help
+    assert model == rm.gear_pair().replace(F=60) != rm.gear_pair()
+    assert pickle.loads(pickle.dumps(model)) == model
+    assert 'name = "gear-pair"' in model.text and model.equations
+
+
+def test_what_is_wrong_is_told(tmp_path: Path) -> None:
+    with pytest.raises(rm.SceneError, match="unknown field `parameters.G = 1.0`"):
+        rm.gear_pair(G=1)
+    with pytest.raises(rm.SceneError, match="out of range: it must be between 0 and 1"):
+        rm.load_model("gear-pair", e=1.5)
+    with pytest.raises(rm.SceneError, match="wrong type"):
+        rm.gear_pair(e="half")
+    with pytest.raises(rm.ModelError, match="no model is called `gear`; there is gear-pair"):
+        rm.load_model("gear")
+    (tmp_path / "mine.toml").write_text('name = "mine"\n')
+    with pytest.raises(rm.ModelError, match="mine.toml"):
+        rm.load_model(tmp_path / "mine.toml")

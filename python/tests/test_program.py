@@ -1,0 +1,42 @@
+"""The program inside: the same commands, exit codes and words."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import rattlemap as rm
+from conftest import SCENES, Program
+
+
+def test_the_program_is_inside(program: Program, tmp_path: Path) -> None:
+    assert program("--version").stdout == f"rattlemap {rm.__version__}\n"
+    assert "Usage: rattlemap map" in program("help", "map").stdout
+    assert json.loads(program("orbit", "--json").stdout)["class"] == "periodic"
+    wrong = program("orbit", "--set", "e=2", fails=True)
+    assert wrong.returncode == 2 and wrong.stderr.startswith("error: --set e=2: `parameters.e = 2` is out of range")
+    assert program("orbit", "--no-such-option", fails=True).returncode == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals to send there")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_it_with_its_code(tmp_path: Path, number: signal.Signals, code: int) -> None:
+    command = [sys.executable, "-m", "rattlemap", "map", SCENES / "e_omega.toml", "--engine", "cpu", "--out", tmp_path / "out"]
+    command += ["--set", "integration.early_stop=false", "--set", "integration.transient_periods=20000"]
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        while not (tmp_path / "out/records.bin").is_file():
+            assert running.poll() is None, running.stderr
+            time.sleep(0.02)
+        time.sleep(1)
+        running.send_signal(number)
+        said = running.communicate(timeout=20)[1]
+    finally:
+        running.kill()
+    assert running.returncode == code
+    assert "interrupted; " in said and "go on with: rattlemap map " in said

@@ -1,0 +1,145 @@
+//! `map --shard`: what is other where a part of a map is made.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::anyhow;
+
+use super::{Kept, summary, unit};
+use crate::cli::arguments::{EngineChoice, Map};
+use crate::cli::error::Failure;
+use crate::cli::finished_map::Manifest;
+use crate::cli::progress::Progress;
+use crate::cli::{processor, say};
+use crate::gpu::Precision;
+use crate::map::engine::Engine;
+use crate::map::plan::Plan;
+use crate::map::scene::Scene;
+use crate::map::shard::Shard;
+use crate::output::inventory::{self, Finding};
+use crate::output::shard::{self, Finished, Tally};
+use crate::output::{self, Identity, RECORDS};
+
+/// Refuses to leave the engine open: two machines could choose two, whose parts make no map.
+pub(super) fn require_engine(ask: &Map) -> Result<(), Failure> {
+    match (ask.shard, ask.engine.engine) {
+        (Some(shard), EngineChoice::Auto) => Err(Failure::Usage(anyhow!(
+            "--shard {shard}: --engine auto may choose otherwise on another machine, and parts of two engines make no \
+             map; name one, the same for all shards: --engine cpu, or --engine gpu (f32 unless told otherwise)"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// How many runs are asked for.
+pub(super) fn runs(ask: &Map, plan: &Plan) -> usize {
+    ask.shard.map_or(plan.run_count(), |shard| shard.run_count(plan))
+}
+
+/// Whether a shard that is to be gone on with is finished, and its files are good: then no engine needs to be opened.
+pub(super) fn is_done(ask: &Map, scene: &Scene) -> bool {
+    let out = ask.out();
+    ask.resume && ask.shard.is_some() && is_same(ask, scene, &out) && is_good(ask, scene, &out)
+}
+
+/// By all but the device: whoever merges compares that.
+fn is_same(ask: &Map, scene: &Scene, out: &Path) -> bool {
+    let Ok(Some(identity)) = Identity::read(&out.join(RECORDS)) else { return false };
+    let (engine, precision) = match ask.engine.engine {
+        EngineChoice::Gpu => ("gpu", ask.engine.precision.unwrap_or(Precision::F32).name()),
+        EngineChoice::Cpu | EngineChoice::Auto => ("cpu", Precision::F64.name()),
+    };
+    let asked = Identity::new(engine, precision, identity.device(), scene.identity()).of_shard(ask.shard);
+    identity.differences(&asked).is_empty()
+}
+
+fn is_good(ask: &Map, scene: &Scene, out: &Path) -> bool {
+    let Ok(manifest) = Manifest::read_part(out) else { return false };
+    let findings = inventory::check(out, &manifest.files);
+    manifest.is_of(scene, &ask.run.set) && findings.is_ok_and(|list| !list.iter().any(Finding::is_lost))
+}
+
+pub(super) fn say_done(ask: &Map, plan: &Plan) -> Result<(), Failure> {
+    if let (false, Some(shard)) = (ask.run.quiet, ask.shard) {
+        let (out, count, unit) = (ask.out(), shard.run_count(plan), unit(plan));
+        say::note(format_args!("{}: shard {shard} is finished: all {count} {unit} are there", out.display()));
+    }
+    Ok(())
+}
+
+/// A shard whose last cell has ended.
+pub(super) struct Ended<'a> {
+    pub(super) shard: Shard,
+    /// Time until the engine was ready.
+    pub(super) opening: Duration,
+    /// Runs that were kept before.
+    pub(super) resumed: usize,
+    pub(super) kept: &'a Kept<'a>,
+    pub(super) tally: &'a Tally,
+}
+
+/// Writes what belongs to the records, and says what came of them.
+pub(super) fn finish(
+    ask: &Map,
+    scene: &Scene,
+    plan: &Plan,
+    engine: &Engine<'_>,
+    ended: &Ended<'_>,
+    progress: &Progress,
+) -> Result<(), Failure> {
+    let &Ended { shard, opening, resumed, kept, tally } = ended;
+    let (device, elapsed) = (engine.device(), kept.clock.elapsed());
+    let run = output::map::Run {
+        sets: &ask.run.set,
+        engine: engine.name(),
+        precision: engine.precision(),
+        device: &device,
+        adapter: engine.adapter(),
+        cards: engine.cards(),
+        processor: &processor::described(),
+        opening,
+        elapsed,
+        elapsed_before: kept.elapsed_before,
+        resumed_cells: resumed,
+        lane_grid: engine.steps_per_period(),
+        refined: None,
+        without_effect: Vec::new(),
+        merged: None,
+    };
+    let finished = Finished { shard, scene, plan, run: &run, tally };
+    let files = shard::write(kept.folder, &finished)?;
+    progress.finish(&told(&finished, kept.folder.path(), &files));
+    if ask.json {
+        shard::print(kept.folder.path(), &files, &finished)?;
+    }
+    if tally.all_failed() && !ask.run.quiet {
+        say::note(
+            "warning: every cell of the shard failed; a map of which no cell is left fails when it is merged",
+        );
+    }
+    Ok(())
+}
+
+/// What was done, how fast, and what came out.
+fn told(finished: &Finished<'_>, folder: &Path, files: &[String]) -> String {
+    let Finished { shard, plan, run, tally, .. } = finished;
+    let (count, unit, seconds) = (shard.run_count(plan), unit(plan), run.elapsed.as_secs_f64().max(1e-9));
+    let before = match run.resumed_cells {
+        0 => String::new(),
+        resumed => format!(", {resumed} of them kept before,"),
+    };
+    let [periodic, chaotic, undecided, failed] = tally.classes;
+    format!(
+        "shard {shard}: {count} of {} {unit}{before} in {seconds:.3} s on {} ({}): {:.0} {unit}/s\n\
+         {}{periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+         {}: {}; the map is made of all {} shards by `rattlemap merge OUT PART...`",
+        plan.run_count(),
+        run.engine,
+        run.precision,
+        (count - run.resumed_cells) as f64 / seconds,
+        summary::by_card(&run.cards, unit),
+        say::path(folder),
+        files.join(", "),
+        shard.count()
+    )
+}

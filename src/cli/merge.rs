@@ -1,0 +1,74 @@
+//! `rattlemap merge`: the shards of a map in, the map out.
+
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+use anyhow::anyhow;
+
+use super::arguments::{EngineChoice, Merge};
+use super::capacity;
+use super::error::{Failure, fail_if};
+use super::interrupt::Interrupt;
+use super::progress;
+use super::say;
+use crate::output::merge::{MergeError, Merged, Parts, Progress};
+use crate::output::{self, Folder};
+
+/// Looks at all shards, gathers their records, writes the map.
+pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
+    let interrupt = Interrupt::listen(ask.quiet)?;
+    let parts = Parts::open(&ask.parts).map_err(refused)?;
+    parts.refuse(&ask.out).map_err(refused)?;
+    capacity::check(parts.scene(), None, EngineChoice::Cpu, &ask.out)?;
+    // A run that ended before it kept anything has left nothing else.
+    let folder = Folder::open(&ask.out, ask.force || !Folder::holds_results(&ask.out))?;
+    folder.refuse_links(output::map::names())?;
+    let (shards, out) = (parts.count(), ask.out.display());
+    let progress = progress::Progress::new(parts.scene().run_count().max(1) as usize, 0, "runs", ask.quiet);
+    let go_on = |Progress { done, of }| {
+        progress.report(done, of);
+        !interrupt.raised().load(Ordering::Relaxed)
+    };
+    interrupt.wait_for(Some("a batch is read"));
+    let gathered = parts.gather(&folder, go_on).map_err(|error| match error {
+        MergeError::Stopped => interrupt.failure(anyhow!("interrupted, and nothing was written to {out}")),
+        error => refused(error),
+    })?;
+    let (runs, again) = (gathered.run_count(), ask.again());
+    interrupt.ends_at_once(format!("all {runs} runs are in {out}; make its files with: {again}"), || {});
+    let merged = gathered.write(&folder).map_err(refused)?;
+    for warning in &merged.warnings {
+        say::note(format_args!("warning: {warning}"));
+    }
+    progress.finish(&told(&merged, shards, runs, folder.path()));
+    if ask.json {
+        let text = serde_json::to_string_pretty(&merged.object).map_err(output::OutputError::from)?;
+        output::print(&text)?;
+    }
+    let [periodic, chaotic, undecided, failed] = merged.classes;
+    let all_failed = failed > 0 && periodic + chaotic + undecided == 0;
+    fail_if(all_failed, "every cell failed; the status column says why")
+}
+
+/// Who asked wrongly, or what failed.
+fn refused(error: MergeError) -> Failure {
+    match error {
+        MergeError::Damaged { .. } | MergeError::Output(_) | MergeError::Stopped => {
+            Failure::Run(error.into())
+        }
+        MergeError::Records(error) => error.into(),
+        _ => Failure::Usage(error.into()),
+    }
+}
+
+fn told(merged: &Merged, shards: usize, runs: usize, folder: &Path) -> String {
+    let [periodic, chaotic, undecided, failed] = merged.classes;
+    let [reading, writing] = merged.times.map(|time| time.as_secs_f64());
+    format!(
+        "{runs} runs of {shards} shards, read in {reading:.3} s; files written in {writing:.3} s\n\
+         {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+         {}: {}",
+        say::path(folder),
+        merged.files.join(", ")
+    )
+}

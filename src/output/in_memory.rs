@@ -1,0 +1,81 @@
+//! What a finished folder tells, without a folder: for who computes in a process of his own.
+
+use std::time::Duration;
+
+use super::bifurcation::Asked;
+use super::bifurcation_manifest::Manifest;
+use super::cell_columns::{self, Values};
+use super::map_manifest::{self, Run};
+use super::words_csv::Rows;
+use super::{
+    Cells, OutputError, WriteError, attractors_csv, bifurcation_columns_csv, bifurcation_csv, words,
+};
+use crate::map::bifurcation::Column;
+use crate::map::scene::Scene;
+
+/// A map as its folder would have it.
+#[derive(Clone, Debug)]
+pub struct Map {
+    /// `manifest.json`, less its files.
+    pub manifest: String,
+    /// The columns of `cells.npy`.
+    pub columns: Vec<(String, Values)>,
+    /// The texts of `words.csv`, by row.
+    pub texts: Vec<String>,
+    /// `attractors.csv` of a map of basins.
+    pub attractors: Option<String>,
+}
+
+/// A finished map.
+///
+/// # Errors
+/// [`OutputError`] if something cannot be put into its form.
+pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
+    let spelled = words::read(cells);
+    let rows = Rows::new(&spelled);
+    let attractors =
+        cells.basins().map(|basins| text(|to| attractors_csv::write(to, cells, basins))).transpose()?;
+    Ok(Map {
+        manifest: serde_json::to_string(&map_manifest::map(cells, run, Duration::ZERO, &[]))?,
+        columns: cell_columns::read(cells, &rows),
+        texts: rows.texts(),
+        attractors,
+    })
+}
+
+/// A bifurcation diagram as its folder would have it.
+#[derive(Clone, Debug)]
+pub struct Diagram {
+    /// `manifest.json`, less its files.
+    pub manifest: String,
+    /// `bifurcation_columns.csv`.
+    pub columns: String,
+    /// `bifurcation.csv`.
+    pub points: String,
+}
+
+/// A finished diagram.
+///
+/// # Errors
+/// [`OutputError`] if something cannot be put into its form.
+pub fn diagram(
+    scene: &Scene,
+    asked: Asked<'_>,
+    columns: &[Column],
+    elapsed: Duration,
+) -> Result<Diagram, OutputError> {
+    let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
+    let manifest = Manifest::new(scene, asked, columns, [elapsed, Duration::ZERO], &[]);
+    Ok(Diagram {
+        manifest: serde_json::to_string(&manifest)?,
+        columns: text(|to| bifurcation_columns_csv::write(to, axis, columns))?,
+        points: text(|to| bifurcation_csv::write(to, axis, &names, columns))?,
+    })
+}
+
+/// A table as text.
+fn text(write: impl FnOnce(&mut Vec<u8>) -> Result<(), WriteError>) -> Result<String, OutputError> {
+    let mut bytes = Vec::new();
+    let written = write(&mut bytes).map(|()| String::from_utf8_lossy(&bytes).into_owned());
+    written.map_err(|reason| OutputError::Write { path: "memory".into(), reason })
+}
