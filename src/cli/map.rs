@@ -36,6 +36,7 @@ use crate::cli::error::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
+pub use shard::open_engine;
 use summary::summary;
 
 /// Asks, checks, computes, writes.

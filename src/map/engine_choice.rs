@@ -335,7 +335,7 @@ async fn rate(plan: &Plan, engine: &mut Engine<'_>) -> Result<f64, EngineError> 
 fn spread(plan: &Plan, from: usize, count: usize) -> Vec<Cell> {
     let all = plan.cell_count() as u64;
     // An odd multiplier near the golden section of 2^32 scatters consecutive numbers.
-    let id = |n: usize| plan.order()[(((n as u64 * 2_654_435_761) % (1 << 32) * all) >> 32) as usize];
+    let id = |n: usize| plan.run_at((((n as u64 * 2_654_435_761) % (1 << 32) * all) >> 32) as usize);
     (from..from + count).map(|n| plan.cell(id(n))).collect()
 }
 

@@ -37,12 +37,12 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use super::map::{self, Merged as Origin, Run};
-use super::{Cells, Folder, Identity, RECORDS, RecordFile, map_json, unfinished};
+use super::{Cells, Folder, Identity, OutputError, RECORDS, RecordFile, in_memory, map_json, unfinished};
 use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
 use crate::map::{attractors, coexistence, effect};
-use crate::record::Record;
+use crate::record::{Record, RecordStore, Records};
 use part::{Begun, Part, Seen};
 
 /// Records that are written together: as many as a batch of the file has at most.
@@ -211,7 +211,7 @@ struct Gathering<'p, G> {
     file: RecordFile,
     go_on: G,
     /// By run: the one place where all are.
-    records: Vec<Record>,
+    records: RecordStore,
     /// A bit for each run that has come.
     come: Vec<u64>,
     done: usize,
@@ -227,7 +227,7 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             plan,
             file,
             go_on,
-            records: vec![Record::default(); runs],
+            records: RecordStore::new(runs, plan.reads_strobes()),
             come: vec![0; runs.div_ceil(64)],
             done: 0,
             waiting: Vec::new(),
@@ -264,7 +264,7 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
 
     /// Takes up a batch; false if it is not of this map, or has what came before.
     fn take(&mut self, batch: &[(u32, Record)]) -> Result<bool, MergeError> {
-        if !(self.go_on)(Progress { done: self.done, of: self.records.len() }) {
+        if !(self.go_on)(Progress { done: self.done, of: self.records.count() }) {
             return Err(MergeError::Stopped);
         }
         if !self.plan.admits(batch) {
@@ -275,11 +275,11 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             let Some(bits) = self.come.get_mut(place / 64).filter(|bits| **bits & bit == 0) else {
                 return Ok(false);
             };
-            if place >= self.records.len() {
+            if place >= self.records.count() {
                 return Ok(false);
             }
             *bits |= bit;
-            self.records[place] = record;
+            self.records.put(place, &record);
         }
         self.done += batch.len();
         if self.plan.policy().follows() {
@@ -302,7 +302,8 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             let ids: Vec<usize> =
                 (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns).collect();
             for ids in ids.chunks(BATCH) {
-                let batch: Vec<(u32, Record)> = ids.iter().map(|&id| (id as u32, self.records[id])).collect();
+                let batch: Vec<(u32, Record)> =
+                    ids.iter().map(|&id| (id as u32, self.records.record(id))).collect();
                 self.file.append(&batch)?;
             }
         } else if !self.waiting.is_empty() {
@@ -317,7 +318,7 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
 pub struct Gathered {
     parts: Parts,
     plan: Plan,
-    records: Vec<Record>,
+    records: RecordStore,
     warnings: Vec<String>,
     reading: Duration,
 }
@@ -343,17 +344,39 @@ impl Gathered {
         self.plan.run_count()
     }
 
+    /// The map as its folder would tell it.
+    ///
+    /// # Errors
+    /// [`MergeError::Output`] if something cannot be put into its form.
+    pub fn told(&self) -> Result<in_memory::Map, MergeError> {
+        self.with_cells(in_memory::map)
+    }
+
     /// Writes tables, figures and report, and the manifest last, into the folder that has the records.
     ///
     /// # Errors
     /// [`MergeError::Output`] if a file cannot be written; the records are there then.
     pub fn write(self, folder: &Folder) -> Result<Merged, MergeError> {
         let clock = Instant::now();
-        let Gathered { parts, plan, records, warnings, reading } = self;
+        let (files, object, classes, writing) = self.with_cells(|cells, run| {
+            let files = map::write(folder, cells, run)?;
+            let writing = clock.elapsed();
+            let object = map_json::object(folder.path(), &files, cells, run, writing)?;
+            Ok((files, object, count_classes(cells.classes()), writing))
+        })?;
+        Ok(Merged { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })
+    }
+
+    /// Hands over the finished map: its cells, and who computed them.
+    fn with_cells<T>(
+        &self,
+        take: impl FnOnce(&Cells<'_>, &Run<'_>) -> Result<T, OutputError>,
+    ) -> Result<T, MergeError> {
+        let Gathered { parts, plan, records, .. } = self;
         let first = &parts.parts[0].manifest;
-        let attractors = coexistence::attractors(&plan, &records);
-        let basins = attractors::basins(&plan, &records, &[]);
-        let cells = Cells::new(&parts.scene, &plan, &records)
+        let attractors = coexistence::attractors(plan, records);
+        let basins = attractors::basins(plan, records, &[]);
+        let cells = Cells::new(&parts.scene, plan, records)
             .counting(attractors.as_deref())
             .in_basins(basins.as_ref());
         let processor = parts.processors();
@@ -362,7 +385,7 @@ impl Gathered {
             engine: &first.engine,
             precision: &first.precision,
             device: &first.device,
-            // Those of the shards stand in their manifests.
+            // Each part's manifest has its own.
             adapter: None,
             cards: Vec::new(),
             processor: &processor,
@@ -372,22 +395,14 @@ impl Gathered {
             resumed_cells: 0,
             lane_grid: parts.lane_grid(),
             refined: None,
-            without_effect: effect::names(&plan, &records, &first.precision),
+            without_effect: effect::names(plan, records, &first.precision),
             merged: Some(Origin {
                 shards: parts.parts[0].shard.count(),
                 sources: &first.sources,
                 target: &first.target,
             }),
         };
-        let files = map::write(folder, &cells, &run)?;
-        let writing = clock.elapsed();
-        Ok(Merged {
-            object: map_json::object(folder.path(), &files, &cells, &run, writing)?,
-            files,
-            classes: count_classes(cells.classes()),
-            warnings,
-            times: [reading, writing],
-        })
+        Ok(take(&cells, &run)?)
     }
 }
 

@@ -29,9 +29,9 @@ fn command(ask: &Map, engine: &EngineOptions, last: &str) -> String {
         words.push(format!("--engine {}", named.get_name()));
     }
     words.extend(engine.precision.map(|precision| format!("--precision {}", precision.name())));
+    words.extend(ask.shard.map(|shard| format!("--shard {shard}")));
     let adapter = engine.adapter.as_ref();
     words.extend(adapter.map(|adapter| format!("--adapter {}", quoted(&adapter.to_string()))));
-    words.extend(ask.shard.map(|shard| format!("--shard {shard}")));
     words.extend(ask.run.set.iter().map(|set| format!("--set {}", quoted(set))));
     words.extend(ask.json.then(|| "--json".to_owned()));
     words.push(last.to_owned());
