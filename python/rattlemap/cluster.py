@@ -94,7 +94,7 @@ def merged(
 
 
 def _default_count(scene: _native.Scene, client: Any) -> int:
-    threads = sum(client.nthreads().values())
+    threads: int = sum(client.nthreads().values())
     return max(1, min(SHARDS_PER_THREAD * max(threads, 1), scene.runs // FEWEST_RUNS))
 
 
