@@ -94,7 +94,7 @@ def merged(
 
 
 def _default_count(scene: _native.Scene, client: Any) -> int:
-    threads = sum(client.nthreads().values())
+    threads: int = sum(client.nthreads().values())
     return max(1, min(SHARDS_PER_THREAD * max(threads, 1), scene.runs // FEWEST_RUNS))
 
 
@@ -102,8 +102,9 @@ def _parts(
     scene: _native.Scene, client: Any, count: int, engine: str, precision: str | None, root: Path
 ) -> Iterator[Path]:
     """The shards' folders, as they come; those that are not wanted any more are cancelled."""
-    from distributed import as_completed
+    import distributed
 
+    as_completed: Any = distributed.as_completed
     run = uuid4().hex
     index_of = {
         client.submit(

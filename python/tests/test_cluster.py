@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import threading
@@ -44,14 +43,14 @@ def assert_same(ds: xr.Dataset, plain: xr.Dataset) -> None:
             assert ds[name].values.tobytes() == variable.values.tobytes(), name
 
 
-AXES: dict[str, Any] = {"e": (0.5, 0.99, 72), "omega": np.linspace(2, 7, 64)}
+AXES: dict[str, Any] = {"e": (0.5, 0.99, 28), "omega": np.linspace(2, 7, 28)}
 WHAT: dict[str, Any] = {"quantities": ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]}
 
 
 def test_a_worker_is_killed_on_the_way(client: Any) -> None:
     model = rm.gear_pair(F=55)
     # Work enough to be killed at.
-    how: dict[str, Any] = {"engine": "cpu", "early_stop": False, "observed_periods": 400, **AXES, **WHAT}
+    how: dict[str, Any] = {"engine": "cpu", "early_stop": False, "observed_periods": 256, **AXES, **WHAT}
     plain = rm.map(model, **how)
     before = client.run(os.getpid)
     killed: list[int] = []
@@ -108,7 +107,7 @@ def test_a_folder_and_basins(client: Any, tmp_path: Path) -> None:
     starts: dict[str, Any] = {"x1": (-0.6, 0.6, 12), "v1": (-6, 6, 9)}
     plain = rm.basins(model, engine="cpu", **starts)
     ds = rm.basins(model, engine="cpu", **starts, client=client, shards=3, out=tmp_path / "map")
-    assert json.loads(ds.attrs["shards"]) == 3
+    assert ds.attrs["shards"] == 3
     assert_same(ds, plain)
     assert [path.name for path in tmp_path.iterdir()] == ["map"]
     assert_same(rm.open(tmp_path / "map"), plain)
