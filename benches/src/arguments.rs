@@ -21,6 +21,7 @@ pub(crate) struct Cli {
 pub(crate) enum Instrument {
     WorkPrecision(WorkPrecision),
     Stress(Stress),
+    Scale(Scale),
 }
 
 /// Error of strobe states and event times against run time per period, for every method
@@ -73,6 +74,37 @@ fn part(text: &str) -> Result<Part, String> {
     let names = Part::ALL.map(Part::name);
     let named = Part::ALL.into_iter().find(|part| part.name() == text);
     named.ok_or_else(|| format!("it must be one of {}", names.join(", ")))
+}
+
+/// Seconds, memory and disk that a large map takes beside its motions, in shards that are merged
+///
+/// A small map is integrated on the processor; its records, stretched and changed a little, are those of the large one.
+/// Writes the shards, merges them, and writes seconds and largest memory by phase to scale.csv, sizes of files to
+/// files.csv. 10^7 cells take a minute or two, and some 3 GB of disk.
+#[derive(Debug, Args)]
+pub(crate) struct Scale {
+    #[command(flatten)]
+    pub(crate) run: Options,
+
+    /// Cells along the first axis
+    #[arg(long, value_name = "N", default_value_t = 3162, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub(crate) columns: u32,
+
+    /// And along the second
+    #[arg(long, value_name = "N", default_value_t = 3163, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub(crate) rows: u32,
+
+    /// Shards that it is dealt out to
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) shards: u32,
+
+    /// Times that they are put together
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub(crate) rounds: u32,
+
+    /// Ask for every quantity; class and exponent alone unless given
+    #[arg(long)]
+    pub(crate) all: bool,
 }
 
 /// Where measurements go, and how thorough they are.

@@ -6,7 +6,7 @@ mod commands;
 use std::process::ExitCode;
 
 use arguments::{Cli, Instrument};
-use commands::{stress, work_precision};
+use commands::{scale, stress, work_precision};
 
 fn main() -> ExitCode {
     let cli = match rattlemap::cli::parsed::<Cli>() {
@@ -16,6 +16,7 @@ fn main() -> ExitCode {
     let done = match cli.instrument {
         Instrument::WorkPrecision(ask) => work_precision::run(&ask),
         Instrument::Stress(ask) => stress::run(&ask),
+        Instrument::Scale(ask) => scale::run(&ask),
     };
     done.map_or_else(|failure| failure.report(), |()| ExitCode::SUCCESS)
 }

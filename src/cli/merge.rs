@@ -5,21 +5,21 @@ use std::sync::atomic::Ordering;
 
 use anyhow::anyhow;
 
-use super::arguments::{EngineChoice, Merge};
+use super::arguments::Merge;
 use super::capacity;
 use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress;
 use super::say;
 use crate::output::merge::{MergeError, Merged, Parts, Progress};
-use crate::output::{self, Folder};
+use crate::output::{self, Folder, RecordFileError};
 
 /// Looks at all shards, gathers their records, writes the map.
 pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(ask.quiet)?;
     let parts = Parts::open(&ask.parts).map_err(refused)?;
     parts.refuse(&ask.out).map_err(refused)?;
-    capacity::check(parts.scene(), None, EngineChoice::Cpu, &ask.out)?;
+    capacity::check_merged(parts.scene(), &ask.out)?;
     // A run that ended before it kept anything has left nothing else.
     let folder = Folder::open(&ask.out, ask.force || !Folder::holds_results(&ask.out))?;
     folder.refuse_links(output::map::names())?;
@@ -53,10 +53,10 @@ pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
 /// Who asked wrongly, or what failed.
 fn refused(error: MergeError) -> Failure {
     match error {
-        MergeError::Damaged { .. } | MergeError::Output(_) | MergeError::Stopped => {
-            Failure::Run(error.into())
-        }
-        MergeError::Records(error) => error.into(),
+        MergeError::Damaged { .. }
+        | MergeError::Output(_)
+        | MergeError::Stopped
+        | MergeError::Records(RecordFileError::Io { .. }) => Failure::Run(error.into()),
         _ => Failure::Usage(error.into()),
     }
 }

@@ -55,7 +55,7 @@ pub fn without_effect<'p>(
 ///
 /// # Panics
 /// As [`without_effect`].
-pub fn names(plan: &Plan, records: &[Record], precision: &str) -> Vec<String> {
+pub fn names(plan: &Plan, records: &(impl Records + ?Sized), precision: &str) -> Vec<String> {
     let rounding = ROUNDING[usize::from(precision == "f64")];
     let found = without_effect(plan, records, rounding);
     found.into_iter().map(|parameter| parameter.name.to_string()).collect()

@@ -114,7 +114,6 @@ pub struct Plan {
     steps: Steps,
     refine: Option<Refine>,
     needs: Needs,
-    order: Vec<u32>,
 }
 
 impl Plan {
@@ -127,7 +126,6 @@ impl Plan {
         assert!(scene.axes().len() == 2 || scene.list().is_some(), "a map has two axes, or a list of cells");
         assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
         let points = scene.points().clone();
-        let [columns, rows] = points.counts();
         let mut needs = needs(&scene.outputs().quantities);
         // Chaos is an attractor, too.
         needs.exponent |= scene.is_basin();
@@ -147,7 +145,6 @@ impl Plan {
             steps: integration.steps_per_period,
             refine: scene.refine(),
             needs,
-            order: morton::order(columns, rows),
         }
     }
 
@@ -203,12 +200,12 @@ impl Plan {
 
     /// How many cells there are.
     pub fn cell_count(&self) -> usize {
-        self.order.len()
+        self.points.counts().iter().product()
     }
 
     /// Cell ids in the order in which engines get them; for further starts the same again.
-    pub fn order(&self) -> &[u32] {
-        &self.order
+    pub fn order(&self) -> Vec<u32> {
+        (0..self.cell_count()).map(|place| self.run_at(place)).collect()
     }
 
     /// Starts per cell.
@@ -224,7 +221,9 @@ impl Plan {
     /// The run at this place of the order: every cell with its first start, then with the next.
     pub fn run_at(&self, place: usize) -> u32 {
         let (nth, place) = (place / self.cell_count(), place % self.cell_count());
-        (nth * self.cell_count()) as u32 + self.order[place]
+        let counts = self.counts();
+        let [i, j] = morton::at(place, counts);
+        (nth * self.cell_count() + j * counts[0] + i) as u32
     }
 
     /// How cells start: the first run of each.
@@ -242,6 +241,11 @@ impl Plan {
             Start::Down if j + 1 < rows => Some(id + columns),
             _ => None,
         }
+    }
+
+    /// Whether anybody reads the last states of runs that have ended: to tell attractors apart, or to go on from them.
+    pub fn reads_strobes(&self) -> bool {
+        self.start_count() > 1 || self.is_basin() || self.policy().follows()
     }
 
     /// The state in which the run `id` starts at phase 0. `records`, by run, are read only
@@ -416,7 +420,7 @@ mod tests {
         let plan = plan("e", "omega", [7, 5]);
         let keys: Vec<u64> = plan.order().iter().map(|&id| morton_key(plan.indices(id))).collect();
         assert!(keys.is_sorted());
-        let mut ids = plan.order().to_vec();
+        let mut ids = plan.order();
         ids.sort_unstable();
         assert!(ids.into_iter().eq(0..35));
     }

@@ -140,16 +140,17 @@ const LEVELS: u8 = 255;
 
 impl Scale {
     fn layer(&self, cells: &Cells<'_>) -> Layer {
-        let values: Vec<Option<f64>> = ids(cells).map(|id| (self.field)(&cells.row(id))).collect();
-        let sizes =
-            |sign: f64| values.iter().flatten().map(move |value| sign * value).filter(|size| *size > 0.0);
-        let is_negative = |value: &f64| *value < 0.0;
-        let high = match values.iter().flatten().all(is_negative) && sizes(-1.0).next().is_some() {
+        // What has no value is no number.
+        let values: Vec<f64> =
+            ids(cells).map(|id| (self.field)(&cells.row(id)).unwrap_or(f64::NAN)).collect();
+        let numbers = || values.iter().copied().filter(|value| !value.is_nan());
+        let sizes = |sign: f64| numbers().map(move |value| sign * value).filter(|size| *size > 0.0);
+        let high = match numbers().all(|value| value < 0.0) && sizes(-1.0).next().is_some() {
             true => 0.0,
             false => nice_bound(sizes(1.0)),
         };
         let low = if sizes(-1.0).next().is_some() { -nice_bound(sizes(-1.0)) } else { 0.0 };
-        let beyond = beyond(values.iter().flatten().copied(), low, high);
+        let beyond = beyond(numbers(), low, high);
         let value_of = |share: f64| low + share * (high - low);
         let level = |value: f64| {
             let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
@@ -165,13 +166,16 @@ impl Scale {
             })
         };
         let colors: Vec<Color> = (0..LEVELS).map(color).collect();
-        let absent = values.iter().filter(|value| value.is_none()).count();
+        let absent = values.iter().filter(|value| value.is_nan()).count();
         let entry = Entry { color: NO_VALUE, text: "no value".to_owned(), cells: absent };
         Layer {
             name: self.name,
             short: self.short,
             title: self.title,
-            indices: values.par_iter().map(|value| value.map_or(LEVELS, level)).collect(),
+            indices: values
+                .par_iter()
+                .map(|&value| if value.is_nan() { LEVELS } else { level(value) })
+                .collect(),
             palette: colors.iter().copied().chain([NO_VALUE]).collect(),
             entries: if absent > 0 { vec![entry] } else { Vec::new() },
             bar: Some(Bar { label: self.title, colors, low, high, beyond }),

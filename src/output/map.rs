@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use super::folder::PARTIAL;
+use super::layers::Layer;
 use super::unfinished::UNFINISHED;
 use super::validation_json::ValidationObject;
 use super::words::{self, Spelled};
@@ -39,6 +40,9 @@ pub const VALIDATION: &str = "validation.json";
 /// The layers of which there are figures, in every format of figures.
 const LAYERS: [&str; 8] =
     ["map", layers::CLASS, "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
+
+/// Cells of a map at most whose figures are drawn side by side.
+const SIDE_BY_SIDE: usize = 1 << 22;
 
 /// Every file that a map may have beside its records, but for its list, which is not made of them.
 static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
@@ -252,9 +256,14 @@ fn write_pictures(
     if wants_figures {
         let named = layers.iter().flat_map(|layer| names(layer.name).map(move |name| (layer, name)));
         let named: Vec<_> = named.filter(|(_, name)| wanted(name)).collect();
-        named.par_iter().try_for_each(|(layer, name)| {
+        let draw = |(layer, name): &(&Layer, String)| {
             folder.replace(name, |path| Ok(map_figure::write(path, cells, layer)?))
-        })?;
+        };
+        // Each holds its pixels, twice.
+        match cells.counts().iter().product::<usize>() > SIDE_BY_SIDE {
+            true => named.iter().try_for_each(draw)?,
+            false => named.par_iter().try_for_each(draw)?,
+        }
         files.extend(named.into_iter().map(|(_, name)| name));
     }
     if wants_page {

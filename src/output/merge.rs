@@ -42,7 +42,7 @@ use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
 use crate::map::{attractors, coexistence, effect};
-use crate::record::Record;
+use crate::record::{Record, RecordStore, Records};
 use part::{Begun, Part, Seen};
 
 /// Records that are written together: as many as a batch of the file has at most.
@@ -211,7 +211,7 @@ struct Gathering<'p, G> {
     file: RecordFile,
     go_on: G,
     /// By run: the one place where all are.
-    records: Vec<Record>,
+    records: RecordStore,
     /// A bit for each run that has come.
     come: Vec<u64>,
     done: usize,
@@ -227,7 +227,7 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             plan,
             file,
             go_on,
-            records: vec![Record::default(); runs],
+            records: RecordStore::new(runs, plan.reads_strobes()),
             come: vec![0; runs.div_ceil(64)],
             done: 0,
             waiting: Vec::new(),
@@ -264,7 +264,7 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
 
     /// Takes up a batch; false if it is not of this map, or has what came before.
     fn take(&mut self, batch: &[(u32, Record)]) -> Result<bool, MergeError> {
-        if !(self.go_on)(Progress { done: self.done, of: self.records.len() }) {
+        if !(self.go_on)(Progress { done: self.done, of: self.records.count() }) {
             return Err(MergeError::Stopped);
         }
         if !self.plan.admits(batch) {
@@ -275,11 +275,11 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             let Some(bits) = self.come.get_mut(place / 64).filter(|bits| **bits & bit == 0) else {
                 return Ok(false);
             };
-            if place >= self.records.len() {
+            if place >= self.records.count() {
                 return Ok(false);
             }
             *bits |= bit;
-            self.records[place] = record;
+            self.records.put(place, &record);
         }
         self.done += batch.len();
         if self.plan.policy().follows() {
@@ -302,7 +302,8 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             let ids: Vec<usize> =
                 (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns).collect();
             for ids in ids.chunks(BATCH) {
-                let batch: Vec<(u32, Record)> = ids.iter().map(|&id| (id as u32, self.records[id])).collect();
+                let batch: Vec<(u32, Record)> =
+                    ids.iter().map(|&id| (id as u32, self.records.record(id))).collect();
                 self.file.append(&batch)?;
             }
         } else if !self.waiting.is_empty() {
@@ -317,7 +318,7 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
 pub struct Gathered {
     parts: Parts,
     plan: Plan,
-    records: Vec<Record>,
+    records: RecordStore,
     warnings: Vec<String>,
     reading: Duration,
 }
@@ -384,6 +385,9 @@ impl Gathered {
             engine: &first.engine,
             precision: &first.precision,
             device: &first.device,
+            // Each part's manifest has its own.
+            adapter: None,
+            cards: Vec::new(),
             processor: &processor,
             opening: parts.sum(|part| part.manifest.timings.open),
             elapsed: parts.elapsed(),

@@ -7,8 +7,8 @@
 //! The page runs its own script and style and nothing else, which its policy says: what gets into a page from a scene or a
 //! manifest is text, and would stay text if it were written as a script.
 
-use std::fs;
-use std::io::Write;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use base64::Engine;
@@ -17,7 +17,7 @@ use bytemuck::NoUninit;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use sha2::{Digest, Sha256};
 
 use super::attractors_csv::named;
@@ -54,7 +54,7 @@ struct Data<'a> {
     /// Components of a state.
     components: usize,
     layers: Vec<LayerData>,
-    values: serde_json::Map<String, serde_json::Value>,
+    values: Values,
     classes: [&'static str; 4],
     statuses: Vec<&'static str>,
     sources: Vec<&'static str>,
@@ -130,6 +130,15 @@ struct Packed {
     data: String,
 }
 
+/// What the page reads out for a cell, by name.
+struct Values(Vec<(&'static str, Packed)>);
+
+impl Serialize for Values {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, values)| (name, values)))
+    }
+}
+
 /// Writes the page, with the section on validation if there is one.
 ///
 /// # Errors
@@ -154,7 +163,7 @@ pub(super) fn write(
         components: scene.base().state_names().len(),
         start: scene.sweeps_start().then(|| cells.start(0)[..scene.base().state_names().len()].to_vec()),
         layers: layers.par_iter().map(LayerData::from).collect(),
-        values: values(cells, spelled)?,
+        values: values(cells, spelled),
         classes: names::CLASSES,
         statuses: Status::ALL.iter().map(|&status| names::status(status)).collect(),
         sources: SOURCES.iter().map(|&source| names::source(source)).collect(),
@@ -168,26 +177,46 @@ pub(super) fn write(
     };
     let [style, script] = [STYLE, SCRIPT].map(inline);
     let policy = policy(&style, &script);
-    // `<` could end the script that holds the data.
-    let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
     let title = scene.title().replace('&', "&amp;").replace('<', "&lt;");
-    // One pass: data must not be searched for marks.
-    let mut page = String::with_capacity(PAGE.len() + STYLE.len() + SCRIPT.len() + json.len());
+    // One pass: data must not be searched for marks. Nor are they held twice: of a large map they are long.
+    let mut page = BufWriter::new(File::create(path)?);
     let mut rest = PAGE;
     for (mark, text) in [
-        ("@POLICY@", policy.as_str()),
-        ("@TITLE@", &title),
-        ("@STYLE@", &style),
-        ("@DATA@", &json),
-        ("@SCRIPT@", &script),
+        ("@POLICY@", Some(policy.as_str())),
+        ("@TITLE@", Some(&title)),
+        ("@STYLE@", Some(&style)),
+        ("@DATA@", None),
+        ("@SCRIPT@", Some(&script)),
     ] {
         let Some((before, after)) = rest.split_once(mark) else { unreachable!("the page has {mark}") };
-        page.push_str(before);
-        page.push_str(text);
+        page.write_all(before.as_bytes())?;
+        match text {
+            Some(text) => page.write_all(text.as_bytes())?,
+            None => serde_json::to_writer(InScript(&mut page), &data)?,
+        }
         rest = after;
     }
-    page.push_str(rest);
-    Ok(fs::write(path, page)?)
+    page.write_all(rest.as_bytes())?;
+    Ok(page.flush()?)
+}
+
+/// JSON inside of a script, which `<` could end: it is escaped.
+struct InScript<W>(W);
+
+impl<W: Write> Write for InScript<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        for (nth, part) in bytes.split(|&byte| byte == b'<').enumerate() {
+            if nth > 0 {
+                self.0.write_all(b"\\u003c")?;
+            }
+            self.0.write_all(part)?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// An inline part as it stands between its tags. Browsers hash what they have parsed, in which lines end in line feeds.
@@ -231,10 +260,7 @@ fn starts(cells: &Cells<'_>) -> Option<Packed> {
 }
 
 /// What the page reads out for a cell, one array per quantity that the scene asks for.
-fn values(
-    cells: &Cells<'_>,
-    spelled: &Spelled,
-) -> serde_json::Result<serde_json::Map<String, serde_json::Value>> {
+fn values(cells: &Cells<'_>, spelled: &Spelled) -> Values {
     let [columns, rows] = cells.counts();
     let all = || (0..columns * rows).into_par_iter().map(|id| cells.row(id));
     let floats = |field: fn(&Row) -> Option<f64>| {
@@ -276,7 +302,7 @@ fn values(
     for (name, words) in [("word", &spelled.words), ("pattern", &spelled.patterns)] {
         list.extend(words.as_ref().map(|words| (name, packed("u32", &words.numbers))));
     }
-    list.into_iter().map(|(name, values)| Ok((name.to_owned(), serde_json::to_value(values)?))).collect()
+    Values(list)
 }
 
 fn texts(words: Option<&Words>) -> Vec<String> {

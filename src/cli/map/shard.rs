@@ -99,6 +99,8 @@ pub(super) fn finish(
         engine: engine.name(),
         precision: engine.precision(),
         device: &device,
+        adapter: engine.adapter(),
+        cards: engine.cards(),
         processor: &processor::described(),
         opening,
         elapsed,

@@ -6,27 +6,41 @@ pub(crate) fn key([i, j]: [usize; 2]) -> u64 {
     spread(i) | spread(j) << 1
 }
 
-/// The ids `j * columns + i` of a grid, in Morton order.
-pub(super) fn order(columns: usize, rows: usize) -> Vec<u32> {
-    let mut ids = Vec::with_capacity(columns * rows);
-    let side = columns.max(rows).next_power_of_two();
-    visit([0, 0], side, [columns, rows], &mut ids);
-    ids
+/// The indices of the cell that has this place, below the number of cells, in the Morton order of a grid. There is no table of
+/// it: one of 10^9 cells would take 4 GB of every process.
+pub(super) fn at(mut place: usize, counts: [usize; 2]) -> [usize; 2] {
+    let mut corner = [0, 0];
+    let mut side = counts[0].max(counts[1]).next_power_of_two();
+    // Squares that the grid's edge cuts have cells less; in a whole one the place is the key.
+    while !(0..2).all(|axis| corner[axis] + side <= counts[axis]) {
+        side /= 2;
+        let [i, j] = corner;
+        for at in [[i, j], [i + side, j], [i, j + side], [i + side, j + side]] {
+            let inside = |axis: usize| counts[axis].saturating_sub(at[axis]).min(side);
+            let cells = inside(0) * inside(1);
+            corner = at;
+            if place < cells {
+                break;
+            }
+            place -= cells;
+        }
+    }
+    [corner[0] + every_other_bit(place), corner[1] + every_other_bit(place >> 1)]
 }
 
-/// Visits the square at `[i, j]` as far as it lies in the grid.
-fn visit([i, j]: [usize; 2], side: usize, counts: [usize; 2], ids: &mut Vec<u32>) {
-    if i >= counts[0] || j >= counts[1] {
-        return;
+/// Bits 0, 2, 4 and so on, side by side.
+fn every_other_bit(n: usize) -> usize {
+    let mut bits = n as u64 & 0x5555_5555_5555_5555;
+    for (shift, mask) in [
+        (1, 0x3333_3333_3333_3333),
+        (2, 0x0f0f_0f0f_0f0f_0f0f),
+        (4, 0x00ff_00ff_00ff_00ff),
+        (8, 0x0000_ffff_0000_ffff),
+        (16, 0x0000_0000_ffff_ffff),
+    ] {
+        bits = (bits | bits >> shift) & mask;
     }
-    if side == 1 {
-        ids.push((j * counts[0] + i) as u32);
-        return;
-    }
-    let half = side / 2;
-    for at in [[i, j], [i + half, j], [i, j + half], [i + half, j + half]] {
-        visit(at, half, counts, ids);
-    }
+    bits as usize
 }
 
 #[cfg(test)]
@@ -35,10 +49,16 @@ mod tests {
 
     #[test]
     fn quadrants_come_one_after_the_other() {
-        assert_eq!(order(4, 4), [0, 1, 4, 5, 2, 3, 6, 7, 8, 9, 12, 13, 10, 11, 14, 15]);
-        assert_eq!(order(3, 2), [0, 1, 3, 4, 2, 5]);
-        let mut long = order(1000, 3);
-        long.sort_unstable();
-        assert!(long.into_iter().eq(0..3000));
+        let order = |counts: [usize; 2]| -> Vec<usize> {
+            let id = |[i, j]: [usize; 2]| j * counts[0] + i;
+            (0..counts[0] * counts[1]).map(|place| id(at(place, counts))).collect()
+        };
+        assert_eq!(order([4, 4]), [0, 1, 4, 5, 2, 3, 6, 7, 8, 9, 12, 13, 10, 11, 14, 15]);
+        assert_eq!(order([3, 2]), [0, 1, 3, 4, 2, 5]);
+        // Keys ascend, and every cell is there once.
+        for counts in [[1000, 3], [1, 77], [64, 64], [65, 63], [37, 100]] {
+            let keys = order(counts).into_iter().map(|id| key([id % counts[0], id / counts[0]]));
+            assert!(keys.is_sorted_by(|a, b| a < b), "{counts:?}");
+        }
     }
 }

@@ -22,7 +22,9 @@ pub(super) fn encoded(canvas: &Canvas<'_>) -> Result<Vec<u8>, DrawError> {
     for item in canvas.items.borrow().iter() {
         draw(&mut page, canvas, item);
     }
-    let rgb = page.pixels().iter().flat_map(|pixel| [pixel.red(), pixel.green(), pixel.blue()]).collect();
+    let mut rgb = Vec::with_capacity(3 * page.pixels().len());
+    page.pixels().iter().for_each(|pixel| rgb.extend([pixel.red(), pixel.green(), pixel.blue()]));
+    drop(page);
     bitmap(&Bitmap { size: [width as usize, height as usize], rgb, alpha: None, is_smooth: false })
 }
 
@@ -136,11 +138,12 @@ fn premultiplied(bitmap: &Bitmap) -> Option<Pixmap> {
     let [columns, rows] = bitmap.size.map(|side| u32::try_from(side).unwrap_or(0));
     let over = |value: u8, alpha: u8| ((u32::from(value) * u32::from(alpha) + 127) / 255) as u8;
     let pixels = bitmap.rgb.chunks_exact(3).enumerate();
-    let data = pixels.flat_map(|(i, c)| {
+    let mut data = Vec::with_capacity(4 * bitmap.rgb.len() / 3);
+    pixels.for_each(|(i, c)| {
         let alpha = bitmap.alpha.as_ref().map_or(0xff, |alpha| alpha[i]);
-        [over(c[0], alpha), over(c[1], alpha), over(c[2], alpha), alpha]
+        data.extend([over(c[0], alpha), over(c[1], alpha), over(c[2], alpha), alpha]);
     });
-    Pixmap::from_vec(data.collect(), IntSize::from_wh(columns, rows)?)
+    Pixmap::from_vec(data, IntSize::from_wh(columns, rows)?)
 }
 
 fn outline(shape: &Shaped) -> Option<Path> {

@@ -26,7 +26,8 @@ impl Canvas<'_> {
         color: impl Fn([usize; 2]) -> [u8; 3],
     ) -> Result<(), DrawError> {
         let cells = (0..rows).rev().flat_map(|row| (0..columns).map(move |column| [column, row]));
-        let rgb = cells.flat_map(color).collect();
+        let mut rgb = Vec::with_capacity(3 * columns * rows);
+        cells.for_each(|cell| rgb.extend(color(cell)));
         self.image(rect, Bitmap { size: [columns, rows], rgb, alpha: None, is_smooth: false })
     }
 

@@ -53,7 +53,7 @@ pub fn work(bench: &mut Bench<'_>, side: u32) -> Result<Option<Work>, GpuError> 
 fn count(device: &mut Gpu, side: u32) -> Result<Work, GpuError> {
     let scene = super::scene(side);
     let plan = Plan::new(&scene);
-    let ids = plan.order().to_vec();
+    let ids = plan.order();
     let undecided_periods = plan.budget().undecided_periods;
     let settings = LaneSettings { undecided_periods, kinds: false, ..LaneSettings::default() };
     let weights = pollster::block_on(run_lanes(device, &plan, &[], &ids, &settings))?;
