@@ -96,9 +96,9 @@ def map(  # noqa: A001
 
     Examples
     --------
-    >>> ds = rm.map(rm.gear_pair(F=50), e=(0, 1, 64), omega=np.linspace(1, 12, 64))
+    >>> ds = rm.map(rm.gear_pair(F=50), e=(0, 1, 32), omega=np.linspace(1, 12, 32))
     >>> ds["lyapunov"].sel(e=0.6, method="nearest").plot()
-    >>> ds = rm.map(scene="scenes/e_omega.toml", set=["axis.0.count=64", "axis.1.count=64"])
+    >>> ds = rm.map(scene="scenes/e_omega.toml", set=["axis.0.count=32", "axis.1.count=32"])
     """
     asked = _asked(model, scene, set, quantities, start, settings, names)
     where = None if out is None else os.fspath(out)
