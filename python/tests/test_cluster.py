@@ -130,12 +130,12 @@ def test_what_cannot_be_split_is_refused_before_anything_is_computed(client: Any
 def test_a_part_of_another_run_ends_it_at_once(client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     began: list[int] = []
 
-    def of_two_runs(scene: Any, client: Any, count: int, engine: str, *_: Any) -> Iterator[Path]:
+    def of_two_runs(scene: Any, client: Any, count: int, how: cluster.How, *_: Any) -> Iterator[Path]:
         other = asking.scene(rm.gear_pair(F=51), {"e": (0, 1, 8), "omega": (1, 12, 8)}, purpose="map", axes=2)
         for index, asked in enumerate((scene, other, scene), 1):
             began.append(index)
             part = tmp_path / f"part-{index}"
-            _native.shard(asked, index, count, engine, None, str(part))
+            _native.shard(asked, index, count, *how[:2], str(part))
             yield part
 
     monkeypatch.setattr(cluster, "_parts", of_two_runs)
