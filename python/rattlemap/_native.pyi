@@ -72,6 +72,7 @@ class MadeMap(TypedDict):
     texts: list[str]
     attractors: str | None
     why: str
+    warnings: list[str]
     files: list[str]
 
 def map(
@@ -82,6 +83,7 @@ def map(
     force: bool = ...,
     resume: bool = ...,
     progress: _Tell = ...,
+    adapter: str | None = ...,
 ) -> MadeMap: ...
 
 def shard(

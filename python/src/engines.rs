@@ -1,12 +1,12 @@
 //! Cells on an engine: what maps and shards have in common.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use rattlemap::cli;
 use rattlemap::gpu::Precision;
-use rattlemap::map::engine::Engine;
+use rattlemap::map::engine::{Engine, Loss};
 use rattlemap::map::engine_choice::{self, Ask, Chosen};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
@@ -24,13 +24,15 @@ use crate::waiting::Watch;
 /// Which engine is asked for.
 ///
 /// # Errors
-/// If there is none of the name, or it does not know the precision.
-pub(crate) fn ask(engine: &str, precision: Option<&str>) -> Result<Ask, Problem> {
+/// If there is none of the name, or it does not know the precision or have adapters.
+pub(crate) fn ask(engine: &str, precision: Option<&str>, adapter: Option<&str>) -> Result<Ask, Problem> {
     let named = |name: &str| {
         let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
         known.ok_or_else(|| Problem::engine(format!("the precision {name:?} is none of f32 and f64")))
     };
-    let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()?, adapter: None };
+    // Whatever it says, it can be read.
+    let adapter = adapter.and_then(|adapter| adapter.parse().ok());
+    let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()?, adapter };
     engine_choice::check(&ask)?;
     Ok(ask)
 }
@@ -68,6 +70,8 @@ pub(crate) struct Integrated<'p> {
     pub(crate) engine: Engine<'p>,
     /// Why that engine.
     pub(crate) why: String,
+    /// Of adapters that failed, a line each.
+    pub(crate) warnings: Vec<String>,
     pub(crate) schedule: Schedule,
     /// By run; none of a shard whose cells need no others.
     pub(crate) records: Vec<Record>,
@@ -116,7 +120,14 @@ impl Task {
         watch: &Watch,
     ) -> Result<Option<Integrated<'p>>, Problem> {
         let clock = Instant::now();
-        let Chosen { mut engine, why, .. } = pollster::block_on(engine_choice::open(plan, &self.ask))?;
+        let chosen = pollster::block_on(engine_choice::open(plan, &self.ask))?;
+        let Chosen { mut engine, why, warnings, .. } = chosen;
+        let warnings = Arc::new(Mutex::new(warnings));
+        let lost = Arc::clone(&warnings);
+        engine.listen(move |Loss { adapter, cells, reason }| {
+            let told = format!("adapter {adapter} was lost ({reason}); {cells} cells went to the others");
+            lost.lock().unwrap_or_else(PoisonError::into_inner).push(told);
+        });
         let opening = clock.elapsed();
         if watch.is_halted() {
             return Ok(None);
@@ -151,9 +162,11 @@ impl Task {
             return Ok(None);
         }
         let elapsed = clock.elapsed();
+        let warnings = std::mem::take(&mut *warnings.lock().unwrap_or_else(PoisonError::into_inner));
         Ok(Some(Integrated {
             engine,
             why,
+            warnings,
             schedule,
             records,
             tally,

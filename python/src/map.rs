@@ -22,6 +22,7 @@ pub(crate) struct Made {
     pub(crate) map: in_memory::Map,
     /// Why that engine.
     pub(crate) why: String,
+    pub(crate) warnings: Vec<String>,
     pub(crate) files: Vec<String>,
 }
 
@@ -34,6 +35,7 @@ impl Made {
         told.set_item("texts", self.map.texts)?;
         told.set_item("attractors", self.map.attractors)?;
         told.set_item("why", self.why)?;
+        told.set_item("warnings", self.warnings)?;
         told.set_item("files", self.files)?;
         Ok(told)
     }
@@ -41,7 +43,7 @@ impl Made {
 
 /// Computes a map.
 #[pyfunction]
-#[pyo3(signature = (scene, engine, precision=None, out=None, force=false, resume=false, progress=None))]
+#[pyo3(signature = (scene, engine, precision=None, out=None, force=false, resume=false, progress=None, adapter=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn map<'py>(
     py: Python<'py>,
@@ -52,11 +54,12 @@ pub(crate) fn map<'py>(
     force: bool,
     resume: bool,
     progress: Option<&Bound<'py, PyAny>>,
+    adapter: Option<&str>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let task = Task {
         scene: Arc::clone(&scene.scene),
         sets: scene.sets.clone(),
-        ask: ask(engine, precision)?,
+        ask: ask(engine, precision, adapter)?,
         shard: None,
         out: out.map(|path| Out { path, force, resume }),
     };
@@ -89,5 +92,10 @@ fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
         Some(folder) => output::map::write(folder, &cells, &run)?,
         None => Vec::new(),
     };
-    Ok(Some(Made { map: in_memory::map(&cells, &run)?, why: integrated.why, files }))
+    Ok(Some(Made {
+        map: in_memory::map(&cells, &run)?,
+        why: integrated.why,
+        warnings: integrated.warnings,
+        files,
+    }))
 }

@@ -32,7 +32,7 @@ pub(crate) fn check_shards(scene: &Scene, count: u32, engine: &str, precision: O
 fn asked(index: u32, count: u32, engine: &str, precision: Option<&str>) -> Result<(Shard, Ask), Problem> {
     let shard = Shard::new(index, count)
         .map_err(|error| Problem::scene(format!("--shard {index}/{count}: {error}")))?;
-    let ask = ask(engine, precision)?;
+    let ask = ask(engine, precision, None)?;
     match ask.engine {
         Who::Auto => Err(Problem::engine(cli::open_engine(shard))),
         _ => Ok((shard, ask)),
@@ -119,5 +119,5 @@ fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Op
     };
     let map = gathered.told()?;
     let files = if writes { gathered.write(&folder)?.files } else { Vec::new() };
-    Ok(Some(Made { map, why: String::new(), files }))
+    Ok(Some(Made { map, why: String::new(), warnings: Vec::new(), files }))
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use anyhow::anyhow;
 
-use super::arguments::{EngineChoice, Merge};
+use super::arguments::Merge;
 use super::capacity;
 use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
@@ -19,7 +19,7 @@ pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(ask.quiet)?;
     let parts = Parts::open(&ask.parts).map_err(refused)?;
     parts.refuse(&ask.out).map_err(refused)?;
-    capacity::check(parts.scene(), None, EngineChoice::Cpu, &ask.out)?;
+    capacity::check_merged(parts.scene(), &ask.out)?;
     // A run that ended before it kept anything has left nothing else.
     let folder = Folder::open(&ask.out, ask.force || !Folder::holds_results(&ask.out))?;
     folder.refuse_links(output::map::names())?;

@@ -10,8 +10,14 @@ use crate::record::Record;
 /// make of it.
 const MEMORY_BESIDE: u64 = 64;
 
-/// Of these what a shard has for all runs of the map: their order, and which of them have come.
-const OF_ALL: u64 = 5;
+/// What a shard has for each run of the map: whether it has come.
+const OF_ALL: u64 = 1;
+
+/// Bytes of a run in a [`RecordStore`](crate::record::RecordStore) beside its numbers.
+const IN_STORE: u64 = 8;
+/// Of its last state, and of a word's number.
+const STROBE: u64 = 32;
+const WORD_NUMBER: u64 = 4;
 
 /// The same of a cell of a list: its values, their text, and which flow and law it has.
 const LIST_ROW: u64 = 200;
@@ -79,6 +85,22 @@ impl Size {
         }
     }
 
+    /// The size of a scene's map that is merged of shards: records are kept by column, and nothing is integrated.
+    pub fn merged(scene: &Scene) -> Size {
+        let whole = Size::of(scene);
+        let compares = whole.runs > whole.cells || scene.is_basin();
+        let rows = scene.list().map_or(0, |list| list.len() as u64);
+        let per_run = in_store(scene).saturating_add(MEMORY_BESIDE);
+        Size {
+            memory: whole.runs.saturating_mul(per_run).saturating_add(rows * LIST_ROW),
+            memory_per_thread: 0,
+            // Cycles are looked for where attractors are told apart.
+            flows: if compares { whole.flows } else { 0 },
+            lane_tables: 0,
+            ..whole
+        }
+    }
+
     /// The size of a scene's map.
     pub fn of(scene: &Scene) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());
@@ -136,6 +158,22 @@ fn in_array(quantity: &Quantity) -> u64 {
     }
 }
 
+/// Bytes of a run's record by column, as far as the scene asks for it.
+fn in_store(scene: &Scene) -> u64 {
+    let quantities = &scene.outputs().quantities;
+    let asks = |quantity| quantities.contains(&quantity);
+    let number = |quantity: &Quantity| match quantity {
+        Quantity::Impacts | Quantity::Mesh => NUMBER,
+        Quantity::Word | Quantity::Pattern => WORD_NUMBER,
+        Quantity::Class | Quantity::Lyapunov | Quantity::Symmetric => 0,
+    };
+    let has_exponent = asks(Quantity::Class) || asks(Quantity::Lyapunov) || scene.is_basin();
+    let exponent = if has_exponent { 2 * NUMBER } else { 0 };
+    let goes_on = scene.run_count() > scene.cell_count() || scene.is_basin() || scene.start().follows();
+    let strobe = if goes_on { STROBE } else { 0 };
+    IN_STORE + exponent + strobe + quantities.iter().map(number).sum::<u64>()
+}
+
 fn record_on_disk(scene: &Scene) -> u64 {
     let quantity = |quantity: &Quantity| match quantity {
         Quantity::Word | Quantity::Pattern => WORD,
@@ -176,7 +214,9 @@ mod tests {
     use crate::gpu::Constants;
     use crate::map::plan::Plan;
     use crate::map::scene::{FileText, Purpose};
+    use crate::record::RecordStore;
     use rattlemap_dynamics::flow::Flow;
+    use rattlemap_dynamics::word::Word;
 
     fn scene(second: &str, min: f64, max: f64, counts: [usize; 2]) -> Scene {
         let [columns, rows] = counts;
@@ -218,6 +258,53 @@ mod tests {
         let list = Scene::parse_beside("[cells]\nfile = 'l.csv'\n", "s", &[], Purpose::Map, &find).unwrap();
         let [list, grid] = [list, scene("omega", 1.0, 12.0, [10, 10])].map(|scene| Size::of(&scene).memory);
         assert_eq!(list - grid, 100 * LIST_ROW);
+    }
+
+    /// What is foreseen of a merge is what its store takes, with what outputs make of a cell.
+    #[test]
+    fn a_merged_map_takes_the_memory_of_what_it_asks_for() {
+        let full = Record {
+            lyapunov: 0.1,
+            lyapunov_error: 0.01,
+            impacts_per_period: 1.0,
+            mesh_fraction: 0.5,
+            strobe: [1.0; 4],
+            period: 1,
+            periods_run: 100,
+            ..Record::default()
+        };
+        for (quantities, more, per_run) in [
+            ("'class', 'lyapunov'", "", 24),
+            ("'impacts'", "", 16),
+            ("'class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word', 'pattern'", "", 48),
+            ("'class'", "[start]\ncount = 3\n", 56),
+            ("'class', 'mesh'", "[start]\npolicy = 'up'\n", 64),
+        ] {
+            let axis = |name| format!("[[axis]]\nparameter = '{name}'\nmin = 0.25\nmax = 0.75\ncount = 10\n");
+            let outputs = format!("[outputs]\nquantities = [{quantities}]\n");
+            let text = axis("e") + &axis("omega") + &outputs + more;
+            let scene = Scene::parse(&text, "s", &[], Purpose::Map).unwrap();
+            let plan = Plan::new(&scene);
+            let needs = plan.needs();
+            let number = |is_asked: bool, value: f64| if is_asked { value } else { 0.0 };
+            let mut record = Record {
+                lyapunov: number(needs.exponent, full.lyapunov),
+                lyapunov_error: number(needs.exponent, full.lyapunov_error),
+                impacts_per_period: number(needs.impacts, full.impacts_per_period),
+                mesh_fraction: number(needs.mesh, full.mesh_fraction),
+                ..full
+            };
+            if needs.word {
+                record.set_word(&Word::cyclic(b"13"));
+                record.set_pattern(&Word::cyclic(b"13"));
+            }
+            let runs = plan.run_count();
+            let mut store = RecordStore::new(runs, plan.reads_strobes());
+            (0..runs).for_each(|id| store.put(id, &record));
+            assert_eq!(store.bytes(), per_run * runs, "{quantities} {more}");
+            assert_eq!(Size::merged(&scene).memory, (per_run as u64 + MEMORY_BESIDE) * runs as u64);
+            assert!(Size::merged(&scene).memory < Size::of(&scene).memory);
+        }
     }
 
     #[test]
