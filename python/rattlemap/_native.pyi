@@ -72,6 +72,7 @@ class MadeMap(TypedDict):
     texts: list[str]
     attractors: str | None
     why: str
+    warnings: list[str]
     files: list[str]
 
 def map(
@@ -82,7 +83,22 @@ def map(
     force: bool = ...,
     resume: bool = ...,
     progress: _Tell = ...,
+    adapter: str | None = ...,
 ) -> MadeMap: ...
+
+def shard(
+    scene: Scene,
+    index: int,
+    count: int,
+    engine: str,
+    precision: str | None,
+    out: str,
+    resume: bool = ...,
+    threads: int | None = ...,
+    progress: _Tell = ...,
+) -> list[str]: ...
+def check_shards(scene: Scene, count: int, engine: str, precision: str | None) -> None: ...
+def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Tell = ...) -> MadeMap: ...
 
 class MadeDiagram(TypedDict):
     manifest: str

@@ -6,6 +6,7 @@ Nothing is judged here but what a file could not say: the library reads the text
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -85,19 +86,16 @@ def _axis(name: str, value: Any) -> _Table:
             raise SceneError(
                 f"`{name} = {value!r}`: an axis is a tuple (min, max, count) or an array of values; this has {len(value)} entries"
             )
-        least, most, count = value
+        least, most, count = map(_number_or_text, value)
         # What is no whole number is refused by who reads it.
-        return {"min": _plain(least), "max": _plain(most), "count": int(count) if count == int(count) else float(count)}
+        is_whole = isinstance(count, float) and count.is_integer()
+        return {"min": least, "max": most, "count": int(count) if is_whole else count}
     values = np.asarray(value, dtype=np.float64)
     if values.ndim != 1:
         raise SceneError(f"`{name}`: an axis is a tuple (min, max, count) or values in one dimension, not in {values.ndim}")
     if is_linear(values):
         return {"min": float(values[0]), "max": float(values[-1]), "count": len(values)}
     return {"values": values.tolist()}
-
-
-def _plain(value: Any) -> Any:
-    return value if isinstance(value, str) else float(value)
 
 
 def is_linear(values: npt.NDArray[np.float64]) -> bool:
@@ -214,7 +212,7 @@ def scene(
         elif name in INTEGRATION and name not in parameters:
             integration[name] = value
         else:
-            fixed[name] = value if isinstance(value, str) else _plain_or_text(value)
+            fixed[name] = _number_or_text(value)
     if len(swept) != axes:
         given = ", ".join(str(axis.get("parameter", axis.get("start"))) for axis in swept) or "none"
         wanted = {0: "no axes", 1: "one axis", 2: "two axes"}[axes]
@@ -234,11 +232,18 @@ def scene(
     document["outputs"] = {} if quantities is None else {"quantities": [*quantities]}
     for path, value in (settings or {}).items():
         _put(document, path, value)
+    # Those that follow others take the place of the model's own values.
+    for name in document.get("derived", {}):
+        if name not in names:
+            fixed.pop(name, None)
     file = None if model._model.is_built_in else (model._model.file, model.text)
     return _native.Scene(_text(document), model=file, cells=cells, purpose=purpose)
 
 
-def _plain_or_text(value: Any) -> Any:
+def _number_or_text(value: Any) -> Any:
+    """A number; anything else as text, which the program refuses."""
+    if isinstance(value, str):
+        return value
     try:
         return float(value)
     except (TypeError, ValueError):
@@ -257,15 +262,13 @@ def scene_file(
     along: tuple[str, list[str]] | None = None,
 ) -> _native.Scene:
     """The scene in a file, with changes as the program's ``--set`` makes them."""
-    import os
-
     swept = [name for name, value in names.items() if is_axis(value)]
     if swept:
         raise SceneError(
             f"the scene has its own axes, and {', '.join(swept)} would be another; change an axis by "
             'settings={"axis.0.count": 64}'
         )
-    own = [*sets]
+    own = [sets] if isinstance(sets, str) else [*sets]
     for name, value in names.items():
         own.append(f"integration.{name}={toml(value)}" if name in INTEGRATION else assignments({name: value})[0])
     if quantities is not None:

@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 
 from . import asking
-from .engine import Engine, Precision
+from .engine import Adapter, Engine, Precision
 from .errors import SceneError
 from .map import map as make_map
 from .model import Model
@@ -21,6 +21,7 @@ def basins(
     *,
     engine: Engine = "auto",
     precision: Precision | None = None,
+    adapter: Adapter | None = None,
     quantities: Iterable[str] | None = None,
     start: asking.Start | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -39,7 +40,7 @@ def basins(
     **names
         Two axes as :func:`rattlemap.map` takes them, at least one of them of a component of the start at phase 0
         (``model.state_names``); values of single parameters and of other components, which are 0 unless told.
-    engine, precision, quantities, start, settings, out, force, resume, progress
+    engine, precision, adapter, quantities, start, settings, out, force, resume, progress
         As :func:`rattlemap.map` takes them.
 
     Returns
@@ -70,6 +71,7 @@ def basins(
         model,
         engine=engine,
         precision=precision,
+        adapter=adapter,
         quantities=quantities,
         start=start,
         settings=settings,

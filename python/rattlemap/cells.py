@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from . import _native, asking
-from .engine import Engine, Precision, dataset, no_display
+from .engine import Adapter, Engine, Precision, adapter_text, dataset, no_display
 from .errors import SceneError
 from .model import Model
 from .progress import Tell, telling
@@ -22,6 +22,7 @@ def cells(
     columns: Sequence[str] | None = None,
     engine: Engine = "auto",
     precision: Precision | None = None,
+    adapter: Adapter | None = None,
     quantities: Iterable[str] | None = None,
     start: asking.Start | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -40,7 +41,7 @@ def cells(
         Those that are parameters, where the frame has others, too; all unless told.
     **names
         Values of single parameters, and settings of ``[integration]``, as :func:`rattlemap.map` takes them.
-    engine, precision, quantities, start, settings, progress
+    engine, precision, adapter, quantities, start, settings, progress
         As :func:`rattlemap.map` takes them.
 
     Returns
@@ -74,7 +75,7 @@ def cells(
         cells=_table(frame, own),
     )
     with no_display(), telling(progress, "cells") as tell:
-        made = _native.map(asked, engine, precision, None, False, False, tell)
+        made = _native.map(asked, engine, precision, None, False, False, tell, adapter_text(adapter))
     found = dataset(made)
     results = {str(name): variable.values for name, variable in found.data_vars.items()}
     taken = [name for name in results if name in frame.columns]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import StringIO
@@ -16,6 +17,13 @@ from . import _native, decode
 
 Engine = Literal["auto", "cpu", "gpu"]
 Precision = Literal["f32", "f64"]
+#: A graphics adapter by its number in `rattlemap devices`, by a part of its name that no other has, or "all" equal ones.
+Adapter = int | str
+
+
+def adapter_text(adapter: Adapter | None) -> str | None:
+    """An adapter as the program's ``--adapter`` takes it."""
+    return None if adapter is None else str(adapter)
 
 
 @contextmanager
@@ -44,6 +52,9 @@ def table(text: str) -> pd.DataFrame:
 
 def dataset(made: _native.MadeMap) -> xr.Dataset:
     """The Dataset of a map that the native module has made."""
+    for warning in made["warnings"]:
+        # The one who called the package's function.
+        warnings.warn(warning, RuntimeWarning, stacklevel=3)
     ds = decode.dataset(made["columns"], json.loads(made["manifest"]), made["texts"])
     attractors: Any = made["attractors"]
     return ds if attractors is None else decode.with_attractors(ds, table(attractors))

@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 
 from . import _native, asking
-from .engine import Engine, Precision, dataset, no_display
+from .engine import Adapter, Engine, Precision, adapter_text, dataset, no_display
 from .errors import SceneError
 from .model import Model
 from .progress import Tell, telling
@@ -22,6 +22,7 @@ def map(  # noqa: A001
     set: Iterable[str] = (),  # noqa: A002
     engine: Engine = "auto",
     precision: Precision | None = None,
+    adapter: Adapter | None = None,
     quantities: Iterable[str] | None = None,
     start: asking.Start | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -43,6 +44,9 @@ def map(  # noqa: A001
         ``"auto"``: a hardware GPU if there is one, else the processor; ``"cpu"``; ``"gpu"``.
     precision
         ``"f32"`` or ``"f64"``; f32 on a GPU and f64 on the processor unless told.
+    adapter
+        A graphics adapter by its number in ``rattlemap devices`` or a part of its name that no other has; ``"all"`` for
+        all of the best one's kind, which share the cells. The records are those of one to the bit.
     quantities
         Some of ``class lyapunov impacts mesh symmetric word pattern``; class and lyapunov unless told. What is not asked
         for is not computed.
@@ -91,7 +95,7 @@ def map(  # noqa: A001
     asked = _asked(model, scene, set, quantities, start, settings, names)
     where = None if out is None else os.fspath(out)
     with no_display(), telling(progress, "cells") as tell:
-        made = _native.map(asked, engine, precision, where, force, resume, tell)
+        made = _native.map(asked, engine, precision, where, force, resume, tell, adapter_text(adapter))
     return dataset(made)
 
 

@@ -5,12 +5,14 @@
 
 mod arrays;
 mod bifurcation;
+mod engines;
 mod map;
 mod model;
 mod orbit;
 mod problem;
 mod program;
 mod scene;
+mod shard;
 mod waiting;
 
 use pyo3::prelude::*;
@@ -26,6 +28,7 @@ mod _native {
         orbit::{Orbit, orbit},
         program::{main, missing_variable},
         scene::Scene,
+        shard::{check_shards, merge, of_map},
     };
 
     use super::*;

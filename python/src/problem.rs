@@ -10,6 +10,7 @@ use rattlemap::map::plan::NoMotion;
 use rattlemap::map::scene::SceneError;
 use rattlemap::map::sweep::SweepError;
 use rattlemap::model::ModelError;
+use rattlemap::output::merge::MergeError;
 use rattlemap::output::{FolderError, OutputError, RecordFileError};
 
 /// An exception of the package that is to be raised, and its text.
@@ -61,6 +62,7 @@ told! {
     FolderError => folder,
     OutputError => folder,
     RecordFileError => folder,
+    MergeError => folder,
     // The request, unless somebody says better.
     Failure => scene,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import subprocess
 import sys
@@ -62,11 +63,16 @@ def test_an_array_is_taken_to_the_bit() -> None:
 
 
 def test_lanes_are_the_programs(program: Program, tmp_path: Path) -> None:
-    made = rm.map(rm.gear_pair(), **SMALL, engine="gpu", out=tmp_path / "made")
+    axes = {"e": (0.1, 0.9, 4), "omega": (4.0, 8.0, 3)}
+    made = rm.map(rm.gear_pair(), **axes, engine="gpu", out=tmp_path / "made")
     (tmp_path / "scene.toml").write_text(made.attrs["scene"])
     program("map", tmp_path / "scene.toml", "--engine", "gpu", "--quiet", "--out", tmp_path / "own")
     assert (made.attrs["engine"], made.attrs["precision"]) == ("gpu", "f32")
     assert_same(made, rm.open(tmp_path / "own"))
+    number = json.loads(made.attrs["adapter"])["number"]
+    with pytest.raises(rm.EngineError, match="--adapter 99"):
+        rm.map(rm.gear_pair(), **axes, engine="gpu", adapter=99)
+    assert_same(rm.map(rm.gear_pair(), **axes, engine="gpu", adapter=number), made)
 
 
 def test_adaptive_maps_and_several_starts(program: Program, tmp_path: Path) -> None:
@@ -79,6 +85,16 @@ def test_adaptive_maps_and_several_starts(program: Program, tmp_path: Path) -> N
         program("map", tmp_path / f"{name}.toml", "--engine", "cpu", "--quiet", "--out", tmp_path / name)
         assert_same(made, rm.open(tmp_path / name))
     assert "attractors" in made
+
+
+def test_parameters_that_follow_others(program: Program, tmp_path: Path) -> None:
+    # The model has a value of k2 of its own, and an expression takes its place.
+    settings = {"derived.k2": "0.5*k1", "integration.max_period": 8}
+    made = rm.map(rm.gear_pair(k2=40), k1=(20, 40, 5), omega=(2, 6, 4), engine="cpu", settings=settings)
+    (tmp_path / "scene.toml").write_text(made.attrs["scene"])
+    program("map", tmp_path / "scene.toml", "--engine", "cpu", "--quiet", "--out", tmp_path / "own")
+    assert_same(made, rm.open(tmp_path / "own"))
+    assert json.loads(made.attrs["derived"])["k2"]["max"] == 20.0
 
 
 def test_a_model_of_ones_own(program: Program, tmp_path: Path) -> None:
@@ -123,6 +139,8 @@ def test_what_is_wrong_is_told_in_the_programs_words(program: Program, tmp_path:
         rm.map(rm.gear_pair(), e=(0, 1, 4))
     with pytest.raises(rm.SceneError, match="did you mean `max_period`"):
         rm.map(rm.gear_pair(), **SMALL, settings={"integration.max_periods": 3})
+    with pytest.raises(rm.SceneError, match=r"axis.0.count = 0.9` has the wrong type"):
+        rm.map(rm.gear_pair(), e=(0.1, 0.5, 0.9), omega=(1, 2, 4))
     with pytest.raises(rm.EngineError, match="the CPU engine computes in f64"):
         rm.map(rm.gear_pair(), **SMALL, engine="cpu", precision="f32")
     with pytest.raises(rm.SceneError, match="of memory, and"):

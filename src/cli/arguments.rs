@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use crate::cli::say;
 use crate::gpu::Precision;
-use crate::map::engine_choice::{Ask, Who};
+use crate::map::engine_choice::{Ask, Wanted, Who};
 use crate::map::printable::is_printable;
 use crate::map::scene::{Along, Format};
 use crate::map::shard::Shard;
@@ -312,7 +312,7 @@ impl FigureFormat {
 }
 
 /// Who computes, and how precisely.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct EngineOptions {
     /// Who computes
     #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
@@ -322,6 +322,12 @@ pub(crate) struct EngineOptions {
     /// where it has double precision; the CPU is f64
     #[arg(long, value_name = "PRECISION", value_parser = precision)]
     pub(crate) precision: Option<Precision>,
+
+    /// The graphics adapter: its number in `rattlemap devices`, or part of its name, driver or PCI address that no other
+    /// has. all takes every card that has the model and driver of the first one, with the same records; others are named
+    /// and left out. It goes before WGPU_ADAPTER_NAME
+    #[arg(long, value_name = "N|NAME|all", value_parser = adapter)]
+    pub(crate) adapter: Option<Wanted>,
 }
 
 impl EngineOptions {
@@ -332,13 +338,20 @@ impl EngineOptions {
             EngineChoice::Gpu => Who::Gpu,
             EngineChoice::Cpu => Who::Cpu,
         };
-        Ask { engine, precision: self.precision }
+        Ask { engine, precision: self.precision, adapter: self.adapter.clone() }
     }
 }
 
 fn precision(text: &str) -> Result<Precision, String> {
     let named = Precision::ALL.into_iter().find(|precision| precision.name() == text);
     named.ok_or_else(|| "it must be f32 or f64".to_owned())
+}
+
+fn adapter(text: &str) -> Result<Wanted, String> {
+    let wanted = (!text.trim().is_empty()).then(|| text.parse().ok()).flatten();
+    wanted.ok_or_else(|| {
+        "it must be a number or part of a name that `rattlemap devices` lists, or all".to_owned()
+    })
 }
 
 /// Engines by name.

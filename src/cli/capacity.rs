@@ -41,19 +41,19 @@ pub(crate) fn check_merged(scene: &Scene, out: &Path) -> Result<(), Failure> {
     judge_size(scene, EngineChoice::Cpu, &free, Size::merged(scene), "use a machine that has as much")
 }
 
-/// Refuses a map that does not fit this machine's memory or, where it is written to a folder, the disk.
+/// Refuses a map, or a shard of it, that does not fit this machine's memory or, where it is written to a folder, the disk.
 ///
 /// # Errors
 /// [`Failure::Usage`] with what it needs and what is free.
-pub fn fits(scene: &Scene, engine: Who, out: Option<&Path>) -> Result<(), Failure> {
+pub fn fits(scene: &Scene, shard: Option<Shard>, engine: Who, out: Option<&Path>) -> Result<(), Failure> {
     let engine = match engine {
         Who::Auto => EngineChoice::Auto,
         Who::Gpu => EngineChoice::Gpu,
         Who::Cpu => EngineChoice::Cpu,
     };
     match out {
-        Some(out) => check(scene, None, engine, out).map(|_| ()),
-        None => judge(scene, None, engine, &Free { memory: free_memory(), disk: None }),
+        Some(out) => check(scene, shard, engine, out).map(|_| ()),
+        None => judge(scene, shard, engine, &Free { memory: free_memory(), disk: None }),
     }
 }
 

@@ -36,13 +36,15 @@ pub(crate) fn run() -> Result<(), Failure> {
 }
 
 fn print_adapter(adapter: &AdapterReport) -> Result<(), OutputError> {
-    let AdapterReport { info, precisions, largest_binding, most_lanes } = adapter;
+    let AdapterReport { number, info, precisions, largest_binding, most_lanes } = adapter;
     let names: Vec<&str> = precisions.iter().map(|precision| precision.name()).collect();
     let kind = if gpu::is_hardware(info) { "hardware" } else { "software" };
     print(&format!("gpu: {}", say::quoted(gpu::describe(info))))?;
     print(&format!("  kind        {kind} ({:?})", info.device_type))?;
     print(&format!("  interface   {:?}, {}", info.backend, gpu::interface_rank(info)))?;
     print(&format!("  precision   {}", names.join(", ")))?;
+    let pci = adapter.id().pci.map_or(String::new(), |pci| format!(", at PCI address {}", say::quoted(pci)));
+    print(&format!("  number      {number} (--adapter {number}){pci}"))?;
     print(&format!("  binding     {:.1} GiB", *largest_binding as f64 / f64::from(1 << 30)))?;
     print(&format!("  batch       up to {most_lanes} lanes"))
 }

@@ -15,7 +15,7 @@ use crate::gpu::Precision;
 use crate::map::attractors;
 use crate::map::coexistence;
 use crate::map::effect;
-use crate::map::engine::Engine;
+use crate::map::engine::{Engine, Loss};
 use crate::map::engine_choice::{self, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
@@ -36,6 +36,7 @@ use crate::cli::error::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::{processor, say, scene_file};
+pub use shard::open_engine;
 use summary::summary;
 
 /// Asks, checks, computes, writes.
@@ -63,13 +64,23 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     interrupt.ends_at_once(stopped::before_anything(ask, &plan), folder.leaver());
     let clock = Instant::now();
     let asked = engine_of(ask, folder.path()).ask();
-    let Chosen { mut engine, why } = pollster::block_on(engine_choice::open(&plan, &asked))
+    let Chosen { mut engine, why, notes, warnings } = pollster::block_on(engine_choice::open(&plan, &asked))
         .map_err(|error| stopped::before_it_began(error.into(), ask, &folder, &plan))?;
     let opening = clock.elapsed();
     interrupt.wait_for(None);
     if !ask.run.quiet && !why.is_empty() {
         say::note(format_args!("{} ({}): {why}", engine.name(), engine.precision()));
     }
+    if !ask.run.quiet {
+        notes.iter().for_each(say::note);
+    }
+    warnings.iter().for_each(say::note);
+    engine.listen(|loss| {
+        let Loss { adapter, cells, reason } = loss;
+        say::note(format_args!(
+            "warning: adapter {adapter} was lost ({reason}); {cells} cells go back to the queue"
+        ));
+    });
     let lane_grid = engine.steps_per_period();
     if let (false, Some(raised)) = (ask.run.quiet, raised_steps(&scene, lane_grid)) {
         say::note(raised);
@@ -99,12 +110,15 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         .in_basins(basins.as_ref())
         .refined(refined.as_ref());
     let (device, lane_steps) = (engine.device(), engine.lane_steps());
+    let (adapter, cards) = (engine.adapter(), engine.cards());
     let (engine, precision) = (engine.name(), engine.precision());
     let run = output::map::Run {
         sets: &ask.run.set,
         engine,
         precision,
         device: &device,
+        adapter,
+        cards,
         processor: &processor::described(),
         opening,
         elapsed,
@@ -156,17 +170,17 @@ fn open_folder(ask: &Map) -> Result<Folder, Failure> {
 /// The engine that was asked for; where that is left open, an interrupted run goes on with
 /// its own.
 fn engine_of(ask: &Map, folder: &Path) -> EngineOptions {
-    let asked = ask.engine;
+    let asked = ask.engine.clone();
     if !ask.resume || asked.engine != EngineChoice::Auto || asked.precision.is_some() {
         return asked;
     }
     match Identity::read(&folder.join(RECORDS)) {
-        Ok(Some(identity)) if identity.engine() == "cpu" => {
+        Ok(Some(identity)) if identity.engine() == "cpu" && asked.adapter.is_none() => {
             EngineOptions { engine: EngineChoice::Cpu, ..asked }
         }
         Ok(Some(identity)) => {
             let precision = Precision::ALL.into_iter().find(|p| p.name() == identity.precision());
-            EngineOptions { engine: EngineChoice::Gpu, precision }
+            EngineOptions { engine: EngineChoice::Gpu, precision, ..asked }
         }
         // What is wrong with the file is said when it is resumed.
         Ok(None) | Err(_) => asked,

@@ -12,7 +12,7 @@ use super::interrupt::Interrupt;
 use super::progress;
 use super::say;
 use crate::output::merge::{MergeError, Merged, Parts, Progress};
-use crate::output::{self, Folder};
+use crate::output::{self, Folder, RecordFileError};
 
 /// Looks at all shards, gathers their records, writes the map.
 pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
@@ -53,10 +53,10 @@ pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
 /// Who asked wrongly, or what failed.
 fn refused(error: MergeError) -> Failure {
     match error {
-        MergeError::Damaged { .. } | MergeError::Output(_) | MergeError::Stopped => {
-            Failure::Run(error.into())
-        }
-        MergeError::Records(error) => error.into(),
+        MergeError::Damaged { .. }
+        | MergeError::Output(_)
+        | MergeError::Stopped
+        | MergeError::Records(RecordFileError::Io { .. }) => Failure::Run(error.into()),
         _ => Failure::Usage(error.into()),
     }
 }

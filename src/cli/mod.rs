@@ -32,6 +32,7 @@ pub use arguments::parsed;
 pub use capacity::fits;
 pub use environment::missing_variable;
 pub use error::{Failure, fail_if};
+pub use map::open_engine;
 pub use model_choice::{check_components, find as find_model};
 pub use processor::{MISFIT, cores, described as described_processor, is_fit, name as processor_name};
 pub use progress::Progress;

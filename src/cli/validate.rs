@@ -116,7 +116,7 @@ fn run_again(
 ) -> Result<(Lanes, String), Failure> {
     let open =
         |precision: Precision, choice: &AdapterChoice| pollster::block_on(Gpu::open(precision, choice)).ok();
-    let own = AdapterChoice { name: Some(made_on.to_owned()) };
+    let own = AdapterChoice::named(made_on);
     let (mut gpu, note) = match subject.is_lane {
         true => match pollster::block_on(Gpu::open(subject.precision, &own)) {
             Ok(gpu) => (Some(gpu), String::new()),

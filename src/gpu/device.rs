@@ -1,24 +1,13 @@
-//! Adapters: which there are, which one is taken, and opening it.
+//! Opening an adapter, and compiling for it.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::adapter::{AdapterChoice, AdapterReport, features, listed, no_adapter};
 use super::caught::{Dropped, caught};
 use super::dispatch_policy::DispatchPolicy;
 use super::layout::{Motion, Tally};
 use super::{Gpu, GpuError, Precision};
-
-/// What narrows the adapters down in the environment: the first is wgpu's own.
-const BACKEND: &str = "WGPU_BACKEND";
-const ADAPTER_NAME: &str = "WGPU_ADAPTER_NAME";
-
-/// Which adapter to take.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct AdapterChoice {
-    /// Part of the adapter's name, or of what [`describe`] says of it, in any case of letters;
-    /// none takes the best.
-    pub name: Option<String>,
-}
 
 /// Storage bindings of the shader by number: flows, shapes, phasors, laws, cells, motions,
 /// tallies, queue, starts, readings, findings, blocks; `true` where it writes.
@@ -57,19 +46,6 @@ pub(super) struct Pipelines {
 /// Left alone, wgpu would panic.
 pub(super) struct Trouble(Arc<Mutex<Option<String>>>);
 
-impl AdapterChoice {
-    /// Whether an adapter may be taken.
-    pub fn allows(&self, info: &wgpu::AdapterInfo) -> bool {
-        let name = describe(info).to_lowercase();
-        self.name.as_ref().is_none_or(|wanted| name.contains(&wanted.to_lowercase()))
-    }
-
-    /// The adapter that the environment names by `WGPU_ADAPTER_NAME`, else the best.
-    pub fn from_environment() -> AdapterChoice {
-        AdapterChoice { name: std::env::var(ADAPTER_NAME).ok().filter(|name| !name.is_empty()) }
-    }
-}
-
 impl Trouble {
     fn watch(device: &wgpu::Device) -> Trouble {
         let first = Arc::new(Mutex::new(None));
@@ -106,94 +82,6 @@ fn told(reason: wgpu::DeviceLostReason, message: &str) -> String {
     }
 }
 
-fn instance() -> wgpu::Instance {
-    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
-}
-
-/// What an adapter offers.
-#[derive(Clone, Debug)]
-pub struct AdapterReport {
-    /// Name, kind, driver.
-    pub info: wgpu::AdapterInfo,
-    /// Precisions that lanes can have on it.
-    pub precisions: Vec<Precision>,
-    /// Largest storage buffer that a shader sees, in bytes.
-    pub largest_binding: u64,
-    /// Lanes that may be under way at a time.
-    pub most_lanes: usize,
-}
-
-/// All adapters of this machine, the best first.
-pub async fn adapters() -> Vec<AdapterReport> {
-    let report = |adapter: &wgpu::Adapter| AdapterReport {
-        info: adapter.get_info(),
-        precisions: Precision::ALL.into_iter().filter(|&p| has(adapter, p)).collect(),
-        largest_binding: adapter.limits().max_storage_buffer_binding_size,
-        most_lanes: most_slots(&adapter.limits()),
-    };
-    all_adapters().await.unwrap_or_default().iter().map(report).collect()
-}
-
-async fn all_adapters() -> Result<Vec<wgpu::Adapter>, GpuError> {
-    let list = caught(|| instance().enumerate_adapters(wgpu::Backends::all()));
-    let mut all = list.map_err(|message| GpuError::Refused { what: "to list its adapters", message })?.await;
-    all.sort_by_key(|adapter| rank(&adapter.get_info()));
-    Ok(all)
-}
-
-/// An adapter in words: name, interface and driver, as manifests have it.
-pub fn describe(info: &wgpu::AdapterInfo) -> String {
-    let driver = [info.driver.as_str(), info.driver_info.as_str()].join(" ");
-    format!("{} ({:?}; {})", info.name, info.backend, driver.trim())
-}
-
-/// Whether an adapter is more than a program on the processor.
-pub fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
-    info.device_type != wgpu::DeviceType::Cpu
-}
-
-fn has(adapter: &wgpu::Adapter, precision: Precision) -> bool {
-    adapter.features().contains(features(precision))
-}
-
-fn features(precision: Precision) -> wgpu::Features {
-    match precision {
-        Precision::F32 => wgpu::Features::empty(),
-        Precision::F64 => wgpu::Features::SHADER_F64,
-    }
-}
-
-/// Hardware before software, dedicated before integrated; of the interfaces to one adapter the
-/// one that offers most.
-fn rank(info: &wgpu::AdapterInfo) -> (u32, u32) {
-    let kind = match info.device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::VirtualGpu => 1,
-        wgpu::DeviceType::IntegratedGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    };
-    let interface = match info.backend {
-        wgpu::Backend::Vulkan => 0,
-        wgpu::Backend::Metal => 1,
-        wgpu::Backend::Dx12 => 2,
-        wgpu::Backend::Gl => 3,
-        wgpu::Backend::BrowserWebGpu | wgpu::Backend::Noop => 4,
-    };
-    (kind, interface)
-}
-
-/// Why an adapter comes before or after itself by another interface.
-pub fn interface_rank(info: &wgpu::AdapterInfo) -> &'static str {
-    match info.backend {
-        wgpu::Backend::Vulkan => "first choice: the only interface with f64",
-        wgpu::Backend::Metal => "second to Vulkan: no f64",
-        wgpu::Backend::Dx12 => "second to Vulkan: no f64 here",
-        wgpu::Backend::Gl => "last choice: no f64, smaller buffers, no clock of its own",
-        wgpu::Backend::BrowserWebGpu | wgpu::Backend::Noop => "last choice",
-    }
-}
-
 /// Slots that a pool has at most: below 1 GB on the device.
 const MOST_SLOTS: usize = 1 << 19;
 
@@ -206,18 +94,20 @@ pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
 }
 
 pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
-    let all = all_adapters().await?;
-    let fits = |adapter: &wgpu::Adapter| choice.allows(&adapter.get_info()) && has(adapter, precision);
-    let Some(adapter) = all.iter().find(|adapter| fits(adapter)) else {
-        return Err(no_adapter(precision, choice, &all));
+    let all = listed().await?;
+    let fits = |report: &AdapterReport| choice.allows(report) && report.precisions.contains(&precision);
+    let Some((AdapterReport { number, info, .. }, adapter)) = all.iter().find(|(report, _)| fits(report))
+    else {
+        let reports: Vec<AdapterReport> = all.into_iter().map(|(report, _)| report).collect();
+        return Err(no_adapter(precision, choice, &reports));
     };
+    let (number, info) = (*number, info.clone());
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("rattlemap"),
         required_features: features(precision) | (adapter.features() & wgpu::Features::TIMESTAMP_QUERY),
         required_limits: adapter.limits(),
         ..Default::default()
     };
-    let info = adapter.get_info();
     let no_device = |reason: String| GpuError::NoDevice { adapter: info.name.clone(), reason };
     let asked = caught(|| adapter.request_device(&descriptor))
         .map_err(|why| no_device(format!("the driver fails while it is opened ({why})")))?;
@@ -228,6 +118,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
     Ok(Gpu {
         device,
         queue,
+        number,
         info,
         precision,
         pipelines,
@@ -237,41 +128,6 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         watcher: None,
         halt: Arc::default(),
     })
-}
-
-/// What in the environment narrows the adapters down, as far as `choice` heeds it, and what to do about it; none
-/// if nothing does.
-pub fn narrowed_by(choice: &AdapterChoice) -> Option<String> {
-    let value = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
-    let backend = value(BACKEND).map(|value| (BACKEND, value, "give vulkan, metal or dx12"));
-    let named = choice.name.clone().filter(|name| value(ADAPTER_NAME).as_ref() == Some(name));
-    let named =
-        named.map(|value| (ADAPTER_NAME, value, "give part of a name that `rattlemap devices` lists"));
-    let sentence =
-        |(name, value, remedy)| format!("the environment has {name}={value}: unset it, or {remedy}");
-    let list: Vec<String> = backend.into_iter().chain(named).map(sentence).collect();
-    (!list.is_empty()).then(|| list.join("; "))
-}
-
-fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[wgpu::Adapter]) -> GpuError {
-    let mut wanted = match precision {
-        Precision::F32 => String::from("at all"),
-        Precision::F64 => String::from("with double precision (SHADER_F64)"),
-    };
-    if let Some(name) = &choice.name {
-        wanted = format!("called {name} {wanted}");
-    }
-    let list: Vec<String> = all
-        .iter()
-        .map(|adapter| {
-            let doubles = if has(adapter, Precision::F64) { "f32, f64" } else { "f32" };
-            format!("{} ({doubles})", adapter.get_info().name)
-        })
-        .collect();
-    let found = if list.is_empty() { String::from("none") } else { list.join(", ") };
-    let remedy = narrowed_by(choice)
-        .unwrap_or_else(|| String::from("install a Vulkan driver (Debian: mesa-vulkan-drivers)"));
-    GpuError::NoAdapter { wanted, remedy, found }
 }
 
 fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::BindGroupLayout {
@@ -333,26 +189,4 @@ fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry_point: EntryPoint) -> 
         compilation_options: Default::default(),
         cache: None,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_adapter_by_two_interfaces_is_taken_by_the_better() {
-        let adapters = pollster::block_on(adapters());
-        let seen = &adapters.first().expect("tests need an adapter").info;
-        let with = |device_type, backend| wgpu::AdapterInfo { device_type, backend, ..seen.clone() };
-        let (dedicated, software) = (wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu);
-        let in_order = [
-            with(dedicated, wgpu::Backend::Vulkan),
-            with(dedicated, wgpu::Backend::Dx12),
-            with(dedicated, wgpu::Backend::Gl),
-            with(software, wgpu::Backend::Vulkan),
-            with(software, wgpu::Backend::Gl),
-        ];
-        let ranks = in_order.each_ref().map(rank);
-        assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:?}");
-    }
 }

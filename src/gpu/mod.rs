@@ -9,6 +9,7 @@
 //! ([`rattlemap_dynamics::model`]) and nothing else. A fixed grid of steps with the exact propagator
 //! carries it from event to event; see `shaders/`.
 
+mod adapter;
 mod averaging;
 mod caught;
 pub(crate) mod constants;
@@ -35,10 +36,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-pub use constants::{Constants, STEP_ANGLE};
-pub use device::{
-    AdapterChoice, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
+pub(crate) use adapter::no_adapter;
+pub use adapter::{
+    AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
 };
+pub use constants::{Constants, STEP_ANGLE};
 pub use error::GpuError;
 pub use pool::Pool;
 pub use reading::Ended;
@@ -213,6 +215,7 @@ pub struct Gpu {
     device: wgpu::Device,
     /// Dropped, it is waited for.
     queue: Dropped<wgpu::Queue>,
+    number: usize,
     info: wgpu::AdapterInfo,
     precision: Precision,
     pipelines: HashMap<Variant, device::Pipelines>,
@@ -235,6 +238,11 @@ impl Gpu {
     /// The adapter in use.
     pub fn adapter(&self) -> &wgpu::AdapterInfo {
         &self.info
+    }
+
+    /// Which of the machine's adapters it is.
+    pub fn id(&self) -> AdapterId {
+        AdapterId::of(self.number, &self.info)
     }
 
     /// The precision in use.

@@ -4,6 +4,8 @@
 //! end. A record depends on its cell, its start and the plan alone: not on what else is under way, the
 //! neighbours, or the number of threads.
 
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+mod cards;
 mod cpu;
 mod fake;
 mod flows;
@@ -15,6 +17,8 @@ use std::sync::atomic::AtomicBool;
 
 use thiserror::Error;
 
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+pub use cards::Cards;
 pub use cpu::Cpu;
 pub use cpu::record as measured_record;
 pub use fake::Fake;
@@ -23,6 +27,8 @@ pub(crate) use flows::Flows;
 pub use gpu::Gpu;
 pub(crate) use gpu::{keep, lane_settings};
 
+#[cfg(feature = "gpu")]
+use crate::gpu::AdapterId;
 use crate::map::plan::Cell;
 use crate::record::Record;
 
@@ -55,6 +61,40 @@ pub enum EngineError {
     },
 }
 
+impl EngineError {
+    /// What happened, without the device.
+    pub fn reason(&self) -> String {
+        match self {
+            EngineError::OutOfMemory { cells, .. } => format!("no memory for {cells} cells at a time"),
+            EngineError::Refused { reason, .. } | EngineError::Lost { reason, .. } => reason.clone(),
+        }
+    }
+}
+
+/// What one of several cards has done.
+#[cfg(feature = "gpu")]
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CardReport {
+    /// Which card.
+    pub adapter: AdapterId,
+    /// Cells that it has computed.
+    pub cells: usize,
+    /// Why it computes no more, if it was lost.
+    pub lost: Option<String>,
+}
+
+/// A card of several that is lost.
+#[cfg(feature = "gpu")]
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Loss {
+    /// Which card.
+    pub adapter: AdapterId,
+    /// Cells that it leaves to the others.
+    pub cells: usize,
+    /// What happened.
+    pub reason: String,
+}
+
 /// What computes cells.
 pub enum Engine<'p> {
     /// The event-driven reference on all processor cores, in f64.
@@ -62,6 +102,9 @@ pub enum Engine<'p> {
     /// Lanes in WGSL on a graphics device, in f32 or f64.
     #[cfg(feature = "gpu")]
     Gpu(Box<Gpu<'p>>),
+    /// The same on several equal cards.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    Cards(Box<Cards>),
     /// Records by rule, and failures on demand: for tests of everything around an engine.
     Fake(Fake),
 }
@@ -73,6 +116,8 @@ impl Engine<'_> {
             Engine::Cpu(_) => "cpu",
             #[cfg(feature = "gpu")]
             Engine::Gpu(_) => "gpu",
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.name(),
             Engine::Fake(_) => "fake",
         }
     }
@@ -83,6 +128,8 @@ impl Engine<'_> {
             Engine::Cpu(_) | Engine::Fake(_) => "f64",
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.precision(),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.precision(),
         }
     }
 
@@ -93,15 +140,58 @@ impl Engine<'_> {
             Engine::Cpu(_) => "event-driven reference".to_owned(),
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.device(),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.device(),
             Engine::Fake(_) => "fake".to_owned(),
         }
     }
 
-    /// Bytes of a device's memory that the map takes at most; none where no device of its own is at work.
+    /// The adapter that computes; none where there is none, or more than one.
+    #[cfg(feature = "gpu")]
+    pub fn adapter(&self) -> Option<AdapterId> {
+        match self {
+            Engine::Gpu(gpu) => Some(gpu.adapter()),
+            _ => None,
+        }
+    }
+
+    /// Devices that compute side by side.
+    pub fn card_count(&self) -> usize {
+        match self {
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.count(),
+            _ => 1,
+        }
+    }
+
+    /// What each card has done so far, where several compute; else none.
+    #[cfg(feature = "gpu")]
+    pub fn cards(&self) -> Vec<CardReport> {
+        match self {
+            #[cfg(not(target_arch = "wasm32"))]
+            Engine::Cards(cards) => cards.reports(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Tells `listener` from here on, while [`Engine::advance`] waits, of cards that are lost and leave their cells to others.
+    #[cfg(feature = "gpu")]
+    #[cfg_attr(target_arch = "wasm32", expect(unused_variables, reason = "there is one card"))]
+    pub fn listen(&mut self, listener: impl Fn(&Loss) + Send + 'static) {
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Engine::Cards(cards) = self {
+            cards.listen(Box::new(listener));
+        }
+    }
+
+    /// Bytes of a device's memory that the map takes at most, of all devices; none where no device of its own
+    /// is at work.
     pub fn device_bytes(&self) -> Option<u64> {
         match self {
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => Some(gpu.device_bytes()),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.device_bytes(),
             Engine::Cpu(_) | Engine::Fake(_) => None,
         }
     }
@@ -112,6 +202,8 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => cpu.least_batch(),
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.least_batch(),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.least_batch(),
             Engine::Fake(_) => 16,
         }
     }
@@ -121,6 +213,8 @@ impl Engine<'_> {
         match self {
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => Some(gpu.steps()),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.lane_steps(),
             Engine::Cpu(_) | Engine::Fake(_) => None,
         }
     }
@@ -131,6 +225,8 @@ impl Engine<'_> {
         match self {
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.steps_per_period(),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.steps_per_period(),
             Engine::Cpu(_) | Engine::Fake(_) => None,
         }
     }
@@ -141,6 +237,8 @@ impl Engine<'_> {
             Engine::Cpu(_) | Engine::Fake(_) => usize::MAX,
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.room(),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.room(),
         }
     }
 
@@ -150,6 +248,8 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => cpu.halt = Arc::clone(halt),
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.heed(halt),
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.heed(halt),
             Engine::Fake(_) => {}
         }
     }
@@ -163,6 +263,8 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => cpu.begin(cells),
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.begin(cells).await?,
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.begin(cells)?,
             Engine::Fake(fake) => fake.begin(cells)?,
         }
         Ok(())
@@ -179,6 +281,8 @@ impl Engine<'_> {
             Engine::Cpu(cpu) => Ok(cpu.advance()),
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => gpu.advance(until).await,
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => cards.advance(until),
             Engine::Fake(fake) => fake.advance(),
         }
     }

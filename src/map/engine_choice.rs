@@ -1,13 +1,22 @@
 //! Which engine runs a map: the one that was asked for, or the fastest at hand.
 
+mod adapters;
+
 use std::str::FromStr;
+#[cfg(not(target_arch = "wasm32"))]
+use std::sync::Arc;
 
 use thiserror::Error;
 use web_time::{Duration, Instant};
 
 use crate::gpu::{self, AdapterChoice, AdapterReport, GpuError, Precision};
+#[cfg(not(target_arch = "wasm32"))]
+use crate::map::engine::Cards;
 use crate::map::engine::{Cpu, Engine, EngineError, Gpu};
 use crate::map::plan::{Cell, Plan};
+
+use adapters::Taken;
+pub use adapters::{AdapterError, Wanted};
 
 /// How long engines are tried that cannot be told apart otherwise.
 const TRIAL: Duration = Duration::from_millis(200);
@@ -27,6 +36,9 @@ pub struct Ask {
     pub engine: Who,
     /// None leaves it open: f32 on a graphics device, f64 on the processor.
     pub precision: Option<Precision>,
+    /// None leaves it to the environment, [`AdapterChoice::from_environment`]. With [`Who::Auto`] a graphics device is
+    /// taken then.
+    pub adapter: Option<Wanted>,
 }
 
 /// Engines by name.
@@ -47,6 +59,16 @@ pub struct Chosen<'p> {
     pub engine: Engine<'p>,
     /// Empty where there was nothing to choose.
     pub why: String,
+    /// Adapters that are left out where all are asked for, a line each.
+    pub notes: Vec<String>,
+    /// The same of those that fail.
+    pub warnings: Vec<String>,
+}
+
+impl<'p> Chosen<'p> {
+    fn plain(engine: Engine<'p>, why: String) -> Chosen<'p> {
+        Chosen { engine, why, notes: Vec::new(), warnings: Vec::new() }
+    }
 }
 
 /// Why there is no engine.
@@ -63,9 +85,17 @@ pub enum ChoiceError {
         "--precision f32: the CPU engine computes in f64; leave --precision out, or ask for --engine gpu"
     )]
     CpuInF32,
+    /// The reference runs on no adapter.
+    #[error(
+        "--adapter {wanted}: the CPU engine runs on no graphics adapter; leave --adapter out, or ask for --engine gpu"
+    )]
+    CpuOnAdapter {
+        /// What was asked for.
+        wanted: Wanted,
+    },
     /// No adapter fits.
     #[error(transparent)]
-    NoAdapter(GpuError),
+    Adapter(#[from] AdapterError),
     /// What was asked for is there, and fails.
     #[error(transparent)]
     Device(GpuError),
@@ -78,7 +108,10 @@ impl ChoiceError {
     /// Whether what was asked for is at fault, and another request may do; else a device fails.
     pub fn is_in_the_request(&self) -> bool {
         match self {
-            ChoiceError::UnknownEngine { .. } | ChoiceError::CpuInF32 | ChoiceError::NoAdapter(_) => true,
+            ChoiceError::UnknownEngine { .. }
+            | ChoiceError::CpuInF32
+            | ChoiceError::CpuOnAdapter { .. }
+            | ChoiceError::Adapter(_) => true,
             ChoiceError::Device(_) | ChoiceError::Engine(_) => false,
         }
     }
@@ -87,7 +120,7 @@ impl ChoiceError {
 impl From<GpuError> for ChoiceError {
     fn from(error: GpuError) -> ChoiceError {
         match error {
-            GpuError::NoAdapter { .. } => ChoiceError::NoAdapter(error),
+            GpuError::NoAdapter { .. } => ChoiceError::Adapter(AdapterError::None(error)),
             _ => ChoiceError::Device(error),
         }
     }
@@ -109,76 +142,149 @@ impl FromStr for Who {
 /// Refuses what no engine can do, before anything else is done.
 ///
 /// # Errors
-/// [`ChoiceError::CpuInF32`].
+/// [`ChoiceError::CpuInF32`] and [`ChoiceError::CpuOnAdapter`].
 pub fn check(ask: &Ask) -> Result<(), ChoiceError> {
-    match (ask.engine, ask.precision) {
-        (Who::Cpu, Some(Precision::F32)) => Err(ChoiceError::CpuInF32),
+    match (ask.engine, ask.precision, &ask.adapter) {
+        (Who::Cpu, Some(Precision::F32), _) => Err(ChoiceError::CpuInF32),
+        (Who::Cpu, _, Some(wanted)) => Err(ChoiceError::CpuOnAdapter { wanted: wanted.clone() }),
         _ => Ok(()),
     }
 }
 
 /// Opens the engine that is asked for; `auto` takes a hardware GPU if there is one, else the CPU, or for
-/// long maps the faster of it and a software GPU on a few cells of the plan.
+/// long maps the faster of it and a software GPU on a few cells of the plan. Where the hardware lacks f64 and f64 is asked
+/// for, `auto` takes the CPU, which has it; a software driver is taken beside hardware only where it is named.
 ///
 /// # Errors
 /// [`ChoiceError`], with nothing computed.
 pub async fn open<'p>(plan: &'p Plan, ask: &Ask) -> Result<Chosen<'p>, ChoiceError> {
     check(ask)?;
-    let precision = ask.precision.unwrap_or(Precision::F32);
-    let plain = |engine| Chosen { engine, why: String::new() };
-    match ask.engine {
-        Who::Cpu => Ok(plain(Engine::Cpu(Cpu::new(plan)))),
-        Who::Gpu => open_gpu(plan, precision).await.map(plain),
-        Who::Auto => choose(plan, ask.precision).await,
+    let (who, precision) = (ask.engine, ask.precision.unwrap_or(Precision::F32));
+    if who == Who::Cpu {
+        return Ok(on_cpu(plan, String::new()));
     }
+    let (all, environment) = (gpu::adapters().await, AdapterChoice::from_environment());
+    let taken = adapters::take(&all, ask.adapter.as_ref(), &environment, precision);
+    let why = match (who, &ask.adapter, ask.precision) {
+        (Who::Gpu | Who::Cpu, ..) => "",
+        (Who::Auto, Some(_), _) => "by --adapter",
+        (Who::Auto, None, Some(Precision::F32)) => "the CPU engine has no f32",
+        (Who::Auto, None, _) => return choose(plan, precision, &all, taken).await,
+    };
+    on_gpu(plan, precision, taken?, why).await
 }
 
-async fn open_gpu(plan: &Plan, precision: Precision) -> Result<Engine<'_>, ChoiceError> {
-    Ok(Engine::Gpu(Box::new(Gpu::new(plan, open_device(precision).await?).await?)))
+fn on_cpu(plan: &Plan, why: String) -> Chosen<'_> {
+    Chosen::plain(Engine::Cpu(Cpu::new(plan)), why)
 }
 
-async fn open_device(precision: Precision) -> Result<gpu::Gpu, ChoiceError> {
-    Ok(gpu::Gpu::open(precision, &AdapterChoice::from_environment()).await?)
-}
-
-async fn choose(plan: &Plan, precision: Option<Precision>) -> Result<Chosen<'_>, ChoiceError> {
-    let wanted = precision.unwrap_or(Precision::F32);
-    let choice = AdapterChoice::from_environment();
-    let adapters = gpu::adapters().await;
-    let fits =
-        |adapter: &&AdapterReport| choice.allows(&adapter.info) && adapter.precisions.contains(&wanted);
-    let best = adapters.iter().find(fits);
-    if choice.name.is_some() && best.is_none() || precision == Some(Precision::F32) {
-        let why = "the CPU engine has no f32".to_owned();
-        return open_gpu(plan, wanted).await.map(|engine| Chosen { engine, why });
+async fn on_gpu<'p>(
+    plan: &'p Plan,
+    precision: Precision,
+    taken: Taken,
+    why: &str,
+) -> Result<Chosen<'p>, ChoiceError> {
+    let Taken { numbers, left_out: notes } = taken;
+    #[cfg(not(target_arch = "wasm32"))]
+    if numbers.len() > 1 {
+        let (engine, warnings) = on_cards(plan, precision, &numbers)?;
+        return Ok(Chosen { notes, warnings, ..Chosen::plain(engine, why.to_owned()) });
     }
-    let cpu = |why| Chosen { engine: Engine::Cpu(Cpu::new(plan)), why };
-    match best {
-        None => {
-            let narrowed =
-                gpu::narrowed_by(&choice).map_or(String::new(), |narrowed| format!("; {narrowed}"));
-            Ok(cpu(format!("no graphics adapter with {}{narrowed}", wanted.name())))
+    let device = open_device(precision, numbers[0]).await?;
+    let engine = Engine::Gpu(Box::new(Gpu::new(plan, device).await?));
+    Ok(Chosen { notes, ..Chosen::plain(engine, why.to_owned()) })
+}
+
+/// All of these adapters that can be opened, side by side; what is to be said of others.
+///
+/// # Errors
+/// The first one's, if there is none.
+#[cfg(not(target_arch = "wasm32"))]
+fn on_cards(
+    plan: &Plan,
+    precision: Precision,
+    numbers: &[usize],
+) -> Result<(Engine<'static>, Vec<String>), ChoiceError> {
+    let plan = Arc::new(plan.clone());
+    let open = |number: usize| {
+        let plan = Arc::clone(&plan);
+        pollster::block_on(async {
+            let device = open_device(precision, number).await?;
+            let id = device.id();
+            Ok::<_, ChoiceError>((id, Box::new(Gpu::shared(plan, device).await?)))
+        })
+    };
+    let opened: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = numbers.iter().map(|&number| scope.spawn(move || open(number))).collect();
+        threads.into_iter().map(|thread| thread.join()).collect()
+    });
+    let (mut cards, mut warnings, mut first_error) = (Vec::new(), Vec::new(), None);
+    for (number, opened) in numbers.iter().zip(opened) {
+        match opened.unwrap_or_else(|panic| std::panic::resume_unwind(panic)) {
+            Ok(card) => cards.push(card),
+            Err(error) => {
+                warnings.push(format!("warning: adapter {number} is left out: {error}"));
+                first_error.get_or_insert(error);
+            }
         }
-        // The reference needs no driver.
-        Some(best) if gpu::is_hardware(&best.info) => Ok(open_gpu(plan, wanted).await.map_or_else(
-            |error| cpu(error.to_string()),
-            |engine| Chosen { engine, why: "a hardware GPU".to_owned() },
-        )),
-        Some(_) => Ok(faster(plan, wanted).await.unwrap_or_else(|error| cpu(error.to_string()))),
     }
+    let engine = match (cards.len(), first_error) {
+        (0, Some(error)) => return Err(error),
+        (1, _) => Engine::Gpu(cards.remove(0).1),
+        _ => {
+            let engines = cards.into_iter().map(|(id, gpu)| (id, Engine::Gpu(gpu)));
+            Engine::Cards(Box::new(Cards::new(engines.collect())))
+        }
+    };
+    Ok((engine, warnings))
+}
+
+async fn open_device(precision: Precision, number: usize) -> Result<gpu::Gpu, ChoiceError> {
+    Ok(gpu::Gpu::open(precision, &AdapterChoice::numbered(number)).await?)
+}
+
+/// What `auto` takes, where nothing but perhaps f64 is asked for.
+async fn choose<'p>(
+    plan: &'p Plan,
+    precision: Precision,
+    all: &[AdapterReport],
+    taken: Result<Taken, AdapterError>,
+) -> Result<Chosen<'p>, ChoiceError> {
+    let environment = AdapterChoice::from_environment();
+    let taken = match taken {
+        Ok(taken) => taken,
+        Err(AdapterError::NoCardHas { precision, cards, .. }) => {
+            return Ok(on_cpu(plan, format!("no graphics card here has {precision}: {cards}")));
+        }
+        // It was named.
+        Err(error) if environment.name.is_some() => return Err(error.into()),
+        Err(_) => {
+            let narrowed =
+                gpu::narrowed_by(&environment).map_or(String::new(), |narrowed| format!("; {narrowed}"));
+            return Ok(on_cpu(plan, format!("no graphics adapter with {}{narrowed}", precision.name())));
+        }
+    };
+    let first = taken.numbers[0];
+    let chosen = if gpu::is_hardware(&all[first].info) {
+        on_gpu(plan, precision, taken, "a hardware GPU").await
+    } else {
+        faster(plan, precision, first).await
+    };
+    // The reference needs no driver.
+    Ok(chosen.unwrap_or_else(|error| on_cpu(plan, error.to_string())))
 }
 
 /// The CPU where it has soon done the map, else the faster of it and a software GPU.
-async fn faster(plan: &Plan, precision: Precision) -> Result<Chosen<'_>, ChoiceError> {
+async fn faster(plan: &Plan, precision: Precision, adapter: usize) -> Result<Chosen<'_>, ChoiceError> {
     let trial = plan.shortened(TRIAL_PERIODS);
-    let on_cpu = rate(&trial, &mut Engine::Cpu(Cpu::new(&trial))).await?;
-    if !is_worth_a_trial(plan, on_cpu) {
+    let cpu_rate = rate(&trial, &mut Engine::Cpu(Cpu::new(&trial))).await?;
+    if !is_worth_a_trial(plan, cpu_rate) {
         let why = format!(
-            "no hardware GPU, and soon done: {on_cpu:.0} cells/s on trial, {TRIAL_PERIODS} periods each"
+            "no hardware GPU, and soon done: {cpu_rate:.0} cells/s on trial, {TRIAL_PERIODS} periods each"
         );
-        return Ok(Chosen { engine: Engine::Cpu(Cpu::new(plan)), why });
+        return Ok(on_cpu(plan, why));
     }
-    on_trial(plan, &trial, precision, on_cpu).await
+    on_trial(plan, &trial, (precision, adapter), cpu_rate).await
 }
 
 /// Whether the CPU has enough to do, which does so many cells of a trial in a second.
@@ -193,25 +299,25 @@ fn is_worth_a_trial(plan: &Plan, on_cpu: f64) -> bool {
 async fn on_trial<'p>(
     plan: &'p Plan,
     trial: &Plan,
-    precision: Precision,
-    on_cpu: f64,
+    (precision, adapter): (Precision, usize),
+    cpu_rate: f64,
 ) -> Result<Chosen<'p>, ChoiceError> {
-    let device = open_device(precision).await?;
+    let device = open_device(precision, adapter).await?;
     let mut lanes = Engine::Gpu(Box::new(Gpu::new(trial, device).await?));
     // The first batch compiles the shader.
     lanes.run(&spread(trial, 0, 1)).await?;
-    let on_gpu = rate(trial, &mut lanes).await?;
+    let gpu_rate = rate(trial, &mut lanes).await?;
     let name = precision.name();
     let why = format!(
-        "on trial {on_cpu:.0} cells/s on cpu (f64), {on_gpu:.0} cells/s on gpu ({name}), {TRIAL_PERIODS} periods each"
+        "on trial {cpu_rate:.0} cells/s on cpu (f64), {gpu_rate:.0} cells/s on gpu ({name}), {TRIAL_PERIODS} periods each"
     );
-    let engine = match lanes {
-        Engine::Gpu(lanes) if on_gpu > on_cpu => {
-            Engine::Gpu(Box::new(Gpu::new(plan, lanes.into_device()).await?))
+    match lanes {
+        Engine::Gpu(lanes) if gpu_rate > cpu_rate => {
+            let engine = Engine::Gpu(Box::new(Gpu::new(plan, lanes.into_device()).await?));
+            Ok(Chosen::plain(engine, why))
         }
-        _ => Engine::Cpu(Cpu::new(plan)),
-    };
-    Ok(Chosen { engine, why })
+        _ => Ok(on_cpu(plan, why)),
+    }
 }
 
 /// Cells per second on cells spread over the plan.
@@ -260,6 +366,8 @@ mod tests {
     #[test]
     fn what_is_at_fault_is_told() {
         assert!(ChoiceError::CpuInF32.is_in_the_request());
+        let ask = Ask { engine: Who::Cpu, adapter: Some(Wanted::All), ..Ask::default() };
+        assert!(check(&ask).is_err_and(|error| error.is_in_the_request()));
         assert!("gpu2".parse::<Who>().unwrap_err().to_string().contains("none of auto, gpu and cpu"));
         let no = GpuError::NoAdapter { wanted: "at all".into(), remedy: "r".into(), found: "none".into() };
         assert!(ChoiceError::from(no).is_in_the_request());
@@ -271,8 +379,8 @@ mod tests {
     fn a_trial_takes_the_faster() {
         let plan = plan(&["integration.transient_periods=100000"]);
         let trial = plan.shortened(TRIAL_PERIODS);
-        for (on_cpu, name) in [(1e9, "cpu"), (1e-3, "gpu")] {
-            let chosen = pollster::block_on(on_trial(&plan, &trial, Precision::F32, on_cpu))
+        for (cpu_rate, name) in [(1e9, "cpu"), (1e-3, "gpu")] {
+            let chosen = pollster::block_on(on_trial(&plan, &trial, (Precision::F32, 0), cpu_rate))
                 .unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(chosen.engine.name(), name, "{}", chosen.why);
             assert!(

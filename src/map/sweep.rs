@@ -18,7 +18,7 @@ const BATCH_SECONDS: f64 = 1.0;
 /// Records that came after the last ones were kept wait no longer than this.
 const KEPT_AFTER: Duration = Duration::from_millis(500);
 
-/// Most cells under way, lest those of a fast engine fill the memory.
+/// Most cells under way per card, lest those of a fast engine fill the memory.
 const LARGEST_BATCH: usize = 1 << 20;
 
 /// Why a sweep ended before its last cell.
@@ -50,7 +50,7 @@ pub async fn run(
     mut keep: impl FnMut(&[(u32, Record)], usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
     engine.heed(halt);
-    let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH };
+    let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH * engine.card_count() };
     let mut under_way = 0;
     let (mut unkept, mut last_kept) = (Vec::new(), Instant::now());
     while !schedule.is_finished() {

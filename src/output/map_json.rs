@@ -8,7 +8,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::cells::Cells;
-use super::map_manifest::{BasinObject, RefinementObject, Run, basins, statuses, tally};
+use super::map_manifest::{
+    AdapterObject, BasinObject, CardObject, RefinementObject, Run, basins, statuses, tally,
+};
 use super::{OutputError, names};
 use crate::map::plan::count_classes;
 
@@ -23,6 +25,10 @@ struct MapObject<'a> {
     /// Of so many it was merged.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adapter: Option<AdapterObject<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cards: Vec<CardObject<'a>>,
     cells: usize,
     /// One per cell and start.
     runs: usize,
@@ -87,6 +93,8 @@ pub(super) fn object(
         precision: run.precision,
         device: run.device,
         shards: run.merged.map(|merged| merged.shards),
+        adapter: run.adapter.as_ref().map(AdapterObject::from),
+        cards: run.cards.iter().map(CardObject::from).collect(),
         cells: cells.counts().iter().product(),
         runs: cells.runs(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),

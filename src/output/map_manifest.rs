@@ -13,7 +13,9 @@ use super::map::LIST;
 use super::names;
 use super::parameters::Parameters;
 use super::record_file::Identity;
+use crate::gpu::AdapterId;
 use crate::map::attractors::Attractor;
+use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
 use crate::map::schedule::{Audit, Deviation, Refined};
@@ -41,6 +43,10 @@ pub struct Run<'a> {
     pub precision: &'a str,
     /// What it ran on.
     pub device: &'a str,
+    /// The graphics adapter, where one was at work.
+    pub adapter: Option<AdapterId>,
+    /// What each card did, where several were at work.
+    pub cards: Vec<CardReport>,
     /// The host's processor, in words.
     pub processor: &'a str,
     /// Time until the engine was ready.
@@ -80,6 +86,10 @@ pub(super) struct Manifest<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adapter: Option<AdapterObject<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cards: Vec<CardObject<'a>>,
     /// Of the host.
     processor: &'a str,
     /// A hash of the sources that decide what records hold, and what they were compiled for.
@@ -121,6 +131,38 @@ pub(super) struct Manifest<'a> {
     refinement: Option<RefinementObject>,
     timings: TimingsObject,
     files: &'a [FileEntry],
+}
+
+/// Which of a machine's adapters: its number as `rattlemap devices` lists them, and its place on the bus where it has one.
+#[derive(Serialize)]
+pub(super) struct AdapterObject<'a> {
+    number: usize,
+    pci: Option<&'a str>,
+}
+
+impl<'a> From<&'a AdapterId> for AdapterObject<'a> {
+    fn from(adapter: &'a AdapterId) -> AdapterObject<'a> {
+        AdapterObject { number: adapter.number, pci: adapter.pci.as_deref() }
+    }
+}
+
+/// What one of several cards did: cells of this run alone, and why it was lost if it was.
+#[derive(Serialize)]
+pub(super) struct CardObject<'a> {
+    number: usize,
+    name: &'a str,
+    pci: Option<&'a str>,
+    cells: usize,
+    lost: Option<&'a str>,
+}
+
+impl<'a> From<&'a CardReport> for CardObject<'a> {
+    fn from(card: &'a CardReport) -> CardObject<'a> {
+        let CardReport { adapter, cells, lost } = card;
+        let AdapterId { number, name, pci } = adapter;
+        let (pci, lost) = (pci.as_deref(), lost.as_deref());
+        CardObject { number: *number, name, pci, cells: *cells, lost }
+    }
 }
 
 /// An attractor and the size of its basin.
@@ -305,6 +347,8 @@ pub(super) fn map<'a>(
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        adapter: run.adapter.as_ref().map(AdapterObject::from),
+        cards: run.cards.iter().map(CardObject::from).collect(),
         processor: run.processor,
         sources: run.merged.map_or(Identity::own_sources(), |merged| merged.sources),
         target: run.merged.map_or(Identity::own_target(), |merged| merged.target),

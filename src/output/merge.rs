@@ -37,7 +37,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use super::map::{self, Merged as Origin, Run};
-use super::{Cells, Folder, Identity, RECORDS, RecordFile, map_json, unfinished};
+use super::{Cells, Folder, Identity, OutputError, RECORDS, RecordFile, in_memory, map_json, unfinished};
 use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
@@ -47,6 +47,9 @@ use part::{Begun, Part, Seen};
 
 /// Records that are written together: as many as a batch of the file has at most.
 const BATCH: usize = 1 << 16;
+
+/// Most batches that wait to be written: each has 12 MB.
+const MOST_BATCHES: usize = 8;
 
 /// How far the merging is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -287,7 +290,8 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             return Ok(true);
         }
         self.waiting.extend_from_slice(batch);
-        if self.waiting.len() >= BATCH {
+        // Those of a core each are compressed side by side.
+        if self.waiting.len() >= BATCH * rayon::current_num_threads().min(MOST_BATCHES) {
             self.file.append(&std::mem::take(&mut self.waiting))?;
         }
         Ok(true)
@@ -344,17 +348,39 @@ impl Gathered {
         self.plan.run_count()
     }
 
+    /// The map as its folder would tell it.
+    ///
+    /// # Errors
+    /// [`MergeError::Output`] if something cannot be put into its form.
+    pub fn told(&self) -> Result<in_memory::Map, MergeError> {
+        self.with_cells(in_memory::map)
+    }
+
     /// Writes tables, figures and report, and the manifest last, into the folder that has the records.
     ///
     /// # Errors
     /// [`MergeError::Output`] if a file cannot be written; the records are there then.
     pub fn write(self, folder: &Folder) -> Result<Merged, MergeError> {
         let clock = Instant::now();
-        let Gathered { parts, plan, records, warnings, reading } = self;
+        let (files, object, classes, writing) = self.with_cells(|cells, run| {
+            let files = map::write(folder, cells, run)?;
+            let writing = clock.elapsed();
+            let object = map_json::object(folder.path(), &files, cells, run, writing)?;
+            Ok((files, object, count_classes(cells.classes()), writing))
+        })?;
+        Ok(Merged { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })
+    }
+
+    /// Hands over the finished map: its cells, and who computed them.
+    fn with_cells<T>(
+        &self,
+        take: impl FnOnce(&Cells<'_>, &Run<'_>) -> Result<T, OutputError>,
+    ) -> Result<T, MergeError> {
+        let Gathered { parts, plan, records, .. } = self;
         let first = &parts.parts[0].manifest;
-        let attractors = coexistence::attractors(&plan, &records);
-        let basins = attractors::basins(&plan, &records, &[]);
-        let cells = Cells::new(&parts.scene, &plan, &records)
+        let attractors = coexistence::attractors(plan, records);
+        let basins = attractors::basins(plan, records, &[]);
+        let cells = Cells::new(&parts.scene, plan, records)
             .counting(attractors.as_deref())
             .in_basins(basins.as_ref());
         let processor = parts.processors();
@@ -363,6 +389,9 @@ impl Gathered {
             engine: &first.engine,
             precision: &first.precision,
             device: &first.device,
+            // Each part's manifest has its own.
+            adapter: None,
+            cards: Vec::new(),
             processor: &processor,
             opening: parts.sum(|part| part.manifest.timings.open),
             elapsed: parts.elapsed(),
@@ -370,22 +399,14 @@ impl Gathered {
             resumed_cells: 0,
             lane_grid: parts.lane_grid(),
             refined: None,
-            without_effect: effect::names(&plan, &records, &first.precision),
+            without_effect: effect::names(plan, records, &first.precision),
             merged: Some(Origin {
                 shards: parts.parts[0].shard.count(),
                 sources: &first.sources,
                 target: &first.target,
             }),
         };
-        let files = map::write(folder, &cells, &run)?;
-        let writing = clock.elapsed();
-        Ok(Merged {
-            object: map_json::object(folder.path(), &files, &cells, &run, writing)?,
-            files,
-            classes: count_classes(cells.classes()),
-            warnings,
-            times: [reading, writing],
-        })
+        Ok(take(&cells, &run)?)
     }
 }
 

@@ -14,7 +14,7 @@ use assert_cmd::Command;
 use tempfile::TempDir;
 
 /// Short enough to be run often: one program without exponents, which Mesa compiles in half a second.
-const SCENE: &str = r#"
+pub(crate) const SCENE: &str = r#"
 [[axis]]
 parameter = "e"
 min = 0.0
@@ -53,6 +53,29 @@ enum End {
     Failed,
 }
 
+/// Puts the layer into a folder. False where there is no compiler for it, which is said.
+pub(crate) fn build_layer(path: &Path) -> bool {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/faults/layer.c");
+    let mut compiler = Process::new("cc");
+    compiler.args(["-shared", "-fPIC", "-O1", "-fvisibility=hidden", "-pthread", "-o"]);
+    match compiler.arg(path.join("layer.so")).arg(source).status() {
+        Ok(status) => assert!(status.success(), "the layer does not compile"),
+        Err(_) => {
+            // Past the harness, which keeps what passing tests print.
+            let mut stderr = std::io::stderr();
+            writeln!(stderr, "SKIPPED: no C compiler to build the layer of faults with").unwrap();
+            return false;
+        }
+    }
+    let layer = serde_json::json!({
+        "name": "VK_LAYER_RATTLEMAP_faults", "type": "GLOBAL", "library_path": path.join("layer.so"),
+        "api_version": "1.3.0", "implementation_version": "1", "description": "calls that fail",
+    });
+    let manifest = serde_json::json!({ "file_format_version": "1.0.0", "layer": layer });
+    fs::write(path.join("layer.json"), manifest.to_string()).unwrap();
+    true
+}
+
 struct Bench {
     folder: TempDir,
 }
@@ -62,24 +85,9 @@ impl Bench {
     fn new() -> Option<Bench> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path();
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/faults/layer.c");
-        let mut compiler = Process::new("cc");
-        compiler.args(["-shared", "-fPIC", "-O1", "-fvisibility=hidden", "-pthread", "-o"]);
-        match compiler.arg(path.join("layer.so")).arg(source).status() {
-            Ok(status) => assert!(status.success(), "the layer does not compile"),
-            Err(_) => {
-                // Past the harness, which keeps what passing tests print.
-                let mut stderr = std::io::stderr();
-                writeln!(stderr, "SKIPPED: no C compiler to build the layer of faults with").unwrap();
-                return None;
-            }
+        if !build_layer(path) {
+            return None;
         }
-        let layer = serde_json::json!({
-            "name": "VK_LAYER_RATTLEMAP_faults", "type": "GLOBAL", "library_path": path.join("layer.so"),
-            "api_version": "1.3.0", "implementation_version": "1", "description": "calls that fail",
-        });
-        let manifest = serde_json::json!({ "file_format_version": "1.0.0", "layer": layer });
-        fs::write(path.join("layer.json"), manifest.to_string()).unwrap();
         fs::write(path.join("s.toml"), SCENE).unwrap();
         Some(Bench { folder })
     }

@@ -2,6 +2,8 @@
 
 mod bench;
 mod bifurcation;
+#[cfg(unix)]
+mod cards;
 mod columns;
 mod commands;
 mod common;

@@ -43,7 +43,7 @@ pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(
     let out = ask.out();
     check_folder(ask, &out)?;
     let clock = Instant::now();
-    let Chosen { mut engine, why } =
+    let Chosen { mut engine, why, .. } =
         pollster::block_on(engine_choice::open(plan, &engine_of(ask, &out).ask()))?;
     let opening = clock.elapsed().as_secs_f64();
     let kept = if ask.resume { kept(ask, &out, scene, plan, &engine)? } else { 0 };

@@ -23,12 +23,17 @@ use crate::output::{self, Identity, RECORDS};
 /// Refuses to leave the engine open: two machines could choose two, whose parts make no map.
 pub(super) fn require_engine(ask: &Map) -> Result<(), Failure> {
     match (ask.shard, ask.engine.engine) {
-        (Some(shard), EngineChoice::Auto) => Err(Failure::Usage(anyhow!(
-            "--shard {shard}: --engine auto may choose otherwise on another machine, and parts of two engines make no \
-             map; name one, the same for all shards: --engine cpu, or --engine gpu (f32 unless told otherwise)"
-        ))),
+        (Some(shard), EngineChoice::Auto) => Err(open_engine(shard)),
         _ => Ok(()),
     }
+}
+
+/// Why a shard's engine is not left open.
+pub fn open_engine(shard: Shard) -> Failure {
+    Failure::Usage(anyhow!(
+        "--shard {shard}: --engine auto may choose otherwise on another machine, and parts of two engines make no map; \
+         name one, the same for all shards: --engine cpu, or --engine gpu (f32 unless told otherwise)"
+    ))
 }
 
 /// How many runs are asked for.
@@ -94,6 +99,8 @@ pub(super) fn finish(
         engine: engine.name(),
         precision: engine.precision(),
         device: &device,
+        adapter: engine.adapter(),
+        cards: engine.cards(),
         processor: &processor::described(),
         opening,
         elapsed,

@@ -1,5 +1,7 @@
 //! The lines printed when a map is done.
 
+use crate::cli::say::quoted;
+use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
 use crate::output::{self, Cells};
@@ -26,9 +28,10 @@ pub(super) fn summary(
         format!(", {} ns per step", rounded(1e9 * integrating / steps as f64))
     });
     let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
+    let cards: String = run.cards.iter().map(|card| format!("{}\n", by_card(card, unit))).collect();
     format!(
         "{integrated} {unit}{resumed} in {integrating:.3} s on {} ({}): {:.0} {unit}/s, {:.0} forcing periods/s\
-         {per_step}; files written in {:.3} s\n{refined}\
+         {per_step}; files written in {:.3} s\n{cards}{refined}\
          {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
         run.engine,
         run.precision,
@@ -36,6 +39,13 @@ pub(super) fn summary(
         periods / integrating,
         seconds - integrating,
     )
+}
+
+/// What one of several cards did.
+fn by_card(card: &CardReport, unit: &str) -> String {
+    let CardReport { adapter, cells, lost } = card;
+    let lost = lost.as_ref().map_or(String::new(), |reason| format!(", then lost: {reason}"));
+    quoted(format_args!("  adapter {adapter}: {cells} {unit}{lost}"))
 }
 
 /// Three significant digits.

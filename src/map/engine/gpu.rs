@@ -1,13 +1,14 @@
 //! Lanes on a graphics device as an engine.
 
 use std::collections::HashMap;
+use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
 use super::EngineError;
-use crate::gpu::{self, Constants, Ended, GpuError, Lane, LaneSettings, Pool, Tables};
+use crate::gpu::{self, AdapterId, Constants, Ended, GpuError, Lane, LaneSettings, Pool, Tables};
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::map::scene::Steps;
 use crate::record::{Record, valid};
@@ -22,7 +23,7 @@ const FLOWS_IN_SOFTWARE: usize = 8_192;
 
 /// Lanes on one device, in one precision.
 pub struct Gpu<'p> {
-    plan: &'p Plan,
+    plan: Held<'p>,
     device: gpu::Gpu,
     settings: LaneSettings,
     /// All flows and laws; none where there are too many of them to be kept.
@@ -36,13 +37,44 @@ pub struct Gpu<'p> {
     most_waiting: usize,
 }
 
+/// A plan, of somebody else's or one that several hold.
+enum Held<'p> {
+    Borrowed(&'p Plan),
+    Shared(Arc<Plan>),
+}
+
+impl Deref for Held<'_> {
+    type Target = Plan;
+
+    fn deref(&self) -> &Plan {
+        match self {
+            Held::Borrowed(plan) => plan,
+            Held::Shared(plan) => plan,
+        }
+    }
+}
+
+impl Gpu<'static> {
+    /// [`Gpu::new`] for a thread of its own.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`].
+    pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
+        Gpu::open(Held::Shared(plan), device).await
+    }
+}
+
 impl<'p> Gpu<'p> {
     /// An engine for the cells of a plan on an open device.
     ///
     /// # Errors
     /// [`EngineError`] if the device takes no constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        let settings = lane_settings(plan);
+        Gpu::open(Held::Borrowed(plan), device).await
+    }
+
+    async fn open(plan: Held<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+        let settings = lane_settings(&plan);
         let mut engine = Gpu {
             plan,
             device,
@@ -56,6 +88,7 @@ impl<'p> Gpu<'p> {
         if !engine.is_hardware() {
             engine.most_waiting = FLOWS_IN_SOFTWARE;
         }
+        let plan = &engine.plan;
         if plan.keeps_flows() {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
@@ -67,13 +100,17 @@ impl<'p> Gpu<'p> {
         }
         // Compiled now, not while somebody waits for cells.
         let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
-        engine.pool = plan.keeps_flows().then_some(pool);
+        engine.pool = engine.plan.keeps_flows().then_some(pool);
         Ok(engine)
     }
 
     /// The device, for another plan.
     pub fn into_device(self) -> gpu::Gpu {
         self.device
+    }
+
+    pub(super) fn adapter(&self) -> AdapterId {
+        self.device.id()
     }
 
     pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
@@ -109,7 +146,7 @@ impl<'p> Gpu<'p> {
 
     /// The least and the most free steps per forcing period, over all flows that lanes can carry.
     pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
-        let (plan, asked) = (self.plan, self.settings.steps_per_period);
+        let (plan, asked) = (&*self.plan, self.settings.steps_per_period);
         let steps = |flow| Constants::steps(&plan.oscillator(flow), asked);
         let all = (0..plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
         all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])

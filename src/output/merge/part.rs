@@ -127,17 +127,22 @@ impl Seen {
         let manifest = path.is_file().then(|| fs::read_to_string(&path)).transpose();
         let manifest = manifest.map_err(|error| no_shard(format!("{MANIFEST} cannot be read: {error}")))?;
         let records = folder.join(RECORDS);
-        if !records.is_file() {
-            return Err(no_shard(format!("there is no {RECORDS}")));
-        }
-        let identity = Identity::read(&records)?;
+        let identity = match records.is_file().then(|| Identity::read(&records)).transpose() {
+            Ok(identity) => identity.flatten(),
+            Err(RecordFileError::Damaged { at, what, .. }) => {
+                return Err(no_shard(format!("{RECORDS} is damaged at byte {at}: {what}")));
+            }
+            Err(other) => return Err(other.into()),
+        };
         if identity.as_ref().is_some_and(|identity| identity.shard().is_none()) {
             return Err(MergeError::WholeMap { part: part() });
         }
         let Some(text) = manifest else {
-            return Ok(Seen::Unfinished(Begun { folder: part(), identity }));
+            return match records.is_file() {
+                true => Ok(Seen::Unfinished(Begun { folder: part(), identity })),
+                false => Err(no_shard(format!("there is no {RECORDS}"))),
+            };
         };
-        let identity = identity.ok_or_else(|| no_shard(format!("{RECORDS} is empty")))?;
         let manifest: Manifest =
             serde_json::from_str(&text).map_err(|error| no_shard(format!("{MANIFEST}: {error}")))?;
         if manifest.command != "map" {
@@ -150,6 +155,10 @@ impl Seen {
             )));
         }
         let Some(shard) = manifest.shard else { return Err(MergeError::WholeMap { part: part() }) };
+        let Some(identity) = identity else {
+            let (what, command) = (format!("{RECORDS} is missing"), manifest.command(shard, Some(folder)));
+            return Err(MergeError::Damaged { part: part(), what, command });
+        };
         let found = Part { folder: part(), shard, identity, manifest };
         found.check(&text)?;
         Ok(Seen::Finished(Box::new(found)))

@@ -1,10 +1,11 @@
 /*
  * A Vulkan layer that lets calls fail, as drivers do when a card falls off the bus or resets.
  *
- *     RATTLEMAP_FAULT=CALL:N:RESULT   from the Nth call of CALL on it returns RESULT (a VkResult, below zero)
- *     RATTLEMAP_CALLS=FILE            at the end "CALL COUNT" lines are written to FILE
+ *     RATTLEMAP_FAULT=CALL:N:RESULT[:DEVICE]   from the Nth call of CALL on it returns RESULT (a VkResult, below zero); on
+ *                                              the DEVICE-th device that is made alone, of whose calls the Nth is meant
+ *     RATTLEMAP_CALLS=FILE                     at the end "CALL COUNT" lines are written to FILE
  *
- * A device that has been lost once (-4) stays so: every call that may say so does from then on. The few types that a
+ * A device that has been lost once (-4) stays so: every call that may say so does from then on; without DEVICE all are. The few types that a
  * layer needs are declared here, so that no headers have to be installed. Calls are handed on with six words: the calling
  * conventions of 64-bit systems pass them alike, whatever their types.
  */
@@ -47,6 +48,19 @@ struct interface {
 /* What comes next, of the instance and the device made last: those of one driver share their functions. */
 static get_function next_instance, next_device;
 static void *instance_made, *device_made;
+
+/* Devices in the order in which they were made, those that are gone left out. What belongs to a device begins with the same
+ * pointer, its table of functions. */
+enum { MOST_DEVICES = 64 };
+static void *devices[MOST_DEVICES];
+static int device_count;
+
+static void *device_of(void *handle) {
+    for (int n = 0; n < device_count && n < MOST_DEVICES; n++)
+        if (devices[n] && *(void **)devices[n] == *(void **)handle) return devices[n];
+    return device_made;
+}
+
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
 /* Calls that may fail; the second says whether they tell of a lost device. */
@@ -72,15 +86,22 @@ static const struct {
     CALLS(ROW){"vkCreateDevice", 0},
 };
 
-static int counts[CALL_COUNT];
+static int counts[CALL_COUNT], counts_on_one[CALL_COUNT];
 static int is_lost;
 
 /* What a call returns in place of the driver's answer; 0 if it may go on. */
-static int32_t fault(int which) {
+static int32_t fault(int which, void *handle) {
     pthread_mutex_lock(&lock);
-    int count = ++counts[which];
-    int32_t result = is_lost && calls[which].tells ? DEVICE_LOST : 0;
+    int count = ++counts[which], one = 0;
     const char *asked = getenv("RATTLEMAP_FAULT"), *colon = asked ? strchr(asked, ':') : NULL;
+    if (colon && sscanf(colon, ":%*d:%*d:%d", &one) == 1 && which != CreateDevice) {
+        if (one < 1 || one > device_count || devices[one - 1] != device_of(handle)) {
+            pthread_mutex_unlock(&lock);
+            return 0;
+        }
+        count = ++counts_on_one[which];
+    }
+    int32_t result = is_lost && calls[which].tells ? DEVICE_LOST : 0;
     size_t length = colon ? (size_t)(colon - asked) : 0;
     int from, code;
     if (colon && strlen(calls[which].name) == length && !strncmp(asked, calls[which].name, length) &&
@@ -93,14 +114,17 @@ static int32_t fault(int which) {
 }
 
 /* The driver does not know that its device is lost: what is destroyed next must not be in use. */
-static void settle(void) {
-    if (device_made) ((call)next_device(device_made, "vkDeviceWaitIdle"))(device_made, 0, 0, 0, 0, 0);
+static void settle(void *handle) {
+    pthread_mutex_lock(&lock);
+    void *device = device_of(handle);
+    pthread_mutex_unlock(&lock);
+    if (device) ((call)next_device(device, "vkDeviceWaitIdle"))(device, 0, 0, 0, 0, 0);
 }
 
 #define WRAPPER(name, tells) \
     static int32_t wrapped_##name(void *handle, word a, word b, word c, word d, word e) { \
-        int32_t result = fault(name); \
-        if (result == DEVICE_LOST) settle(); \
+        int32_t result = fault(name, handle); \
+        if (result == DEVICE_LOST) settle(handle); \
         return result ? result : ((call)next_device(device_made, "vk" #name))(handle, a, b, c, d, e); \
     }
 CALLS(WRAPPER)
@@ -125,14 +149,27 @@ static int32_t create_instance(const struct info *create, const void *allocator,
 static int32_t create_device(void *physical, const struct info *create, const void *allocator, void **device) {
     struct info *link = (struct info *)link_of(create, DEVICE_LINK);
     if (!link) return INITIALIZATION_FAILED;
-    int32_t result = fault(CreateDevice);
+    int32_t result = fault(CreateDevice, NULL);
     if (result) return result;
     get_function instance = link->link->instance, next = link->link->other;
     link->link = link->link->next;
     int32_t (*made)(void *, const void *, const void *, void **) = (void *)instance(instance_made, "vkCreateDevice");
     result = made(physical, create, allocator, device);
-    if (!result) next_device = next, device_made = *device;
-    return result;
+    if (result) return result;
+    pthread_mutex_lock(&lock);
+    next_device = next, device_made = *device;
+    if (device_count < MOST_DEVICES) devices[device_count++] = *device;
+    pthread_mutex_unlock(&lock);
+    return 0;
+}
+
+static int32_t destroy_device(void *device, word allocator, word a, word b, word c, word d) {
+    pthread_mutex_lock(&lock);
+    for (int n = 0; n < device_count; n++)
+        if (devices[n] == device) devices[n] = NULL;
+    pthread_mutex_unlock(&lock);
+    call next = device ? (call)next_device(device, "vkDestroyDevice") : NULL;
+    return next ? next(device, allocator, a, b, c, d) : 0;
 }
 
 static function device_function(void *device, const char *name);
@@ -144,6 +181,7 @@ static function own(const char *name) {
     CALLS(MATCH)
     if (!strcmp(name, "vkCreateInstance")) return (function)create_instance;
     if (!strcmp(name, "vkCreateDevice")) return (function)create_device;
+    if (!strcmp(name, "vkDestroyDevice")) return (function)destroy_device;
     if (!strcmp(name, "vkGetInstanceProcAddr")) return (function)instance_function;
     if (!strcmp(name, "vkGetDeviceProcAddr")) return (function)device_function;
     return NULL;

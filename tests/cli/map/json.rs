@@ -17,7 +17,7 @@ fn printed(folder: &TempDir, arguments: &[&str]) -> serde_json::Value {
 #[test]
 fn json_says_what_a_map_came_to() {
     let folder = folder();
-    let summary = printed(&folder, &[]);
+    let summary = printed(&folder, &["--engine", "cpu"]);
     let fields = "cells classes device engine files folder periods precision refinement resumed runs seconds statuses \
          without_effect";
     assert_eq!(keys(&summary), fields);

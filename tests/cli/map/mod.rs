@@ -11,6 +11,7 @@ mod folders;
 mod interrupts;
 mod json;
 mod records;
+mod shards;
 mod streams;
 mod torture;
 

@@ -11,7 +11,7 @@ pub(super) fn bytes(out: &Path) -> Vec<Vec<u8>> {
 }
 
 /// All that a file holds, in the order in which it was kept.
-fn kept(path: &Path) -> (Vec<(u32, Record)>, Extent) {
+pub(super) fn kept(path: &Path) -> (Vec<(u32, Record)>, Extent) {
     let identity = Identity::read(path).unwrap().unwrap();
     let mut all = Vec::new();
     let take = |batch: &[(u32, Record)]| {

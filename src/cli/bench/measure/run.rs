@@ -119,7 +119,7 @@ impl<'a> Bench<'a> {
     /// If it cannot be opened, gives wrong answers, or does not compile the lane.
     pub fn gpu(precision: Precision, device: &str, folder: &'a Folder) -> Result<Bench<'a>> {
         let clock = Instant::now();
-        let choice = AdapterChoice { name: Some(device.to_owned()) };
+        let choice = AdapterChoice::named(device);
         let mut opened = pollster::block_on(gpu::Gpu::open(precision, &choice))?;
         let open_seconds = clock.elapsed().as_secs_f64();
         let is_hardware = gpu::is_hardware(opened.adapter());
@@ -211,6 +211,8 @@ impl<'a> Bench<'a> {
             elapsed: Duration::from_secs_f64(run.times.running()),
             opening: Duration::ZERO,
             elapsed_before: Duration::ZERO,
+            adapter: None,
+            cards: Vec::new(),
             resumed_cells: 0,
             lane_grid: None,
             refined: None,

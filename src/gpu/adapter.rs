@@ -1,0 +1,258 @@
+//! Adapters: which there are, in which order, and what they are called.
+
+use std::fmt;
+
+use super::caught::caught;
+use super::device::most_slots;
+use super::{GpuError, Precision};
+
+/// What narrows the adapters down in the environment: the first is wgpu's own.
+const BACKEND: &str = "WGPU_BACKEND";
+const ADAPTER_NAME: &str = "WGPU_ADAPTER_NAME";
+
+/// Which adapter to take.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct AdapterChoice {
+    /// Part of the adapter's name, or of what [`describe`] says of it, in any case of letters;
+    /// none takes the best.
+    pub name: Option<String>,
+    /// The one with this number ([`AdapterReport::number`]) and no other.
+    pub number: Option<usize>,
+}
+
+impl AdapterChoice {
+    /// The adapter with this number.
+    pub fn numbered(number: usize) -> AdapterChoice {
+        AdapterChoice { number: Some(number), name: None }
+    }
+
+    /// The best of the adapters in whose name, or in what [`describe`] says of them, this is a part.
+    pub fn named(name: impl Into<String>) -> AdapterChoice {
+        AdapterChoice { name: Some(name.into()), number: None }
+    }
+
+    /// Whether an adapter may be taken.
+    pub fn allows(&self, adapter: &AdapterReport) -> bool {
+        let AdapterReport { number, info, .. } = adapter;
+        let name = describe(info).to_lowercase();
+        self.number.is_none_or(|wanted| wanted == *number)
+            && self.name.as_ref().is_none_or(|wanted| name.contains(&wanted.to_lowercase()))
+    }
+
+    /// The adapter that the environment names by `WGPU_ADAPTER_NAME`, else the best.
+    pub fn from_environment() -> AdapterChoice {
+        AdapterChoice { name: std::env::var(ADAPTER_NAME).ok().filter(|name| !name.is_empty()), number: None }
+    }
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+}
+
+/// What an adapter offers.
+#[derive(Clone, Debug)]
+pub struct AdapterReport {
+    /// Its place in [`adapters`], from 0: the same in every run on one machine and under one `WGPU_BACKEND`, as long
+    /// as no adapter comes or goes.
+    pub number: usize,
+    /// Name, kind, driver.
+    pub info: wgpu::AdapterInfo,
+    /// Precisions that lanes can have on it.
+    pub precisions: Vec<Precision>,
+    /// Largest storage buffer that a shader sees, in bytes.
+    pub largest_binding: u64,
+    /// Lanes that may be under way at a time.
+    pub most_lanes: usize,
+}
+
+impl AdapterReport {
+    fn of(number: usize, adapter: &wgpu::Adapter) -> AdapterReport {
+        AdapterReport {
+            number,
+            info: adapter.get_info(),
+            precisions: Precision::ALL.into_iter().filter(|&p| has(adapter, p)).collect(),
+            largest_binding: adapter.limits().max_storage_buffer_binding_size,
+            most_lanes: most_slots(&adapter.limits()),
+        }
+    }
+
+    /// Which one it is.
+    pub fn id(&self) -> AdapterId {
+        AdapterId::of(self.number, &self.info)
+    }
+}
+
+/// What tells an adapter from others of its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AdapterId {
+    /// See [`AdapterReport::number`].
+    pub number: usize,
+    /// As its driver calls it.
+    pub name: String,
+    /// Where it sits on the bus (`domain:bus:device.function`); none where there is no such place, or no driver that
+    /// tells.
+    pub pci: Option<String>,
+}
+
+impl AdapterId {
+    pub(super) fn of(number: usize, info: &wgpu::AdapterInfo) -> AdapterId {
+        let pci = Some(info.device_pci_bus_id.clone()).filter(|pci| !pci.is_empty());
+        AdapterId { number, name: info.name.clone(), pci }
+    }
+}
+
+impl fmt::Display for AdapterId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let AdapterId { number, name, pci } = self;
+        write!(f, "{number} ({name}{})", pci.as_ref().map_or(String::new(), |pci| format!(", PCI {pci}")))
+    }
+}
+
+/// All adapters of this machine, the best first: by kind, then by interface, then by PCI address, which is what tells
+/// equal cards apart; those without one as the driver lists them.
+pub async fn adapters() -> Vec<AdapterReport> {
+    listed().await.unwrap_or_default().into_iter().map(|(report, _)| report).collect()
+}
+
+/// The same, with what they are opened by.
+pub(super) async fn listed() -> Result<Vec<(AdapterReport, wgpu::Adapter)>, GpuError> {
+    let list = caught(|| instance().enumerate_adapters(wgpu::Backends::all()));
+    let mut all = list.map_err(|message| GpuError::Refused { what: "to list its adapters", message })?.await;
+    all.sort_by_cached_key(|adapter| place(&adapter.get_info()));
+    Ok(all.into_iter().enumerate().map(|(n, adapter)| (AdapterReport::of(n, &adapter), adapter)).collect())
+}
+
+fn place(info: &wgpu::AdapterInfo) -> ((u32, u32), String) {
+    (rank(info), info.device_pci_bus_id.clone())
+}
+
+/// An adapter in words: name, interface and driver, as manifests have it.
+pub fn describe(info: &wgpu::AdapterInfo) -> String {
+    let driver = [info.driver.as_str(), info.driver_info.as_str()].join(" ");
+    format!("{} ({:?}; {})", info.name, info.backend, driver.trim())
+}
+
+/// Whether an adapter is more than a program on the processor.
+pub fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
+    info.device_type != wgpu::DeviceType::Cpu
+}
+
+fn has(adapter: &wgpu::Adapter, precision: Precision) -> bool {
+    adapter.features().contains(features(precision))
+}
+
+pub(super) fn features(precision: Precision) -> wgpu::Features {
+    match precision {
+        Precision::F32 => wgpu::Features::empty(),
+        Precision::F64 => wgpu::Features::SHADER_F64,
+    }
+}
+
+/// Hardware before software, dedicated before integrated; of the interfaces to one adapter the
+/// one that offers most.
+fn rank(info: &wgpu::AdapterInfo) -> (u32, u32) {
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::VirtualGpu => 1,
+        wgpu::DeviceType::IntegratedGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    let interface = match info.backend {
+        wgpu::Backend::Vulkan => 0,
+        wgpu::Backend::Metal => 1,
+        wgpu::Backend::Dx12 => 2,
+        wgpu::Backend::Gl => 3,
+        wgpu::Backend::BrowserWebGpu | wgpu::Backend::Noop => 4,
+    };
+    (kind, interface)
+}
+
+/// Why an adapter comes before or after itself by another interface.
+pub fn interface_rank(info: &wgpu::AdapterInfo) -> &'static str {
+    match info.backend {
+        wgpu::Backend::Vulkan => "first choice: the only interface with f64",
+        wgpu::Backend::Metal => "second to Vulkan: no f64",
+        wgpu::Backend::Dx12 => "second to Vulkan: no f64 here",
+        wgpu::Backend::Gl => "last choice: no f64, smaller buffers, no clock of its own",
+        wgpu::Backend::BrowserWebGpu | wgpu::Backend::Noop => "last choice",
+    }
+}
+
+/// What in the environment narrows the adapters down, as far as `choice` heeds it, and what to do about it; none
+/// if nothing does.
+pub fn narrowed_by(choice: &AdapterChoice) -> Option<String> {
+    let value = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let backend = value(BACKEND).map(|value| (BACKEND, value, "give vulkan, metal or dx12"));
+    let named = choice.name.clone().filter(|name| value(ADAPTER_NAME).as_ref() == Some(name));
+    let named =
+        named.map(|value| (ADAPTER_NAME, value, "give part of a name that `rattlemap devices` lists"));
+    let sentence =
+        |(name, value, remedy)| format!("the environment has {name}={value}: unset it, or {remedy}");
+    let list: Vec<String> = backend.into_iter().chain(named).map(sentence).collect();
+    (!list.is_empty()).then(|| list.join("; "))
+}
+
+/// That no adapter fits, in words.
+pub(crate) fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[AdapterReport]) -> GpuError {
+    let mut wanted = match precision {
+        Precision::F32 => String::from("at all"),
+        Precision::F64 => String::from("with double precision (SHADER_F64)"),
+    };
+    if let Some(name) = &choice.name {
+        wanted = format!("called {name} {wanted}");
+    }
+    if let Some(number) = choice.number {
+        wanted = format!("of number {number} {wanted}");
+    }
+    let list: Vec<String> = all
+        .iter()
+        .map(|adapter| {
+            let names: Vec<&str> = adapter.precisions.iter().map(|precision| precision.name()).collect();
+            format!("{} ({})", adapter.info.name, names.join(", "))
+        })
+        .collect();
+    let found = if list.is_empty() { String::from("none") } else { list.join(", ") };
+    let remedy = narrowed_by(choice)
+        .unwrap_or_else(|| String::from("install a Vulkan driver (Debian: mesa-vulkan-drivers)"));
+    GpuError::NoAdapter { wanted, remedy, found }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_adapter_by_two_interfaces_is_taken_by_the_better() {
+        let with = wgpu::AdapterInfo::new;
+        let (dedicated, software) = (wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::Cpu);
+        let in_order = [
+            with(dedicated, wgpu::Backend::Vulkan),
+            with(dedicated, wgpu::Backend::Dx12),
+            with(dedicated, wgpu::Backend::Gl),
+            with(software, wgpu::Backend::Vulkan),
+            with(software, wgpu::Backend::Gl),
+        ];
+        let ranks = in_order.each_ref().map(rank);
+        assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:?}");
+    }
+    #[test]
+    fn equal_cards_are_numbered_by_their_place_on_the_bus() {
+        let at = |pci: &str, device_type| wgpu::AdapterInfo {
+            device_pci_bus_id: pci.to_owned(),
+            ..wgpu::AdapterInfo::new(device_type, wgpu::Backend::Vulkan)
+        };
+        let dedicated = wgpu::DeviceType::DiscreteGpu;
+        let mut all = [
+            at("", wgpu::DeviceType::Cpu),
+            at("0000:65:00.0", dedicated),
+            at("0000:00:02.0", wgpu::DeviceType::IntegratedGpu),
+            at("0000:17:00.0", dedicated),
+        ];
+        all.sort_by_cached_key(place);
+        let addresses = all.each_ref().map(|info| info.device_pci_bus_id.as_str());
+        assert_eq!(addresses, ["0000:17:00.0", "0000:65:00.0", "0000:00:02.0", ""]);
+        let told = [&all[1], &all[3]].map(|info| AdapterId::of(1, info).to_string());
+        assert_eq!(told, ["1 (, PCI 0000:65:00.0)", "1 ()"]);
+    }
+}

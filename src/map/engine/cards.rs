@@ -1,0 +1,611 @@
+//! Several equal cards as one engine: a thread for each, one queue for all.
+//!
+//! A card takes up cells when it has room, as many as keeps it busy as long as the others: its part of all cells that
+//! are queued or under way goes by the rate at which it has computed so far. While there are more cells than it takes
+//! to fill the cards, a quarter waits for whoever is done first; the last cells are all under way at once. So a slow card
+//! has few of them, and none idles while another has a queue. A card that is lost leaves its cells to the others.
+//!
+//! Which card computes a cell, nobody can see from its record.
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use super::{CardReport, Engine, EngineError, Loss};
+use crate::gpu::AdapterId;
+use crate::map::plan::Cell;
+use crate::record::Record;
+
+/// Records that have come wait no longer than this for others.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// How often flags are looked at that wake nobody.
+const TICK: Duration = Duration::from_millis(50);
+
+/// Cards that are told to stop are waited for no longer than this.
+const STOPPED_AFTER: Duration = Duration::from_secs(2);
+
+/// Share of its part that a card takes up at once, where that is more than enough to keep it busy.
+const AT_ONCE: f64 = 0.75;
+
+/// How much an earlier rate counts beside the last one.
+const MEMORY: f64 = 0.5;
+
+/// Equal cards that compute one plan together.
+pub struct Cards {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+    /// Raised by whoever wants no more cells.
+    halt: Arc<AtomicBool>,
+    /// Told of each card that is lost.
+    listener: Option<Listener>,
+    name: &'static str,
+    precision: &'static str,
+    device: String,
+    device_bytes: Option<u64>,
+    steps_per_period: Option<[u32; 2]>,
+}
+
+/// Whoever is told of losses.
+type Listener = Box<dyn Fn(&Loss) + Send>;
+
+struct Shared {
+    state: Mutex<State>,
+    /// There are cells to take up, or no more will come.
+    work: Condvar,
+    /// There are records, or a card is gone.
+    news: Condvar,
+    /// What the cards' engines heed.
+    stop: Arc<AtomicBool>,
+}
+
+struct State {
+    queue: VecDeque<Cell>,
+    ended: Vec<(u32, Record)>,
+    cards: Vec<Card>,
+    losses: Vec<Loss>,
+    is_closed: bool,
+}
+
+struct Card {
+    adapter: AdapterId,
+    under_way: HashMap<u32, Cell>,
+    /// Most cells under way that it has memory for.
+    most: usize,
+    /// Fewer do not keep it busy.
+    least: usize,
+    /// Cells per second while it was busy; none if it was not yet.
+    rate: Option<f64>,
+    cells: usize,
+    steps: Option<u64>,
+    is_at_work: bool,
+    lost: Option<EngineError>,
+}
+
+impl Cards {
+    /// Engines that compute the same records, each on a card of its own.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn new(engines: Vec<(AdapterId, Engine<'static>)>) -> Cards {
+        let (_, first) = engines.first().expect("one card at least");
+        let cards = engines.iter().map(|(adapter, engine)| Card {
+            adapter: adapter.clone(),
+            under_way: HashMap::new(),
+            most: engine.room(),
+            least: engine.least_batch(),
+            rate: None,
+            cells: 0,
+            steps: engine.lane_steps(),
+            is_at_work: false,
+            lost: None,
+        });
+        let state = State {
+            queue: VecDeque::new(),
+            ended: Vec::new(),
+            cards: cards.collect(),
+            losses: Vec::new(),
+            is_closed: false,
+        };
+        let shared = Arc::new(Shared {
+            state: Mutex::new(state),
+            work: Condvar::new(),
+            news: Condvar::new(),
+            stop: Arc::default(),
+        });
+        let (name, precision, device) = (first.name(), first.precision(), first.device());
+        let steps_per_period = first.steps_per_period();
+        let bytes = engines.iter().map(|(_, engine)| engine.device_bytes());
+        let device_bytes = bytes.reduce(|a, b| Some(a?.saturating_add(b?))).flatten();
+        let spawn = |(nth, (_, engine)): (usize, (AdapterId, Engine<'static>))| {
+            let shared = Arc::clone(&shared);
+            thread::spawn(move || work(nth, engine, &shared))
+        };
+        let threads = engines.into_iter().enumerate().map(spawn).collect();
+        let (halt, listener) = (Arc::default(), None);
+        Cards { shared, threads, halt, listener, name, precision, device, device_bytes, steps_per_period }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.threads.len()
+    }
+
+    pub(super) fn name(&self) -> &'static str {
+        self.name
+    }
+
+    pub(super) fn precision(&self) -> &'static str {
+        self.precision
+    }
+
+    pub(super) fn device(&self) -> String {
+        self.device.clone()
+    }
+
+    /// Of all cards.
+    pub(super) fn device_bytes(&self) -> Option<u64> {
+        self.device_bytes
+    }
+
+    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
+        self.steps_per_period
+    }
+
+    pub(super) fn least_batch(&self) -> usize {
+        let state = self.shared.lock();
+        state.at_hand().map(|card| card.least).fold(0, usize::saturating_add).max(1)
+    }
+
+    pub(super) fn lane_steps(&self) -> Option<u64> {
+        self.shared.lock().cards.iter().map(|card| card.steps).sum()
+    }
+
+    /// Cells that the cards have room for, those in the queue left out.
+    pub(super) fn room(&self) -> usize {
+        let state = self.shared.lock();
+        state.at_hand().map(|card| card.most).fold(0, usize::saturating_add).saturating_sub(state.left())
+    }
+
+    pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
+        self.halt = Arc::clone(halt);
+    }
+
+    pub(super) fn listen(&mut self, listener: Listener) {
+        self.listener = Some(listener);
+    }
+
+    /// What each card has done so far.
+    pub(super) fn reports(&self) -> Vec<CardReport> {
+        let report = |card: &Card| CardReport {
+            adapter: card.adapter.clone(),
+            cells: card.cells,
+            lost: card.lost.as_ref().map(EngineError::reason),
+        };
+        self.shared.lock().cards.iter().map(report).collect()
+    }
+
+    pub(super) fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
+        let mut state = self.shared.lock();
+        if let Some(error) = state.last_loss() {
+            return Err(error);
+        }
+        state.queue.extend(cells);
+        drop(state);
+        self.shared.work.notify_all();
+        Ok(())
+    }
+
+    /// Waits until no more than `until` cells are left, or some have ended and waited for long enough.
+    pub(super) fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
+        let clock = Instant::now();
+        let mut halted_at = None;
+        loop {
+            let is_halted = self.halt.load(Ordering::Relaxed);
+            self.shared.stop.store(is_halted, Ordering::Relaxed);
+            let mut state = self.shared.lock();
+            let losses = std::mem::take(&mut state.losses);
+            let is_over = if is_halted {
+                let halted_at = *halted_at.get_or_insert_with(Instant::now);
+                let is_idle = state.cards.iter().all(|card| !card.is_at_work);
+                is_idle || halted_at.elapsed() >= STOPPED_AFTER
+            } else {
+                let left = state.left();
+                let has_ended = !state.ended.is_empty();
+                left == 0
+                    || state.last_loss().is_some()
+                    || has_ended && (left <= until || clock.elapsed() >= PATIENCE)
+            };
+            if is_over {
+                let ended = std::mem::take(&mut state.ended);
+                let gone = state.last_loss().filter(|_| ended.is_empty() && state.left() > 0);
+                if gone.is_some() {
+                    state.queue.clear();
+                }
+                drop(state);
+                self.tell(&losses);
+                return gone.map_or(Ok(ended), Err);
+            }
+            if losses.is_empty() {
+                let waited = self.shared.news.wait_timeout(state, TICK);
+                drop(waited.unwrap_or_else(PoisonError::into_inner));
+            } else {
+                drop(state);
+                self.tell(&losses);
+            }
+        }
+    }
+
+    fn tell(&self, losses: &[Loss]) {
+        if let Some(listener) = &self.listener {
+            losses.iter().for_each(listener);
+        }
+    }
+}
+
+impl Drop for Cards {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.lock().is_closed = true;
+        self.shared.work.notify_all();
+        for thread in self.threads.drain(..) {
+            // One that has panicked has told so.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    /// What the lock guards is sound between any two of its changes.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The next cells of a card, none to go on with those under way; waits while there are neither. False once no more
+    /// will come.
+    fn next(&self, nth: usize, cells: &mut Vec<Cell>) -> bool {
+        let mut state = self.lock();
+        loop {
+            if state.is_closed {
+                return false;
+            }
+            if !self.stop.load(Ordering::Relaxed) {
+                let count = state.share(nth);
+                cells.extend(state.queue.drain(..count));
+                let card = &mut state.cards[nth];
+                card.under_way.extend(cells.iter().map(|cell| (cell.id, *cell)));
+                card.is_at_work = !card.under_way.is_empty();
+                if card.is_at_work {
+                    return true;
+                }
+            }
+            let waited = self.work.wait_timeout(state, TICK);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Takes what a card has computed, in so many seconds.
+    fn take(&self, nth: usize, ended: Vec<(u32, Record)>, seconds: f64, steps: Option<u64>) {
+        let mut state = self.lock();
+        let card = &mut state.cards[nth];
+        let under_way = card.under_way.len();
+        for (id, _) in &ended {
+            card.under_way.remove(id);
+        }
+        card.cells += ended.len();
+        card.steps = steps;
+        card.is_at_work = false;
+        // Fewer cells take as long; the last few, which are waited for, say nothing.
+        if under_way >= card.least && 4 * ended.len() >= under_way {
+            let now = ended.len() as f64 / seconds.max(1e-6);
+            card.rate = Some(card.rate.map_or(now, |before| MEMORY * before + (1.0 - MEMORY) * now));
+        }
+        state.ended.extend(ended);
+        drop(state);
+        self.news.notify_all();
+    }
+
+    /// Puts cells back for which a card has no memory. False if it has none for a single one.
+    fn take_back(&self, nth: usize, cells: &[Cell]) -> bool {
+        let mut state = self.lock();
+        let card = &mut state.cards[nth];
+        let tried = card.under_way.len();
+        for cell in cells {
+            card.under_way.remove(&cell.id);
+        }
+        card.most = tried / 2;
+        let goes_on = card.most > 0 || !card.under_way.is_empty();
+        cells.iter().rev().for_each(|cell| state.queue.push_front(*cell));
+        drop(state);
+        self.work.notify_all();
+        goes_on
+    }
+
+    /// Leaves a card's cells to the others.
+    fn lose(&self, nth: usize, error: EngineError) {
+        let mut state = self.lock();
+        let card = &mut state.cards[nth];
+        let mut cells: Vec<Cell> = card.under_way.drain().map(|(_, cell)| cell).collect();
+        cells.sort_unstable_by_key(|cell| cell.id);
+        let loss = Loss { adapter: card.adapter.clone(), cells: cells.len(), reason: error.reason() };
+        card.is_at_work = false;
+        card.lost = Some(error);
+        cells.iter().rev().for_each(|cell| state.queue.push_front(*cell));
+        state.losses.push(loss);
+        drop(state);
+        self.work.notify_all();
+        self.news.notify_all();
+    }
+}
+
+impl State {
+    /// Cards that are not lost.
+    fn at_hand(&self) -> impl Iterator<Item = &Card> {
+        self.cards.iter().filter(|card| card.lost.is_none())
+    }
+
+    /// Cells that have not ended.
+    fn left(&self) -> usize {
+        self.queue.len() + self.cards.iter().map(|card| card.under_way.len()).sum::<usize>()
+    }
+
+    /// Why the last card was lost; none while one is left.
+    fn last_loss(&self) -> Option<EngineError> {
+        if self.at_hand().next().is_some() {
+            return None;
+        }
+        self.cards.iter().rev().find_map(|card| card.lost.clone())
+    }
+
+    /// Cells that a card takes up now.
+    fn share(&self, nth: usize) -> usize {
+        let card = &self.cards[nth];
+        let rates = || self.at_hand().filter_map(|card| card.rate);
+        // A card whose rate is not known yet is taken to be like the others.
+        let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
+        let rate = |card: &Card| card.rate.unwrap_or(if mean > 0.0 { mean } else { 1.0 });
+        let weight = rate(card) / self.at_hand().map(rate).sum::<f64>();
+        let part = (self.left() as f64 * weight).ceil() as usize;
+        let at_once = ((part as f64 * AT_ONCE).ceil() as usize).max(card.least.min(part));
+        at_once.min(card.most).saturating_sub(card.under_way.len()).min(self.queue.len())
+    }
+}
+
+/// A card that leaves its thread by a panic is lost like any other.
+struct Leaving<'s> {
+    nth: usize,
+    shared: &'s Shared,
+    device: String,
+}
+
+impl Drop for Leaving<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            let (device, reason) = (self.device.clone(), "its thread panicked".to_owned());
+            self.shared.lose(self.nth, EngineError::Lost { device, reason });
+        }
+    }
+}
+
+/// The thread of a card: takes up cells and hands over records until no more cells will come, or it is lost.
+fn work(nth: usize, mut engine: Engine<'static>, shared: &Shared) {
+    let leaving = Leaving { nth, shared, device: engine.device() };
+    engine.heed(&shared.stop);
+    let mut cells = Vec::new();
+    while shared.next(nth, &mut cells) {
+        let clock = Instant::now();
+        match pollster::block_on(engine.begin(&cells)) {
+            Ok(()) => {}
+            Err(EngineError::OutOfMemory { .. }) if shared.take_back(nth, &cells) => {
+                cells.clear();
+                continue;
+            }
+            Err(error) => return shared.lose(nth, error),
+        }
+        cells.clear();
+        let half = shared.lock().cards[nth].under_way.len() / 2;
+        match pollster::block_on(engine.advance(half)) {
+            Ok(ended) => shared.take(nth, ended, clock.elapsed().as_secs_f64(), engine.lane_steps()),
+            Err(error) => return shared.lose(nth, error),
+        }
+    }
+    drop(leaving);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicU64;
+
+    use super::super::Fake;
+    use super::*;
+
+    fn adapter(number: usize) -> AdapterId {
+        AdapterId { number, name: "fake".to_owned(), pci: None }
+    }
+
+    fn cards(fakes: Vec<Fake>) -> Cards {
+        let named = fakes.into_iter().enumerate();
+        Cards::new(named.map(|(n, fake)| (adapter(n), Engine::Fake(fake))).collect())
+    }
+
+    fn cells(count: u32) -> Vec<Cell> {
+        (0..count).map(|id| Cell { id, flow: 0, law: 0, start: [f64::from(id); 4] }).collect()
+    }
+
+    /// By the start, which a cell that changes cards must keep.
+    fn rule(cell: &Cell) -> Record {
+        Record { period: cell.start[0] as u32 + 1, ..Record::default() }
+    }
+
+    fn slow(cell: &Cell) -> Record {
+        thread::sleep(Duration::from_millis(2));
+        rule(cell)
+    }
+
+    /// Runs cells as a sweep does, some at a time; which cells came, and why it ended if not for want of cells.
+    fn run(cards: &mut Cards, cells: &[Cell], at_a_time: usize) -> (Vec<u32>, Option<EngineError>) {
+        let (mut left, mut under_way, mut seen) = (cells, 0, Vec::new());
+        while under_way > 0 || !left.is_empty() {
+            let (next, later) = left.split_at(left.len().min(at_a_time - under_way).min(cards.room()));
+            left = later;
+            under_way += next.len();
+            match cards.begin(next).and_then(|()| cards.advance(under_way / 2)) {
+                Ok(ended) => {
+                    under_way -= ended.len();
+                    for (id, record) in ended {
+                        assert_eq!(record, rule(&cells[id as usize]), "cell {id}");
+                        seen.push(id);
+                    }
+                }
+                Err(error) => return (seen, Some(error)),
+            }
+        }
+        (seen, None)
+    }
+
+    fn all_of(mut seen: Vec<u32>, count: u32) {
+        seen.sort_unstable();
+        assert_eq!(seen, (0..count).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn every_cell_comes_once_and_the_cards_share_them() {
+        let mut cards = cards(vec![Fake::new(slow), Fake::new(slow), Fake::new(slow)]);
+        let (seen, error) = run(&mut cards, &cells(600), 200);
+        assert_eq!(error, None);
+        all_of(seen, 600);
+        let counts: Vec<usize> = cards.reports().iter().map(|card| card.cells).collect();
+        assert_eq!(counts.iter().sum::<usize>(), 600);
+        assert!(counts.iter().all(|&count| count > 100), "{counts:?}");
+    }
+
+    #[test]
+    fn a_slow_card_gets_few_of_the_last_cells() {
+        static MICROSECONDS: AtomicU64 = AtomicU64::new(0);
+        fn slower(cell: &Cell) -> Record {
+            let clock = Instant::now();
+            thread::sleep(Duration::from_millis(8));
+            let record = slow(cell);
+            MICROSECONDS.fetch_add(clock.elapsed().as_micros() as u64, Ordering::Relaxed);
+            record
+        }
+        let mut cards = cards(vec![Fake::new(slow), Fake::new(slower)]);
+        let clock = Instant::now();
+        let (seen, _) = run(&mut cards, &cells(600), 120);
+        let took = clock.elapsed().as_secs_f64();
+        all_of(seen, 600);
+        let counts: Vec<usize> = cards.reports().iter().map(|card| card.cells).collect();
+        assert!(counts[1] < 200 && counts[1] > 30, "{counts:?}");
+        // Half of all cells would take the slow one three times as long as both need together.
+        let each = 1e-6 * MICROSECONDS.load(Ordering::Relaxed) as f64 / counts[1] as f64;
+        assert!(took < 0.6 * 300.0 * each, "{took} s, {each} s per cell");
+    }
+
+    #[test]
+    fn a_lost_card_leaves_its_cells_to_the_others() {
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let heard = Arc::clone(&told);
+        let mut cards = cards(vec![Fake::new(slow), Fake::lost_after(2, slow)]);
+        cards.listen(Box::new(move |loss| heard.lock().unwrap().push(loss.clone())));
+        let (seen, error) = run(&mut cards, &cells(400), 100);
+        assert_eq!(error, None);
+        all_of(seen, 400);
+        let reports = cards.reports();
+        assert_eq!(reports[0].cells + reports[1].cells, 400);
+        assert_eq!((&reports[0].lost, &reports[1].lost), (&None, &Some("as it was told".to_owned())));
+        let told = told.lock().unwrap();
+        assert!(told.len() == 1 && told[0].cells > 0 && told[0].adapter.number == 1, "{told:?}");
+    }
+
+    #[test]
+    fn what_the_last_card_has_done_is_kept_when_it_is_lost() {
+        let mut cards = cards(vec![Fake::lost_after(1, slow), Fake::lost_after(3, slow)]);
+        let (seen, error) = run(&mut cards, &cells(400), 100);
+        assert!(matches!(error, Some(EngineError::Lost { .. })), "{error:?}");
+        let done: usize = cards.reports().iter().map(|card| card.cells).sum();
+        assert!(seen.len() == done && done > 0 && done < 400, "{done} {}", seen.len());
+        assert!(cards.begin(&cells(1)).is_err());
+    }
+
+    #[test]
+    fn a_card_without_memory_takes_fewer_cells() {
+        let mut cards = cards(vec![Fake::new(slow), Fake::with_memory(5, slow)]);
+        let (seen, error) = run(&mut cards, &cells(200), 100);
+        assert_eq!(error, None);
+        all_of(seen, 200);
+        let reports = cards.reports();
+        assert!(reports[1].cells > 0 && reports[1].lost.is_none(), "{reports:?}");
+        // One that has none at all is none.
+        let mut cards = self::cards(vec![Fake::new(slow), Fake::with_memory(0, slow)]);
+        let (seen, error) = run(&mut cards, &cells(50), 50);
+        assert_eq!(error, None);
+        all_of(seen, 50);
+        assert!(cards.reports()[1].lost.is_some());
+    }
+
+    #[test]
+    fn a_raised_flag_stops_them_and_a_lowered_one_lets_them_go_on() {
+        let mut cards = cards(vec![Fake::slow(|cell| cell.id, slow), Fake::slow(|cell| cell.id, slow)]);
+        let halt = Arc::new(AtomicBool::new(false));
+        cards.heed(&halt);
+        let cells = cells(200);
+        cards.begin(&cells).unwrap();
+        halt.store(true, Ordering::Relaxed);
+        let clock = Instant::now();
+        let mut seen = cards.advance(0).unwrap();
+        assert!(clock.elapsed() < Duration::from_secs(1) && seen.len() < 200);
+        halt.store(false, Ordering::Relaxed);
+        while seen.len() < 200 {
+            seen.extend(cards.advance(0).unwrap());
+        }
+        all_of(seen.iter().map(|&(id, _)| id).collect(), 200);
+        assert_eq!(cards.advance(0), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn a_card_that_panics_is_lost() {
+        fn panics(cell: &Cell) -> Record {
+            assert!(cell.id > 3, "not this one");
+            slow(cell)
+        }
+        let mut cards = cards(vec![Fake::new(panics), Fake::new(panics)]);
+        cards.begin(&cells(2)).unwrap();
+        let error = cards.advance(0).unwrap_err();
+        assert!(error.to_string().contains("its thread panicked"), "{error}");
+    }
+
+    #[test]
+    fn shares_add_up_and_keep_some_for_the_first_to_be_done() {
+        let card = |least, rate| Card {
+            adapter: adapter(0),
+            under_way: HashMap::new(),
+            most: 1000,
+            least,
+            rate,
+            cells: 0,
+            steps: None,
+            is_at_work: false,
+            lost: None,
+        };
+        let shares = |cards: Vec<Card>, queued: u32| {
+            let count = cards.len();
+            let state = State {
+                queue: cells(queued).into(),
+                ended: Vec::new(),
+                cards,
+                losses: Vec::new(),
+                is_closed: false,
+            };
+            (0..count).map(|nth| state.share(nth)).collect::<Vec<_>>()
+        };
+        // More than enough: a quarter waits.
+        assert_eq!(shares(vec![card(16, None), card(16, None)], 400), [150, 150]);
+        // Too few to keep them busy: all at once.
+        assert_eq!(shares(vec![card(256, None), card(256, None)], 400), [200, 200]);
+        assert_eq!(shares(vec![card(256, Some(30.0)), card(256, Some(10.0))], 100), [75, 25]);
+        assert_eq!(shares(vec![card(256, Some(30.0)), card(256, None)], 100), [50, 50]);
+        assert_eq!(shares(vec![card(16, None), card(16, None)], 1), [1, 1]);
+        assert_eq!(shares(vec![card(16, None), card(16, None)], 4000), [1000, 1000]);
+    }
+}
