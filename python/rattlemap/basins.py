@@ -28,6 +28,8 @@ def basins(
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     resume: bool = False,
+    client: Any = None,
+    shards: int | None = None,
     progress: bool | Tell = True,
     **names: Any,
 ) -> xr.Dataset:
@@ -40,7 +42,7 @@ def basins(
     **names
         Two axes as :func:`rattlemap.map` takes them, at least one of them of a component of the start at phase 0
         (``model.state_names``); values of single parameters and of other components, which are 0 unless told.
-    engine, precision, adapter, quantities, start, settings, out, force, resume, progress
+    engine, precision, adapter, quantities, start, settings, out, force, resume, client, shards, progress
         As :func:`rattlemap.map` takes them.
 
     Returns
@@ -78,6 +80,8 @@ def basins(
         out=out,
         force=force,
         resume=resume,
+        client=client,
+        shards=shards,
         progress=progress,
         **names,
     )

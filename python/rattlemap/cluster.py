@@ -90,7 +90,7 @@ def merged(
             if tell is not None:
                 tell(len(parts), count)
         where = os.path.join(root, "map") if out is None else out
-        return _native.merge([str(part) for part in parts], where, force, out is not None)
+        return _native.merge([*map(str, parts)], where, force, out is not None)
 
 
 def _default_count(scene: _native.Scene, client: Any) -> int:
@@ -127,7 +127,7 @@ def _require_same_run(parts: list[Path]) -> None:
     """Refuses at once what merging would refuse at the end."""
     first, last = (_identity(part) for part in (parts[0], parts[-1]))
     if first != last:
-        _native.merge([str(parts[0]), str(parts[-1])], str(parts[0].parent / "map"), False, False)
+        _native.merge([str(parts[0]), str(parts[-1])], str(parts[0].parent / "refused"), False, False)
 
 
 def _identity(part: Path) -> list[Any]:
@@ -153,5 +153,5 @@ def _shard(scene: _native.Scene, index: int, count: int, engine: str, precision:
     ):
         folder = Path(root) / "part"
         tell(0, 0)
-        _native.shard(scene, index, count, engine, precision, str(folder), 1, tell)
+        _native.shard(scene, index, count, engine, precision, str(folder), threads=1, progress=tell)
         return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}

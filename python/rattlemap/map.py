@@ -29,6 +29,8 @@ def map(  # noqa: A001
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     resume: bool = False,
+    client: Any = None,
+    shards: int | None = None,
     progress: bool | Tell = True,
     **names: Any,
 ) -> xr.Dataset:
@@ -59,6 +61,12 @@ def map(  # noqa: A001
     out
         A folder to write to, too, as the program does; it must be empty unless ``force`` or ``resume`` is given. An
         interrupted map goes on with ``resume``.
+    client
+        A ``distributed.Client``: the map is computed as ``shards`` on the workers of its Dask cluster and merged here, the
+        same to the bit. The engine must be named. A shard that is lost with its worker is computed by another one;
+        nothing else is computed twice. Progress is told in shards, a bar shows them.
+    shards
+        How many parts a cluster computes; 4 for each of its threads unless told.
     progress
         A bar of tqdm where that is installed, or a function of (done, total).
     **names
@@ -94,6 +102,18 @@ def map(  # noqa: A001
     """
     asked = _asked(model, scene, set, quantities, start, settings, names)
     where = None if out is None else os.fspath(out)
+    if client is not None:
+        if resume:
+            raise SceneError("resume goes with a map that is computed here; on a cluster, begin anew with force=True")
+        from .cluster import merged
+
+        with telling(progress, "shards") as tell:
+            made = merged(
+                asked, client, engine=engine, precision=precision, shards=shards, out=where, force=force, tell=tell
+            )
+        return dataset(made)
+    if shards is not None:
+        raise SceneError("shards are for a cluster: give its client, too")
     with no_display(), telling(progress, "cells") as tell:
         made = _native.map(asked, engine, precision, where, force, resume, tell, adapter_text(adapter))
     return dataset(made)

@@ -22,7 +22,8 @@ def test_all_shards_are_the_map(tmp_path: Path) -> None:
         _native.shard(scene, index, 3, "cpu", None, part)
     with pytest.raises(rm.FolderError, match="2/3"):
         _native.merge(parts[::2], str(tmp_path / "all"))
-    assert "cells.npy" in _native.merge(parts[::-1], str(tmp_path / "all"))["files"]
+    made = _native.merge(parts[::-1], str(tmp_path / "all"))
+    assert "cells.npy" in made["files"]
     whole = rm.map(model, **axes, engine="cpu")
     merged = rm.open(tmp_path / "all")
     for name in ("processor", "shards"):

@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use crate::common::rattlemap;
 use node::Node;
 
-/// Motions without early stops: a shard is long enough to be cancelled on its way.
+/// Motions without early stops: no shard is done before one sees it begin.
 const SCENE: &str = r#"
 [[axis]]
 parameter = "e"
@@ -29,7 +29,6 @@ count = 32
 
 [integration]
 early_stop = false
-transient_periods = 3000
 
 [outputs]
 quantities = ["class", "lyapunov", "impacts", "word"]
@@ -122,6 +121,18 @@ impl Work {
         }
     }
 
+    /// The process that makes a shard here.
+    fn task(&self, shard: &str) -> String {
+        let is_it = |process: &Path| {
+            let words = fs::read(process.join("cmdline")).unwrap_or_default();
+            words.split(|&byte| byte == 0).any(|word| word == shard.as_bytes())
+                && fs::read_link(process.join("cwd")).is_ok_and(|cwd| cwd == self.folder.path())
+        };
+        let mut processes = fs::read_dir("/proc").unwrap().map(|entry| entry.unwrap().path());
+        let found = processes.find(|process| is_it(process)).unwrap_or_else(|| panic!("{}", self.logs()));
+        found.file_name().unwrap().to_str().unwrap().to_owned()
+    }
+
     /// What jobs said, for whoever reads of a failure.
     fn logs(&self) -> String {
         let mut text = String::new();
@@ -181,14 +192,17 @@ fn an_array_job_and_a_merge_make_the_map_of_one_run() {
     let clock = Instant::now();
     while !records.exists() {
         assert!(clock.elapsed().as_secs() < 60, "shard 2 does not begin\n{}", work.logs());
-        std::thread::sleep(Duration::from_millis(5));
+        std::thread::sleep(Duration::from_millis(2));
     }
+    // Slurm wakes it up again, and needs a while to do so.
+    work.command("kill", &["-STOP", &work.task("2/8")]);
     assert!(work.command("scancel", &[&format!("{job}_2")]).status.success());
     work.wait(Duration::from_secs(120));
     // The others went on, the merge was given up, and what the cancelled task says is how to go on.
     assert!(!work.at("out/100 % rattle").exists(), "merged without shard 2\n{}", work.logs());
     let log = work.text("out/100 % rattle.slurm/shard-2.log");
-    assert!(log.contains("cells are kept; go on with: rattlemap map 'my scene.toml' --shard 2/8"), "{log}");
+    let go_on = log.split_once("of 160 cells are kept; go on with: ").unwrap_or_else(|| panic!("{log}")).1;
+    assert!(go_on.contains("--shard 2/8") && go_on.trim_end().ends_with("--resume"), "{log}");
     let done =
         |shard: usize| work.at(&format!("out/100 % rattle.shard-{shard}-of-{SHARDS}/manifest.json")).exists();
     assert_eq!((1..=SHARDS).filter(|&shard| !done(shard)).collect::<Vec<_>>(), [2], "{}", work.logs());
