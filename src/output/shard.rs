@@ -9,7 +9,9 @@ use serde::Serialize;
 use super::inventory::{self, FileEntry};
 use super::manifest::{AxisObject, Head, MANIFEST, ModelObject, StartObject, start};
 use super::map::{self, Run};
-use super::map_manifest::{IntegrationObject, ListObject, TimingsObject, integration};
+use super::map_manifest::{
+    AdapterObject, CardObject, IntegrationObject, ListObject, TimingsObject, integration,
+};
 use super::record_file::Identity;
 use super::{Folder, OutputError, RECORDS, names, unfinished};
 use crate::map::plan::Plan;
@@ -81,6 +83,10 @@ struct Manifest<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adapter: Option<AdapterObject<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cards: Vec<CardObject<'a>>,
     processor: &'a str,
     sources: &'static str,
     target: &'static str,
@@ -132,6 +138,8 @@ fn manifest<'a>(finished: &Finished<'a>, writing: Duration, files: &'a [FileEntr
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        adapter: run.adapter.as_ref().map(AdapterObject::from),
+        cards: run.cards.iter().map(CardObject::from).collect(),
         processor: run.processor,
         sources: Identity::own_sources(),
         target: Identity::own_target(),
@@ -168,6 +176,10 @@ struct Object<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adapter: Option<AdapterObject<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cards: Vec<CardObject<'a>>,
     cells: usize,
     runs: usize,
     classes: BTreeMap<&'static str, usize>,
@@ -202,6 +214,8 @@ pub fn print(folder: &Path, files: &[String], finished: &Finished<'_>) -> Result
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        adapter: run.adapter.as_ref().map(AdapterObject::from),
+        cards: run.cards.iter().map(CardObject::from).collect(),
         cells: plan.cell_count(),
         runs: shard.run_count(plan),
         classes: tally.classes(),
