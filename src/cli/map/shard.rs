@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 
-use super::{Kept, Work, order, unit};
+use super::{Kept, Work, order, summary, unit};
 use crate::cli::arguments::{EngineChoice, Map};
 use crate::cli::error::Failure;
 use crate::cli::finished_map::Manifest;
@@ -153,12 +153,13 @@ fn told(finished: &Finished<'_>, folder: &Path, files: &[String]) -> String {
     let [periodic, chaotic, undecided, failed] = tally.classes;
     format!(
         "shard {shard}: {count} of {} {unit}{before} in {seconds:.3} s on {} ({}): {:.0} {unit}/s\n\
-         {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+         {}{periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
          {}: {}; the map is made of all {} shards by `rattlemap merge OUT PART...`",
         plan.run_count(),
         run.engine,
         run.precision,
         (count - run.resumed_cells) as f64 / seconds,
+        summary::by_card(&run.cards, unit),
         say::path(folder),
         files.join(", "),
         shard.count()
