@@ -63,7 +63,7 @@ def bifurcation(
 
     Examples
     --------
-    >>> bd = rm.bifurcation(rm.gear_pair(), e=(0, 0.999, 1000), omega=5.6)
+    >>> bd = rm.bifurcation(rm.gear_pair(), e=(0, 0.999, 200), omega=5.6)
     >>> plt.plot(bd["point_e"], bd["v1"], ",")
     """
     if scene is not None:

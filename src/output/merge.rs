@@ -48,6 +48,9 @@ use part::{Begun, Part, Seen};
 /// Records that are written together: as many as a batch of the file has at most.
 const BATCH: usize = 1 << 16;
 
+/// Most batches that wait to be written: each has 12 MB.
+const MOST_BATCHES: usize = 8;
+
 /// How far the merging is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
@@ -287,7 +290,8 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             return Ok(true);
         }
         self.waiting.extend_from_slice(batch);
-        if self.waiting.len() >= BATCH {
+        // Those of a core each are compressed side by side.
+        if self.waiting.len() >= BATCH * rayon::current_num_threads().min(MOST_BATCHES) {
             self.file.append(&std::mem::take(&mut self.waiting))?;
         }
         Ok(true)

@@ -9,9 +9,7 @@ use serde::Serialize;
 use super::inventory::{self, FileEntry};
 use super::manifest::{AxisObject, Head, MANIFEST, ModelObject, StartObject, start};
 use super::map::{self, Run};
-use super::map_manifest::{
-    AdapterObject, CardObject, IntegrationObject, ListObject, TimingsObject, integration,
-};
+use super::map_manifest::{AdaptersObject, IntegrationObject, ListObject, TimingsObject, integration};
 use super::record_file::Identity;
 use super::{Folder, OutputError, RECORDS, names, unfinished};
 use crate::map::plan::Plan;
@@ -83,10 +81,8 @@ struct Manifest<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    adapter: Option<AdapterObject<'a>>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    cards: Vec<CardObject<'a>>,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
     processor: &'a str,
     sources: &'static str,
     target: &'static str,
@@ -138,8 +134,7 @@ fn manifest<'a>(finished: &Finished<'a>, writing: Duration, files: &'a [FileEntr
         engine: run.engine,
         precision: run.precision,
         device: run.device,
-        adapter: run.adapter.as_ref().map(AdapterObject::from),
-        cards: run.cards.iter().map(CardObject::from).collect(),
+        adapters: AdaptersObject::of(run),
         processor: run.processor,
         sources: Identity::own_sources(),
         target: Identity::own_target(),
@@ -176,10 +171,8 @@ struct Object<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    adapter: Option<AdapterObject<'a>>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    cards: Vec<CardObject<'a>>,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
     cells: usize,
     runs: usize,
     classes: BTreeMap<&'static str, usize>,
@@ -214,8 +207,7 @@ pub fn print(folder: &Path, files: &[String], finished: &Finished<'_>) -> Result
         engine: run.engine,
         precision: run.precision,
         device: run.device,
-        adapter: run.adapter.as_ref().map(AdapterObject::from),
-        cards: run.cards.iter().map(CardObject::from).collect(),
+        adapters: AdaptersObject::of(run),
         cells: plan.cell_count(),
         runs: shard.run_count(plan),
         classes: tally.classes(),
