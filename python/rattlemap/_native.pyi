@@ -96,14 +96,19 @@ def shard(
     resume: bool = ...,
     threads: int | None = ...,
     progress: _Tell = ...,
+    adapter: str | None = ...,
 ) -> list[str]: ...
-def check_shards(scene: Scene, count: int, engine: str, precision: str | None) -> None: ...
+def check_shards(
+    scene: Scene, count: int, engine: str, precision: str | None, adapter: str | None = ...
+) -> None: ...
 def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Tell = ...) -> MadeMap: ...
 
 class MadeDiagram(TypedDict):
     manifest: str
     columns: str
-    points: str
+    points: dict[str, npt.NDArray[Any]]
+    kinds: list[str]
+    directions: list[str]
 
 def bifurcation(scene: Scene, progress: _Tell = ...) -> MadeDiagram: ...
 

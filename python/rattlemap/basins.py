@@ -60,7 +60,7 @@ def basins(
 
     Examples
     --------
-    >>> bs = rm.basins(rm.load_model("impact-oscillator"), x=(-1, 1, 64), v=(-1, 1, 64), omega=2.8)
+    >>> bs = rm.basins(rm.load_model("impact-oscillator"), x=(-1, 1, 32), v=(-1, 1, 32), omega=2.8)
     >>> bs["attractor"].plot(); bs["attractor_share"].values
     """
     swept = [name for name, value in names.items() if asking.is_axis(value)]

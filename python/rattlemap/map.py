@@ -96,21 +96,22 @@ def map(  # noqa: A001
 
     Examples
     --------
-    >>> ds = rm.map(rm.gear_pair(F=50), e=(0, 1, 64), omega=np.linspace(1, 12, 64))
+    >>> ds = rm.map(rm.gear_pair(F=50), e=(0, 1, 32), omega=np.linspace(1, 12, 32))
     >>> ds["lyapunov"].sel(e=0.6, method="nearest").plot()
-    >>> ds = rm.map(scene="scenes/e_omega.toml", set=["axis.0.count=64", "axis.1.count=64"])
+    >>> ds = rm.map(scene="scenes/e_omega.toml", set=["axis.0.count=32", "axis.1.count=32"])
     """
     asked = _asked(model, scene, set, quantities, start, settings, names)
     where = None if out is None else os.fspath(out)
     if client is not None:
         if resume:
             raise SceneError("resume goes with a map that is computed here; on a cluster, begin anew with force=True")
+        if adapter is not None:
+            raise SceneError("adapter goes with a map that is computed here; workers of a cluster take their best one")
         from .cluster import merged
 
         with telling(progress, "shards") as tell:
-            made = merged(
-                asked, client, engine=engine, precision=precision, shards=shards, out=where, force=force, tell=tell
-            )
+            how = (engine, precision, adapter_text(adapter))
+            made = merged(asked, client, how=how, shards=shards, out=where, force=force, tell=tell)
         return dataset(made)
     if shards is not None:
         raise SceneError("shards are for a cluster: give its client, too")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 #: Called with what is done and the total, some times a second, from the thread that called the package.
 Tell = Callable[[int, int], object]
@@ -36,14 +37,21 @@ def telling(progress: bool | Tell, unit: str) -> Iterator[Tell | None]:
     except ImportError:
         yield None
         return
-    with warnings.catch_warnings():
-        # A notebook without widgets gets a bar of text.
-        warnings.simplefilter("ignore", TqdmWarning)
-        bar = tqdm(unit=f" {unit}", leave=False, delay=_DELAY)
+    bar: Any = None
 
     def tell(done: int, total: int) -> None:
+        nonlocal bar
+        if bar is None:
+            with warnings.catch_warnings():
+                # A notebook without widgets gets a bar of text.
+                warnings.simplefilter("ignore", TqdmWarning)
+                bar = tqdm(total=total, initial=done, unit=f" {unit}", leave=False, delay=_DELAY)
+        # That of an adaptive map grows.
         bar.total = total
         bar.update(done - bar.n)
 
-    with bar:
+    try:
         yield tell
+    finally:
+        if bar is not None:
+            bar.close()
