@@ -18,8 +18,13 @@ use crate::gpu::AdapterId;
 use crate::map::plan::Cell;
 use crate::record::Record;
 
-/// Records that have come wait no longer than this for others.
+/// Records that have come wait no longer than this for others while there is a queue.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Without a queue cells may be wanted that wait for these records: then they wait for those of other cards as long as
+/// this, and this share of the time that the first of them took.
+const GRACE: Duration = Duration::from_millis(2);
+const GRACE_SHARE: f64 = 0.25;
 
 /// How often flags are looked at that wake nobody.
 const TICK: Duration = Duration::from_millis(50);
@@ -197,10 +202,10 @@ impl Cards {
         Ok(())
     }
 
-    /// Waits until no more than `until` cells are left, or some have ended and waited for long enough.
+    /// Waits until no more than `until` cells are left, or some have ended and waited long enough for others.
     pub(super) fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         let clock = Instant::now();
-        let mut halted_at = None;
+        let (mut halted_at, mut first_at) = (None, None);
         loop {
             let is_halted = self.halt.load(Ordering::Relaxed);
             self.shared.stop.store(is_halted, Ordering::Relaxed);
@@ -212,10 +217,16 @@ impl Cards {
                 is_idle || halted_at.elapsed() >= STOPPED_AFTER
             } else {
                 let left = state.left();
-                let has_ended = !state.ended.is_empty();
+                if !state.ended.is_empty() {
+                    first_at.get_or_insert_with(|| clock.elapsed());
+                }
+                let is_patient = |first: Duration| match state.queue.is_empty() {
+                    true => clock.elapsed() < first.mul_f64(1.0 + GRACE_SHARE) + GRACE,
+                    false => clock.elapsed() < PATIENCE,
+                };
                 left == 0
                     || state.last_loss().is_some()
-                    || has_ended && (left <= until || clock.elapsed() >= PATIENCE)
+                    || first_at.is_some_and(|first| left <= until || !is_patient(first))
             };
             if is_over {
                 let ended = std::mem::take(&mut state.ended);
@@ -228,7 +239,8 @@ impl Cards {
                 return gone.map_or(Ok(ended), Err);
             }
             if losses.is_empty() {
-                let waited = self.shared.news.wait_timeout(state, TICK);
+                let longest = if first_at.is_some() { GRACE } else { TICK };
+                let waited = self.shared.news.wait_timeout(state, longest);
                 drop(waited.unwrap_or_else(PoisonError::into_inner));
             } else {
                 drop(state);
@@ -500,6 +512,20 @@ mod tests {
         // Half of all cells would take the slow one three times as long as both need together.
         let each = 1e-6 * MICROSECONDS.load(Ordering::Relaxed) as f64 / counts[1] as f64;
         assert!(took < 0.6 * 300.0 * each, "{took} s, {each} s per cell");
+    }
+
+    #[test]
+    fn nobody_waits_for_the_slowest_card() {
+        fn slow_for_one(cell: &Cell) -> Record {
+            thread::sleep(Duration::from_millis(if cell.id == 1 { 1500 } else { 1 }));
+            rule(cell)
+        }
+        let mut cards = cards(vec![Fake::new(slow_for_one), Fake::new(slow_for_one)]);
+        cards.begin(&cells(2)).unwrap();
+        let clock = Instant::now();
+        let ended = cards.advance(0).unwrap();
+        assert!(ended.len() == 1 && clock.elapsed() < Duration::from_millis(700), "{:?}", clock.elapsed());
+        assert_eq!(cards.advance(0).unwrap().len(), 1);
     }
 
     #[test]

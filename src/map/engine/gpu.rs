@@ -224,9 +224,9 @@ impl<'p> Gpu<'p> {
     }
 
     async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
-        let steps = self.settings.steps_per_period;
-        let derive = |&flow: &u32| Constants::new(&self.plan.oscillator(flow), steps);
-        let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
+        let (plan, steps): (&Plan, _) = (&self.plan, self.settings.steps_per_period);
+        let derive = |&flow: &u32| Constants::new(&plan.oscillator(flow), steps);
+        let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
         self.device.load_derived(flows.par_iter().map(derive).collect(), &laws).await
     }
 

@@ -13,7 +13,7 @@ fn a_dry_run_tells_and_writes_nothing() {
     let told = foreseen(&folder, &[]);
     let mut fields: Vec<&String> = told.as_object().unwrap().keys().collect();
     fields.sort();
-    let contract = "cells device disk_bytes engine folder is_upper_bound kept memory_bytes precision runs sampled seconds why";
+    let contract = "cells device disk_bytes engine folder is_upper_bound kept memory_bytes precision runs sampled seconds shard why";
     assert_eq!(fields, contract.split(' ').collect::<Vec<_>>());
     assert_eq!((&told["cells"], &told["runs"], &told["kept"]), (&320.into(), &320.into(), &0.into()));
     assert_eq!((&told["engine"], &told["is_upper_bound"]), (&"cpu".into(), &false.into()));
