@@ -18,6 +18,9 @@ from .errors import SceneError
 if TYPE_CHECKING:
     from .progress import Tell
 
+#: Engine, precision, adapter.
+How = tuple[str, str | None, str | None]
+
 #: Shards for each thread of the cluster unless told: shards differ in what they cost, and the last ones should be short.
 SHARDS_PER_THREAD = 4
 #: Runs that a shard of those has at least.
@@ -38,8 +41,7 @@ def merged(
     scene: _native.Scene,
     client: Any,
     *,
-    engine: str,
-    precision: str | None,
+    how: How,
     shards: int | None,
     out: str | None,
     force: bool,
@@ -57,8 +59,8 @@ def merged(
         What is asked.
     client
         A ``distributed.Client``; the workers have this package, built from the same sources.
-    engine, precision
-        As :func:`rattlemap.map` takes them, but for ``"auto"``.
+    how
+        Engine, precision and adapter as :func:`rattlemap.map` takes them, but for ``"auto"``.
     shards
         How many; 4 for each thread of the cluster unless told.
     out, force
@@ -78,13 +80,13 @@ def merged(
     if getattr(client, "asynchronous", False):
         raise SceneError("the client is asynchronous, and this call waits for it; make one with Client(...) outside of a coroutine")
     count = _default_count(scene, client) if shards is None else shards
-    _native.check_shards(scene, count, engine, precision)
+    _native.check_shards(scene, count, *how)
     beside = None if out is None else Path(out).absolute().parent
     if beside is not None:
         beside.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".rattlemap-parts-", dir=beside) as root:
         parts = []
-        for part in _parts(scene, client, count, engine, precision, Path(root)):
+        for part in _parts(scene, client, count, how, Path(root)):
             parts.append(part)
             _require_same_run(parts)
             if tell is not None:
@@ -98,16 +100,15 @@ def _default_count(scene: _native.Scene, client: Any) -> int:
     return max(1, min(SHARDS_PER_THREAD * max(threads, 1), scene.runs // FEWEST_RUNS))
 
 
-def _parts(
-    scene: _native.Scene, client: Any, count: int, engine: str, precision: str | None, root: Path
-) -> Iterator[Path]:
+def _parts(scene: _native.Scene, client: Any, count: int, how: How, root: Path) -> Iterator[Path]:
     """The shards' folders, as they come; those that are not wanted any more are cancelled."""
-    from distributed import as_completed
+    import distributed
 
+    as_completed: Any = distributed.as_completed
     run = uuid4().hex
     index_of = {
         client.submit(
-            _shard, scene, index, count, engine, precision, key=f"rattlemap-shard-{run}-{index}-of-{count}", pure=False
+            _shard, scene, index, count, how, key=f"rattlemap-shard-{run}-{index}-of-{count}", pure=False
         ): index
         for index in range(1, count + 1)
     }
@@ -135,10 +136,11 @@ def _identity(part: Path) -> list[Any]:
     return [manifest.get(name) for name in _IDENTITY]
 
 
-def _shard(scene: _native.Scene, index: int, count: int, engine: str, precision: str | None) -> dict[str, bytes]:
+def _shard(scene: _native.Scene, index: int, count: int, how: How) -> dict[str, bytes]:
     """Computes a shard, on a worker: the files of its folder."""
     from distributed import get_worker
 
+    engine, precision, adapter = how
     worker = get_worker()
     key = worker.get_current_task()
 
@@ -153,5 +155,5 @@ def _shard(scene: _native.Scene, index: int, count: int, engine: str, precision:
     ):
         folder = Path(root) / "part"
         tell(0, 0)
-        _native.shard(scene, index, count, engine, precision, str(folder), threads=1, progress=tell)
+        _native.shard(scene, index, count, engine, precision, str(folder), threads=1, progress=tell, adapter=adapter)
         return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}

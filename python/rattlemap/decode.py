@@ -28,7 +28,7 @@ CELL = "cell"
 
 _LONG_NAMES = {
     "class": "class",
-    "period": "forcing periods per cycle, 0 without a cycle",
+    "period": "forcing periods per cycle",
     "lyapunov": "largest Lyapunov exponent",
     "lyapunov_error": "standard error of the exponent",
     "impacts_per_period": "impacts per forcing period",
@@ -40,7 +40,7 @@ _LONG_NAMES = {
     "periods_run": "forcing periods integrated",
     "source": "integrated or filled",
     "attractors": "attractors found",
-    "attractor": "label of the attractor, -1 where there is none",
+    "attractor": "label of the attractor",
 }
 
 

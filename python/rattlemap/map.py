@@ -110,9 +110,8 @@ def map(  # noqa: A001
         from .cluster import merged
 
         with telling(progress, "shards") as tell:
-            made = merged(
-                asked, client, engine=engine, precision=precision, shards=shards, out=where, force=force, tell=tell
-            )
+            how = (engine, precision, adapter_text(adapter))
+            made = merged(asked, client, how=how, shards=shards, out=where, force=force, tell=tell)
         return dataset(made)
     if shards is not None:
         raise SceneError("shards are for a cluster: give its client, too")

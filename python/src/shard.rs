@@ -22,17 +22,30 @@ use crate::waiting::{self, Watch};
 
 /// Refuses a map that cannot be dealt out to so many shards, or whose engine is left open.
 #[pyfunction]
-pub(crate) fn check_shards(scene: &Scene, count: u32, engine: &str, precision: Option<&str>) -> PyResult<()> {
-    let (shard, _) = asked(1, count, engine, precision)?;
+#[pyo3(signature = (scene, count, engine, precision, adapter=None))]
+pub(crate) fn check_shards(
+    scene: &Scene,
+    count: u32,
+    engine: &str,
+    precision: Option<&str>,
+    adapter: Option<&str>,
+) -> PyResult<()> {
+    let (shard, _) = asked(1, count, engine, precision, adapter)?;
     let plan = Plan::new(&scene.scene);
     Ok(shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?)
 }
 
 /// A shard, and who is to compute it.
-fn asked(index: u32, count: u32, engine: &str, precision: Option<&str>) -> Result<(Shard, Ask), Problem> {
+fn asked(
+    index: u32,
+    count: u32,
+    engine: &str,
+    precision: Option<&str>,
+    adapter: Option<&str>,
+) -> Result<(Shard, Ask), Problem> {
     let shard = Shard::new(index, count)
         .map_err(|error| Problem::scene(format!("--shard {index}/{count}: {error}")))?;
-    let ask = ask(engine, precision, None)?;
+    let ask = ask(engine, precision, adapter)?;
     match ask.engine {
         Who::Auto => Err(Problem::engine(cli::open_engine(shard))),
         _ => Ok((shard, ask)),
@@ -43,7 +56,7 @@ fn asked(index: u32, count: u32, engine: &str, precision: Option<&str>) -> Resul
 /// with what is kept there where `resume` says so. The processor's part takes so many threads, or all. Returns the names
 /// of its files.
 #[pyfunction]
-#[pyo3(signature = (scene, index, count, engine, precision, out, resume=false, threads=None, progress=None))]
+#[pyo3(signature = (scene, index, count, engine, precision, out, resume=false, threads=None, progress=None, adapter=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 #[pyo3(name = "shard")]
 pub(crate) fn of_map<'py>(
@@ -57,8 +70,9 @@ pub(crate) fn of_map<'py>(
     resume: bool,
     threads: Option<usize>,
     progress: Option<&Bound<'py, PyAny>>,
+    adapter: Option<&str>,
 ) -> PyResult<Vec<String>> {
-    let (shard, ask) = asked(index, count, engine, precision)?;
+    let (shard, ask) = asked(index, count, engine, precision, adapter)?;
     let task = Task {
         scene: Arc::clone(&scene.scene),
         sets: scene.sets.clone(),

@@ -15,6 +15,9 @@ use crate::problem::Problem;
 /// How soon a signal is heard.
 const TICK: Duration = Duration::from_millis(50);
 
+/// How soon `progress` is asked again where there is nothing new: it may want to end the computation.
+const ASKS_AGAIN: Duration = Duration::from_millis(500);
+
 /// How long a computation may take to end that was told to; then it is left to itself: a driver that compiles heeds nobody.
 const ENDS_WITHIN: Duration = Duration::from_millis(700);
 
@@ -49,7 +52,7 @@ impl Watch {
 }
 
 /// Runs `work` without the interpreter's lock and returns what it comes to; `progress` is called with what is done and the
-/// total, some times a second. Work that was told to end gives nothing.
+/// total, some times a second, with the same again where nothing is new. Work that was told to end gives nothing.
 ///
 /// # Errors
 /// KeyboardInterrupt within a second, whatever another signal's handler or `progress` raises, and the work's own.
@@ -67,7 +70,7 @@ pub(crate) fn run<T: Send + 'static>(
             let _ = sender.send(work(&watch));
         })?
     };
-    let mut told = (0, 0);
+    let (mut told, mut asked) = ((0, 0), Instant::now());
     let mut stopped: Option<(PyErr, Instant)> = None;
     loop {
         let (back, received) = py.detach(move || {
@@ -77,8 +80,12 @@ pub(crate) fn run<T: Send + 'static>(
         receiver = back;
         let is_over = !matches!(received, Err(RecvTimeoutError::Timeout));
         let now = watch.told();
-        let progressed = match progress.filter(|_| now != told && stopped.is_none()) {
-            Some(progress) => progress.call1(now).map(|_| ()),
+        let is_due = now != told || (now.1 > 0 && asked.elapsed() >= ASKS_AGAIN);
+        let progressed = match progress.filter(|_| is_due && stopped.is_none()) {
+            Some(progress) => {
+                asked = Instant::now();
+                progress.call1(now).map(|_| ())
+            }
             None => Ok(()),
         };
         told = now;
