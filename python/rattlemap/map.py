@@ -105,8 +105,6 @@ def map(  # noqa: A001
     if client is not None:
         if resume:
             raise SceneError("resume goes with a map that is computed here; on a cluster, begin anew with force=True")
-        if adapter is not None:
-            raise SceneError("adapter goes with a map that is computed here; workers of a cluster take their best one")
         from .cluster import merged
 
         with telling(progress, "shards") as tell:
