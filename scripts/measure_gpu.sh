@@ -14,6 +14,7 @@
 #     brute       the same cells by brute force: no early stops
 #     own_flow    the same number of cells, each with a flow of its own: meshing stiffness against frequency
 #     adaptive    the adaptive map of the same plane, classes alone
+#     cards       the same as brute, by all cards that are like this one, where there are several
 #     latency     four lanes side by side, for as many periods as the slowest of a map may take
 #     compile     from start to files of 2 x 2 cells: with a fresh shader cache (cold), and with one that was kept (warm)
 #     engines     the main plane on every engine, from 10^3 lanes on (`rattlemap bench engines`): share of the device's
@@ -39,7 +40,7 @@ binary="$(realpath "$1")"
 out="$2"
 side="${3:-1024}"
 steps=("${@:4}")
-all=(right main classes brute own_flow adaptive latency compile engines again)
+all=(right main classes brute own_flow adaptive cards latency compile engines again)
 ((${#steps[@]})) || steps=("${all[@]}")
 for step in "${steps[@]}"; do
     [[ " ${all[*]} " == *" $step "* ]] || { echo "error: no step $step; there are ${all[*]}" >&2; exit 2; }
@@ -106,6 +107,7 @@ if [[ "$adapter" != gpu:* ]]; then
 fi
 WGPU_ADAPTER_NAME="$(sed -n '1s/^gpu: //p' <<<"$adapter")"
 export WGPU_ADAPTER_NAME
+cards="$(grep -cxF -- "gpu: $WGPU_ADAPTER_NAME" "$out/devices.txt")"
 
 precisions=()
 for precision in ${PRECISIONS:-f32 f64}; do
@@ -209,6 +211,7 @@ settings() {
         main) ((side >= 512)) || square "$side" ;;
         classes) square "$side" && sets+=("${classes[@]}") ;;
         brute) square "$side" && sets+=(--set integration.early_stop=false) ;;
+        cards) square "$side" && sets+=(--set integration.early_stop=false --adapter all) ;;
         own_flow)
             square "$side"
             sets+=("${classes[@]}" --set e=0.6 --set axis.0.parameter=k --set axis.0.min=500 --set axis.0.max=2000)
@@ -334,6 +337,7 @@ for step in "${steps[@]}"; do
             for precision in "${precisions[@]}"; do
                 case $step in
                     right | compile) "$step" "$precision" ;;
+                    cards) ((cards < 2)) || { settings cards && timed cards "$precision" 1 "${sets[@]}"; } ;;
                     *) settings "$step" && timed "$step" "$precision" 1 "${sets[@]}" ;;
                 esac
                 summary

@@ -123,6 +123,11 @@ pub(crate) struct Engines {
     #[arg(long, value_name = "SECONDS", default_value_t = 480, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) budget: u32,
 
+    /// Measure no graphics adapter but this: its number in `rattlemap devices`, or part of its name, driver or PCI address
+    /// that no other has. One of several equal cards is measured unless another is named
+    #[arg(long, value_name = "N|NAME", value_parser = adapter)]
+    pub(crate) adapter: Option<Wanted>,
+
     /// Peak of the hardware adapter in f32, in 10^12 operations per second, if it is not known
     #[arg(long, value_name = "TERA")]
     pub(crate) peak_f32: Option<f64>,

@@ -11,7 +11,7 @@ use crate::cli::bench::measure::work::work;
 use crate::cli::bench::measure::{
     Answers, Bench, Engine, Extent, LEAST_RUNS, Point, QUICK_SIDES, RUNS, Run, SIDES, Series, peak,
 };
-use crate::gpu::{self, Precision};
+use crate::gpu::{self, AdapterReport, Precision};
 use crate::map::scene::Scene;
 use crate::output::Folder;
 use crate::validate::{DEFAULT_SAMPLES, Kind};
@@ -30,10 +30,15 @@ const FOR_CHECKS: f64 = 0.15;
 
 /// Measures every engine there is, writes, and says what came out.
 pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
+    let adapters = pollster::block_on(gpu::adapters());
+    let adapters = match &ask.adapter {
+        Some(wanted) => wanted.among(&adapters).map_err(|error| Failure::Usage(error.into()))?,
+        None => &adapters,
+    };
+    let engines = engines(adapters);
     let out = ask.run.out("engines");
     let folder = Folder::open(&out, ask.run.force)?;
     let scratch = Folder::open(&out.join("scratch"), true)?;
-    let engines = engines();
     let clock = Instant::now();
     let budget = if ask.run.quick { 0.0 } else { f64::from(ask.budget) };
     let mut answers = Answers::new();
@@ -75,11 +80,11 @@ fn asked_of(ask: &Engines, all: &[Series], budget_seconds: f64) -> Asked {
 
 /// The CPU on all cores, which the others are compared with; adapters, the best first; the CPU
 /// on fewer cores.
-fn engines() -> Vec<Engine> {
+fn engines(adapters: &[AdapterReport]) -> Vec<Engine> {
     let most = processor::cores();
     let mut list = vec![Engine::Cpu { threads: most }];
     let mut cards: Vec<Card> = Vec::new();
-    for adapter in pollster::block_on(gpu::adapters()) {
+    for adapter in adapters {
         let card = [adapter.info.vendor, adapter.info.device];
         if is_listed(card, &cards) {
             continue;
@@ -87,8 +92,10 @@ fn engines() -> Vec<Engine> {
         cards.push(card);
         let device = gpu::describe(&adapter.info);
         let is_hardware = gpu::is_hardware(&adapter.info);
-        let lanes = |precision| Engine::Gpu { precision, device: device.clone(), is_hardware };
-        list.extend(adapter.precisions.into_iter().map(lanes));
+        let number = adapter.number;
+        let lanes =
+            |&precision: &Precision| Engine::Gpu { precision, number, device: device.clone(), is_hardware };
+        list.extend(adapter.precisions.iter().map(lanes));
     }
     let mut threads = 1;
     while threads < most {
@@ -117,7 +124,7 @@ fn measure(
     say(ask, &format!("{}:", engine.label()));
     let mut bench = match engine {
         Engine::Cpu { threads } => Bench::cpu(*threads, scratch)?,
-        Engine::Gpu { precision, device, .. } => Bench::gpu(*precision, device, scratch)?,
+        Engine::Gpu { precision, number, .. } => Bench::gpu(*precision, *number, scratch)?,
     };
     let choice = if engine.threads().is_some() { EngineChoice::Cpu } else { EngineChoice::Gpu };
     let misfit = |scene: &Scene| {
@@ -143,7 +150,7 @@ fn measure(
 
 /// What was given, or else is known of the adapter.
 fn peak_of(ask: &Engines, engine: &Engine) -> Option<f64> {
-    let Engine::Gpu { precision, device, is_hardware } = engine else { return None };
+    let Engine::Gpu { precision, device, is_hardware, .. } = engine else { return None };
     let given = match precision {
         Precision::F32 => ask.peak_f32,
         Precision::F64 => ask.peak_f64,

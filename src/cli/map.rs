@@ -56,7 +56,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     if ask.dry_run {
         return dry_run::run(ask, &scene, &plan, free);
     }
-    if shard::is_done(ask, &scene) {
+    if shard::is_done(ask, &scene, &plan) {
         return shard::say_done(ask, &plan);
     }
     let interrupt = Interrupt::listen(ask.run.quiet)?;

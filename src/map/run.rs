@@ -6,15 +6,15 @@ use thiserror::Error;
 
 use super::attractors::{self, Basins};
 use super::coexistence;
+use super::engine::{Cpu, Engine};
 #[cfg(feature = "gpu")]
-use super::engine::Gpu;
-use super::engine::{Cpu, Engine, EngineError};
+use super::engine_choice::{self, Ask, ChoiceError, Who};
 use super::plan::{NoMotion, Plan};
 use super::scene::Scene;
 use super::schedule::{Refined, Schedule};
 use super::sweep::{self, SweepError};
 #[cfg(feature = "gpu")]
-use crate::gpu::{self, AdapterChoice, GpuError, Precision};
+use crate::gpu::Precision;
 use crate::record::Record;
 use crate::record::classify::classify;
 use rattlemap_dynamics::model::Model;
@@ -48,13 +48,10 @@ pub enum MapError {
     /// The model has no motion somewhere.
     #[error(transparent)]
     NoMotion(#[from] NoMotion),
-    /// There is no such device.
+    /// There is no such engine.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
-    Device(#[from] GpuError),
-    /// The engine takes none of the cells.
-    #[error(transparent)]
-    Engine(#[from] EngineError),
+    Choice(#[from] ChoiceError),
     /// The engine failed on the way.
     #[error(transparent)]
     Sweep(#[from] SweepError),
@@ -117,8 +114,8 @@ fn open(plan: &Plan, on: Processor) -> Result<Engine<'_>, MapError> {
         Processor::Cpu => Ok(Engine::Cpu(Cpu::new(plan))),
         #[cfg(feature = "gpu")]
         Processor::Gpu(precision) => {
-            let device = pollster::block_on(gpu::Gpu::open(precision, &AdapterChoice::from_environment()))?;
-            Ok(Engine::Gpu(Box::new(pollster::block_on(Gpu::new(plan, device))?)))
+            let ask = Ask { engine: Who::Gpu, precision: Some(precision), adapter: None };
+            Ok(pollster::block_on(engine_choice::open(plan, &ask))?.engine)
         }
     }
 }

@@ -3,8 +3,10 @@
 //! Cells go to shards in small blocks of the plan's order: cells side by side stay together, as lanes that run together
 //! should, and the blocks of a shard are spread over the whole map, for regions differ in what their cells cost by a
 //! factor of 100. Block `n` is the next shard's, and after every round of all shards the turn is shifted: else a shard
-//! would own a stripe of a map whose side is a multiple of their number. All starts of a cell are in its shard. Where
-//! cells follow their neighbours along the last axis, what is dealt out are columns: a chain of cells stays whole.
+//! would own stripes of a map whose side is a multiple of their number. Of 64 shards of the main map the one with the most
+//! work has 9 % more than the mean; without the shift 20 %, as 64 ranges of the order five times as much. All starts of a
+//! cell are in its shard. Where cells follow their neighbours along the last axis, what is dealt out are columns: a chain
+//! of cells stays whole.
 //!
 //! A shard derives those flows that its cells need, lanes all of the map's where they are kept (8,192 at most): on the
 //! main map 512 flows, in some milliseconds.
@@ -22,8 +24,9 @@ use super::plan::Plan;
 /// Most cells of a block: what a subgroup of a graphics card runs together.
 const LARGEST_BLOCK: usize = 64;
 
-/// Blocks that each shard of a small map gets at least, as far as there are cells: shards differ by one block.
-const BLOCKS: usize = 16;
+/// Blocks that each shard gets, of smaller ones where cells are few: the more, the better work is spread. Cells that are
+/// no neighbours make lanes wait for each other: 5 % in blocks of 16, a quarter one by one.
+const BLOCKS: usize = 256;
 
 /// An odd number near the golden section of 2^32: its multiples are spread.
 const GOLDEN: u32 = 2_654_435_761;
@@ -264,7 +267,7 @@ mod tests {
         }
     }
 
-    /// A band along either axis, and a square, cost every shard about the same.
+    /// A narrow band along either axis, and a square, cost every shard about the same.
     #[test]
     fn regions_are_spread_over_shards() {
         let plan = plan([512, 512], "");
@@ -277,8 +280,8 @@ mod tests {
                 let counts: Vec<usize> = Shard::all(count).map(hard).collect();
                 *counts.iter().max().unwrap() as f64 * f64::from(count) / counts.iter().sum::<usize>() as f64
             };
-            let bands = [worst(|i, _| i >= 480), worst(|_, j| j < 64), worst(|i, j| i < 128 && j < 128)];
-            assert!(bands.iter().all(|&band| band < 1.7), "{count}: {bands:?}");
+            let bands = [worst(|i, _| i >= 504), worst(|_, j| j < 8), worst(|i, j| i < 64 && j < 64)];
+            assert!(bands.iter().all(|&band| band <= 1.5), "{count}: {bands:?}");
         }
     }
 

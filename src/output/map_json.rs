@@ -8,9 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::cells::Cells;
-use super::map_manifest::{
-    AdapterObject, BasinObject, CardObject, RefinementObject, Run, basins, statuses, tally,
-};
+use super::map_manifest::{AdaptersObject, BasinObject, RefinementObject, Run, basins, statuses, tally};
 use super::{OutputError, names};
 use crate::map::plan::count_classes;
 
@@ -22,13 +20,11 @@ struct MapObject<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
     /// Of so many it was merged.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    adapter: Option<AdapterObject<'a>>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    cards: Vec<CardObject<'a>>,
     cells: usize,
     /// One per cell and start.
     runs: usize,
@@ -92,9 +88,8 @@ pub(super) fn object(
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        adapters: AdaptersObject::of(run),
         shards: run.merged.map(|merged| merged.shards),
-        adapter: run.adapter.as_ref().map(AdapterObject::from),
-        cards: run.cards.iter().map(CardObject::from).collect(),
         cells: cells.counts().iter().product(),
         runs: cells.runs(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),

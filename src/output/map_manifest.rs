@@ -86,10 +86,8 @@ pub(super) struct Manifest<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    adapter: Option<AdapterObject<'a>>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    cards: Vec<CardObject<'a>>,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
     /// Of the host.
     processor: &'a str,
     /// A hash of the sources that decide what records hold, and what they were compiled for.
@@ -133,9 +131,27 @@ pub(super) struct Manifest<'a> {
     files: &'a [FileEntry],
 }
 
+/// On which adapters a map was computed: one or several.
+#[derive(Serialize)]
+pub(super) struct AdaptersObject<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    adapter: Option<AdapterObject<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cards: Vec<CardObject<'a>>,
+}
+
+impl<'a> AdaptersObject<'a> {
+    pub(super) fn of(run: &'a Run<'_>) -> AdaptersObject<'a> {
+        AdaptersObject {
+            adapter: run.adapter.as_ref().map(AdapterObject::from),
+            cards: run.cards.iter().map(CardObject::from).collect(),
+        }
+    }
+}
+
 /// Which of a machine's adapters: its number as `rattlemap devices` lists them, and its place on the bus where it has one.
 #[derive(Serialize)]
-pub(super) struct AdapterObject<'a> {
+struct AdapterObject<'a> {
     number: usize,
     pci: Option<&'a str>,
 }
@@ -148,7 +164,7 @@ impl<'a> From<&'a AdapterId> for AdapterObject<'a> {
 
 /// What one of several cards did: cells of this run alone, and why it was lost if it was.
 #[derive(Serialize)]
-pub(super) struct CardObject<'a> {
+struct CardObject<'a> {
     number: usize,
     name: &'a str,
     pci: Option<&'a str>,
@@ -347,8 +363,7 @@ pub(super) fn map<'a>(
         engine: run.engine,
         precision: run.precision,
         device: run.device,
-        adapter: run.adapter.as_ref().map(AdapterObject::from),
-        cards: run.cards.iter().map(CardObject::from).collect(),
+        adapters: AdaptersObject::of(run),
         processor: run.processor,
         sources: run.merged.map_or(Identity::own_sources(), |merged| merged.sources),
         target: run.merged.map_or(Identity::own_target(), |merged| merged.target),

@@ -48,6 +48,9 @@ use part::{Begun, Part, Seen};
 /// Records that are written together: as many as a batch of the file has at most.
 const BATCH: usize = 1 << 16;
 
+/// Most batches that wait to be written: each has 12 MB.
+const MOST_BATCHES: usize = 8;
+
 /// How far the merging is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
@@ -287,7 +290,8 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             return Ok(true);
         }
         self.waiting.extend_from_slice(batch);
-        if self.waiting.len() >= BATCH {
+        // Those of a core each are compressed side by side.
+        if self.waiting.len() >= BATCH * rayon::current_num_threads().min(MOST_BATCHES) {
             self.file.append(&std::mem::take(&mut self.waiting))?;
         }
         Ok(true)
@@ -299,11 +303,13 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             let [columns, rows] = self.plan.counts();
             let is_down = self.plan.policy() == Start::Down;
             let row = |nth: usize| if is_down { rows - 1 - nth } else { nth };
-            let ids: Vec<usize> =
-                (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns).collect();
-            for ids in ids.chunks(BATCH) {
-                let batch: Vec<(u32, Record)> =
-                    ids.iter().map(|&id| (id as u32, self.records.record(id))).collect();
+            let mut ids = (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns);
+            loop {
+                let next = ids.by_ref().take(BATCH);
+                let batch: Vec<(u32, Record)> = next.map(|id| (id as u32, self.records.record(id))).collect();
+                if batch.is_empty() {
+                    break;
+                }
                 self.file.append(&batch)?;
             }
         } else if !self.waiting.is_empty() {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::inventory::{self, FileEntry};
 use super::manifest::{AxisObject, Head, MANIFEST, ModelObject, StartObject, start};
 use super::map::{self, Run};
-use super::map_manifest::{IntegrationObject, ListObject, TimingsObject, integration};
+use super::map_manifest::{AdaptersObject, IntegrationObject, ListObject, TimingsObject, integration};
 use super::record_file::Identity;
 use super::{Folder, OutputError, RECORDS, names, unfinished};
 use crate::map::plan::Plan;
@@ -81,6 +81,8 @@ struct Manifest<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
     processor: &'a str,
     sources: &'static str,
     target: &'static str,
@@ -132,6 +134,7 @@ fn manifest<'a>(finished: &Finished<'a>, writing: Duration, files: &'a [FileEntr
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        adapters: AdaptersObject::of(run),
         processor: run.processor,
         sources: Identity::own_sources(),
         target: Identity::own_target(),
@@ -168,6 +171,8 @@ struct Object<'a> {
     engine: &'a str,
     precision: &'a str,
     device: &'a str,
+    #[serde(flatten)]
+    adapters: AdaptersObject<'a>,
     cells: usize,
     runs: usize,
     classes: BTreeMap<&'static str, usize>,
@@ -202,6 +207,7 @@ pub fn print(folder: &Path, files: &[String], finished: &Finished<'_>) -> Result
         engine: run.engine,
         precision: run.precision,
         device: run.device,
+        adapters: AdaptersObject::of(run),
         cells: plan.cell_count(),
         runs: shard.run_count(plan),
         classes: tally.classes(),

@@ -213,11 +213,27 @@ fn a_lost_card_leaves_its_cells_to_the_other() {
     assert!(machine.manifest("alone").get("cards").is_none() && machine.table("alone") == whole);
 }
 
+/// On a machine with one card the script's step is left out.
+#[test]
+fn all_cards_are_measured_against_one() {
+    let Some(machine) = Machine::new() else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/measure_gpu.sh");
+    let mut run = Process::new(script);
+    run.arg(assert_cmd::cargo::cargo_bin("rattlemap")).arg(machine.folder.path().join("measured"));
+    run.args(["8", "cards"]).envs(machine.environment());
+    run.env("WGPU_ADAPTER_NAME", "llvmpipe").env("PRECISIONS", "f32").env("MEASURE_SECONDS", "400");
+    let output = run.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = fs::read_to_string(machine.file("measured", "speed.csv")).unwrap();
+    let row =
+        table.lines().find(|line| line.starts_with("cards,f32,1,")).unwrap_or_else(|| panic!("{table}"));
+    assert_eq!(row.split(',').nth(4), Some("64"), "{row}");
+}
+
 #[test]
 fn cards_that_are_stopped_keep_what_has_ended() {
     let Some(machine) = Machine::new() else { return };
-    let slow =
-        ["--set", "integration.early_stop=false", "--set", "axis.0.count=40", "--set", "axis.1.count=40"];
+    let slow = ["--set", "integration.early_stop=false"];
     let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
     run.current_dir(machine.folder.path()).envs(machine.environment()).env_remove("WGPU_ADAPTER_NAME");
     run.args(GPU).args(slow).args(["--adapter", "all", "--out", "cut"]).stderr(Stdio::piped());

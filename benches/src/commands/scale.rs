@@ -43,9 +43,11 @@ pub(crate) fn run(ask: &Scale) -> Result<(), Failure> {
     write(&outer.path().join("scale.csv"), &taken)?;
     write(&outer.path().join("files.csv"), &sizes)?;
     if !ask.run.quiet {
-        for Taken { phase, seconds, peak_bytes } in &taken {
+        for Taken { phase, seconds, processor_seconds, peak_bytes } in &taken {
             let peak = peak_bytes.map_or(String::new(), |bytes| format!("{:>9.1} MB", bytes as f64 / 1e6));
-            note(format_args!("{phase:<24} {seconds:>8.2} s {peak}"));
+            note(format_args!(
+                "{phase:<24} {seconds:>8.2} s, on processors {processor_seconds:>8.2} s {peak}"
+            ));
         }
         for Size { file, bytes, per_cell } in &sizes {
             note(format_args!("{file:<24} {:>8.1} MB {per_cell:>7.2} bytes per cell", *bytes as f64 / 1e6));
@@ -54,14 +56,14 @@ pub(crate) fn run(ask: &Scale) -> Result<(), Failure> {
     Ok(())
 }
 
-/// By phase the median of seconds, and the largest memory of all rounds.
+/// By phase the round of the median time on processors, with the largest memory of all rounds.
 fn medians(rounds: &[Vec<Taken>]) -> Vec<Taken> {
     let mut by_phase: BTreeMap<usize, Vec<&Taken>> = BTreeMap::new();
     for round in rounds {
         round.iter().enumerate().for_each(|(nth, taken)| by_phase.entry(nth).or_default().push(taken));
     }
     let median = |mut all: Vec<&Taken>| {
-        all.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        all.sort_by(|a, b| a.processor_seconds.total_cmp(&b.processor_seconds));
         let peak_bytes = all.iter().filter_map(|taken| taken.peak_bytes).max();
         Taken { peak_bytes, ..all[all.len() / 2].clone() }
     };

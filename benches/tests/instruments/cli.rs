@@ -5,9 +5,9 @@ use std::fs;
 
 use assert_cmd::Command;
 
-type Row = HashMap<String, String>;
+pub(super) type Row = HashMap<String, String>;
 
-fn rows(path: &std::path::Path) -> Vec<Row> {
+pub(super) fn rows(path: &std::path::Path) -> Vec<Row> {
     csv::Reader::from_path(path).unwrap().deserialize().map(|row| row.unwrap()).collect()
 }
 

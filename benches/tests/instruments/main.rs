@@ -4,4 +4,5 @@
 
 mod cli;
 mod order;
+mod scale;
 mod stress;

@@ -60,6 +60,8 @@ pub enum Engine {
     Gpu {
         /// Their precision.
         precision: Precision,
+        /// Its number among the adapters.
+        number: usize,
         /// The adapter, as manifests have it.
         device: String,
         /// Whether it is more than a program on the processor.

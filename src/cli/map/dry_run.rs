@@ -11,7 +11,7 @@ use super::{engine_of, order, shard, unit};
 use crate::cli::arguments::Map;
 use crate::cli::capacity::{Free, bytes};
 use crate::cli::error::Failure;
-use crate::cli::processor;
+use crate::cli::{processor, say};
 use crate::map::engine::Engine;
 use crate::map::engine_choice::{self, Chosen};
 use crate::map::plan::Plan;
@@ -43,9 +43,13 @@ pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(
     let out = ask.out();
     check_folder(ask, &out)?;
     let clock = Instant::now();
-    let Chosen { mut engine, why, .. } =
+    let Chosen { mut engine, why, notes, warnings } =
         pollster::block_on(engine_choice::open(plan, &engine_of(ask, &out).ask()))?;
     let opening = clock.elapsed().as_secs_f64();
+    if !ask.run.quiet {
+        notes.iter().for_each(say::note);
+    }
+    warnings.iter().for_each(say::note);
     let kept = if ask.resume { kept(ask, &out, scene, plan, &engine)? } else { 0 };
     let runs = shard::runs(ask, plan);
     let left = runs.saturating_sub(kept);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 
-use super::{Kept, unit};
+use super::{Kept, Work, order, summary, unit};
 use crate::cli::arguments::{EngineChoice, Map};
 use crate::cli::error::Failure;
 use crate::cli::finished_map::Manifest;
@@ -16,9 +16,11 @@ use crate::map::engine::Engine;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::map::shard::Shard;
+use crate::map::sweep;
 use crate::output::inventory::{self, Finding};
 use crate::output::shard::{self, Finished, Tally};
-use crate::output::{self, Identity, RECORDS};
+use crate::output::{self, Identity, RECORDS, RecordFile};
+use crate::record::Record;
 
 /// Refuses to leave the engine open: two machines could choose two, whose parts make no map.
 pub(super) fn require_engine(ask: &Map) -> Result<(), Failure> {
@@ -42,9 +44,13 @@ pub(super) fn runs(ask: &Map, plan: &Plan) -> usize {
 }
 
 /// Whether a shard that is to be gone on with is finished, and its files are good: then no engine needs to be opened.
-pub(super) fn is_done(ask: &Map, scene: &Scene) -> bool {
+pub(super) fn is_done(ask: &Map, scene: &Scene, plan: &Plan) -> bool {
     let out = ask.out();
-    ask.resume && ask.shard.is_some() && is_same(ask, scene, &out) && is_good(ask, scene, &out)
+    ask.resume
+        && ask.shard.is_some()
+        && is_same(ask, scene, &out)
+        && is_good(ask, scene, &out)
+        && has_all(ask, plan, &out)
 }
 
 /// By all but the device: whoever merges compares that.
@@ -62,6 +68,17 @@ fn is_good(ask: &Map, scene: &Scene, out: &Path) -> bool {
     let Ok(manifest) = Manifest::read_part(out) else { return false };
     let findings = inventory::check(out, &manifest.files);
     manifest.is_of(scene, &ask.run.set) && findings.is_ok_and(|list| !list.iter().any(Finding::is_lost))
+}
+
+/// By the records themselves: where a network disk has no locks, a second run may have spoilt them before the first one
+/// took down what they are.
+fn has_all(ask: &Map, plan: &Plan, out: &Path) -> bool {
+    let path = out.join(RECORDS);
+    let Ok(Some(identity)) = Identity::read(&path) else { return false };
+    let Work { schedule, records, .. } = &mut Work::new(plan, ask.shard);
+    let order = order(schedule);
+    let take = |batch: &[(u32, Record)]| plan.admits(batch) && sweep::replay(schedule, records, batch);
+    RecordFile::read(&path, &identity, order, take).is_ok_and(|extent| extent.count == runs(ask, plan))
 }
 
 pub(super) fn say_done(ask: &Map, plan: &Plan) -> Result<(), Failure> {
@@ -136,12 +153,13 @@ fn told(finished: &Finished<'_>, folder: &Path, files: &[String]) -> String {
     let [periodic, chaotic, undecided, failed] = tally.classes;
     format!(
         "shard {shard}: {count} of {} {unit}{before} in {seconds:.3} s on {} ({}): {:.0} {unit}/s\n\
-         {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
+         {}{periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
          {}: {}; the map is made of all {} shards by `rattlemap merge OUT PART...`",
         plan.run_count(),
         run.engine,
         run.precision,
         (count - run.resumed_cells) as f64 / seconds,
+        summary::by_card(&run.cards, unit),
         say::path(folder),
         files.join(", "),
         shard.count()

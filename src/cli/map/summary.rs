@@ -28,7 +28,7 @@ pub(super) fn summary(
         format!(", {} ns per step", rounded(1e9 * integrating / steps as f64))
     });
     let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
-    let cards: String = run.cards.iter().map(|card| format!("{}\n", by_card(card, unit))).collect();
+    let cards = by_card(&run.cards, unit);
     format!(
         "{integrated} {unit}{resumed} in {integrating:.3} s on {} ({}): {:.0} {unit}/s, {:.0} forcing periods/s\
          {per_step}; files written in {:.3} s\n{cards}{refined}\
@@ -41,11 +41,13 @@ pub(super) fn summary(
     )
 }
 
-/// What one of several cards did.
-fn by_card(card: &CardReport, unit: &str) -> String {
-    let CardReport { adapter, cells, lost } = card;
-    let lost = lost.as_ref().map_or(String::new(), |reason| format!(", then lost: {reason}"));
-    quoted(format_args!("  adapter {adapter}: {cells} {unit}{lost}"))
+/// What each of several cards did, a line each.
+pub(super) fn by_card(cards: &[CardReport], unit: &str) -> String {
+    let line = |CardReport { adapter, cells, lost }: &CardReport| {
+        let lost = lost.as_ref().map_or(String::new(), |reason| format!(", then lost: {reason}"));
+        quoted(format_args!("  adapter {adapter}: {cells} {unit}{lost}")) + "\n"
+    };
+    cards.iter().map(line).collect()
 }
 
 /// Three significant digits.

@@ -88,7 +88,7 @@ pub enum AdapterError {
         remedies: String,
     },
     /// Hardware is there, and none of it has the precision. A software driver is no stand-in that is taken in silence: it
-    /// may be a thousand times slower.
+    /// may be slower by orders of magnitude.
     #[error("no graphics card here has {precision}: {cards}; choose {remedies}")]
     NoCardHas {
         /// What they lack.
@@ -118,13 +118,29 @@ pub(super) fn take(
         None => best(all, environment, precision).map(|best| only(best.number)),
         Some(Wanted::All) => best(all, environment, precision).map(|best| equal_to(best, all)),
         Some(Wanted::Number(number)) => {
-            let found = all.iter().find(|adapter| adapter.number == *number);
-            let found =
-                found.ok_or_else(|| AdapterError::NoSuchNumber { number: *number, list: listed(all) })?;
-            with(precision, found, all).map(|found| only(found.number))
+            with(precision, numbered(*number, all)?, all).map(|found| only(found.number))
         }
         Some(Wanted::Named(name)) => with(precision, called(name, all)?, all).map(|found| only(found.number)),
     }
+}
+
+impl Wanted {
+    /// Those of a machine's adapters that are asked for, whatever they can do.
+    ///
+    /// # Errors
+    /// [`AdapterError`] if there is no such adapter, or a name that one alone should have is that of several.
+    pub fn among<'a>(&self, all: &'a [AdapterReport]) -> Result<&'a [AdapterReport], AdapterError> {
+        match self {
+            Wanted::Number(number) => numbered(*number, all).map(std::slice::from_ref),
+            Wanted::Named(name) => called(name, all).map(std::slice::from_ref),
+            Wanted::All => Ok(all),
+        }
+    }
+}
+
+fn numbered(number: usize, all: &[AdapterReport]) -> Result<&AdapterReport, AdapterError> {
+    let found = all.iter().find(|adapter| adapter.number == number);
+    found.ok_or_else(|| AdapterError::NoSuchNumber { number, list: listed(all) })
 }
 
 /// The first that is allowed and has the precision, but no software driver beside hardware.

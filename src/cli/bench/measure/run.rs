@@ -113,17 +113,18 @@ impl<'a> Bench<'a> {
         Ok(Bench::new(Engine::Cpu { threads }, Machine::Cpu(pool), folder))
     }
 
-    /// Lanes on the adapter that is described as `device`.
+    /// Lanes on the adapter with this number.
     ///
     /// # Errors
     /// If it cannot be opened, gives wrong answers, or does not compile the lane.
-    pub fn gpu(precision: Precision, device: &str, folder: &'a Folder) -> Result<Bench<'a>> {
+    pub fn gpu(precision: Precision, number: usize, folder: &'a Folder) -> Result<Bench<'a>> {
         let clock = Instant::now();
-        let choice = AdapterChoice::named(device);
+        let choice = AdapterChoice::numbered(number);
         let mut opened = pollster::block_on(gpu::Gpu::open(precision, &choice))?;
         let open_seconds = clock.elapsed().as_secs_f64();
         let is_hardware = gpu::is_hardware(opened.adapter());
-        let engine = Engine::Gpu { precision, device: device.to_owned(), is_hardware };
+        let device = gpu::describe(opened.adapter());
+        let engine = Engine::Gpu { precision, number, device, is_hardware };
         let split = Arc::new(Mutex::new(Split { last: Instant::now(), times: Times::default() }));
         let told = Arc::clone(&split);
         opened.watch(move |stage| told.lock().unwrap_or_else(PoisonError::into_inner).take(stage));
