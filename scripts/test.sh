@@ -2,8 +2,8 @@
 # Everything that must hold before a change is taken: formatting, lints, docs, dependencies, checks for other systems, tests.
 # Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, Rust's targets, and Slurm, whose
 # daemons run in the tests' own folders only.
-# With --all the tests run, too, that take minutes each, and all of the program is checked for macOS. Ends with the time of
-# each phase and the ten slowest tests.
+# With --all the tests run, too, that take minutes each, all of the program is checked for macOS, and the Python package is
+# installed in an environment of its own. Ends with the time of each phase and the ten slowest tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -200,6 +200,9 @@ phase "compilation of tests" cargo test --workspace --tests --benches --no-run
 phase "tests" timed_tests "${ignored[@]}"
 phase "examples in docs" cargo test --workspace --doc
 phase "benchmarks at tiny sizes" cargo test --quiet --workspace --bench reference --bench lane
+if [[ "${#ignored[@]}" -ne 0 ]]; then
+    phase "the Python package, installed" scripts/python.sh
+fi
 say "time by phase"
 printf '%s\n' "${phases[@]}"
 say "the ten slowest tests"

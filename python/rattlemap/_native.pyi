@@ -106,7 +106,9 @@ def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., pro
 class MadeDiagram(TypedDict):
     manifest: str
     columns: str
-    points: str
+    points: dict[str, npt.NDArray[Any]]
+    kinds: list[str]
+    directions: list[str]
 
 def bifurcation(scene: Scene, progress: _Tell = ...) -> MadeDiagram: ...
 

@@ -81,5 +81,8 @@ def bifurcation(
         asked = asking.scene(model, names, purpose="bifurcation", axes=1, start=start, settings=settings)
     with telling(progress, "columns") as tell:
         made = _native.bifurcation(asked, tell)
-    manifest = json.loads(made["manifest"])
-    return decode.diagram(manifest["axis"]["parameter"], table(made["columns"]), table(made["points"]), manifest)
+    manifest, points = json.loads(made["manifest"]), made["points"]
+    for name, names_of in (("kind", made["kinds"]), ("direction", made["directions"])):
+        if name in points:
+            points[name] = decode.named(names_of, points[name])
+    return decode.diagram(manifest["axis"]["parameter"], table(made["columns"]), points, manifest)

@@ -228,7 +228,20 @@ def with_attractors(ds: xr.Dataset, table: pd.DataFrame) -> xr.Dataset:
     return ds.assign(variables).assign_coords(label=label, component=component)
 
 
-def diagram(axis: str, columns: pd.DataFrame, points: pd.DataFrame, manifest: Mapping[str, Any]) -> xr.Dataset:
+def typed_points(points: pd.DataFrame) -> dict[str, Array]:
+    """Section points by column, of ``bifurcation.csv`` with every column read as text; rows without a point are left out."""
+    points = points[points["side"].fillna("") != ""]
+    return {str(name): table_column(str(name), points[name]) for name in points.columns}
+
+
+def named(names: list[str], codes: Array) -> Array:
+    """Names by their places in a list, as wide as the longest of them that is there."""
+    texts = np.array(names)[codes]
+    width = max((len(names[code]) for code in np.unique(codes)), default=1)
+    return texts.astype(f"<U{width}")
+
+
+def diagram(axis: str, columns: pd.DataFrame, points: Mapping[str, Array], manifest: Mapping[str, Any]) -> xr.Dataset:
     """The Dataset of a bifurcation diagram.
 
     Parameters
@@ -238,7 +251,7 @@ def diagram(axis: str, columns: pd.DataFrame, points: pd.DataFrame, manifest: Ma
     columns
         As ``bifurcation_columns.csv``, every column read as text: a row per value (and direction).
     points
-        As ``bifurcation.csv``, likewise: a row per section point; rows without one say nothing here.
+        The columns of ``bifurcation.csv``, each of its type: a value per section point.
     manifest
         Becomes attributes.
 
@@ -264,12 +277,10 @@ def diagram(axis: str, columns: pd.DataFrame, points: pd.DataFrame, manifest: Ma
     variables = {
         name: xr.Variable(dims, values[place], variable_attributes(name, codes)) for name, values in data.items()
     }
-    points = points[points["side"].fillna("") != ""]
     of_column = {"class", "period", "status"}
-    for name in map(str, points.columns):
+    for name, values in points.items():
         if name in of_column:
             continue
-        values = table_column(name, points[name])
         if name in (axis, "direction"):
             coords[f"point_{name}"] = (("point",), values)
         else:

@@ -170,7 +170,7 @@ def _map(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
 
 def _diagram(folder: Path, manifest: dict[str, Any]) -> xr.Dataset:
     columns, points = (_table(_require(folder, manifest, name, "csv")) for name in (_COLUMNS, _POINTS))
-    return decode.diagram(manifest["axis"]["parameter"], columns, points, manifest)
+    return decode.diagram(manifest["axis"]["parameter"], columns, decode.typed_points(points), manifest)
 
 
 class _Cells:

@@ -11,11 +11,12 @@ use rattlemap::map::{bifurcation as diagram, plan};
 use rattlemap::output::bifurcation::Asked;
 use rattlemap::output::in_memory;
 
+use crate::arrays::columns;
 use crate::problem::Problem;
 use crate::scene::{For, Scene};
 use crate::waiting::{self, Watch};
 
-/// Computes a diagram: its manifest, and its tables as texts.
+/// Computes a diagram: its manifest, the table of its columns as text, and its points by column.
 #[pyfunction]
 #[pyo3(signature = (scene, progress=None))]
 pub(crate) fn bifurcation<'py>(
@@ -28,7 +29,9 @@ pub(crate) fn bifurcation<'py>(
     let told = PyDict::new(py);
     told.set_item("manifest", made.manifest)?;
     told.set_item("columns", made.columns)?;
-    told.set_item("points", made.points)?;
+    told.set_item("points", columns(py, made.points)?)?;
+    told.set_item("kinds", made.kinds)?;
+    told.set_item("directions", made.directions)?;
     Ok(told)
 }
 

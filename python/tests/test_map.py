@@ -145,6 +145,8 @@ def test_what_is_wrong_is_told_in_the_programs_words(program: Program, tmp_path:
         rm.map(rm.gear_pair(), **SMALL, engine="cpu", precision="f32")
     with pytest.raises(rm.SceneError, match="of memory, and"):
         rm.map(rm.gear_pair(), e=(0, 1, 60_000), omega=(1, 12, 60_000), engine="cpu")
+    with pytest.raises(rm.SceneError, match="adapter goes with a map that is computed here"):
+        rm.map(rm.gear_pair(), **SMALL, client=object(), adapter=0)
     for kind in (rm.SceneError, rm.ModelError, rm.FolderError):
         assert issubclass(kind, rm.RattlemapError) and issubclass(kind, ValueError)
     assert issubclass(rm.EngineError, rm.RattlemapError) and issubclass(rm.EngineError, RuntimeError)

@@ -62,10 +62,18 @@ pub(crate) fn require_folder(dir: &Path) -> Result<(), Failure> {
 pub(crate) fn read_json(dir: &Path) -> anyhow::Result<Value> {
     let path = dir.join(MANIFEST);
     if !path.is_file() {
-        let advice = if dir.join(RECORDS).is_file() {
-            "the run is unfinished: go on with `rattlemap map SCENE --resume`"
-        } else {
-            "it is not the folder of a map: `rattlemap map SCENE` makes one"
+        let records = dir.join(RECORDS);
+        let shard = Identity::read(&records).ok().flatten().and_then(|identity| identity.shard());
+        let advice = match shard {
+            Some(shard) => {
+                format!(
+                    "shard {shard} is unfinished: go on with `rattlemap map SCENE --engine E --shard {shard} --resume`"
+                )
+            }
+            None if records.is_file() => {
+                "the run is unfinished: go on with `rattlemap map SCENE --resume`".to_owned()
+            }
+            None => "it is not the folder of a map: `rattlemap map SCENE` makes one".to_owned(),
         };
         return Err(anyhow!("{}: there is no {MANIFEST}; {advice}", dir.display()));
     }

@@ -2,9 +2,11 @@
 
 use std::io;
 
+use super::cell_columns::Values;
 use super::{WriteError, names};
-use crate::map::bifurcation::{Column, SectionPoint};
+use crate::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::orbit::EventKind;
 
 /// Point fields after `class`, `period` and `status`; the state before and after follows.
 const POINT_FIELDS: [&str; 3] = ["side", "kind", "t_mod_period"];
@@ -41,6 +43,40 @@ pub(super) fn write(
     Ok(table.flush()?)
 }
 
+/// The points by column, each of its own type: what the table says but for class, period and status. Columns without
+/// points are not among them. Directions are numbered as [`Direction::BOTH`], kinds as [`KINDS`].
+pub(super) fn points(axis: &str, names: &[&str], columns: &[Column]) -> Vec<(String, Values)> {
+    let all = || columns.iter().flat_map(|column| column.points.iter().map(move |point| (column, point)));
+    let floats = |of: &dyn Fn(&Column, &SectionPoint) -> f64| {
+        let finite = |x: f64| if x.is_finite() { x } else { f64::NAN };
+        Values::F64(all().map(|(column, point)| finite(of(column, point))).collect())
+    };
+    let place = |column: &Column| Direction::BOTH.iter().position(|way| Some(*way) == column.direction);
+    let directions = || all().map(|(column, _)| place(column).unwrap_or_default() as i8).collect();
+    let kind = |point: &SectionPoint| KINDS.iter().position(|kind| *kind == point.kind).unwrap_or_default();
+    let mut list = vec![(axis.to_owned(), floats(&|column, _| column.value))];
+    list.extend(direction_field(columns).map(|name| (name.to_owned(), Values::I8(directions()))));
+    let [side, kinds, time] = POINT_FIELDS.map(str::to_owned);
+    list.push((side, Values::I8(all().map(|(_, point)| names::side(point.side)).collect())));
+    list.push((kinds, Values::I8(all().map(|(_, point)| kind(point) as i8).collect())));
+    list.push((time, floats(&|_, point| point.t_mod_period)));
+    for (i, name) in names.iter().enumerate() {
+        list.push((format!("{name}_before"), floats(&|_, point| point.before[i])));
+    }
+    for (i, name) in names.iter().enumerate() {
+        list.push(((*name).to_owned(), floats(&|_, point| point.after[i])));
+    }
+    list
+}
+
+/// The kinds of points, by their numbers in columns.
+const KINDS: [EventKind; 3] = [EventKind::Impact, EventKind::MeshStart, EventKind::MeshEnd];
+
+/// The names of kinds and directions, by their numbers in columns.
+pub(super) fn point_codes() -> [Vec<&'static str>; 2] {
+    [KINDS.map(names::kind).to_vec(), Direction::BOTH.map(Direction::name).to_vec()]
+}
+
 /// The name of a field that only diagrams with both passes have.
 pub(super) fn direction_field(columns: &[Column]) -> Option<&'static str> {
     columns.iter().any(|column| column.direction.is_some()).then_some("direction")
@@ -71,9 +107,8 @@ fn fields(point: &SectionPoint, components: usize) -> impl Iterator<Item = Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::bifurcation::Direction;
     use rattlemap_dynamics::model::Side;
-    use rattlemap_dynamics::orbit::{Class, EventKind};
+    use rattlemap_dynamics::orbit::Class;
 
     #[test]
     fn one_row_per_point_and_one_for_none() {

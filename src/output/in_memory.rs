@@ -50,8 +50,13 @@ pub struct Diagram {
     pub manifest: String,
     /// `bifurcation_columns.csv`.
     pub columns: String,
-    /// `bifurcation.csv`.
-    pub points: String,
+    /// The columns of `bifurcation.csv` but for class, period and status; rows without a point are left out. Kinds and
+    /// directions are places in the next two.
+    pub points: Vec<(String, Values)>,
+    /// The names of kinds.
+    pub kinds: Vec<&'static str>,
+    /// The names of directions.
+    pub directions: Vec<&'static str>,
 }
 
 /// A finished diagram.
@@ -66,10 +71,13 @@ pub fn diagram(
 ) -> Result<Diagram, OutputError> {
     let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
     let manifest = Manifest::new(scene, asked, columns, [elapsed, Duration::ZERO], &[]);
+    let [kinds, directions] = bifurcation_csv::point_codes();
     Ok(Diagram {
         manifest: serde_json::to_string(&manifest)?,
         columns: text(|to| bifurcation_columns_csv::write(to, axis, columns))?,
-        points: text(|to| bifurcation_csv::write(to, axis, &names, columns))?,
+        points: bifurcation_csv::points(axis, &names, columns),
+        kinds,
+        directions,
     })
 }
 

@@ -303,11 +303,13 @@ impl<'p, G: FnMut(Progress) -> bool> Gathering<'p, G> {
             let [columns, rows] = self.plan.counts();
             let is_down = self.plan.policy() == Start::Down;
             let row = |nth: usize| if is_down { rows - 1 - nth } else { nth };
-            let ids: Vec<usize> =
-                (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns).collect();
-            for ids in ids.chunks(BATCH) {
-                let batch: Vec<(u32, Record)> =
-                    ids.iter().map(|&id| (id as u32, self.records.record(id))).collect();
+            let mut ids = (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns);
+            loop {
+                let next = ids.by_ref().take(BATCH);
+                let batch: Vec<(u32, Record)> = next.map(|id| (id as u32, self.records.record(id))).collect();
+                if batch.is_empty() {
+                    break;
+                }
                 self.file.append(&batch)?;
             }
         } else if !self.waiting.is_empty() {

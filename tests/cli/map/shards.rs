@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use rattlemap::output::merge::{MergeError, Parts};
-use rattlemap::output::{Folder, inventory};
+use rattlemap::output::{Folder, Identity, RecordFile, inventory};
 
 use super::*;
 
@@ -20,13 +20,15 @@ fn merged(folder: &TempDir, shards: u32, arguments: &[&str]) {
     command(folder, &[&["merge", "merged", "--quiet"], &parts[..]].concat()).assert().success().stderr("");
 }
 
-/// All of a manifest but commit, times, what was resumed, the records' hash and the number of shards.
+/// All of a manifest but commit, times, what was resumed, the records' hash, the adapter's number and the number of shards.
 fn lasting(out: &Path) -> serde_json::Value {
     let mut manifest: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
     let fields = manifest.as_object_mut().unwrap();
-    for name in ["commit", "elapsed_seconds", "timings", "manifest_sha256", "resumed_cells", "shards"] {
-        assert!(fields.remove(name).is_some() || name == "shards", "{name}");
+    for name in
+        ["commit", "elapsed_seconds", "timings", "manifest_sha256", "resumed_cells", "adapter", "shards"]
+    {
+        assert!(fields.remove(name).is_some() || ["adapter", "shards"].contains(&name), "{name}");
     }
     for file in manifest["files"].as_array_mut().unwrap() {
         if file["name"] == "records.bin" {
@@ -108,7 +110,8 @@ fn cells_that_belong_together_stay_together() {
     let basin = "[parameters]\ne = 0.98\nomega = 9.2\n[[axis]]\nstart = 'x1'\nmin = -0.6\nmax = 0.4\ncount = 9\n\
                  [[axis]]\nstart = 'v1'\nmin = -2.0\nmax = 2.0\ncount = 7\n";
     let few = "[[axis]]\nparameter = 'omega'\nmin = 5.6\nmax = 5.61\ncount = 5\n\
-               [[axis]]\nparameter = 'e'\nmin = 0.9\nmax = 0.94\ncount = 6\n";
+               [[axis]]\nparameter = 'e'\nmin = 0.9\nmax = 0.94\ncount = 6\n\
+               [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word', 'pattern']\n";
     for (scene, sets) in [
         (few, &["--set", "start.policy=up"][..]),
         (few, &["--set", "start.policy=down"]),
@@ -252,6 +255,37 @@ fn parts_that_make_no_map_are_refused_and_named() {
     assert!(manifest.contains("\"title\": \"It's another\"") && manifest.contains("\"shards\": 3"));
 }
 
+/// Other commits, processors and numbers of cards make the same records; other deciding sources may not.
+#[test]
+fn what_decides_records_is_compared_and_nothing_else() {
+    let folder = folder();
+    let few = ["--quiet", "--set", "axis.0.count=6", "--set", "axis.1.count=4"];
+    for shard in ["1/2", "2/2"] {
+        map(&folder, &[&few[..], &["--shard", shard, "--out", &shard[..1]]].concat()).success();
+    }
+    let (manifest, records) = (path(&folder, "2/manifest.json"), path(&folder, "2/records.bin"));
+    let tell = |fields: &[(&str, serde_json::Value)]| {
+        let mut told: serde_json::Value = serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap();
+        fields.iter().for_each(|(name, value)| told[*name] = value.clone());
+        fs::write(&manifest, inventory::sealed(told).unwrap()).unwrap();
+    };
+    tell(&[
+        ("commit", "another".into()),
+        ("processor", "Z80, 1 cores".into()),
+        ("adapter", serde_json::json!({ "number": 3, "pci": null })),
+    ]);
+    let merge = || command(&folder, &["merge", "merged", "1", "2", "--force", "--quiet"]).assert();
+    merge().success();
+    let text = fs::read_to_string(path(&folder, "merged/manifest.json")).unwrap();
+    assert!(text.contains("cores; Z80, 1 cores\","), "{text}");
+    let (all, _) = records::kept(&records);
+    let other = Identity::read(&records).unwrap().unwrap().built_from("0123", Identity::own_target());
+    RecordFile::create(&records, &other).unwrap().append(&all).unwrap();
+    merge().code(1).stderr(says(&["2: records.bin does not belong to the manifest.json beside it"]));
+    tell(&[("sources", "0123".into())]);
+    merge().code(2).stderr(says(&["1 and 2 are of two runs", "`sources` is ", "and 0123 in the other"]));
+}
+
 /// A map that is to be replaced stays as it is until all records are there.
 #[test]
 fn a_merge_that_fails_leaves_what_was_there() {
@@ -389,6 +423,10 @@ fn a_shard_that_is_stopped_is_gone_on_with() {
         .assert()
         .code(2)
         .stderr(says(&["shard 1/2 in out/s.shard-1-of-2 is unfinished", "of 160 runs"]));
+    let check = command(&folder, &["check", "out/s.shard-1-of-2"]).assert();
+    check.code(2).stderr(says(&[
+        "shard 1/2 is unfinished: go on with `rattlemap map SCENE --engine E --shard 1/2 --resume`",
+    ]));
     command(&folder, &[&shard[..], &["--resume", "--quiet"]].concat()).assert().success();
     command(&folder, &[&merge[..], &["--quiet"]].concat()).assert().success();
     map(&folder, &[&slow[..], &["--quiet", "--out", "whole"]].concat()).success();
