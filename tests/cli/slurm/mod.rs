@@ -60,7 +60,12 @@ impl Work {
         let mut text = String::new();
         let given = fs::read_to_string(scripts.join("settings.sh")).unwrap();
         let program = format!("'{}'", program.display());
-        let all = [&[("program", program.as_str())], settings].concat();
+        // Of two the last one counts.
+        let mut all = vec![("program", program.as_str())];
+        for setting in settings {
+            all.retain(|(name, _)| *name != setting.0);
+            all.push(*setting);
+        }
         for line in given.lines() {
             match all.iter().find(|(name, _)| line.starts_with(&format!("{name}="))) {
                 Some((name, value)) => writeln!(text, "{name}={value}").unwrap(),
@@ -230,6 +235,43 @@ fn an_array_job_and_a_merge_make_the_map_of_one_run() {
 
     let (code, said) = work.submit();
     assert!(code == Some(0) && said.contains("is finished"), "{said}");
+
+    // Shards of another scene are merged for nobody.
+    fs::remove_file(work.at("out/100 % rattle/manifest.json")).unwrap();
+    fs::write(work.at("my scene.toml"), SCENE.replace("max = 7.0", "max = 8.0")).unwrap();
+    let (code, said) = work.submit();
+    assert!(code == Some(0) && said.contains("all 8 shards are finished"), "{said}");
+    work.wait(Duration::from_secs(60));
+    let log = work.text("out/100 % rattle.slurm/merge.log");
+    assert!(log.contains("holds another run: `axis.1.max` was 7.0, now 8.0"), "{log}");
+    assert!(!work.at("out/100 % rattle/manifest.json").exists(), "{log}");
+}
+
+#[test]
+fn settings_that_make_no_map_are_refused_before_anything_is_submitted() {
+    let Some(node) = Node::start(1) else { return };
+    let work = Work::new(&node);
+    fs::write(work.at("s.toml"), SCENE).unwrap();
+    fs::create_dir_all(work.at("out/other")).unwrap();
+    fs::write(work.at("out/other/thesis.tex"), "").unwrap();
+    for (name, value, told) in [
+        ("scene", "t.toml", "no scene 't.toml'"),
+        ("out", "", "out is empty"),
+        ("out", "out/other", "out/other holds something that no merge of these shards has left"),
+        ("shards", "0", "shards is '0'; write a number from 1"),
+        ("engine", "auto", "engine is 'auto'; write cpu or gpu"),
+        ("gpus", "1", "gpus are for engine=gpu"),
+        ("at_once", "all", "at_once is 'all'"),
+        ("program", "./rattlemap", "no program './rattlemap'"),
+        ("partition", "none", "Slurm did not take the array job; nothing is submitted"),
+    ] {
+        work.edit(&[&[("scene", "s.toml")][..], &[(name, value)]].concat());
+        let (code, said) = work.submit();
+        let expected = if name == "partition" { 1 } else { 2 };
+        assert!(code == Some(expected) && said.contains(told), "{name}={value}: {code:?}: {said}");
+    }
+    let queue = work.command("squeue", &["--noheader"]);
+    assert!(queue.status.success() && queue.stdout.is_empty());
 }
 
 /// The main map, and a task that meets its time limit: half a minute before, which Slurm rounds to a minute.
