@@ -30,8 +30,14 @@ pub(crate) fn ask(engine: &str, precision: Option<&str>, adapter: Option<&str>) 
         let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
         known.ok_or_else(|| Problem::engine(format!("the precision {name:?} is none of f32 and f64")))
     };
-    // Whatever it says, it can be read.
-    let adapter = adapter.and_then(|adapter| adapter.parse().ok());
+    let adapter = match adapter {
+        Some(text) if text.trim().is_empty() => {
+            let must = "it must be a number or part of a name that `rattlemap devices` lists, or all";
+            return Err(Problem::engine(format!("the adapter {text:?}: {must}")));
+        }
+        // Whatever it says, it can be read.
+        adapter => adapter.and_then(|text| text.parse().ok()),
+    };
     let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()?, adapter };
     engine_choice::check(&ask)?;
     Ok(ask)

@@ -145,6 +145,17 @@ def test_what_is_wrong_is_told_in_the_programs_words(program: Program, tmp_path:
         rm.map(rm.gear_pair(), **SMALL, engine="cpu", precision="f32")
     with pytest.raises(rm.SceneError, match="of memory, and"):
         rm.map(rm.gear_pair(), e=(0, 1, 60_000), omega=(1, 12, 60_000), engine="cpu")
+    with pytest.raises(rm.SceneError, match=r"`e = \['a', 'b'\]`: it must be numbers"):
+        rm.map(rm.gear_pair(), e=["a", "b"], omega=(1, 2, 4))
+    with pytest.raises(rm.SceneError, match="`omega = .*: it must be numbers"):
+        rm.map(rm.gear_pair(), e=(0, 1, 4), omega=np.array([1, 2j]))
+    with pytest.raises(rm.SceneError, match="start.state"):
+        rm.map(rm.gear_pair(), **SMALL, v1="fast")
+    with pytest.raises(rm.EngineError, match='the adapter "": it must be a number or'):
+        rm.map(rm.gear_pair(), **SMALL, engine="gpu", adapter="")
+    for function in (rm.map, rm.basins, rm.bifurcation, rm.orbit):
+        with pytest.raises(TypeError, match=r"'gear-pair' is not a model; rm.gear_pair\(\) is one"):
+            function("gear-pair", **SMALL)
     for kind in (rm.SceneError, rm.ModelError, rm.FolderError):
         assert issubclass(kind, rm.RattlemapError) and issubclass(kind, ValueError)
     assert issubclass(rm.EngineError, rm.RattlemapError) and issubclass(rm.EngineError, RuntimeError)
