@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -184,6 +185,22 @@ def test_ctrl_c_is_heeded_within_a_second_and_what_has_ended_is_kept(tmp_path: P
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 1.0
     assert (tmp_path / "out/records.bin").stat().st_size > 1000
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_process_that_was_forked_computes_too() -> None:
+    code = """
+        import multiprocessing
+        import rattlemap as rm
+        def maps(e):
+            ds = rm.map(rm.gear_pair(), e=(e, 0.9, 3), omega=(5, 6, 2), engine="cpu", progress=False)
+            return ds["lyapunov"].values.tobytes()
+        own = [maps(e) for e in (0.5, 0.6)]
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            print(pool.map(maps, (0.5, 0.6)) == own)
+    """
+    ask = [sys.executable, "-W", "ignore", "-c", textwrap.dedent(code)]
+    assert subprocess.run(ask, capture_output=True, text=True, timeout=60).stdout == "True\n"
 
 
 def test_an_interrupted_map_goes_on(tmp_path: Path) -> None:
