@@ -148,6 +148,15 @@ impl Task {
             }
             None => None,
         };
+        if let Some(kept) = &kept
+            && let Some(damage) = kept.file.damage()
+        {
+            let (path, count) = (kept.folder.path().join(RECORDS), kept.file.count());
+            warnings.lock().unwrap_or_else(PoisonError::into_inner).push(format!(
+                "{}: {damage}; what is damaged is dropped: {count} are kept, the others computed again",
+                path.display()
+            ));
+        }
         let resumed = kept.as_ref().map_or(0, |kept| kept.file.count());
         let elapsed_before = kept.as_ref().map_or(Duration::ZERO, |kept| kept.elapsed_before);
         let clock = Instant::now();

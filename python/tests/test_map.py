@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rattlemap as rm
+import xarray as xr
 from compare import assert_same
 from conftest import SCENES, Program, small
 
@@ -224,6 +225,17 @@ def test_an_interrupted_map_goes_on(tmp_path: Path) -> None:
     whole = rm.map(rm.gear_pair(), **axes, **{**setting, "out": None, "resume": False})
     whole.attrs["resumed_cells"] = made.attrs["resumed_cells"]
     assert_same(made, whole)
+
+
+def test_damage_is_told_when_a_map_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    whole = rm.map(rm.gear_pair(), **SMALL, engine="cpu", out=out)
+    (out / "manifest.json").unlink()
+    records = out / "records.bin"
+    records.write_bytes(records.read_bytes()[:-10])
+    with pytest.warns(RuntimeWarning, match="records.bin: .* what is damaged is dropped"):
+        again = rm.map(rm.gear_pair(), **SMALL, engine="cpu", out=out, resume=True)
+    xr.testing.assert_equal(again, whole)
 
 
 def test_other_threads_run_meanwhile_and_progress_is_told() -> None:
