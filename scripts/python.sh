@@ -30,7 +30,7 @@ bin="$scratch/venv/bin"
 pip() { "$bin/python" -m pip install --quiet --disable-pip-version-check "$@"; }
 
 began=$SECONDS
-pip "$package[plot,progress,dask]"
+pip "${package}[plot,progress,dask]"
 printf '== installed in %d s\n' $((SECONDS - began))
 pip -r "$root/python/tests/requirements.txt"
 cd "$scratch"

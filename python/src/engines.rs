@@ -10,12 +10,11 @@ use rattlemap::map::engine::{Engine, Loss};
 use rattlemap::map::engine_choice::{self, Ask, Chosen};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
-use rattlemap::map::schedule::Schedule;
 use rattlemap::map::shard::Shard;
 use rattlemap::map::sweep;
+use rattlemap::output::kept::{self, Kept, Work};
 use rattlemap::output::map::Run;
-use rattlemap::output::shard::Tally;
-use rattlemap::output::{self, Folder, Identity, Order, RECORDS, RecordFile, RecordFileError, unfinished};
+use rattlemap::output::{Folder, RECORDS};
 use rattlemap::record::Record;
 
 use crate::problem::Problem;
@@ -62,12 +61,7 @@ pub(crate) struct Out {
 impl Out {
     /// Opens it.
     pub(crate) fn open(&self) -> Result<Folder, Problem> {
-        if self.resume && !self.path.join(RECORDS).is_file() && Folder::holds_results(&self.path) {
-            return Err(RecordFileError::NothingToResume { folder: self.path.clone() }.into());
-        }
-        let folder = Folder::open(&self.path, self.force || self.resume)?;
-        folder.refuse_links(output::map::names())?;
-        Ok(folder)
+        Ok(kept::open_folder(&self.path, self.force, self.resume)?)
     }
 }
 
@@ -78,10 +72,7 @@ pub(crate) struct Integrated<'p> {
     pub(crate) why: String,
     /// Of adapters that failed, a line each.
     pub(crate) warnings: Vec<String>,
-    pub(crate) schedule: Schedule,
-    /// By run; none of a shard whose cells need no others.
-    pub(crate) records: Vec<Record>,
-    pub(crate) tally: Tally,
+    pub(crate) work: Work<'p>,
     opening: Duration,
     elapsed: Duration,
     elapsed_before: Duration,
@@ -126,7 +117,11 @@ impl Task {
         watch: &Watch,
     ) -> Result<Option<Integrated<'p>>, Problem> {
         let clock = Instant::now();
-        let chosen = pollster::block_on(engine_choice::open(plan, &self.ask))?;
+        let ask = match &self.out {
+            Some(out) if out.resume => kept::engine_of(self.ask.clone(), &out.path),
+            _ => self.ask.clone(),
+        };
+        let chosen = pollster::block_on(engine_choice::open(plan, &ask))?;
         let Chosen { mut engine, why, warnings, .. } = chosen;
         let warnings = Arc::new(Mutex::new(warnings));
         let lost = Arc::clone(&warnings);
@@ -138,99 +133,39 @@ impl Task {
         if watch.is_halted() {
             return Ok(None);
         }
-        let mut schedule = Schedule::of(plan, self.shard);
-        let count = if self.shard.is_none() || schedule.reads_records() { plan.run_count() } else { 0 };
-        let mut records = vec![Record::default(); count];
-        let mut tally = Tally::default();
-        let mut kept = match folder {
-            Some(folder) => {
-                Some(self.open_records(folder, plan, &engine, &mut schedule, &mut records, &mut tally)?)
-            }
-            None => None,
-        };
-        if let Some(kept) = &kept
-            && let Some(damage) = kept.file.damage()
-        {
-            let (path, count) = (kept.folder.path().join(RECORDS), kept.file.count());
+        let mut work = Work::new(plan, self.shard);
+        let resumes = self.out.as_ref().is_some_and(|out| out.resume);
+        let opened =
+            folder.map(|folder| Kept::open(folder, &self.scene, &engine, resumes, &mut work)).transpose();
+        let mut kept = opened?;
+        if let Some((folder, damage)) = folder.zip(kept.as_ref().and_then(Kept::damage)) {
+            let (path, count) = (folder.path().join(RECORDS), kept.as_ref().map_or(0, Kept::resumed));
             warnings.lock().unwrap_or_else(PoisonError::into_inner).push(format!(
                 "{}: {damage}; what is damaged is dropped: {count} are kept, the others computed again",
                 path.display()
             ));
         }
-        let resumed = kept.as_ref().map_or(0, |kept| kept.file.count());
-        let elapsed_before = kept.as_ref().map_or(Duration::ZERO, |kept| kept.elapsed_before);
+        let resumed = kept.as_ref().map_or(0, Kept::resumed);
+        let elapsed_before = kept.as_ref().map_or(Duration::ZERO, Kept::elapsed_before);
         let clock = Instant::now();
         let mut done = resumed;
+        let Work { schedule, records, tally, .. } = &mut work;
         watch.tell(done, schedule.expected());
         let keep = |batch: &[(u32, Record)], expected| {
             tally.take(plan, batch);
             if let Some(kept) = &mut kept {
-                kept.file.append(batch)?;
-                unfinished::keep_elapsed(kept.folder, elapsed_before + clock.elapsed())?;
+                kept.keep(batch)?;
             }
             done += batch.len();
             watch.tell(done, expected);
             Ok(())
         };
-        let swept = sweep::run(plan, &mut schedule, &mut engine, &mut records, watch.halt(), keep);
+        let swept = sweep::run(plan, schedule, &mut engine, records, watch.halt(), keep);
         if !pollster::block_on(swept)? {
             return Ok(None);
         }
         let elapsed = clock.elapsed();
         let warnings = std::mem::take(&mut *warnings.lock().unwrap_or_else(PoisonError::into_inner));
-        Ok(Some(Integrated {
-            engine,
-            why,
-            warnings,
-            schedule,
-            records,
-            tally,
-            opening,
-            elapsed,
-            elapsed_before,
-            resumed,
-        }))
+        Ok(Some(Integrated { engine, why, warnings, work, opening, elapsed, elapsed_before, resumed }))
     }
-
-    /// The record file, and what it holds already.
-    fn open_records<'f>(
-        &self,
-        folder: &'f Folder,
-        plan: &Plan,
-        engine: &Engine<'_>,
-        schedule: &mut Schedule,
-        records: &mut [Record],
-        tally: &mut Tally,
-    ) -> Result<Kept<'f>, Problem> {
-        let path = folder.path().join(RECORDS);
-        let identity =
-            Identity::new(engine.name(), engine.precision(), &engine.device(), self.scene.identity())
-                .of_shard(self.shard);
-        let resumes = self.out.as_ref().is_some_and(|out| out.resume) && path.is_file();
-        let (file, elapsed_before) = if resumes {
-            let order = if schedule.takes_any_order() { Order::Any } else { Order::AsKept };
-            let take = |batch: &[(u32, Record)]| {
-                tally.take(plan, batch);
-                plan.admits(batch) && sweep::replay(schedule, records, batch)
-            };
-            (RecordFile::resume(&path, &identity, order, take)?, unfinished::elapsed(folder))
-        } else {
-            (RecordFile::create(&path, &identity)?, Duration::ZERO)
-        };
-        if elapsed_before.is_zero() {
-            unfinished::clear(folder)?;
-        } else {
-            unfinished::keep_elapsed(folder, elapsed_before)?;
-        }
-        output::map::begin(folder, &self.scene)?;
-        Ok(Kept { folder, file, elapsed_before })
-    }
-}
-
-/// What outlives cells that are interrupted.
-struct Kept<'f> {
-    folder: &'f Folder,
-    file: RecordFile,
-    /// How long earlier runs took.
-    elapsed_before: Duration,
 }

@@ -73,8 +73,8 @@ fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
     plan.check()?;
     let folder = task.out.as_ref().map(Out::open).transpose()?;
     let Some(mut integrated) = task.integrate(&plan, folder.as_ref(), watch)? else { return Ok(None) };
-    let refined = integrated.schedule.finish(&mut integrated.records);
-    let records = &integrated.records;
+    let refined = integrated.work.schedule.finish(&mut integrated.work.records);
+    let records = &integrated.work.records;
     let attractors = coexistence::attractors(&plan, records);
     let filled_from = refined.as_ref().map_or(&[][..], |refined| &refined.filled_from);
     let basins = attractors::basins(&plan, records, filled_from);

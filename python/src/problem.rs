@@ -10,6 +10,7 @@ use rattlemap::map::plan::NoMotion;
 use rattlemap::map::scene::SceneError;
 use rattlemap::map::sweep::SweepError;
 use rattlemap::model::ModelError;
+use rattlemap::output::kept::KeptError;
 use rattlemap::output::merge::MergeError;
 use rattlemap::output::{FolderError, OutputError, RecordFileError};
 
@@ -62,6 +63,7 @@ told! {
     FolderError => folder,
     OutputError => folder,
     RecordFileError => folder,
+    KeptError => folder,
     MergeError => folder,
     // The request, unless somebody says better.
     Failure => scene,

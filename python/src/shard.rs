@@ -106,7 +106,8 @@ fn compute(task: &Task, shard: Shard, watch: &Watch) -> Result<Option<Vec<String
     let Some(integrated) = task.integrate(&plan, Some(&folder), watch)? else { return Ok(None) };
     let (device, processor) = (integrated.engine.device(), cli::described_processor());
     let run = integrated.run(task, &device, &processor);
-    let finished = Finished { shard, scene: &task.scene, plan: &plan, run: &run, tally: &integrated.tally };
+    let finished =
+        Finished { shard, scene: &task.scene, plan: &plan, run: &run, tally: &integrated.work.tally };
     Ok(Some(shard::write(&folder, &finished)?))
 }
 

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use crate::map::engine_choice::ChoiceError;
 use crate::map::plan::NoMotion;
 use crate::map::scene::SceneError;
+use crate::output::kept::KeptError;
 use crate::output::{FolderError, OutputError, RecordFileError};
 use anyhow::anyhow;
 use rattlemap_dynamics::model::ModelError;
@@ -99,6 +100,16 @@ impl From<FolderError> for Failure {
 impl From<RecordFileError> for Failure {
     fn from(error: RecordFileError) -> Self {
         Failure::Usage(error.into())
+    }
+}
+
+impl From<KeptError> for Failure {
+    fn from(error: KeptError) -> Self {
+        match error {
+            KeptError::Folder(error) => error.into(),
+            KeptError::Records(error) => error.into(),
+            KeptError::Output(error) => error.into(),
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use crate::map::schedule::{Refined, Schedule};
 use crate::map::shard::Shard;
 use crate::map::sweep;
 use crate::output::inventory::{self, FileEntry, Finding};
+use crate::output::kept::order;
 use crate::output::manifest::{FORMAT, MANIFEST};
 use crate::output::map::LIST;
 use crate::output::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
@@ -20,7 +21,7 @@ use serde_json::Value;
 
 use crate::cli::capacity;
 use crate::cli::error::Failure;
-use crate::cli::map::{order, unit};
+use crate::cli::map::unit;
 use crate::cli::say;
 use crate::cli::scene_file::{MOST_OF_COPY, read_table};
 

@@ -7,30 +7,27 @@ mod shard;
 mod stopped;
 mod summary;
 
-use std::error::Error;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crate::gpu::Precision;
 use crate::map::attractors;
 use crate::map::coexistence;
 use crate::map::effect;
 use crate::map::engine::{Engine, Loss};
-use crate::map::engine_choice::{self, Chosen};
+use crate::map::engine_choice::{self, Ask, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
-use crate::map::schedule::{Refined, Schedule};
-use crate::map::shard::Shard;
+use crate::map::schedule::Refined;
 use crate::map::sweep::{self, SweepError};
+use crate::output::kept::{self, Kept, Work};
 use crate::output::map::LIST;
-use crate::output::shard::Tally;
-use crate::output::{self, Cells, Folder, Identity, Order, RECORDS, RecordFile, RecordFileError, unfinished};
+use crate::output::{self, Cells, Folder, RECORDS};
 use crate::record::Record;
 use crate::record::classify::status;
 use anyhow::anyhow;
 use rattlemap_dynamics::orbit::{Class, Status};
 
-use crate::cli::arguments::{EngineChoice, EngineOptions, Map};
+use crate::cli::arguments::Map;
 use crate::cli::capacity;
 use crate::cli::error::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
@@ -60,10 +57,10 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         return shard::say_done(ask, &plan);
     }
     let interrupt = Interrupt::listen(ask.run.quiet)?;
-    let folder = open_folder(ask)?;
+    let folder = kept::open_folder(&ask.out(), ask.run.force, ask.resume)?;
     interrupt.ends_at_once(stopped::before_anything(ask, &plan), folder.leaver());
     let clock = Instant::now();
-    let asked = engine_of(ask, folder.path()).ask();
+    let asked = engine_of(ask, folder.path());
     let Chosen { mut engine, why, notes, warnings } = pollster::block_on(engine_choice::open(&plan, &asked))
         .map_err(|error| stopped::before_it_began(error.into(), ask, &folder, &plan))?;
     let opening = clock.elapsed();
@@ -87,22 +84,21 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     }
     let mut work = Work::new(&plan, ask.shard);
     let mut kept = open_records(ask, &folder, &scene, &mut work, &engine)?;
-    let resumed_cells = kept.file.count();
+    let resumed_cells = kept.resumed();
     let total = work.schedule.expected();
     let progress = match plan.refine() {
         Some(_) => Progress::of_at_least(total, resumed_cells, unit(&plan), ask.run.quiet),
         None => Progress::new(total, resumed_cells, unit(&plan), ask.run.quiet),
     };
     integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
-    interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.file.count()), || {});
+    interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.count()), || {});
     if let Some(shard) = ask.shard {
-        let ended = shard::Ended { shard, opening, resumed: resumed_cells, kept: &kept, tally: &work.tally };
+        let ended = shard::Ended { shard, opening, kept: &kept, tally: &work.tally };
         return shard::finish(ask, &scene, &plan, &engine, &ended, &progress);
     }
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
-    let Kept { elapsed_before, clock, .. } = kept;
-    let elapsed = clock.elapsed();
+    let elapsed = kept.elapsed();
     let attractors = coexistence::attractors(&plan, &records);
     let basins = attractors::basins(&plan, &records, filled_from(refined.as_ref()));
     let cells = Cells::new(&scene, &plan, &records)
@@ -122,7 +118,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         processor: &processor::described(),
         opening,
         elapsed,
-        elapsed_before,
+        elapsed_before: kept.elapsed_before(),
         resumed_cells,
         lane_grid,
         refined: refined.clone(),
@@ -139,7 +135,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let idle: String = idle.collect();
     progress.finish(&format!(
         "{}{idle}\n{}: {}",
-        summary(&cells, &run, lane_steps, clock.elapsed().as_secs_f64()),
+        summary(&cells, &run, lane_steps, kept.elapsed().as_secs_f64()),
         say::path(folder.path()),
         files.join(", ")
     ));
@@ -150,41 +146,15 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     fail_if(all_failed, "every cell failed; the status column says why")
 }
 
+/// The engine that was asked for; where that is left open, an interrupted run goes on with its own.
+fn engine_of(ask: &Map, folder: &Path) -> Ask {
+    let asked = ask.engine.ask();
+    if ask.resume { kept::engine_of(asked, folder) } else { asked }
+}
+
 /// For every cell of an adaptive map of basins the one that it was filled from.
 pub(crate) fn filled_from(refined: Option<&Refined>) -> &[u32] {
     refined.map_or(&[], |refined| &refined.filled_from)
-}
-
-/// A new folder, an earlier run's with `--force`, an interrupted one's with `--resume`.
-fn open_folder(ask: &Map) -> Result<Folder, Failure> {
-    let out = ask.out();
-    // A run that ended before it kept anything has left nothing else.
-    if ask.resume && !out.join(RECORDS).is_file() && Folder::holds_results(&out) {
-        return Err(RecordFileError::NothingToResume { folder: out }.into());
-    }
-    let folder = Folder::open(&out, ask.run.force || ask.resume)?;
-    folder.refuse_links(output::map::names())?;
-    Ok(folder)
-}
-
-/// The engine that was asked for; where that is left open, an interrupted run goes on with
-/// its own.
-fn engine_of(ask: &Map, folder: &Path) -> EngineOptions {
-    let asked = ask.engine.clone();
-    if !ask.resume || asked.engine != EngineChoice::Auto || asked.precision.is_some() {
-        return asked;
-    }
-    match Identity::read(&folder.join(RECORDS)) {
-        Ok(Some(identity)) if identity.engine() == "cpu" && asked.adapter.is_none() => {
-            EngineOptions { engine: EngineChoice::Cpu, ..asked }
-        }
-        Ok(Some(identity)) => {
-            let precision = Precision::ALL.into_iter().find(|p| p.name() == identity.precision());
-            EngineOptions { engine: EngineChoice::Gpu, precision, ..asked }
-        }
-        // What is wrong with the file is said when it is resumed.
-        Ok(None) | Err(_) => asked,
-    }
 }
 
 /// The record file, and what it holds already, by run.
@@ -195,90 +165,20 @@ fn open_records<'f>(
     work: &mut Work<'_>,
     engine: &Engine<'_>,
 ) -> Result<Kept<'f>, Failure> {
-    let path = folder.path().join(RECORDS);
-    let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
-        .of_shard(ask.shard);
-    let (file, elapsed_before) = if ask.resume && path.is_file() {
-        let Work { plan, schedule, records, tally } = work;
-        let (plan, order) = (*plan, order(schedule));
-        let take = |batch: &[(u32, Record)]| {
-            tally.take(plan, batch);
-            plan.admits(batch) && sweep::replay(schedule, records, batch)
-        };
-        let file = RecordFile::resume(&path, &identity, order, take)?;
-        if let Some(damage) = file.damage() {
-            let (path, count, unit) = (path.display(), file.count(), unit(work.plan));
-            say::note(format_args!(
-                "warning: {path}: {damage}; what is damaged is dropped: {count} {unit} are kept, the others computed \
-                 again"
-            ));
-        }
-        if file.count() == 0 && file.damage().is_none() {
-            say_anew(ask, folder);
-        }
-        (file, unfinished::elapsed(folder))
-    } else {
-        if ask.resume {
-            say_anew(ask, folder);
-        }
-        (RecordFile::create(&path, &identity)?, Duration::ZERO)
-    };
-    // The manifest, which may have that time, too, goes next.
-    if elapsed_before.is_zero() {
-        unfinished::clear(folder)?;
-    } else {
-        unfinished::keep_elapsed(folder, elapsed_before)?;
-    }
-    output::map::begin(folder, scene)?;
-    Ok(Kept { file, folder, elapsed_before, clock: Instant::now() })
-}
-
-fn say_anew(ask: &Map, folder: &Folder) {
-    if !ask.run.quiet {
+    let kept = Kept::open(folder, scene, engine, ask.resume, work)?;
+    if let Some(damage) = kept.damage() {
+        let (path, count, unit) = (folder.path().join(RECORDS), kept.count(), unit(work.plan));
+        say::note(format_args!(
+            "warning: {}: {damage}; what is damaged is dropped: {count} {unit} are kept, the others computed again",
+            path.display()
+        ));
+    } else if ask.resume && kept.count() == 0 && !ask.run.quiet {
         say::note(format_args!(
             "{}: nothing was kept there yet; the map is begun anew",
             folder.path().display()
         ));
     }
-}
-
-/// In which order a schedule takes up records again.
-pub(crate) fn order(schedule: &Schedule) -> Order {
-    if schedule.takes_any_order() { Order::Any } else { Order::AsKept }
-}
-
-/// What outlives a run that is interrupted.
-struct Kept<'f> {
-    file: RecordFile,
-    folder: &'f Folder,
-    /// How long earlier runs integrated, and since when this one has.
-    elapsed_before: Duration,
-    clock: Instant,
-}
-
-impl Kept<'_> {
-    fn keep(&mut self, batch: &[(u32, Record)]) -> Result<(), Box<dyn Error + Send + Sync>> {
-        self.file.append(batch)?;
-        Ok(unfinished::keep_elapsed(self.folder, self.elapsed_before + self.clock.elapsed())?)
-    }
-}
-
-/// What is to be done, and what has been.
-struct Work<'p> {
-    plan: &'p Plan,
-    schedule: Schedule,
-    /// By run; none of a shard whose cells need no others.
-    records: Vec<Record>,
-    /// Of a shard.
-    tally: Tally,
-}
-
-impl<'p> Work<'p> {
-    fn new(plan: &'p Plan, shard: Option<Shard>) -> Work<'p> {
-        let schedule = Schedule::of(plan, shard);
-        let count = if shard.is_none() || schedule.reads_records() { plan.run_count() } else { 0 };
-        Work { plan, schedule, records: vec![Record::default(); count], tally: Tally::default() }
-    }
+    Ok(kept)
 }
 
 /// Integrates what is left. Ctrl-C ends it once some cells have ended; those under way are computed again.
@@ -290,20 +190,20 @@ fn integrate(
     progress: &Progress,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let Work { plan, schedule, records, tally } = work;
-    let mut warning = Warning::new(kept.file.count(), ask.run.quiet);
+    let Work { plan, schedule, records, tally, .. } = work;
+    let mut warning = Warning::new(kept.count(), ask.run.quiet);
     let keep = |batch: &[(u32, Record)], known| {
         kept.keep(batch)?;
         tally.take(plan, batch);
         warning.heed(batch, unit(plan));
-        progress.report(kept.file.count(), known);
+        progress.report(kept.count(), known);
         Ok(())
     };
     let swept = match interrupt.wait_for(Some("what has ended is kept")) {
         true => pollster::block_on(sweep::run(plan, schedule, engine, records, interrupt.raised(), keep)),
         false => Ok(false),
     };
-    let go_on = || stopped::go_on(ask, plan, kept.file.count());
+    let go_on = || stopped::go_on(ask, plan, kept.count());
     match swept {
         Ok(true) => Ok(()),
         Ok(false) => Err(interrupt.failure(anyhow!("interrupted; {}", go_on()))),

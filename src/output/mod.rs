@@ -19,6 +19,7 @@ mod error;
 pub mod folder;
 pub mod in_memory;
 pub mod inventory;
+pub mod kept;
 mod layers;
 pub mod manifest;
 pub mod map;

@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use serde_json::{Value, json};
 
 use super::forecast::Forecast;
-use super::{engine_of, order, shard, unit};
+use super::{engine_of, shard, unit};
 use crate::cli::arguments::Map;
 use crate::cli::capacity::{Free, bytes};
 use crate::cli::error::Failure;
@@ -19,6 +19,7 @@ use crate::map::scene::Scene;
 use crate::map::schedule::Schedule;
 use crate::map::shard::Shard;
 use crate::map::size::Size;
+use crate::output::kept;
 use crate::output::{self, Folder, Identity, RECORDS, RecordFile, RecordFileError};
 
 /// What is foreseen.
@@ -44,13 +45,13 @@ pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(
     check_folder(ask, &out)?;
     let clock = Instant::now();
     let Chosen { mut engine, why, notes, warnings } =
-        pollster::block_on(engine_choice::open(plan, &engine_of(ask, &out).ask()))?;
+        pollster::block_on(engine_choice::open(plan, &engine_of(ask, &out)))?;
     let opening = clock.elapsed().as_secs_f64();
     if !ask.run.quiet {
         notes.iter().for_each(say::note);
     }
     warnings.iter().for_each(say::note);
-    let kept = if ask.resume { kept(ask, &out, scene, plan, &engine)? } else { 0 };
+    let kept = if ask.resume { kept_runs(ask, &out, scene, plan, &engine)? } else { 0 };
     let runs = shard::runs(ask, plan);
     let left = runs.saturating_sub(kept);
     let forecast = match left {
@@ -87,14 +88,20 @@ fn check_folder(ask: &Map, out: &Path) -> Result<(), Failure> {
 }
 
 /// How many runs are kept of those that are asked for.
-fn kept(ask: &Map, out: &Path, scene: &Scene, plan: &Plan, engine: &Engine<'_>) -> Result<usize, Failure> {
+fn kept_runs(
+    ask: &Map,
+    out: &Path,
+    scene: &Scene,
+    plan: &Plan,
+    engine: &Engine<'_>,
+) -> Result<usize, Failure> {
     let path = out.join(RECORDS);
     if !path.is_file() {
         return Ok(0);
     }
     let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
         .of_shard(ask.shard);
-    let order = order(&Schedule::of(plan, ask.shard));
+    let order = kept::order(&Schedule::of(plan, ask.shard));
     Ok(RecordFile::read(&path, &identity, order, |batch| plan.admits(batch))?.count)
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 
-use super::{Kept, Work, order, summary, unit};
+use super::{summary, unit};
 use crate::cli::arguments::{EngineChoice, Map};
 use crate::cli::error::Failure;
 use crate::cli::finished_map::Manifest;
@@ -18,6 +18,7 @@ use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::map::sweep;
 use crate::output::inventory::{self, Finding};
+use crate::output::kept::{Kept, Work, order};
 use crate::output::shard::{self, Finished, Tally};
 use crate::output::{self, Identity, RECORDS, RecordFile};
 use crate::record::Record;
@@ -94,8 +95,6 @@ pub(super) struct Ended<'a> {
     pub(super) shard: Shard,
     /// Time until the engine was ready.
     pub(super) opening: Duration,
-    /// Runs that were kept before.
-    pub(super) resumed: usize,
     pub(super) kept: &'a Kept<'a>,
     pub(super) tally: &'a Tally,
 }
@@ -109,8 +108,8 @@ pub(super) fn finish(
     ended: &Ended<'_>,
     progress: &Progress,
 ) -> Result<(), Failure> {
-    let &Ended { shard, opening, resumed, kept, tally } = ended;
-    let (device, elapsed) = (engine.device(), kept.clock.elapsed());
+    let &Ended { shard, opening, kept, tally } = ended;
+    let (device, elapsed) = (engine.device(), kept.elapsed());
     let run = output::map::Run {
         sets: &ask.run.set,
         engine: engine.name(),
@@ -121,18 +120,18 @@ pub(super) fn finish(
         processor: &processor::described(),
         opening,
         elapsed,
-        elapsed_before: kept.elapsed_before,
-        resumed_cells: resumed,
+        elapsed_before: kept.elapsed_before(),
+        resumed_cells: kept.resumed(),
         lane_grid: engine.steps_per_period(),
         refined: None,
         without_effect: Vec::new(),
         merged: None,
     };
     let finished = Finished { shard, scene, plan, run: &run, tally };
-    let files = shard::write(kept.folder, &finished)?;
-    progress.finish(&told(&finished, kept.folder.path(), &files));
+    let files = shard::write(kept.folder(), &finished)?;
+    progress.finish(&told(&finished, kept.folder().path(), &files));
     if ask.json {
-        shard::print(kept.folder.path(), &files, &finished)?;
+        shard::print(kept.folder().path(), &files, &finished)?;
     }
     if tally.all_failed() && !ask.run.quiet {
         say::note(
