@@ -99,7 +99,13 @@ def shard(
     adapter: str | None = ...,
 ) -> list[str]: ...
 def check_shards(
-    scene: Scene, count: int, engine: str, precision: str | None, adapter: str | None = ...
+    scene: Scene,
+    count: int,
+    engine: str,
+    precision: str | None,
+    adapter: str | None = ...,
+    out: str | None = ...,
+    force: bool = ...,
 ) -> None: ...
 def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Tell = ...) -> MadeMap: ...
 

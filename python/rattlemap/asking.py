@@ -90,12 +90,23 @@ def _axis(name: str, value: Any) -> _Table:
         # What is no whole number is refused by who reads it.
         is_whole = isinstance(count, float) and count.is_integer()
         return {"min": least, "max": most, "count": int(count) if is_whole else count}
-    values = np.asarray(value, dtype=np.float64)
+    values = _floats(name, value)
     if values.ndim != 1:
         raise SceneError(f"`{name}`: an axis is a tuple (min, max, count) or values in one dimension, not in {values.ndim}")
     if is_linear(values):
         return {"min": float(values[0]), "max": float(values[-1]), "count": len(values)}
     return {"values": values.tolist()}
+
+
+def _floats(name: str, value: Any) -> npt.NDArray[np.float64]:
+    """Numbers as the program has them."""
+    given = np.asarray(value)
+    if not np.iscomplexobj(given):
+        try:
+            return given.astype(np.float64)
+        except (TypeError, ValueError):
+            pass
+    raise SceneError(f"`{name} = {value!r}`: it must be numbers")
 
 
 def is_linear(values: npt.NDArray[np.float64]) -> bool:
@@ -124,11 +135,11 @@ def _start_table(model: Model, start: Start | None, components: Mapping[str, flo
     if not components:
         if start is None:
             return {}
-        return {"policy": start} if isinstance(start, str) else {"policy": "state", "state": [float(x) for x in start]}
+        return {"policy": start} if isinstance(start, str) else {"policy": "state", "state": _floats("start", start).tolist()}
     if isinstance(start, str) and start != "rest":
         raise SceneError(f"start = {start!r} does not go with {', '.join(components)}: a given state follows no neighbour")
     state = dict.fromkeys(names, 0.0) if start is None or isinstance(start, str) else dict(zip(names, start, strict=False))
-    state.update({name: float(value) for name, value in components.items()})
+    state.update({name: _number_or_text(value) for name, value in components.items()})
     return {"policy": "state", "state": list(state.values())}
 
 
@@ -229,7 +240,7 @@ def scene(
         document["cells"] = {"file": "cells.csv"}
     document["integration"] = integration
     document["start"] = _start_table(model, start, states)
-    document["outputs"] = {} if quantities is None else {"quantities": [*quantities]}
+    document["outputs"] = {} if quantities is None else {"quantities": _listed(quantities)}
     for path, value in (settings or {}).items():
         _put(document, path, value)
     # Those that follow others take the place of the model's own values.
@@ -238,6 +249,11 @@ def scene(
             fixed.pop(name, None)
     file = None if model._model.is_built_in else (model._model.file, model.text)
     return _native.Scene(_text(document), model=file, cells=cells, purpose=purpose)
+
+
+def _listed(names: Iterable[str]) -> list[str]:
+    """Names, of which one may be given bare."""
+    return [names] if isinstance(names, str) else [*names]
 
 
 def _number_or_text(value: Any) -> Any:
@@ -272,11 +288,11 @@ def scene_file(
     for name, value in names.items():
         own.append(f"integration.{name}={toml(value)}" if name in INTEGRATION else assignments({name: value})[0])
     if quantities is not None:
-        own.append(f"outputs.quantities={toml([*quantities])}")
+        own.append(f"outputs.quantities={toml(_listed(quantities))}")
     if isinstance(start, Mapping):
         raise SceneError("a scene's start is a policy or a state with all components")
     if start is not None:
-        state = [] if isinstance(start, str) else [f"start.state={toml([float(x) for x in start])}"]
+        state = [] if isinstance(start, str) else [f"start.state={toml(_floats('start', start).tolist())}"]
         own += [f"start.policy={toml(start if isinstance(start, str) else 'state')}", *state]
     own += settings_as_sets(settings or {})
     return _native.Scene.load(os.fspath(path), own, purpose, along)

@@ -12,7 +12,7 @@ from . import asking
 from .engine import Adapter, Engine, Precision
 from .errors import SceneError
 from .map import map as make_map
-from .model import Model
+from .model import Model, required
 from .progress import Tell
 
 
@@ -64,7 +64,7 @@ def basins(
     >>> bs["attractor"].plot(); bs["attractor_share"].values
     """
     swept = [name for name, value in names.items() if asking.is_axis(value)]
-    components = model.state_names
+    components = required(model).state_names
     if swept and not any(name in components for name in swept):
         raise SceneError(
             f"the axes {', '.join(swept)} are no components of the start, {', '.join(components)}: basins sweep at least one"

@@ -12,7 +12,7 @@ import xarray as xr
 from . import _native, asking, decode
 from .engine import table
 from .errors import SceneError
-from .model import Model
+from .model import Model, required
 from .progress import Tell, telling
 
 
@@ -78,7 +78,7 @@ def bifurcation(
     elif along is not None or at is not None or [*set]:
         raise SceneError("`set`, `along` and `at` are for a scene file; beside a model say settings={...} or keywords")
     else:
-        asked = asking.scene(model, names, purpose="bifurcation", axes=1, start=start, settings=settings)
+        asked = asking.scene(required(model), names, purpose="bifurcation", axes=1, start=start, settings=settings)
     with telling(progress, "columns") as tell:
         made = _native.bifurcation(asked, tell)
     manifest, points = json.loads(made["manifest"]), made["points"]

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from . import _native, asking
+from . import _native, asking, decode
 from .engine import Adapter, Engine, Precision, adapter_text, dataset, no_display
 from .errors import SceneError
-from .model import Model
+from .model import Model, required
 from .progress import Tell, telling
 
 
@@ -53,19 +53,22 @@ def cells(
     Raises
     ------
     SceneError
-        For an unknown column, a value out of its range, and as :func:`rattlemap.map`.
+        For an unknown column, one with a result's name, a value out of its range, and as :func:`rattlemap.map`.
 
     Examples
     --------
     >>> rm.cells(rm.gear_pair(), pd.DataFrame({"e": [0.06, 0.605], "omega": [5.6, 5.6]}))["class"]
     """
     frame = frame if isinstance(frame, pd.DataFrame) else pd.DataFrame({name: np.asarray(frame[name]) for name in frame})
-    own = [*frame.columns] if columns is None else [*columns]
+    taken = [name for name in frame.columns if name in decode.RESULTS]
+    if taken:
+        raise SceneError(f"the frame has a column {taken[0]!r}, which is a result's name; rename it")
+    own = [*frame.columns] if columns is None else [columns] if isinstance(columns, str) else [*columns]
     missing = [name for name in own if name not in frame.columns]
     if missing:
         raise SceneError(f"the frame has no column {missing[0]!r}; it has {', '.join(map(str, frame.columns))}")
     asked = asking.scene(
-        model,
+        required(model),
         names,
         purpose="map",
         axes=0,
@@ -78,9 +81,6 @@ def cells(
         made = _native.map(asked, engine, precision, None, False, False, tell, adapter_text(adapter))
     found = dataset(made)
     results = {str(name): variable.values for name, variable in found.data_vars.items()}
-    taken = [name for name in results if name in frame.columns]
-    if taken:
-        raise SceneError(f"the frame has a column {taken[0]!r} already, which is a result's name; rename it")
     return frame.assign(**{name: pd.Series(values, index=frame.index) for name, values in results.items()})
 
 

@@ -80,7 +80,7 @@ def merged(
     if getattr(client, "asynchronous", False):
         raise SceneError("the client is asynchronous, and this call waits for it; make one with Client(...) outside of a coroutine")
     count = _default_count(scene, client) if shards is None else shards
-    _native.check_shards(scene, count, *how)
+    _native.check_shards(scene, count, *how, out, force)
     beside = None if out is None else Path(out).absolute().parent
     if beside is not None:
         beside.mkdir(parents=True, exist_ok=True)

@@ -43,6 +43,9 @@ _LONG_NAMES = {
     "attractor": "label of the attractor",
 }
 
+#: What the results of a cell can be called.
+RESULTS = frozenset(_LONG_NAMES)
+
 
 def names_of(codes: Mapping[str, int]) -> Array:
     """The names that codes of one byte stand for.

@@ -132,9 +132,11 @@ def _require(folder: Path, manifest: dict[str, Any], name: str, kind: str) -> Pa
     path = folder / name
     if path.is_file():
         return path
-    if any(entry["name"] == name for entry in manifest["files"]):
-        raise FolderError(f"{folder}: {name} is missing; `rattlemap check {folder} --repair` makes it anew")
     command = manifest["command"]
+    if any(entry["name"] == name for entry in manifest["files"]):
+        has_records = (folder / _RECORDS).is_file()
+        again = f"rattlemap check {folder} --repair" if has_records else f"rattlemap {command} SCENE --out {folder} --force"
+        raise FolderError(f"{folder}: {name} is missing; `{again}` makes it anew")
     again = "--resume" if command == "map" else "--force"
     raise FolderError(
         f"{folder}: there is no {name}, for the scene's outputs.files do not have {kind!r}; add it and write the files anew: "

@@ -11,7 +11,7 @@ import xarray as xr
 from . import _native, asking
 from .engine import Adapter, Engine, Precision, adapter_text, dataset, no_display
 from .errors import SceneError
-from .model import Model
+from .model import Model, required
 from .progress import Tell, telling
 
 
@@ -138,5 +138,5 @@ def _asked(
     if [*sets]:
         raise SceneError("`set` changes a scene file; say settings={...} or keywords beside a model")
     return asking.scene(
-        model, names, purpose="map", axes=2, quantities=quantities, start=start, settings=settings
+        required(model), names, purpose="map", axes=2, quantities=quantities, start=start, settings=settings
     )

@@ -94,6 +94,19 @@ class Model:
         return _rebuilt, (self.text, self._model.file, self._model.changed)
 
 
+def required(model: object) -> Model:
+    """The model, if it is one.
+
+    Raises
+    ------
+    TypeError
+        For anything else, such as a model's name.
+    """
+    if not isinstance(model, Model):
+        raise TypeError(f"{model!r} is not a model; rm.gear_pair() is one, rm.load_model(NAME_OR_FILE) makes others")
+    return model
+
+
 def _rebuilt(text: str, file: str, changed: dict[str, float]) -> Model:
     return Model(_native.Model(text, file).replace(assignments(changed)))
 

@@ -13,7 +13,7 @@ import pandas as pd
 from . import _native
 from .asking import assignments
 from .errors import SceneError
-from .model import Model
+from .model import Model, required
 
 #: What `orbit` takes, as the program bounds it.
 _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
@@ -222,10 +222,11 @@ def orbit(
     True
     """
     for name, value, (least, most) in (("periods", periods, _PERIODS), ("transient", transient, _TRANSIENT)):
-        if not least <= value <= most:
-            raise SceneError(f"{name} = {value}: it must be a whole number from {least} to {most}")
-    state = None if start is None else _state(model, start)
-    own = model.replace(**parameters)
+        is_whole = isinstance(value, (int, np.integer)) or (isinstance(value, float) and value.is_integer())
+        if not is_whole or not least <= value <= most:
+            raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
+    own = required(model).replace(**parameters)
+    state = None if start is None else _state(own, start)
     return Orbit(_native.orbit(own._model, [], int(transient), int(periods), state), own)
 
 

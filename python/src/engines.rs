@@ -12,9 +12,9 @@ use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
 use rattlemap::map::shard::Shard;
 use rattlemap::map::sweep;
-use rattlemap::output::Folder;
 use rattlemap::output::kept::{self, Kept, Work};
 use rattlemap::output::map::Run;
+use rattlemap::output::{Folder, RECORDS};
 use rattlemap::record::Record;
 
 use crate::problem::Problem;
@@ -29,8 +29,14 @@ pub(crate) fn ask(engine: &str, precision: Option<&str>, adapter: Option<&str>) 
         let known = Precision::ALL.into_iter().find(|precision| precision.name() == name);
         known.ok_or_else(|| Problem::engine(format!("the precision {name:?} is none of f32 and f64")))
     };
-    // Whatever it says, it can be read.
-    let adapter = adapter.and_then(|adapter| adapter.parse().ok());
+    let adapter = match adapter {
+        Some(text) if text.trim().is_empty() => {
+            let must = "it must be a number or part of a name that `rattlemap devices` lists, or all";
+            return Err(Problem::engine(format!("the adapter {text:?}: {must}")));
+        }
+        // Whatever it says, it can be read.
+        adapter => adapter.and_then(|text| text.parse().ok()),
+    };
     let ask = Ask { engine: engine.parse()?, precision: precision.map(named).transpose()?, adapter };
     engine_choice::check(&ask)?;
     Ok(ask)
@@ -132,6 +138,13 @@ impl Task {
         let opened =
             folder.map(|folder| Kept::open(folder, &self.scene, &engine, resumes, &mut work)).transpose();
         let mut kept = opened?;
+        if let Some((folder, damage)) = folder.zip(kept.as_ref().and_then(Kept::damage)) {
+            let (path, count) = (folder.path().join(RECORDS), kept.as_ref().map_or(0, Kept::resumed));
+            warnings.lock().unwrap_or_else(PoisonError::into_inner).push(format!(
+                "{}: {damage}; what is damaged is dropped: {count} are kept, the others computed again",
+                path.display()
+            ));
+        }
         let resumed = kept.as_ref().map_or(0, Kept::resumed);
         let elapsed_before = kept.as_ref().map_or(Duration::ZERO, Kept::elapsed_before);
         let clock = Instant::now();

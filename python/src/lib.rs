@@ -35,6 +35,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        waiting::loaded();
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("SOURCES", Identity::own_sources())?;
         module.add("TARGET", Identity::own_target())

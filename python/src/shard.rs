@@ -9,9 +9,9 @@ use rattlemap::cli;
 use rattlemap::map::engine_choice::{Ask, Who};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::shard::Shard;
-use rattlemap::output::Folder;
 use rattlemap::output::merge::{MergeError, Parts, Progress};
 use rattlemap::output::shard::{self, Finished};
+use rattlemap::output::{self, Folder};
 use rayon::ThreadPoolBuilder;
 
 use crate::engines::{Out, Task, ask};
@@ -20,19 +20,29 @@ use crate::problem::Problem;
 use crate::scene::Scene;
 use crate::waiting::{self, Watch};
 
-/// Refuses a map that cannot be dealt out to so many shards, or whose engine is left open.
+/// Refuses a map that cannot be dealt out to so many shards, whose engine is left open, that does not fit this machine
+/// or whose folder cannot be used.
 #[pyfunction]
-#[pyo3(signature = (scene, count, engine, precision, adapter=None))]
+#[pyo3(signature = (scene, count, engine, precision, adapter=None, out=None, force=false))]
 pub(crate) fn check_shards(
     scene: &Scene,
     count: u32,
     engine: &str,
     precision: Option<&str>,
     adapter: Option<&str>,
+    out: Option<PathBuf>,
+    force: bool,
 ) -> PyResult<()> {
     let (shard, _) = asked(1, count, engine, precision, adapter)?;
+    cli::fits(&scene.scene, None, Who::Cpu, out.as_deref()).map_err(Problem::from)?;
     let plan = Plan::new(&scene.scene);
-    Ok(shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?)
+    shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?;
+    if let Some(out) = out {
+        // As when the shards are merged.
+        let force = force || !Folder::holds_results(&out);
+        Folder::check(&out, force, output::map::names()).map_err(Problem::from)?;
+    }
+    Ok(())
 }
 
 /// A shard, and who is to compute it.

@@ -1,14 +1,16 @@
 //! Computations on a thread of their own, while the interpreter's thread watches: for Ctrl-C, and to tell of progress.
 
 use std::panic::resume_unwind;
-use std::sync::Arc;
+use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::problem::Problem;
 
@@ -51,6 +53,34 @@ impl Watch {
     }
 }
 
+/// The process that loaded the module.
+static LOADED_BY: OnceLock<u32> = OnceLock::new();
+
+/// Takes down which process loads the module.
+pub(crate) fn loaded() {
+    let _ = LOADED_BY.set(process::id());
+}
+
+/// Threads for a process that was forked from the one that loaded the module: a fork leaves those of rayon's own pool
+/// behind, and whoever waits for them waits for ever. They are made once, and none for the process itself.
+fn own_threads() -> Result<Option<&'static ThreadPool>, Problem> {
+    static OWN: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
+    let this = process::id();
+    if LOADED_BY.get() == Some(&this) {
+        return Ok(None);
+    }
+    let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, pool)) = own.filter(|(process, _)| *process == this) {
+        return Ok(Some(pool));
+    }
+    let pool = ThreadPoolBuilder::new().build();
+    let pool = pool.map_err(|error| Problem::engine(format!("no threads to compute with: {error}")))?;
+    // Kept for good: a pool of the process before has no threads that could end.
+    let pool: &'static ThreadPool = Box::leak(Box::new(pool));
+    *own = Some((this, pool));
+    Ok(Some(pool))
+}
+
 /// Runs `work` without the interpreter's lock and returns what it comes to; `progress` is called with what is done and the
 /// total, some times a second, with the same again where nothing is new. Work that was told to end gives nothing.
 ///
@@ -61,13 +91,17 @@ pub(crate) fn run<T: Send + 'static>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Watch) -> Result<Option<T>, Problem> + Send + 'static,
 ) -> PyResult<T> {
+    let threads = own_threads()?;
     let watch = Arc::new(Watch::default());
     let (sender, mut receiver) = mpsc::channel();
     let worker = {
         let watch = Arc::clone(&watch);
         thread::Builder::new().name("rattlemap".to_owned()).spawn(move || {
             // Nobody listens where it was left to itself.
-            let _ = sender.send(work(&watch));
+            let _ = sender.send(match threads {
+                Some(threads) => threads.install(|| work(&watch)),
+                None => work(&watch),
+            });
         })?
     };
     let (mut told, mut asked) = ((0, 0), Instant::now());

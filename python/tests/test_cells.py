@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -40,10 +41,14 @@ def test_columns_of_ones_own_and_starts() -> None:
     assert by_name["period"].tolist() == [1, 1]
 
 
+LONG: dict[str, Any] = {"engine": "cpu", "early_stop": False, "transient_periods": 1_000_000}
+
+
 def test_what_is_wrong_is_told() -> None:
     with pytest.raises(rm.SceneError, match="column 2 = G` is not known|column 2"):
         rm.cells(rm.gear_pair(), {"e": [0.5], "G": [1.0]})
     with pytest.raises(rm.SceneError, match=r"cells:3:1: `e = 1.5` is out of range"):
         rm.cells(rm.gear_pair(), {"e": [0.5, 1.5]})
-    with pytest.raises(rm.SceneError, match="has a column 'class' already"):
-        rm.cells(rm.gear_pair(), pd.DataFrame({"e": [0.5], "class": ["x"]}), columns=["e"], engine="cpu")
+    with pytest.raises(rm.SceneError, match="has a column 'class', which is a result's name"):
+        # Said before anything is computed: these rows would take minutes.
+        rm.cells(rm.gear_pair(), pd.DataFrame({"e": [0.5] * 1000, "class": "x"}), columns=["e"], **LONG)

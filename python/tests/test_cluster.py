@@ -142,3 +142,13 @@ def test_a_part_of_another_run_ends_it_at_once(client: Any, tmp_path: Path, monk
     with pytest.raises(rm.FolderError, match=r"F.* is 50.0 in the first and 51.0 in the other"):
         rm.map(rm.gear_pair(), e=(0, 1, 8), omega=(1, 12, 8), engine="cpu", client=client, shards=3)
     assert began == [1, 2]
+
+
+def test_a_folder_that_cannot_be_used_is_refused_before_shards_are_computed(client: Any, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    told: list[int] = []
+    with pytest.raises(rm.FolderError, match="the folder is not empty"):
+        rm.map(
+            rm.gear_pair(), **AXES, engine="cpu", client=client, out=tmp_path, progress=lambda done, _: told.append(done)
+        )
+    assert not told

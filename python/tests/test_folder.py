@@ -170,6 +170,13 @@ def mark_unlisted(folder: Path) -> None:
     edit_manifest(folder, files=[])
 
 
+def keep_manifest_alone(folder: Path) -> None:
+    """What is left of a map without the records that other files are made of."""
+    for path in folder.iterdir():
+        if path.name != "manifest.json":
+            path.unlink()
+
+
 SPOILT: list[tuple[Callable[[Path], object], str]] = [
     (shutil.rmtree, "there is no such folder"),
     (lambda folder: (folder / "manifest.json").unlink(), "the run is unfinished: go on with `rattlemap map SCENE --resume`"),
@@ -179,6 +186,7 @@ SPOILT: list[tuple[Callable[[Path], object], str]] = [
     (lambda folder: edit_manifest(folder, shard="3/16"), "`rattlemap merge OUT PART...` makes the map"),
     (mark_unlisted, "outputs.files do not have 'npy'"),
     (lambda folder: (folder / "cells.npy").unlink(), "cells.npy is missing; `rattlemap check"),
+    (keep_manifest_alone, "cells.npy is missing; `rattlemap map SCENE --out "),
     (lambda folder: (folder / "words.csv").unlink(), "words.csv is missing; `rattlemap check"),
     (lambda folder: truncate(folder / "cells.npy"), "cells.npy is damaged"),
 ]

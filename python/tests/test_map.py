@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rattlemap as rm
+import xarray as xr
 from compare import assert_same
 from conftest import SCENES, Program, small
 
@@ -145,6 +147,17 @@ def test_what_is_wrong_is_told_in_the_programs_words(program: Program, tmp_path:
         rm.map(rm.gear_pair(), **SMALL, engine="cpu", precision="f32")
     with pytest.raises(rm.SceneError, match="of memory, and"):
         rm.map(rm.gear_pair(), e=(0, 1, 60_000), omega=(1, 12, 60_000), engine="cpu")
+    with pytest.raises(rm.SceneError, match=r"`e = \['a', 'b'\]`: it must be numbers"):
+        rm.map(rm.gear_pair(), e=["a", "b"], omega=(1, 2, 4))
+    with pytest.raises(rm.SceneError, match="`omega = .*: it must be numbers"):
+        rm.map(rm.gear_pair(), e=(0, 1, 4), omega=np.array([1, 2j]))
+    with pytest.raises(rm.SceneError, match="start.state"):
+        rm.map(rm.gear_pair(), **SMALL, v1="fast")
+    with pytest.raises(rm.EngineError, match='the adapter "": it must be a number or'):
+        rm.map(rm.gear_pair(), **SMALL, engine="gpu", adapter="")
+    for function in (rm.map, rm.basins, rm.bifurcation, rm.orbit):
+        with pytest.raises(TypeError, match=r"'gear-pair' is not a model; rm.gear_pair\(\) is one"):
+            function("gear-pair", **SMALL)
     for kind in (rm.SceneError, rm.ModelError, rm.FolderError):
         assert issubclass(kind, rm.RattlemapError) and issubclass(kind, ValueError)
     assert issubclass(rm.EngineError, rm.RattlemapError) and issubclass(rm.EngineError, RuntimeError)
@@ -175,6 +188,22 @@ def test_ctrl_c_is_heeded_within_a_second_and_what_has_ended_is_kept(tmp_path: P
     assert (tmp_path / "out/records.bin").stat().st_size > 1000
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_process_that_was_forked_computes_too() -> None:
+    code = """
+        import multiprocessing
+        import rattlemap as rm
+        def maps(e):
+            ds = rm.map(rm.gear_pair(), e=(e, 0.9, 3), omega=(5, 6, 2), engine="cpu", progress=False)
+            return ds["lyapunov"].values.tobytes()
+        own = [maps(e) for e in (0.5, 0.6)]
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            print(pool.map(maps, (0.5, 0.6)) == own)
+    """
+    ask = [sys.executable, "-W", "ignore", "-c", textwrap.dedent(code)]
+    assert subprocess.run(ask, capture_output=True, text=True, timeout=60).stdout == "True\n"
+
+
 def test_an_interrupted_map_goes_on(tmp_path: Path) -> None:
     axes = {"e": (0.0, 1.0, 24), "omega": (1.0, 12.0, 24)}
 
@@ -196,6 +225,17 @@ def test_an_interrupted_map_goes_on(tmp_path: Path) -> None:
     whole = rm.map(rm.gear_pair(), **axes, **{**setting, "out": None, "resume": False})
     whole.attrs["resumed_cells"] = made.attrs["resumed_cells"]
     assert_same(made, whole)
+
+
+def test_damage_is_told_when_a_map_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    whole = rm.map(rm.gear_pair(), **SMALL, engine="cpu", out=out)
+    (out / "manifest.json").unlink()
+    records = out / "records.bin"
+    records.write_bytes(records.read_bytes()[:-10])
+    with pytest.warns(RuntimeWarning, match="records.bin: .* what is damaged is dropped"):
+        again = rm.map(rm.gear_pair(), **SMALL, engine="cpu", out=out, resume=True)
+    xr.testing.assert_equal(again, whole)
 
 
 def test_other_threads_run_meanwhile_and_progress_is_told() -> None:

@@ -71,6 +71,8 @@ def test_what_is_wrong_is_told() -> None:
         rm.orbit(rm.gear_pair(), start=[0.0, 1.0])
     with pytest.raises(rm.SceneError, match="from 2 to 10000000"):
         rm.orbit(rm.gear_pair(), periods=1)
+    with pytest.raises(rm.SceneError, match="periods = 2.5: it must be a whole number"):
+        rm.orbit(rm.gear_pair(), periods=2.5)
 
 
 def test_numbers_that_are_absent_are_not_a_number() -> None:
