@@ -26,11 +26,16 @@ class Orbit:
     dimensionless.
     """
 
-    def __init__(self, native: _native.Orbit, model: Model) -> None:
-        self._native = native
-        self._told: dict[str, Any] = json.loads(native.json())
+    def __init__(self, model: Model, transient: int, periods: int, start: list[float] | None) -> None:
+        self._asked = (model, transient, periods, start)
+        self._native = _native.orbit(model._model, [], transient, periods, start)
+        self._told: dict[str, Any] = json.loads(self._native.json())
         self.model = model
         """The model with the values of this orbit."""
+
+    def __reduce__(self) -> tuple[type[Orbit], tuple[Model, int, int, list[float] | None]]:
+        """What it was made from: elsewhere it is computed again, which takes milliseconds and gives the same bits."""
+        return Orbit, self._asked
 
     @property
     def class_(self) -> str:
@@ -227,7 +232,7 @@ def orbit(
             raise SceneError(f"{name} = {value!r}: it must be a whole number from {least} to {most}")
     own = required(model).replace(**parameters)
     state = None if start is None else _state(own, start)
-    return Orbit(_native.orbit(own._model, [], int(transient), int(periods), state), own)
+    return Orbit(own, int(transient), int(periods), state)
 
 
 def _state(model: Model, start: Sequence[float] | Mapping[str, float]) -> list[float]:

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use rattlemap::cli;
@@ -12,13 +13,13 @@ use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
 use rattlemap::map::shard::Shard;
 use rattlemap::map::sweep;
-use rattlemap::output::kept::{self, Kept, Work};
+use rattlemap::output::kept::{self, Kept, KeptError, Work};
 use rattlemap::output::map::Run;
-use rattlemap::output::{Folder, RECORDS};
+use rattlemap::output::{Folder, FolderError};
 use rattlemap::record::Record;
 
 use crate::problem::Problem;
-use crate::waiting::Watch;
+use crate::waiting::{self, Watch};
 
 /// Which engine is asked for.
 ///
@@ -59,9 +60,18 @@ pub(crate) struct Out {
 }
 
 impl Out {
-    /// Opens it.
-    pub(crate) fn open(&self) -> Result<Folder, Problem> {
-        Ok(kept::open_folder(&self.path, self.force, self.resume)?)
+    /// Opens it; waits where a computation of this process, which was left to itself, may still have it.
+    pub(crate) fn open(&self, watch: &Watch) -> Result<Folder, Problem> {
+        loop {
+            match kept::open_folder(&self.path, self.force, self.resume) {
+                Err(KeptError::Folder(FolderError::InUse { .. }))
+                    if waiting::is_anything_left() && !watch.is_halted() =>
+                {
+                    thread::sleep(waiting::TICK);
+                }
+                opened => return Ok(opened?),
+            }
+        }
     }
 }
 
@@ -122,7 +132,9 @@ impl Task {
             _ => self.ask.clone(),
         };
         let chosen = pollster::block_on(engine_choice::open(plan, &ask))?;
-        let Chosen { mut engine, why, warnings, .. } = chosen;
+        let Chosen { mut engine, why, mut warnings, notes } = chosen;
+        // Cards that are left out.
+        warnings.extend(notes);
         let warnings = Arc::new(Mutex::new(warnings));
         let lost = Arc::clone(&warnings);
         engine.listen(move |Loss { adapter, cells, reason }| {
@@ -138,13 +150,9 @@ impl Task {
         let opened =
             folder.map(|folder| Kept::open(folder, &self.scene, &engine, resumes, &mut work)).transpose();
         let mut kept = opened?;
-        if let Some((folder, damage)) = folder.zip(kept.as_ref().and_then(Kept::damage)) {
-            let (path, count) = (folder.path().join(RECORDS), kept.as_ref().map_or(0, Kept::resumed));
-            warnings.lock().unwrap_or_else(PoisonError::into_inner).push(format!(
-                "{}: {damage}; what is damaged is dropped: {count} are kept, the others computed again",
-                path.display()
-            ));
-        }
+        let unit = if plan.start_count() > 1 { "runs" } else { "cells" };
+        let damage = kept.as_ref().and_then(|kept| kept.damage(unit));
+        warnings.lock().unwrap_or_else(PoisonError::into_inner).extend(damage);
         let resumed = kept.as_ref().map_or(0, Kept::resumed);
         let elapsed_before = kept.as_ref().map_or(Duration::ZERO, Kept::elapsed_before);
         let clock = Instant::now();

@@ -71,7 +71,7 @@ pub(crate) fn map<'py>(
 fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
     let plan = Plan::new(&task.scene);
     plan.check()?;
-    let folder = task.out.as_ref().map(Out::open).transpose()?;
+    let folder = task.out.as_ref().map(|out| out.open(watch)).transpose()?;
     let Some(mut integrated) = task.integrate(&plan, folder.as_ref(), watch)? else { return Ok(None) };
     let refined = integrated.work.schedule.finish(&mut integrated.work.records);
     let records = &integrated.work.records;

@@ -34,7 +34,7 @@ pub(crate) fn check_shards(
     force: bool,
 ) -> PyResult<()> {
     let (shard, _) = asked(1, count, engine, precision, adapter)?;
-    cli::fits(&scene.scene, None, Who::Cpu, out.as_deref()).map_err(Problem::from)?;
+    cli::fits_merged(&scene.scene, out.as_deref()).map_err(Problem::from)?;
     let plan = Plan::new(&scene.scene);
     shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?;
     if let Some(out) = out {
@@ -102,7 +102,7 @@ fn compute(task: &Task, shard: Shard, watch: &Watch) -> Result<Option<Vec<String
     shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?;
     plan.check()?;
     let Some(out) = &task.out else { return Ok(None) };
-    let folder = out.open()?;
+    let folder = out.open(watch)?;
     let Some(integrated) = task.integrate(&plan, Some(&folder), watch)? else { return Ok(None) };
     let (device, processor) = (integrated.engine.device(), cli::described_processor());
     let run = integrated.run(task, &device, &processor);
@@ -130,10 +130,10 @@ pub(crate) fn merge<'py>(
 fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Option<Made>, Problem> {
     let parts = Parts::open(parts)?;
     parts.refuse(&out.path)?;
-    cli::fits(parts.scene(), None, Who::Cpu, Some(&out.path))?;
+    cli::fits_merged(parts.scene(), Some(&out.path))?;
     // A run that ended before it kept anything has left nothing else.
     let force = out.force || !Folder::holds_results(&out.path);
-    let folder = Out { force, ..out }.open()?;
+    let folder = Out { force, ..out }.open(watch)?;
     let go_on = |Progress { done, of }| {
         watch.tell(done, of);
         !watch.is_halted()

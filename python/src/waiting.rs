@@ -15,7 +15,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::problem::Problem;
 
 /// How soon a signal is heard.
-const TICK: Duration = Duration::from_millis(50);
+pub(crate) const TICK: Duration = Duration::from_millis(50);
 
 /// How soon `progress` is asked again where there is nothing new: it may want to end the computation.
 const ASKS_AGAIN: Duration = Duration::from_millis(500);
@@ -50,6 +50,25 @@ impl Watch {
 
     fn told(&self) -> (usize, usize) {
         (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
+    }
+}
+
+/// Computations of this process that did not end in time and were left to themselves.
+static LEFT: AtomicUsize = AtomicUsize::new(0);
+
+/// Whether there are any: they have their folders until they end.
+pub(crate) fn is_anything_left() -> bool {
+    LEFT.load(Ordering::SeqCst) > 0
+}
+
+/// Ends with a computation: whoever of it and of those who wait comes second takes it from the count.
+struct Over(Arc<AtomicBool>);
+
+impl Drop for Over {
+    fn drop(&mut self) {
+        if self.0.swap(true, Ordering::SeqCst) {
+            LEFT.fetch_sub(1, Ordering::SeqCst);
+        }
     }
 }
 
@@ -93,10 +112,12 @@ pub(crate) fn run<T: Send + 'static>(
 ) -> PyResult<T> {
     let threads = own_threads()?;
     let watch = Arc::new(Watch::default());
+    let is_left = Arc::new(AtomicBool::new(false));
     let (sender, mut receiver) = mpsc::channel();
     let worker = {
-        let watch = Arc::clone(&watch);
+        let (watch, is_left) = (Arc::clone(&watch), Arc::clone(&is_left));
         thread::Builder::new().name("rattlemap".to_owned()).spawn(move || {
+            let _over = Over(is_left);
             // Nobody listens where it was left to itself.
             let _ = sender.send(match threads {
                 Some(threads) => threads.install(|| work(&watch)),
@@ -133,7 +154,12 @@ pub(crate) fn run<T: Send + 'static>(
                 let Err(panic) = worker.join() else { return Err(PyKeyboardInterrupt::new_err(())) };
                 resume_unwind(panic)
             }
-            (_, Some((error, since))) if is_over || since.elapsed() > ENDS_WITHIN => return Err(error),
+            (_, Some((error, _))) if is_over => return Err(error),
+            (_, Some((error, since))) if since.elapsed() > ENDS_WITHIN => {
+                LEFT.fetch_add(1, Ordering::SeqCst);
+                drop(Over(is_left));
+                return Err(error);
+            }
             (Ok(Ok(Some(made))), None) => return Ok(made),
             (Ok(Ok(None)), None) => return Err(PyKeyboardInterrupt::new_err(())),
             (Ok(Err(problem)), None) => return Err(problem.into()),

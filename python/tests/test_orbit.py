@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,12 @@ def test_a_trajectory_has_the_points_that_are_asked_for() -> None:
     assert len(samples) == 401 and samples["t"].iloc[-1] == pytest.approx(made.forcing_period)
     assert len(path) == 401 + 2 * len(made.events)
     assert "periodic, period 1, word 36" in repr(made)
+
+
+def test_an_orbit_travels_to_other_processes() -> None:
+    made = rm.orbit(rm.gear_pair(), e=0.605, omega=5.6, start={"v1": 1.0})
+    again = pickle.loads(pickle.dumps(made))
+    assert again.to_dict() == made.to_dict() and again.model.parameters == made.model.parameters
 
 
 def test_orbits_of_other_models_and_states_by_name(program: Program) -> None:

@@ -34,9 +34,12 @@ pub(crate) fn check(
     judge(scene, shard, engine, &free).map(|()| free)
 }
 
-/// Refuses a map that is merged and does not fit memory or disk.
-pub(crate) fn check_merged(scene: &Scene, out: &Path) -> Result<(), Failure> {
-    let disk = free_disk(out).map(|free| free.saturating_add(replaced(out)));
+/// Refuses a map that is merged and does not fit this machine's memory or, where it is written to a folder, the disk.
+///
+/// # Errors
+/// [`Failure::Usage`] with what it needs and what is free.
+pub fn fits_merged(scene: &Scene, out: Option<&Path>) -> Result<(), Failure> {
+    let disk = out.and_then(|out| Some(free_disk(out)?.saturating_add(replaced(out))));
     let free = Free { memory: free_memory(), disk };
     judge_size(scene, EngineChoice::Cpu, &free, Size::merged(scene), "use a machine that has as much")
 }

@@ -21,7 +21,7 @@ use crate::map::schedule::Refined;
 use crate::map::sweep::{self, SweepError};
 use crate::output::kept::{self, Kept, Work};
 use crate::output::map::LIST;
-use crate::output::{self, Cells, Folder, RECORDS};
+use crate::output::{self, Cells, Folder};
 use crate::record::Record;
 use crate::record::classify::status;
 use anyhow::anyhow;
@@ -166,12 +166,8 @@ fn open_records<'f>(
     engine: &Engine<'_>,
 ) -> Result<Kept<'f>, Failure> {
     let kept = Kept::open(folder, scene, engine, ask.resume, work)?;
-    if let Some(damage) = kept.damage() {
-        let (path, count, unit) = (folder.path().join(RECORDS), kept.count(), unit(work.plan));
-        say::note(format_args!(
-            "warning: {}: {damage}; what is damaged is dropped: {count} {unit} are kept, the others computed again",
-            path.display()
-        ));
+    if let Some(damage) = kept.damage(unit(work.plan)) {
+        say::note(format_args!("warning: {damage}"));
     } else if ask.resume && kept.count() == 0 && !ask.run.quiet {
         say::note(format_args!(
             "{}: nothing was kept there yet; the map is begun anew",

@@ -19,7 +19,7 @@ pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(ask.quiet)?;
     let parts = Parts::open(&ask.parts).map_err(refused)?;
     parts.refuse(&ask.out).map_err(refused)?;
-    capacity::check_merged(parts.scene(), &ask.out)?;
+    capacity::fits_merged(parts.scene(), Some(&ask.out))?;
     // A run that ended before it kept anything has left nothing else.
     let folder = Folder::open(&ask.out, ask.force || !Folder::holds_results(&ask.out))?;
     folder.refuse_links(output::map::names())?;

@@ -29,7 +29,7 @@ use std::process::ExitCode;
 use arguments::{Bench, Cli, Command, parsed_from};
 
 pub use arguments::parsed;
-pub use capacity::fits;
+pub use capacity::{fits, fits_merged};
 pub use environment::missing_variable;
 pub use error::{Failure, fail_if};
 pub use map::open_engine;

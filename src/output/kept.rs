@@ -7,8 +7,7 @@ use thiserror::Error;
 
 use super::shard::Tally;
 use super::{
-    Damage, Folder, FolderError, Identity, Order, OutputError, RECORDS, RecordFile, RecordFileError, map,
-    unfinished,
+    Folder, FolderError, Identity, Order, OutputError, RECORDS, RecordFile, RecordFileError, map, unfinished,
 };
 use crate::gpu::Precision;
 use crate::map::engine::Engine;
@@ -160,9 +159,13 @@ impl<'f> Kept<'f> {
         self.resumed
     }
 
-    /// What was no good of those, if anything was.
-    pub fn damage(&self) -> Option<&Damage> {
-        self.file.damage()
+    /// What was no good of those, if anything was, in words; `unit` is what is counted: cells or runs.
+    pub fn damage(&self, unit: &str) -> Option<String> {
+        let (path, count, damage) = (self.folder.path().join(RECORDS), self.resumed, self.file.damage()?);
+        Some(format!(
+            "{}: {damage}; what is damaged is dropped: {count} {unit} are kept, the others computed again",
+            path.display()
+        ))
     }
 
     /// Where they are.
