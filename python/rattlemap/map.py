@@ -71,7 +71,7 @@ def map(  # noqa: A001
         A bar of tqdm where that is installed, or a function of (done, total).
     **names
         Two axes, the first keyword is the first axis: a tuple ``(min, max, count)``, both ends included, or an array of
-        increasing values, which are taken exactly. Then values of single parameters, components of the start, and
+        increasing values, which are taken exactly (those of ``np.linspace`` differ from a tuple's in last digits). Then values of single parameters, components of the start, and
         settings of ``[integration]`` such as ``max_period=32``. An axis of a component of the start (``v1=(-2, 2, 64)``)
         makes a map of basins. All quantities are dimensionless.
 
