@@ -8,7 +8,6 @@ mod phase;
 mod stretched;
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use rattlemap::gpu::Constants;
 use rattlemap::map::plan::Plan;
@@ -17,7 +16,7 @@ use rattlemap::map::schedule::Schedule;
 use rattlemap::map::shard::Shard;
 use rattlemap::map::{self, MapError, Processor};
 use rattlemap::model::GearPair;
-use rattlemap::output::map::Run;
+use rattlemap::output::map::{Made, Run};
 use rattlemap::output::merge::{MergeError, Parts};
 use rattlemap::output::shard::{Finished, Tally};
 use rattlemap::output::{
@@ -130,23 +129,8 @@ pub fn write_shards(ask: Ask, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Taken>), 
                 file.append(&batch)?;
                 tally.take(&plan, &batch);
             }
-            let run = Run {
-                sets: &[],
-                engine: "cpu",
-                precision: "f64",
-                device: "event-driven reference",
-                adapter: None,
-                cards: Vec::new(),
-                processor: "none: the records are made up",
-                opening: Duration::ZERO,
-                elapsed: Duration::ZERO,
-                elapsed_before: Duration::ZERO,
-                resumed_cells: 0,
-                lane_grid: None,
-                refined: None,
-                without_effect: Vec::new(),
-                merged: None,
-            };
+            let made = Made { engine: "cpu", precision: "f64", device: "event-driven reference" };
+            let run = Run::new(made, &[], "none: the records are made up");
             shard::write(
                 &folder,
                 &Finished { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally },

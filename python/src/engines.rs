@@ -14,7 +14,7 @@ use rattlemap::map::scene::Scene;
 use rattlemap::map::shard::Shard;
 use rattlemap::map::sweep;
 use rattlemap::output::kept::{self, Kept, KeptError, Work};
-use rattlemap::output::map::Run;
+use rattlemap::output::map::{Made, Run};
 use rattlemap::output::{Folder, FolderError};
 use rattlemap::record::Record;
 
@@ -92,22 +92,13 @@ pub(crate) struct Integrated<'p> {
 impl Integrated<'_> {
     /// Who computed them and in what time.
     pub(crate) fn run<'a>(&self, task: &'a Task, device: &'a str, processor: &'a str) -> Run<'a> {
+        let made = Made { engine: self.engine.name(), precision: self.engine.precision(), device };
         Run {
-            sets: &task.sets,
-            engine: self.engine.name(),
-            precision: self.engine.precision(),
-            device,
-            adapter: self.engine.adapter(),
-            cards: self.engine.cards(),
-            processor,
             opening: self.opening,
             elapsed: self.elapsed,
             elapsed_before: self.elapsed_before,
             resumed_cells: self.resumed,
-            lane_grid: self.engine.steps_per_period(),
-            refined: None,
-            without_effect: Vec::new(),
-            merged: None,
+            ..Run::new(made, &task.sets, processor).on(&self.engine)
         }
     }
 }

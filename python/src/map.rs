@@ -6,10 +6,10 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rattlemap::cli;
+use rattlemap::map::effect;
 use rattlemap::map::plan::Plan;
-use rattlemap::map::{attractors, coexistence, effect};
 use rattlemap::output::map::Run;
-use rattlemap::output::{self, Cells, in_memory};
+use rattlemap::output::{self, Cells, Survey, in_memory};
 
 use crate::arrays::columns;
 use crate::engines::{Out, Task, ask};
@@ -75,16 +75,10 @@ fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
     let Some(mut integrated) = task.integrate(&plan, folder.as_ref(), watch)? else { return Ok(None) };
     let refined = integrated.work.schedule.finish(&mut integrated.work.records);
     let records = &integrated.work.records;
-    let attractors = coexistence::attractors(&plan, records);
-    let filled_from = refined.as_ref().map_or(&[][..], |refined| &refined.filled_from);
-    let basins = attractors::basins(&plan, records, filled_from);
-    let cells = Cells::new(&task.scene, &plan, records)
-        .counting(attractors.as_deref())
-        .in_basins(basins.as_ref())
-        .refined(refined.as_ref());
+    let survey = Survey::of(&plan, records, refined);
+    let cells = Cells::new(&task.scene, &plan, records).surveyed(&survey);
     let (device, processor) = (integrated.engine.device(), cli::described_processor());
     let run = Run {
-        refined: refined.clone(),
         without_effect: effect::names(&plan, records, integrated.engine.precision()),
         ..integrated.run(task, &device, &processor)
     };

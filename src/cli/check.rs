@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use crate::map::attractors;
-use crate::map::coexistence;
+use crate::output::Survey;
 use crate::output::inventory::{FileEntry, Finding};
 use crate::output::manifest::MANIFEST;
 use crate::output::map::{LIST, VALIDATION, repair};
@@ -14,7 +13,6 @@ use serde_json::Value;
 use crate::cli::arguments::Check;
 use crate::cli::error::Failure;
 use crate::cli::finished_map::{self, Manifest, check_files, told};
-use crate::cli::map::filled_from;
 use crate::cli::say;
 
 /// The command whose folders can be mended.
@@ -120,12 +118,8 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
     let finished = manifest.scene(dir)?;
     let plan = finished.plan()?;
     let (records, refined) = finished.records(&plan)?;
-    let attractors = coexistence::attractors(&plan, &records);
-    let basins = attractors::basins(&plan, &records, filled_from(refined.as_ref()));
-    let cells = Cells::new(&finished.scene, &plan, &records)
-        .counting(attractors.as_deref())
-        .in_basins(basins.as_ref())
-        .refined(refined.as_ref());
+    let survey = Survey::of(&plan, &records, refined);
+    let cells = Cells::new(&finished.scene, &plan, &records).surveyed(&survey);
     let has_validation =
         manifest.files.iter().any(|file| file.name == VALIDATION) && !lost.contains(&VALIDATION);
     let made = repair(folder, &cells, &lost, has_validation)?;

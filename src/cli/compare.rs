@@ -16,7 +16,7 @@ use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::output::compare::{Compared, MapSide};
 use crate::output::map::Made;
-use crate::output::{self, Cells, Folder};
+use crate::output::{self, Cells, Folder, Survey};
 
 /// Reads both, compares, writes.
 pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
@@ -55,9 +55,10 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         has_exponents: scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
     });
     let comparison = compare(of_a, of_b);
+    let surveys = [refined_a, refined_b].map(Survey::of_refinement);
     let cells = [
-        Cells::new(scenes[0], &plans[0], &a).refined(refined_a.as_ref()),
-        Cells::new(scenes[1], &plans[1], &b).refined(refined_b.as_ref()),
+        Cells::new(scenes[0], &plans[0], &a).surveyed(&surveys[0]),
+        Cells::new(scenes[1], &plans[1], &b).surveyed(&surveys[1]),
     ];
     let side = |i: usize| {
         let Manifest { engine, precision, device, crate_version, commit, .. } = &manifests[i];

@@ -10,18 +10,15 @@ mod summary;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::map::attractors;
-use crate::map::coexistence;
 use crate::map::effect;
 use crate::map::engine::{Engine, Loss};
 use crate::map::engine_choice::{self, Ask, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
-use crate::map::schedule::Refined;
 use crate::map::sweep::{self, SweepError};
 use crate::output::kept::{self, Kept, Work};
-use crate::output::map::LIST;
-use crate::output::{self, Cells, Folder};
+use crate::output::map::{LIST, Made, Run};
+use crate::output::{self, Cells, Folder, Survey};
 use crate::record::Record;
 use crate::record::classify::status;
 use anyhow::anyhow;
@@ -99,31 +96,17 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let Work { schedule, mut records, .. } = work;
     let refined = schedule.finish(&mut records);
     let elapsed = kept.elapsed();
-    let attractors = coexistence::attractors(&plan, &records);
-    let basins = attractors::basins(&plan, &records, filled_from(refined.as_ref()));
-    let cells = Cells::new(&scene, &plan, &records)
-        .counting(attractors.as_deref())
-        .in_basins(basins.as_ref())
-        .refined(refined.as_ref());
-    let (device, lane_steps) = (engine.device(), engine.lane_steps());
-    let (adapter, cards) = (engine.adapter(), engine.cards());
-    let (engine, precision) = (engine.name(), engine.precision());
-    let run = output::map::Run {
-        sets: &ask.run.set,
-        engine,
-        precision,
-        device: &device,
-        adapter,
-        cards,
-        processor: &processor::described(),
+    let survey = Survey::of(&plan, &records, refined);
+    let cells = Cells::new(&scene, &plan, &records).surveyed(&survey);
+    let (device, processor, lane_steps) = (engine.device(), processor::described(), engine.lane_steps());
+    let made = Made { engine: engine.name(), precision: engine.precision(), device: &device };
+    let run = Run {
         opening,
         elapsed,
         elapsed_before: kept.elapsed_before(),
         resumed_cells,
-        lane_grid,
-        refined: refined.clone(),
-        without_effect: effect::names(&plan, &records, precision),
-        merged: None,
+        without_effect: effect::names(&plan, &records, made.precision),
+        ..Run::new(made, &ask.run.set, &processor).on(&engine)
     };
     let written = Instant::now();
     let files = output::map::write(&folder, &cells, &run)?;
@@ -150,11 +133,6 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
 fn engine_of(ask: &Map, folder: &Path) -> Ask {
     let asked = ask.engine.ask();
     if ask.resume { kept::engine_of(asked, folder) } else { asked }
-}
-
-/// For every cell of an adaptive map of basins the one that it was filled from.
-pub(crate) fn filled_from(refined: Option<&Refined>) -> &[u32] {
-    refined.map_or(&[], |refined| &refined.filled_from)
 }
 
 /// The record file, and what it holds already, by run.

@@ -6,9 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use crate::gpu::{self, AdapterChoice, Gpu, Precision};
-use crate::map::attractors;
-use crate::map::coexistence;
 use crate::map::plan::Plan;
+use crate::output::Survey;
 use crate::output::inventory::Finding;
 use crate::output::map::{MANIFEST, Made, write_validation};
 use crate::output::{self, Cells, Folder};
@@ -21,7 +20,6 @@ use crate::cli::arguments::Validate;
 use crate::cli::error::Failure;
 use crate::cli::finished_map::{self, Manifest};
 use crate::cli::interrupt::Interrupt;
-use crate::cli::map::filled_from;
 use crate::cli::progress::Progress;
 use crate::cli::say;
 
@@ -46,7 +44,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         precision: precision(&manifest).map_err(Failure::Usage)?,
         is_lane: manifest.engine == "gpu",
     };
-    let basins = attractors::basins(&plan, &records, filled_from(refined.as_ref()));
+    let survey = Survey::of(&plan, &records, refined);
     let sample = validate::sample(&plan, &records, ask.samples as usize, ask.seed);
     let count = sample.ids().len();
     let tell = |what: &str| (!ask.quiet).then(|| say::note(format_args!("{what}")));
@@ -72,13 +70,9 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         progress.report(done, count);
     };
     let replay =
-        validate::replay_until(&subject, basins.as_ref(), &sample, &lanes, &report, interrupt.raised());
+        validate::replay_until(&subject, survey.basins(), &sample, &lanes, &report, interrupt.raised());
     let Some(validation) = replay else { return Err(interrupted(replayed.into_inner())) };
-    let attractors = coexistence::attractors(&plan, &records);
-    let cells = Cells::new(scene, &plan, &records)
-        .counting(attractors.as_deref())
-        .in_basins(basins.as_ref())
-        .refined(refined.as_ref());
+    let cells = Cells::new(scene, &plan, &records).surveyed(&survey);
     let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let device = lanes.device.as_deref();
     let files = write_validation(&folder, &cells, &made, device, &validation, clock.elapsed())?;

@@ -1,6 +1,7 @@
 //! A finished map as rows: the one view that tables, figures and reports are made from.
 
-use crate::map::attractors::{Basins, NONE};
+use crate::map::attractors::{self, Basins, NONE};
+use crate::map::coexistence;
 use crate::map::plan::Plan;
 use crate::map::scene::{Continuous, Quantity, Scene};
 use crate::map::schedule::Refined;
@@ -41,15 +42,44 @@ pub(super) struct Row {
     pub(super) attractor: Option<u16>,
 }
 
+/// What only all records of a map together tell.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    /// Attractors found per cell, by id, where cells have several starts.
+    attractors: Option<Vec<u8>>,
+    basins: Option<Basins>,
+    refined: Option<Refined>,
+}
+
+impl Survey {
+    /// Surveys a map whose last record has come; `refined` is what became of an adaptive one.
+    ///
+    /// # Panics
+    /// If there are not as many records as runs.
+    pub fn of(plan: &Plan, records: &(impl Records + ?Sized), refined: Option<Refined>) -> Survey {
+        let filled_from = refined.as_ref().map_or(&[][..], |refined| &refined.filled_from);
+        let basins = attractors::basins(plan, records, filled_from);
+        Survey { attractors: coexistence::attractors(plan, records), basins, refined }
+    }
+
+    /// What became of an adaptive map, and nothing else: for who does not ask for attractors.
+    pub fn of_refinement(refined: Option<Refined>) -> Survey {
+        Survey { attractors: None, basins: None, refined }
+    }
+
+    /// The basins of a map that has them.
+    pub fn basins(&self) -> Option<&Basins> {
+        self.basins.as_ref()
+    }
+}
+
 /// A scene, its plan, and one record per run; what is shown of a cell is its first run.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells<'a> {
     scene: &'a Scene,
     plan: &'a Plan,
     records: &'a dyn Records,
-    attractors: Option<&'a [u8]>,
-    basins: Option<&'a Basins>,
-    refined: Option<&'a Refined>,
+    survey: Option<&'a Survey>,
 }
 
 impl<'a> Cells<'a> {
@@ -59,32 +89,18 @@ impl<'a> Cells<'a> {
     /// If there are not as many records as runs.
     pub fn new(scene: &'a Scene, plan: &'a Plan, records: &'a dyn Records) -> Cells<'a> {
         assert_eq!(plan.run_count(), records.count(), "one record per run");
-        Cells { scene, plan, records, attractors: None, basins: None, refined: None }
+        Cells { scene, plan, records, survey: None }
     }
 
-    /// The same with what became of an adaptive map.
-    pub fn refined(self, refined: Option<&'a Refined>) -> Cells<'a> {
-        Cells { refined, ..self }
-    }
-
-    pub(super) fn refinement(&self) -> Option<&'a Refined> {
-        self.refined
-    }
-
-    /// The same with the number of attractors found per cell, by id.
-    ///
-    /// # Panics
-    /// If there are not as many numbers as cells.
+    /// The same with what all records together tell.
     #[must_use]
-    pub fn counting(self, attractors: Option<&'a [u8]>) -> Cells<'a> {
-        assert!(attractors.is_none_or(|list| list.len() == self.plan.cell_count()), "one number per cell");
-        Cells { attractors, ..self }
+    pub fn surveyed(self, survey: &'a Survey) -> Cells<'a> {
+        Cells { survey: Some(survey), ..self }
     }
 
-    /// The same with the basin of every cell.
-    #[must_use]
-    pub fn in_basins(self, basins: Option<&'a Basins>) -> Cells<'a> {
-        Cells { basins, ..self }
+    /// What became of an adaptive map.
+    pub fn refinement(&self) -> Option<&'a Refined> {
+        self.survey?.refined.as_ref()
     }
 
     /// Cells along the two axes; a list is one row.
@@ -133,12 +149,12 @@ impl<'a> Cells<'a> {
 
     /// Attractors found per cell, by id, if they were counted.
     pub(super) fn attractors(&self) -> Option<&'a [u8]> {
-        self.attractors
+        self.survey?.attractors.as_deref()
     }
 
     /// The basins of a map that has them.
     pub(super) fn basins(&self) -> Option<&'a Basins> {
-        self.basins
+        self.survey?.basins.as_ref()
     }
 
     /// The state in which the run `id` starts.
@@ -204,9 +220,9 @@ impl<'a> Cells<'a> {
             status: status(record),
             periods_run: record.periods_run,
             source: if is_filled { Source::Filled } else { Source::Integrated },
-            attractors: self.attractors.and_then(|list| list.get(id).copied()),
+            attractors: self.attractors().and_then(|list| list.get(id).copied()),
             attractor: self
-                .basins
+                .basins()
                 .and_then(|basins| basins.labels().get(id).copied())
                 .filter(|&label| label != NONE),
         }

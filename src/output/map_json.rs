@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::cells::Cells;
-use super::map_manifest::{AdaptersObject, BasinObject, RefinementObject, Run, basins, statuses, tally};
+use super::map_manifest::{BasinObject, MadeObject, RefinementObject, Run, basins, statuses, tally};
 use super::{OutputError, names};
 use crate::map::plan::count_classes;
 
@@ -17,11 +17,8 @@ struct MapObject<'a> {
     /// As it was named.
     folder: String,
     files: &'a [String],
-    engine: &'a str,
-    precision: &'a str,
-    device: &'a str,
     #[serde(flatten)]
-    adapters: AdaptersObject<'a>,
+    made: MadeObject<'a>,
     /// Of so many it was merged.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<u32>,
@@ -85,10 +82,7 @@ pub(super) fn object(
     let object = MapObject {
         folder: folder.to_string_lossy().into_owned(),
         files,
-        engine: run.engine,
-        precision: run.precision,
-        device: run.device,
-        adapters: AdaptersObject::of(run),
+        made: MadeObject::of(run),
         shards: run.merged.map(|merged| merged.shards),
         cells: cells.counts().iter().product(),
         runs: cells.runs(),
@@ -96,7 +90,7 @@ pub(super) fn object(
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
         basins: basins(cells),
-        refinement: run.refined.as_ref().map(RefinementObject::from),
+        refinement: cells.refinement().map(RefinementObject::from),
         periods: cells.periods(),
         without_effect: &run.without_effect,
         resumed: ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() },

@@ -15,7 +15,7 @@ use super::parameters::Parameters;
 use super::record_file::Identity;
 use crate::gpu::AdapterId;
 use crate::map::attractors::Attractor;
-use crate::map::engine::CardReport;
+use crate::map::engine::{CardReport, Engine};
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
 use crate::map::schedule::{Audit, Deviation, Refined};
@@ -37,12 +37,8 @@ pub struct Made<'a> {
 pub struct Run<'a> {
     /// The `--set` arguments.
     pub sets: &'a [String],
-    /// The engine's name.
-    pub engine: &'a str,
-    /// Its precision.
-    pub precision: &'a str,
-    /// What it ran on.
-    pub device: &'a str,
+    /// Who computed it.
+    pub made: Made<'a>,
     /// The graphics adapter, where one was at work.
     pub adapter: Option<AdapterId>,
     /// What each card did, where several were at work.
@@ -59,12 +55,37 @@ pub struct Run<'a> {
     pub resumed_cells: usize,
     /// The least and the most free steps that lanes take per forcing period; none where there is no grid.
     pub lane_grid: Option<[u32; 2]>,
-    /// How an adaptive map went.
-    pub refined: Option<Refined>,
     /// Swept parameters that changed nothing that was measured.
     pub without_effect: Vec<String>,
     /// Of what it was merged, if it was.
     pub merged: Option<Merged<'a>>,
+}
+
+impl<'a> Run<'a> {
+    /// A run of which no more is known, in no time.
+    pub fn new(made: Made<'a>, sets: &'a [String], processor: &'a str) -> Run<'a> {
+        Run {
+            sets,
+            made,
+            adapter: None,
+            cards: Vec::new(),
+            processor,
+            opening: Duration::ZERO,
+            elapsed: Duration::ZERO,
+            elapsed_before: Duration::ZERO,
+            resumed_cells: 0,
+            lane_grid: None,
+            without_effect: Vec::new(),
+            merged: None,
+        }
+    }
+
+    /// The same by an engine that is still there: on which adapters, by which grid.
+    #[must_use]
+    pub fn on(self, engine: &Engine<'_>) -> Run<'a> {
+        let (adapter, cards, lane_grid) = (engine.adapter(), engine.cards(), engine.steps_per_period());
+        Run { adapter, cards, lane_grid, ..self }
+    }
 }
 
 /// Shards of which a map was merged, and what computed their records.
@@ -83,11 +104,8 @@ pub struct Merged<'a> {
 pub(super) struct Manifest<'a> {
     #[serde(flatten)]
     head: Head,
-    engine: &'a str,
-    precision: &'a str,
-    device: &'a str,
     #[serde(flatten)]
-    adapters: AdaptersObject<'a>,
+    made: MadeObject<'a>,
     /// Of the host.
     processor: &'a str,
     /// A hash of the sources that decide what records hold, and what they were compiled for.
@@ -131,18 +149,25 @@ pub(super) struct Manifest<'a> {
     files: &'a [FileEntry],
 }
 
-/// On which adapters a map was computed: one or several.
+/// Who computed a map; on graphics adapters on which, one or several.
 #[derive(Serialize)]
-pub(super) struct AdaptersObject<'a> {
+pub(super) struct MadeObject<'a> {
+    engine: &'a str,
+    precision: &'a str,
+    device: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     adapter: Option<AdapterObject<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cards: Vec<CardObject<'a>>,
 }
 
-impl<'a> AdaptersObject<'a> {
-    pub(super) fn of(run: &'a Run<'_>) -> AdaptersObject<'a> {
-        AdaptersObject {
+impl<'a> MadeObject<'a> {
+    pub(super) fn of(run: &'a Run<'_>) -> MadeObject<'a> {
+        let Made { engine, precision, device } = run.made;
+        MadeObject {
+            engine,
+            precision,
+            device,
             adapter: run.adapter.as_ref().map(AdapterObject::from),
             cards: run.cards.iter().map(CardObject::from).collect(),
         }
@@ -360,10 +385,7 @@ pub(super) fn map<'a>(
     let scene = cells.scene();
     Manifest {
         head: Head::of("map"),
-        engine: run.engine,
-        precision: run.precision,
-        device: run.device,
-        adapters: AdaptersObject::of(run),
+        made: MadeObject::of(run),
         processor: run.processor,
         sources: run.merged.map_or(Identity::own_sources(), |merged| merged.sources),
         target: run.merged.map_or(Identity::own_target(), |merged| merged.target),
@@ -389,7 +411,7 @@ pub(super) fn map<'a>(
         codes: codes(),
         elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,
-        refinement: run.refined.as_ref().map(RefinementObject::from),
+        refinement: cells.refinement().map(RefinementObject::from),
         timings: TimingsObject {
             open: run.opening.as_secs_f64(),
             integrate: (run.elapsed_before + run.elapsed).as_secs_f64(),

@@ -36,12 +36,14 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use super::map::{self, Merged as Origin, Run};
-use super::{Cells, Folder, Identity, OutputError, RECORDS, RecordFile, in_memory, map_json, unfinished};
+use super::map::{self, Made, Merged as Origin, Run};
+use super::{
+    Cells, Folder, Identity, OutputError, RECORDS, RecordFile, Survey, in_memory, map_json, unfinished,
+};
+use crate::map::effect;
 use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
-use crate::map::{attractors, coexistence, effect};
 use crate::record::{Record, RecordStore, Records};
 use part::{Begun, Part, Seen};
 
@@ -380,33 +382,22 @@ impl Gathered {
     ) -> Result<T, MergeError> {
         let Gathered { parts, plan, records, .. } = self;
         let first = &parts.parts[0].manifest;
-        let attractors = coexistence::attractors(plan, records);
-        let basins = attractors::basins(plan, records, &[]);
-        let cells = Cells::new(&parts.scene, plan, records)
-            .counting(attractors.as_deref())
-            .in_basins(basins.as_ref());
+        let survey = Survey::of(plan, records, None);
+        let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
         let processor = parts.processors();
+        let made = Made { engine: &first.engine, precision: &first.precision, device: &first.device };
+        // Adapters and cards are told by each part's own manifest.
         let run = Run {
-            sets: &first.set,
-            engine: &first.engine,
-            precision: &first.precision,
-            device: &first.device,
-            // Each part's manifest has its own.
-            adapter: None,
-            cards: Vec::new(),
-            processor: &processor,
             opening: parts.sum(|part| part.manifest.timings.open),
             elapsed: parts.elapsed(),
-            elapsed_before: Duration::ZERO,
-            resumed_cells: 0,
             lane_grid: parts.lane_grid(),
-            refined: None,
-            without_effect: effect::names(plan, records, &first.precision),
+            without_effect: effect::names(plan, records, made.precision),
             merged: Some(Origin {
                 shards: parts.parts[0].shard.count(),
                 sources: &first.sources,
                 target: &first.target,
             }),
+            ..Run::new(made, &first.set, &processor)
         };
         Ok(take(&cells, &run)?)
     }

@@ -51,7 +51,7 @@ mod words;
 mod words_csv;
 
 pub use cell_columns::Values;
-pub use cells::Cells;
+pub use cells::{Cells, Survey};
 pub use error::{DrawError, FigureError, OutputError, WriteError};
 pub use folder::{Folder, FolderError};
 pub use record_file::{Damage, Extent, Identity, Order, RECORDS, RecordFile, RecordFileError};

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::inventory::{self, FileEntry};
 use super::manifest::{AxisObject, Head, MANIFEST, ModelObject, StartObject, start};
 use super::map::{self, Run};
-use super::map_manifest::{AdaptersObject, IntegrationObject, ListObject, TimingsObject, integration};
+use super::map_manifest::{IntegrationObject, ListObject, MadeObject, TimingsObject, integration};
 use super::record_file::Identity;
 use super::{Folder, OutputError, RECORDS, names, unfinished};
 use crate::map::plan::Plan;
@@ -78,11 +78,8 @@ struct Manifest<'a> {
     #[serde(flatten)]
     head: Head,
     shard: Shard,
-    engine: &'a str,
-    precision: &'a str,
-    device: &'a str,
     #[serde(flatten)]
-    adapters: AdaptersObject<'a>,
+    made: MadeObject<'a>,
     processor: &'a str,
     sources: &'static str,
     target: &'static str,
@@ -131,10 +128,7 @@ fn manifest<'a>(finished: &Finished<'a>, writing: Duration, files: &'a [FileEntr
     Manifest {
         head: Head::of("map"),
         shard,
-        engine: run.engine,
-        precision: run.precision,
-        device: run.device,
-        adapters: AdaptersObject::of(run),
+        made: MadeObject::of(run),
         processor: run.processor,
         sources: Identity::own_sources(),
         target: Identity::own_target(),
@@ -168,11 +162,8 @@ struct Object<'a> {
     folder: String,
     files: &'a [String],
     shard: Shard,
-    engine: &'a str,
-    precision: &'a str,
-    device: &'a str,
     #[serde(flatten)]
-    adapters: AdaptersObject<'a>,
+    made: MadeObject<'a>,
     cells: usize,
     runs: usize,
     classes: BTreeMap<&'static str, usize>,
@@ -204,10 +195,7 @@ pub fn print(folder: &Path, files: &[String], finished: &Finished<'_>) -> Result
         folder: folder.to_string_lossy().into_owned(),
         files,
         shard,
-        engine: run.engine,
-        precision: run.precision,
-        device: run.device,
-        adapters: AdaptersObject::of(run),
+        made: MadeObject::of(run),
         cells: plan.cell_count(),
         runs: shard.run_count(plan),
         classes: tally.classes(),

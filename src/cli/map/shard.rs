@@ -19,8 +19,9 @@ use crate::map::shard::Shard;
 use crate::map::sweep;
 use crate::output::inventory::{self, Finding};
 use crate::output::kept::{Kept, Work, order};
+use crate::output::map::{Made, Run};
 use crate::output::shard::{self, Finished, Tally};
-use crate::output::{self, Identity, RECORDS, RecordFile};
+use crate::output::{Identity, RECORDS, RecordFile};
 use crate::record::Record;
 
 /// Refuses to leave the engine open: two machines could choose two, whose parts make no map.
@@ -109,23 +110,14 @@ pub(super) fn finish(
     progress: &Progress,
 ) -> Result<(), Failure> {
     let &Ended { shard, opening, kept, tally } = ended;
-    let (device, elapsed) = (engine.device(), kept.elapsed());
-    let run = output::map::Run {
-        sets: &ask.run.set,
-        engine: engine.name(),
-        precision: engine.precision(),
-        device: &device,
-        adapter: engine.adapter(),
-        cards: engine.cards(),
-        processor: &processor::described(),
+    let (device, processor, elapsed) = (engine.device(), processor::described(), kept.elapsed());
+    let made = Made { engine: engine.name(), precision: engine.precision(), device: &device };
+    let run = Run {
         opening,
         elapsed,
         elapsed_before: kept.elapsed_before(),
         resumed_cells: kept.resumed(),
-        lane_grid: engine.steps_per_period(),
-        refined: None,
-        without_effect: Vec::new(),
-        merged: None,
+        ..Run::new(made, &ask.run.set, &processor).on(engine)
     };
     let finished = Finished { shard, scene, plan, run: &run, tally };
     let files = shard::write(kept.folder(), &finished)?;
@@ -155,8 +147,8 @@ fn told(finished: &Finished<'_>, folder: &Path, files: &[String]) -> String {
          {}{periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed\n\
          {}: {}; the map is made of all {} shards by `rattlemap merge OUT PART...`",
         plan.run_count(),
-        run.engine,
-        run.precision,
+        run.made.engine,
+        run.made.precision,
         (count - run.resumed_cells) as f64 / seconds,
         summary::by_card(&run.cards, unit),
         say::path(folder),

@@ -15,7 +15,7 @@ pub(super) fn summary(
 ) -> String {
     let (count, [columns, rows]) = (cells.runs(), cells.counts());
     let unit = if count > columns * rows { "runs" } else { "cells" };
-    let integrated = run.refined.as_ref().map_or(count, |refined| refined.integrated);
+    let integrated = cells.refinement().map_or(count, |refined| refined.integrated);
     let integrating = run.elapsed.as_secs_f64().max(1e-9);
     let here = (integrated - run.resumed_cells) as f64;
     let periods = cells.periods() as f64 * here / integrated as f64;
@@ -27,14 +27,14 @@ pub(super) fn summary(
     let per_step = lane_steps.filter(|&steps| steps > 0).map_or(String::new(), |steps| {
         format!(", {} ns per step", rounded(1e9 * integrating / steps as f64))
     });
-    let refined = run.refined.as_ref().map_or(String::new(), |refined| refinement(refined, count));
+    let refined = cells.refinement().map_or(String::new(), |refined| refinement(refined, count));
     let cards = by_card(&run.cards, unit);
     format!(
         "{integrated} {unit}{resumed} in {integrating:.3} s on {} ({}): {:.0} {unit}/s, {:.0} forcing periods/s\
          {per_step}; files written in {:.3} s\n{cards}{refined}\
          {periodic} periodic, {chaotic} chaotic, {undecided} undecided, {failed} failed",
-        run.engine,
-        run.precision,
+        run.made.engine,
+        run.made.precision,
         here / integrating,
         periods / integrating,
         seconds - integrating,

@@ -203,23 +203,13 @@ impl<'a> Bench<'a> {
         run.times.prepare += planned;
         let clock = Instant::now();
         let cells = Cells::new(scene, &plan, &records);
-        let made = map::Run {
-            sets: &[],
+        let made = map::Made {
             engine: self.engine.name(),
             precision: self.engine.precision(),
             device: self.engine.device(),
-            processor: "",
-            elapsed: Duration::from_secs_f64(run.times.running()),
-            opening: Duration::ZERO,
-            elapsed_before: Duration::ZERO,
-            adapter: None,
-            cards: Vec::new(),
-            resumed_cells: 0,
-            lane_grid: None,
-            refined: None,
-            without_effect: Vec::new(),
-            merged: None,
         };
+        let elapsed = Duration::from_secs_f64(run.times.running());
+        let made = map::Run { elapsed, ..map::Run::new(made, &[], "") };
         map::write(self.folder, &cells, &made)?;
         run.times.write = clock.elapsed().as_secs_f64();
         map::clear(self.folder)?;
