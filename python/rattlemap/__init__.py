@@ -20,6 +20,7 @@ from .folder import open  # noqa: A004, E402
 from .map import map  # noqa: A004, E402
 from .model import Model, gear_pair, load_model  # noqa: E402
 from .orbit import Orbit, orbit  # noqa: E402
+from .plot import plot  # noqa: E402
 
 __all__ = [
     "EngineError",
@@ -38,6 +39,7 @@ __all__ = [
     "map",
     "open",
     "orbit",
+    "plot",
 ]
 
 __version__: str = _native.__version__

@@ -14,6 +14,9 @@ TARGET: str
 _Tell = Callable[[int, int], object] | None
 
 def main(arguments: Sequence[str]) -> int: ...
+_Color = tuple[int, int, int]
+
+def colors() -> tuple[dict[str, _Color], list[_Color]]: ...
 def missing_variable() -> tuple[str, str] | None: ...
 
 class Model:

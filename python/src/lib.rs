@@ -23,7 +23,7 @@ mod _native {
     #[pymodule_export]
     use super::{
         bifurcation::bifurcation,
-        map::map,
+        map::{colors, map},
         model::Model,
         orbit::{Orbit, orbit},
         program::{main, missing_variable},

@@ -1,5 +1,6 @@
 //! Maps: what `rattlemap map` computes, handed back as columns and, where asked for, written to a folder, too.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -92,4 +93,15 @@ fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
         warnings: integrated.warnings,
         files,
     }))
+}
+
+/// Colours of the program's figures, red, green and blue: by name, and of things in a row.
+#[pyfunction]
+pub(crate) fn colors() -> (BTreeMap<&'static str, (u8, u8, u8)>, Vec<(u8, u8, u8)>) {
+    let (named, row) = in_memory::colors();
+    let parts = |[red, green, blue]: [u8; 3]| (red, green, blue);
+    (
+        named.into_iter().map(|(name, color)| (name, parts(color))).collect(),
+        row.into_iter().map(parts).collect(),
+    )
 }

@@ -8,7 +8,7 @@ use super::cell_columns::{self, Values};
 use super::map_manifest::{self, Run};
 use super::words_csv::Rows;
 use super::{
-    Cells, OutputError, WriteError, attractors_csv, bifurcation_columns_csv, bifurcation_csv, words,
+    Cells, OutputError, WriteError, attractors_csv, bifurcation_columns_csv, bifurcation_csv, layers, words,
 };
 use crate::map::bifurcation::Column;
 use crate::map::scene::Scene;
@@ -41,6 +41,11 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
         texts: rows.texts(),
         attractors,
     })
+}
+
+/// Colours of the program's figures, red, green and blue: by name, and of things in a row.
+pub fn colors() -> ([(&'static str, [u8; 3]); 7], Vec<[u8; 3]>) {
+    layers::shared_colors()
 }
 
 /// A bifurcation diagram as its folder would have it.

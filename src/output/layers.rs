@@ -21,6 +21,21 @@ use crate::map::scene::Quantity;
 use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
 
+/// Colours that figures of other programs share with those of this one: by name, and of things in a row, the most common
+/// one left out.
+pub(super) fn shared_colors() -> ([(&'static str, Color); 7], Vec<Color>) {
+    let named = [
+        ("commonest", words::COMMONEST),
+        ("period 1", colors::SYMMETRIC),
+        ("without events", words::WITHOUT_EVENTS),
+        ("chaotic", words::NOT_PERIODIC),
+        ("undecided", colors::UNDECIDED),
+        ("failed", colors::FAILED),
+        ("rare", words::RARE),
+    ];
+    (named, (1..64).map(colors::distinct).collect())
+}
+
 /// One view of a map.
 #[derive(Clone, Debug)]
 pub(super) struct Layer {

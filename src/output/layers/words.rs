@@ -15,12 +15,12 @@ const NONE: u8 = 1;
 const UNFILLED: u8 = 2;
 const FIRST_WORD: u8 = 3;
 
-const WITHOUT_EVENTS: Color = [0xf2, 0xf2, 0xf2];
-const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
-const RARE: Color = [0x5a, 0x5a, 0x5a];
+pub(super) const WITHOUT_EVENTS: Color = [0xf2, 0xf2, 0xf2];
+pub(super) const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
+pub(super) const RARE: Color = [0x5a, 0x5a, 0x5a];
 const NOT_KNOWN: Color = [0xc4, 0xc4, 0xc4];
 /// As dark as chaos, which most of it is.
-const NOT_PERIODIC: Color = [0x2a, 0x2a, 0x2a];
+pub(super) const NOT_PERIODIC: Color = [0x2a, 0x2a, 0x2a];
 
 /// What a layer of words is called.
 struct Named {
