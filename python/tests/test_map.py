@@ -188,6 +188,27 @@ def test_ctrl_c_is_heeded_within_a_second_and_what_has_ended_is_kept(tmp_path: P
     assert (tmp_path / "out/records.bin").stat().st_size > 1000
 
 
+def test_a_folder_is_waited_for_where_a_driver_still_compiles(tmp_path: Path) -> None:
+    code = f"""
+        import _thread, threading, time
+        import rattlemap as rm
+        ask = dict(e=(0.4, 0.6, 3), omega=(5, 6, 2), engine="gpu", progress=False)
+        ask |= dict(quantities=["impacts"], out={str(tmp_path / "out")!r})
+        threading.Timer(1.5, _thread.interrupt_main).start()
+        try:
+            rm.map(rm.gear_pair(), **ask)
+            print("compiled before it was interrupted")
+        except KeyboardInterrupt:
+            print(rm.map(rm.gear_pair(), **ask, resume=True).sizes)
+    """
+    ask = [sys.executable, "-W", "ignore", "-c", textwrap.dedent(code)]
+    # Nothing that was compiled before.
+    cold = {**os.environ, "MESA_SHADER_CACHE_DIR": str(tmp_path / "shaders")}
+    done = subprocess.run(ask, capture_output=True, text=True, timeout=120, env=cold)
+    assert done.returncode == 0, done.stderr
+    assert "'e': 3" in done.stdout, done.stdout
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
 def test_a_process_that_was_forked_computes_too() -> None:
     code = """
