@@ -141,8 +141,7 @@ impl Task {
         let opened =
             folder.map(|folder| Kept::open(folder, &self.scene, &engine, resumes, &mut work)).transpose();
         let mut kept = opened?;
-        let unit = if plan.start_count() > 1 { "runs" } else { "cells" };
-        let damage = kept.as_ref().and_then(|kept| kept.damage(unit));
+        let damage = kept.as_ref().and_then(|kept| kept.damage());
         warnings.lock().unwrap_or_else(PoisonError::into_inner).extend(damage);
         let resumed = kept.as_ref().map_or(0, Kept::resumed);
         let elapsed_before = kept.as_ref().map_or(Duration::ZERO, Kept::elapsed_before);

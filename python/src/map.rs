@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use rattlemap::cli;
 use rattlemap::map::effect;
 use rattlemap::map::plan::Plan;
+use rattlemap::output::in_memory::Colors;
 use rattlemap::output::map::Run;
 use rattlemap::output::{self, Cells, Survey, in_memory};
 
@@ -95,13 +96,16 @@ fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
     }))
 }
 
-/// Colours of the program's figures, red, green and blue: by name, and of things in a row.
+/// Red, green and blue. A list of bytes would be Python's `bytes`.
+type Rgb = (u8, u8, u8);
+
+/// Colours of the program's figures: by name, and of things in a row.
 #[pyfunction]
-pub(crate) fn colors() -> (BTreeMap<&'static str, (u8, u8, u8)>, Vec<(u8, u8, u8)>) {
-    let (named, row) = in_memory::colors();
+pub(crate) fn colors() -> (BTreeMap<&'static str, Rgb>, Vec<Rgb>) {
+    let Colors { named, in_a_row } = in_memory::colors();
     let parts = |[red, green, blue]: [u8; 3]| (red, green, blue);
     (
         named.into_iter().map(|(name, color)| (name, parts(color))).collect(),
-        row.into_iter().map(parts).collect(),
+        in_a_row.into_iter().map(parts).collect(),
     )
 }

@@ -21,7 +21,6 @@ use serde_json::Value;
 
 use crate::cli::capacity;
 use crate::cli::error::Failure;
-use crate::cli::map::unit;
 use crate::cli::say;
 use crate::cli::scene_file::{MOST_OF_COPY, read_table};
 
@@ -224,7 +223,7 @@ impl FinishedMap<'_> {
             |batch: &[(u32, Record)]| plan.admits(batch) && sweep::replay(&mut schedule, &mut records, batch);
         let read = RecordFile::read(&path, &identity, order, take).map_err(unreadable)?;
         let Extent { count, damage, .. } = read;
-        let unit = unit(plan);
+        let unit = plan.unit();
         if !schedule.is_finished() {
             let cells = schedule.expected();
             let go_on =

@@ -84,8 +84,8 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let resumed_cells = kept.resumed();
     let total = work.schedule.expected();
     let progress = match plan.refine() {
-        Some(_) => Progress::of_at_least(total, resumed_cells, unit(&plan), ask.run.quiet),
-        None => Progress::new(total, resumed_cells, unit(&plan), ask.run.quiet),
+        Some(_) => Progress::of_at_least(total, resumed_cells, plan.unit(), ask.run.quiet),
+        None => Progress::new(total, resumed_cells, plan.unit(), ask.run.quiet),
     };
     integrate(ask, &mut work, &mut engine, &mut kept, &progress, &interrupt)?;
     interrupt.ends_at_once(stopped::go_on(ask, &plan, kept.count()), || {});
@@ -144,7 +144,7 @@ fn open_records<'f>(
     engine: &Engine<'_>,
 ) -> Result<Kept<'f>, Failure> {
     let kept = Kept::open(folder, scene, engine, ask.resume, work)?;
-    if let Some(damage) = kept.damage(unit(work.plan)) {
+    if let Some(damage) = kept.damage() {
         say::note(format_args!("warning: {damage}"));
     } else if ask.resume && kept.count() == 0 && !ask.run.quiet {
         say::note(format_args!(
@@ -169,7 +169,7 @@ fn integrate(
     let keep = |batch: &[(u32, Record)], known| {
         kept.keep(batch)?;
         tally.take(plan, batch);
-        warning.heed(batch, unit(plan));
+        warning.heed(batch, plan.unit());
         progress.report(kept.count(), known);
         Ok(())
     };
@@ -211,11 +211,6 @@ impl Warning {
             list.join(", ")
         ));
     }
-}
-
-/// What is counted while a map is made.
-pub(crate) fn unit(plan: &Plan) -> &'static str {
-    if plan.start_count() > 1 { "runs" } else { "cells" }
 }
 
 /// What is to be said where lanes take more steps than the scene asks for.

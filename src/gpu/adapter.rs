@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::caught::caught;
-use super::device::most_slots;
+use super::layout::{Motion, Tally};
 use super::{GpuError, Precision};
 
 /// What narrows the adapters down in the environment: the first is wgpu's own.
@@ -135,6 +135,17 @@ pub fn describe(info: &wgpu::AdapterInfo) -> String {
 /// Whether an adapter is more than a program on the processor.
 pub fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
     info.device_type != wgpu::DeviceType::Cpu
+}
+
+/// Slots that a pool has at most: below 1 GB on the device.
+const MOST_SLOTS: usize = 1 << 19;
+
+/// Slots that an adapter's limits allow.
+pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
+    let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
+    let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
+    let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
+    by_binding.min(by_grid).clamp(1, MOST_SLOTS as u64) as usize
 }
 
 fn has(adapter: &wgpu::Adapter, precision: Precision) -> bool {

@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::adapter::{AdapterChoice, AdapterReport, features, listed, no_adapter};
 use super::caught::{Dropped, caught};
 use super::dispatch_policy::DispatchPolicy;
-use super::layout::{Motion, Tally};
 use super::{Gpu, GpuError, Precision};
 
 /// Storage bindings of the shader by number: flows, shapes, phasors, laws, cells, motions,
@@ -80,17 +79,6 @@ fn told(reason: wgpu::DeviceLostReason, message: &str) -> String {
         (wgpu::DeviceLostReason::Unknown, message) => format!("its driver says: {message}"),
         (wgpu::DeviceLostReason::Destroyed, _) => "it was destroyed".to_owned(),
     }
-}
-
-/// Slots that a pool has at most: below 1 GB on the device.
-const MOST_SLOTS: usize = 1 << 19;
-
-/// Slots that an adapter's limits allow.
-pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
-    let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
-    let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
-    let by_grid = u64::from(limits.max_compute_workgroups_per_dimension).pow(2);
-    by_binding.min(by_grid).clamp(1, MOST_SLOTS as u64) as usize
 }
 
 pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {

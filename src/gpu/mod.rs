@@ -446,7 +446,7 @@ impl Gpu {
 
     /// Bytes of its memory that so many lanes take at most.
     pub(crate) fn bytes_of_lanes(&self, lanes: usize) -> u64 {
-        slots::bytes(lanes.min(device::most_slots(&self.device.limits())), self.precision)
+        slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision)
     }
 
     /// Integrates until no more than `until` lanes are left; returns those that have ended. Only where a flag is

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use bytemuck::Zeroable;
 
-use super::device::{BEGIN, Pipelines, most_slots};
+use super::adapter::most_slots;
+use super::device::{BEGIN, Pipelines};
 use super::guard::guarded;
 use super::layout::Cell;
 use super::reading::Ended;

@@ -208,6 +208,11 @@ impl Plan {
         (0..self.cell_count()).map(|place| self.run_at(place)).collect()
     }
 
+    /// What is counted while a map is made: cells, or runs where cells have several starts.
+    pub fn unit(&self) -> &'static str {
+        if self.start_count() > 1 { "runs" } else { "cells" }
+    }
+
     /// Starts per cell.
     pub fn start_count(&self) -> usize {
         self.starts.count()

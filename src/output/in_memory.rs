@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::bifurcation::Asked;
 use super::bifurcation_manifest::Manifest;
 use super::cell_columns::{self, Values};
+pub use super::layers::Colors;
 use super::map_manifest::{self, Run};
 use super::words_csv::Rows;
 use super::{
@@ -43,8 +44,8 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
     })
 }
 
-/// Colours of the program's figures, red, green and blue: by name, and of things in a row.
-pub fn colors() -> ([(&'static str, [u8; 3]); 7], Vec<[u8; 3]>) {
+/// The colours of the program's figures.
+pub fn colors() -> Colors {
     layers::shared_colors()
 }
 

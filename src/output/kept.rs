@@ -98,6 +98,8 @@ pub struct Kept<'f> {
     file: RecordFile,
     folder: &'f Folder,
     resumed: usize,
+    /// What is counted.
+    unit: &'static str,
     elapsed_before: Duration,
     clock: Instant,
 }
@@ -137,7 +139,7 @@ impl<'f> Kept<'f> {
         }
         map::begin(folder, scene)?;
         let resumed = file.count();
-        Ok(Kept { file, folder, resumed, elapsed_before, clock: Instant::now() })
+        Ok(Kept { file, folder, resumed, unit: work.plan.unit(), elapsed_before, clock: Instant::now() })
     }
 
     /// Keeps what has ended: it is on the disk then.
@@ -159,8 +161,9 @@ impl<'f> Kept<'f> {
         self.resumed
     }
 
-    /// What was no good of those, if anything was, in words; `unit` is what is counted: cells or runs.
-    pub fn damage(&self, unit: &str) -> Option<String> {
+    /// What was no good of those, if anything was, in words.
+    pub fn damage(&self) -> Option<String> {
+        let unit = self.unit;
         let (path, count, damage) = (self.folder.path().join(RECORDS), self.resumed, self.file.damage()?);
         Some(format!(
             "{}: {damage}; what is damaged is dropped: {count} {unit} are kept, the others computed again",

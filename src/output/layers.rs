@@ -21,10 +21,17 @@ use crate::map::scene::Quantity;
 use colors::{NO_VALUE, diverging, sequential};
 use scale::nice_bound;
 
-/// Colours that figures of other programs share with those of this one: by name, and of things in a row, the most common
-/// one left out.
-pub(super) fn shared_colors() -> ([(&'static str, Color); 7], Vec<Color>) {
-    let named = [
+/// The colours of figures, for those of other programs: red, green and blue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Colors {
+    /// By name.
+    pub named: Vec<(&'static str, Color)>,
+    /// Of things in a row, the most common one left out.
+    pub in_a_row: Vec<Color>,
+}
+
+pub(super) fn shared_colors() -> Colors {
+    let named = vec![
         ("commonest", words::COMMONEST),
         ("period 1", colors::SYMMETRIC),
         ("without events", words::WITHOUT_EVENTS),
@@ -33,7 +40,7 @@ pub(super) fn shared_colors() -> ([(&'static str, Color); 7], Vec<Color>) {
         ("failed", colors::FAILED),
         ("rare", words::RARE),
     ];
-    (named, (1..64).map(colors::distinct).collect())
+    Colors { named, in_a_row: (1..64).map(colors::distinct).collect() }
 }
 
 /// One view of a map.

@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use serde_json::{Value, json};
 
 use super::forecast::Forecast;
-use super::{engine_of, shard, unit};
+use super::{engine_of, shard};
 use crate::cli::arguments::Map;
 use crate::cli::capacity::{Free, bytes};
 use crate::cli::error::Failure;
@@ -133,10 +133,10 @@ impl Foreseen<'_> {
             starts => format!(", {starts} starts each: {} runs", plan.run_count()),
         };
         let of_shard = self.shard.map_or(String::new(), |(shard, runs)| {
-            format!("; {runs} {} of them in shard {shard}", unit(plan))
+            format!("; {runs} {} of them in shard {shard}", plan.unit())
         });
         let kept =
-            if *kept > 0 { format!("; {kept} {} are kept already", unit(plan)) } else { String::new() };
+            if *kept > 0 { format!("; {kept} {} are kept already", plan.unit()) } else { String::new() };
         let of = |free: Option<u64>| free.map_or(String::new(), |free| format!("; {} are free", bytes(free)));
         let device = engine
             .device_bytes()

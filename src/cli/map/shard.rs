@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 
-use super::{summary, unit};
+use super::summary;
 use crate::cli::arguments::{EngineChoice, Map};
 use crate::cli::error::Failure;
 use crate::cli::finished_map::Manifest;
@@ -85,7 +85,7 @@ fn has_all(ask: &Map, plan: &Plan, out: &Path) -> bool {
 
 pub(super) fn say_done(ask: &Map, plan: &Plan) -> Result<(), Failure> {
     if let (false, Some(shard)) = (ask.run.quiet, ask.shard) {
-        let (out, count, unit) = (ask.out(), shard.run_count(plan), unit(plan));
+        let (out, count, unit) = (ask.out(), shard.run_count(plan), plan.unit());
         say::note(format_args!("{}: shard {shard} is finished: all {count} {unit} are there", out.display()));
     }
     Ok(())
@@ -136,7 +136,7 @@ pub(super) fn finish(
 /// What was done, how fast, and what came out.
 fn told(finished: &Finished<'_>, folder: &Path, files: &[String]) -> String {
     let Finished { shard, plan, run, tally, .. } = finished;
-    let (count, unit, seconds) = (shard.run_count(plan), unit(plan), run.elapsed.as_secs_f64().max(1e-9));
+    let (count, unit, seconds) = (shard.run_count(plan), plan.unit(), run.elapsed.as_secs_f64().max(1e-9));
     let before = match run.resumed_cells {
         0 => String::new(),
         resumed => format!(", {resumed} of them kept before,"),

@@ -3,7 +3,7 @@
 use anyhow::anyhow;
 
 use super::resume_command::{cpu_command, resume_command, same_command};
-use super::{shard, unit};
+use super::shard;
 use crate::cli::arguments::{EngineChoice, Map};
 use crate::cli::error::Failure;
 use crate::map::plan::Plan;
@@ -11,7 +11,7 @@ use crate::output::{Folder, Identity, Order, RECORDS, RecordFile};
 
 /// How many are kept, and the command that computes the others.
 pub(super) fn go_on(ask: &Map, plan: &Plan, done: usize) -> String {
-    let (total, unit) = (shard::runs(ask, plan), unit(plan));
+    let (total, unit) = (shard::runs(ask, plan), plan.unit());
     let most = if plan.refine().is_some() { "at most " } else { "" };
     format!("{done} of {most}{total} {unit} are kept; go on with: {}", resume_command(ask))
 }
