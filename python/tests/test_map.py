@@ -235,7 +235,7 @@ def test_an_interrupted_map_goes_on(tmp_path: Path) -> None:
         if 0 < done < total:
             raise Enough
 
-    setting = {"engine": "cpu", "early_stop": False, "transient_periods": 1500, "out": tmp_path / "out"}
+    setting = {"engine": "cpu", "early_stop": False, "transient_periods": 4000, "out": tmp_path / "out"}
     with pytest.raises(Enough):
         rm.map(rm.gear_pair(), **axes, **setting, progress=tell)
     with pytest.raises(rm.FolderError, match="unfinished"):
