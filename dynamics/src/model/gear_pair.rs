@@ -61,10 +61,10 @@ parameters! { GearPair:
 }
 
 impl GearPair {
-    /// Every parameter, in the order of Table 1.
+    /// All parameters, in the order of Table 1.
     pub const PARAMETERS: &'static [Parameter] = TABLE;
 
-    /// Table 1 with restitution `e`. Valid if `0 <= e <= 1`.
+    /// Returns the values of Table 1 with restitution `e`, `0 <= e <= 1`.
     pub fn paper(e: f64) -> GearPair {
         GearPair {
             m1: 2.0,
@@ -83,10 +83,10 @@ impl GearPair {
         }
     }
 
-    /// As [`Model::oscillator`].
+    /// Implements [`Model::oscillator`].
     ///
     /// # Errors
-    /// [`ModelError`] if a parameter is not valid, or an entry too large for a number.
+    /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
         let free = Domain {
@@ -114,7 +114,7 @@ impl GearPair {
         Ok(oscillator)
     }
 
-    /// As [`Model::law`].
+    /// Implements [`Model::law`].
     pub fn law(&self) -> Law {
         Law::both(self.e, self.mesh_speed)
     }
@@ -168,7 +168,7 @@ mod tests {
     use crate::model::ParameterError;
 
     #[test]
-    fn table_and_paper_agree() {
+    fn paper_uses_the_defaults_of_the_table() {
         let mut pair = GearPair::paper(0.5);
         for (parameter, at) in TABLE.iter().zip(ACCESSORS) {
             assert_eq!(*at(&mut pair), parameter.default.unwrap_or(0.5), "{}", parameter.name);

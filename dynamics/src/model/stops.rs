@@ -1,12 +1,11 @@
-//! A 1-DOF oscillator between stops: the second model, small enough to solve by hand.
+//! An oscillator of one degree of freedom between stops, which can be solved by hand.
 
 use super::parameter::parameters;
 use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
 
 /// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
 ///
-/// With `r = k = F = 0` flights are straight lines and every event is known in closed
-/// form, which is what the tests use it for.
+/// With `r = k = F = 0` flights are straight lines and every event is known in closed form. Tests use that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stops {
     /// Mass, > 0.
@@ -45,10 +44,10 @@ parameters! { Stops:
 }
 
 impl Stops {
-    /// Every parameter.
+    /// All parameters.
     pub const PARAMETERS: &'static [Parameter] = TABLE;
 
-    /// Every parameter at its default, with restitution `e`. Valid if `0 <= e <= 1`.
+    /// Returns the model with all parameters at their defaults and restitution `e`, `0 <= e <= 1`.
     pub fn with_restitution(e: f64) -> Stops {
         Stops {
             m: 1.0,
@@ -64,10 +63,10 @@ impl Stops {
         }
     }
 
-    /// As [`Model::oscillator`]; the second degree of freedom is a unit mass that nothing acts on.
+    /// Implements [`Model::oscillator`]. The second degree of freedom is a unit mass without forces.
     ///
     /// # Errors
-    /// [`ModelError`] if a parameter is not valid, or an entry too large for a number.
+    /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
         let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
@@ -91,7 +90,7 @@ impl Stops {
         Ok(oscillator)
     }
 
-    /// As [`Model::law`].
+    /// Implements [`Model::law`].
     pub fn law(&self) -> Law {
         Law::both(self.e, self.mesh_speed)
     }
@@ -136,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn table_and_defaults_agree() {
+    fn with_restitution_uses_the_defaults_of_the_table() {
         let stops = Stops::with_restitution(0.5);
         for (i, parameter) in TABLE.iter().enumerate() {
             assert_eq!(stops.value(i), parameter.default.unwrap_or(0.5), "{}", parameter.name);

@@ -2,7 +2,7 @@
 
 use super::{Crossing, Observer, Stop, Trajectory};
 use crate::certificate::Bracket;
-use crate::flow::{Expansion, Gap, LinearFlow, Phasor, REACH, TERMS};
+use crate::flow::{EXPANSION_REACH, Expansion, Gap, LinearFlow, Phasor, TERMS};
 use crate::fused::fma;
 
 /// Evaluations of the exact flow allowed for one root; one or two are needed, and bisection ends
@@ -108,7 +108,7 @@ impl<const N: usize> Trajectory<'_, N> {
             let next = expansion.start + root.unwrap_or(f64::NAN);
             // Rounding may put a root at the step's end beyond it.
             let is_within = next >= lo * (1.0 - ENDS) && next <= hi * (1.0 + ENDS);
-            if root.is_some_and(|v| v.abs() <= REACH) && is_within {
+            if root.is_some_and(|v| v.abs() <= EXPANSION_REACH) && is_within {
                 return Some((expansion, next.clamp(lo, hi)));
             }
             let v = u - expansion.start;
@@ -136,7 +136,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 linear.acceleration_rates(&expansion.state(v), &expansion.phasor(linear.turn * v));
             let delta = -pressing / (rate * linear.unit);
             v += delta;
-            if v.is_nan() || v.abs() > REACH {
+            if v.is_nan() || v.abs() > EXPANSION_REACH {
                 return None;
             }
             if delta * delta * (bend * linear.unit).abs() <= LEFT * rate.abs() * u {

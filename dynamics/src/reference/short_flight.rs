@@ -2,7 +2,7 @@
 //! of meshing. Half of all flights are such where impacts are dense.
 
 use super::{Crossing, Mode, Observer, Stop, Trajectory};
-use crate::flow::{LinearFlow, SHORT, turned};
+use crate::flow::{LONGEST_SHORT_FLIGHT, LinearFlow, turned};
 use crate::model::Side;
 
 /// Flights that promise to last no more than this share of the longest are tried.
@@ -18,7 +18,9 @@ impl<const N: usize> Trajectory<'_, N> {
     #[inline(always)]
     pub(super) fn promises_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
         let gained = pressing * linear.unit;
-        2.0 * leaving < PROMISE * SHORT * gained && gained > PRESSING * self.flow.speed && leaving > 0.0
+        2.0 * leaving < PROMISE * LONGEST_SHORT_FLIGHT * gained
+            && gained > PRESSING * self.flow.speed
+            && leaving > 0.0
     }
 
     /// Flies back to the wall just left, if that is certain to be what comes next. False if not.
@@ -34,9 +36,9 @@ impl<const N: usize> Trajectory<'_, N> {
             (Mode::Onset(side), Some((_, 1))) => (side, Crossing::OnsetEnds(side)),
             _ => return Ok(false),
         };
-        let rise = linear.short_flight.from(&self.q, &self.phasor);
+        let series = linear.short_flight.from(&self.q, &self.phasor);
         let [right, left] = self.flow.walls;
-        let Some(u) = rise.back(right - left) else { return Ok(false) };
+        let Some(u) = series.first_return(right - left) else { return Ok(false) };
         let s = u * linear.unit;
         if s >= self.clock.remaining(until) {
             return Ok(false);
@@ -44,7 +46,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.work.steps += 1;
         self.work.root_iterations += 1;
         self.steps_in_period += 1;
-        let [w, x, v] = rise.gained(u, linear.per_unit);
+        let [w, x, v] = series.changes(u, linear.per_unit);
         self.q = [self.flow.wall(side), self.q[1] + w, self.q[2] + x, self.q[3] + v];
         self.phasor = turned(&self.phasor, linear.turn * u);
         if N > 0 {

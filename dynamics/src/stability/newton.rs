@@ -238,7 +238,7 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
 pub fn pitchfork(model: &dyn Model, parameter: &str, lo: f64, hi: f64, guess: State) -> Option<f64> {
     let mut state = guess;
     let mut test = |value: f64| -> Option<f64> {
-        let mut model = model.boxed();
+        let mut model = model.clone_model();
         model.set(parameter, value).ok()?;
         let flow = Flow::of(&*model).ok()?;
         let map = StrobeMap::MirroredHalves(1);
