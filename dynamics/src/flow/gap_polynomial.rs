@@ -23,7 +23,7 @@ impl GapPolynomial {
         let bend_gained = propagator.left(&bend);
         let bend_end: [f64; 7] = std::array::from_fn(|j| bend[j] + bend_gained[j]);
         let columns = std::array::from_fn(|j| {
-            Bernstein::departures(slope[j], bend[j], rise[j], slope_end[j], bend_end[j]).wide()
+            Bernstein::from_zero(slope[j], bend[j], rise[j], slope_end[j], bend_end[j]).wide()
         });
         GapPolynomial { columns }
     }

@@ -230,7 +230,7 @@ impl Analysis<'_> {
             *periods_run += 1;
             exponent.renormalise(&mut carrier);
         }
-        exponent.forget();
+        exponent.reset();
         let (mesh_start, impacts_start) = (carrier.meshing_time(), carrier.work().impacts);
         let mut strobes = vec![carrier.state()];
         for _ in 0..length {
@@ -390,7 +390,7 @@ impl Analysis<'_> {
         let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
         let closes = trajectory.is_in_domain_of(&begun) || reading.on_strobe;
         // The first flight has its symbol from where `seed` came from: right if the cycle comes from there, too.
-        if !trajectory.stands_as(&begun) || reading.near_grazing || reading.on_strobe {
+        if !trajectory.has_mode_and_origin_of(&begun) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
         }
         Ok(Reading { closes, ..reading })

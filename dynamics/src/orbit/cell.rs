@@ -166,7 +166,7 @@ impl<'a> Watch<'a> {
         let mut carrier = bare.carrying([FRESH_TANGENT]);
         while carrier.period() < u64::from(last) {
             if carrier.period() == u64::from(exponent_from) {
-                self.exponent.forget();
+                self.exponent.reset();
             }
             if let Some(measured) = self.period(&mut carrier, &mut next_check, last)? {
                 return Ok(measured);
@@ -366,7 +366,7 @@ impl<'a> Watch<'a> {
         let (period, now) = (found.cycle.period as usize, self.last_beside(found));
         let is_near = |n: &usize| metric.distance(&self.strobes[now - n * period], &found.cycle.state) < NEAR;
         let cycles = (0..=now / period).take_while(is_near).count();
-        swings(self.exponent.lately((cycles * period).min(self.exponent.periods())))
+        swings(self.exponent.recent_growth((cycles * period).min(self.exponent.periods())))
     }
 
     /// The last strobe that the cycle's state belongs to: the others, unless the period is 1,

@@ -43,7 +43,7 @@ pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Opt
 /// the last check, the last eight, by more than any would near a cycle that may be stable.
 pub(super) fn escapes(exponent: &Exponent, period: u32, is_last: bool) -> bool {
     let cycles = if is_last { LAST_CYCLES } else { CYCLES };
-    let growth = exponent.lately(cycles * period as usize);
+    let growth = exponent.recent_growth(cycles * period as usize);
     growth.is_some_and(|growth| growth > cycles as f64 * LARGEST_MULTIPLIER.ln())
 }
 

@@ -1,29 +1,29 @@
-//! Flights pressed back to their wall before they have gone far: chatter, and the contact onset
-//! of meshing. Half of all flights are such where impacts are dense.
+//! Short flights from a wall and back to it: chatter, and contact onsets. They are half of all flights if impacts
+//! are dense.
 
 use super::{Crossing, Mode, Observer, Stop, Trajectory};
 use crate::flow::{LONGEST_SHORT_FLIGHT, LinearFlow, turned};
 use crate::model::Side;
 
-/// Flights that promise to last no more than this share of the longest are tried.
-const PROMISE: f64 = 0.9;
+/// Longest expected flight for which the short-flight series is tried, as a share of the longest short flight.
+const TRIED_SHARE: f64 = 0.9;
 
-/// Speeds gained in a Taylor step below this, relative to the scale of length and the rate of free
-/// motion, may be rounding: the certificate judges such flights.
-const PRESSING: f64 = 1e-6;
+/// Least change of speed by the pressing acceleration in a Taylor step, relative to the scale of length and the rate
+/// of free motion. Below it the acceleration may be rounding error, and the certificate is used instead.
+const LEAST_PRESSING: f64 = 1e-6;
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Whether a flight that leaves a wall at a speed, under an acceleration back to it, promises
-    /// to be short.
+    /// Whether a flight that leaves a wall at the speed `leaving` under the acceleration `pressing` back to it is
+    /// probably a short flight.
     #[inline(always)]
-    pub(super) fn promises_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
+    pub(super) fn expects_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
         let gained = pressing * linear.unit;
-        2.0 * leaving < PROMISE * LONGEST_SHORT_FLIGHT * gained
-            && gained > PRESSING * self.flow.speed
+        2.0 * leaving < TRIED_SHARE * LONGEST_SHORT_FLIGHT * gained
+            && gained > LEAST_PRESSING * self.flow.speed
             && leaving > 0.0
     }
 
-    /// Flies back to the wall just left, if that is certain to be what comes next. False if not.
+    /// Moves to the return to the wall that the gap has just left, if the series proves it. Returns whether it did.
     #[inline(always)]
     pub(super) fn fly_back(
         &mut self,

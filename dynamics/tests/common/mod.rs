@@ -3,7 +3,7 @@
 
 use rattlemap_dynamics::flow::{DomainKind, Flow};
 use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Stop, Trajectory, Work};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory, Work};
 
 pub(crate) mod linear;
 pub(crate) mod table;
@@ -42,7 +42,7 @@ pub(crate) fn strobe(flow: &Flow, pair: &GearPair, from: State, periods: u64) ->
 }
 
 /// The domain of the flight that follows an event.
-pub(crate) fn domain_after(event: &Happening) -> DomainKind {
+pub(crate) fn domain_after(event: &GapEvent) -> DomainKind {
     match event.kind {
         EventKind::Impact | EventKind::MeshEnd => DomainKind::Free,
         EventKind::MeshStart => DomainKind::Meshing(event.side),
@@ -59,9 +59,9 @@ pub(crate) struct Leg {
     pub(crate) start: State,
     pub(crate) end: State,
     /// The event that begins it; none at a strobe.
-    pub(crate) begins: Option<Happening>,
+    pub(crate) begins: Option<GapEvent>,
     /// The event that ends it; none at a strobe.
-    pub(crate) ends: Option<Happening>,
+    pub(crate) ends: Option<GapEvent>,
 }
 
 /// The legs of `periods` periods after `skip` periods.
@@ -74,7 +74,7 @@ pub(crate) fn legs(flow: &Flow, pair: &GearPair, from: State, skip: u64, periods
     for _ in 0..periods {
         let domain = trajectory.meshing().map_or(DomainKind::Free, DomainKind::Meshing);
         let mut mark = (0.0, trajectory.state(), domain, None);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         trajectory.advance_period(&mut events).expect("an ordinary cell");
         for event in events {
             let (t, start, domain, begins) = mark;

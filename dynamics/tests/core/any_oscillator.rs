@@ -4,7 +4,7 @@ use crate::common::linear::with_wall;
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Stop, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 
 type Matrix = [[f64; 2]; 2];
 
@@ -160,7 +160,7 @@ fn flow_of(case: &Case) -> Flow {
 }
 
 /// Whether some event decides by a threshold that it passes narrowly.
-fn is_narrow(case: &Case, events: &[Happening]) -> bool {
+fn is_narrow(case: &Case, events: &[GapEvent]) -> bool {
     events.iter().any(|event| {
         let i = event.side.index();
         let leaving = case.law.restitution[i] * event.before[1].abs();
@@ -170,7 +170,7 @@ fn is_narrow(case: &Case, events: &[Happening]) -> bool {
 }
 
 /// Which events there are, and at which walls.
-fn kinds(events: &[Happening]) -> Vec<(EventKind, Side)> {
+fn kinds(events: &[GapEvent]) -> Vec<(EventKind, Side)> {
     events.iter().map(|event| (event.kind, event.side)).collect()
 }
 
@@ -217,7 +217,7 @@ proptest! {
     fn words_and_laws_are_those_of_the_events(case in cases()) {
         let flow = flow_of(&case);
         let mut trajectory = Trajectory::new(&flow, case.law, case.start);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         let mut meshing = trajectory.meshing();
         let mut origin = meshing;
         for _ in 0..4 {
@@ -279,14 +279,14 @@ proptest! {
         let sticks = settled.meshing().is_some_and(|side| case.oscillator.contacts[side.index()] == Contact::Rigid);
         prop_assume!(sticks || !Side::BOTH.into_iter().any(is_beside));
         let mut carrier = settled.at(y, UNITS);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         prop_assume!(carrier.advance_period(&mut events) != Err(Stop::CapEvents));
         prop_assume!(!carrier.near_grazing() && growth(&carrier) < GROWTH && events.len() <= 3 * COMPARED);
         // Closed series of impacts are as good as the square of their length.
-        let is_closed = |event: &Happening| event.kind == EventKind::MeshStart && event.before[1] == 0.0;
+        let is_closed = |event: &GapEvent| event.kind == EventKind::MeshStart && event.before[1] == 0.0;
         prop_assume!(!events.iter().any(is_closed) && !is_narrow(&case, &events));
         // Slow crossings bend the map within the width of the differences.
-        let is_slow = |event: &Happening| event.kind != EventKind::MeshEnd && event.before[1].abs() < 0.05;
+        let is_slow = |event: &GapEvent| event.kind != EventKind::MeshEnd && event.before[1].abs() < 0.05;
         prop_assume!(!events.iter().any(is_slow));
         const H: f64 = 1e-6;
         let tangents = carrier.tangents().map(|u| u.map(|x| x * carrier.log_scale().exp()));
@@ -296,7 +296,7 @@ proptest! {
             for (end, h) in ends.iter_mut().zip([H, -H, 2.0 * H, -2.0 * H]) {
                 let moved = std::array::from_fn(|i| y[i] + if i == j { h } else { 0.0 });
                 let mut neighbour = settled.at::<0>(moved, []);
-                let mut met: Vec<Happening> = Vec::new();
+                let mut met: Vec<GapEvent> = Vec::new();
                 prop_assume!(neighbour.advance_period(&mut met) != Err(Stop::CapEvents));
                 // Another branch of the map.
                 prop_assume!(kinds(&met) == kinds(&events));
@@ -331,7 +331,7 @@ proptest! {
         let mut anew = Trajectory::meshing_from(&flow, case.law, whole.state(), whole.meshing());
         let mut carrier = whole.carrying(UNITS);
         carrier.clear_near_grazing();
-        let (mut first, mut second): (Vec<Happening>, Vec<Happening>) = (Vec::new(), Vec::new());
+        let (mut first, mut second): (Vec<GapEvent>, Vec<GapEvent>) = (Vec::new(), Vec::new());
         prop_assume!(carrier.advance_period(&mut first) != Err(Stop::CapEvents));
         prop_assume!(anew.advance_period(&mut second) != Err(Stop::CapEvents));
         prop_assume!(!carrier.near_grazing() && growth(&carrier) < GROWTH && !is_narrow(&case, &first));
@@ -368,7 +368,7 @@ proptest! {
         let run = |oscillator: &Oscillator, law: Law, start: State| {
             let flow = Flow::new(oscillator);
             let mut trajectory = Trajectory::new(&flow, law, start);
-            let mut events: Vec<Happening> = Vec::new();
+            let mut events: Vec<GapEvent> = Vec::new();
             for _ in 0..3 {
                 let advanced = trajectory.advance_period(&mut events);
                 assert!(matches!(advanced, Ok(()) | Err(Stop::CapEvents)), "{advanced:?}");
@@ -432,7 +432,7 @@ proptest! {
         let (flow, other_flow) = (Flow::new(o), Flow::new(&other));
         let mut ours = Trajectory::with_tangents(&flow, case.law, case.start, UNITS);
         let mut theirs = Trajectory::new(&other_flow, case.law, each(&back, case.start));
-        let (mut events, mut images): (Vec<Happening>, Vec<Happening>) = (Vec::new(), Vec::new());
+        let (mut events, mut images): (Vec<GapEvent>, Vec<GapEvent>) = (Vec::new(), Vec::new());
         prop_assume!(ours.advance_period(&mut events) != Err(Stop::CapEvents));
         prop_assume!(theirs.advance_period(&mut images) != Err(Stop::CapEvents));
         prop_assume!(!ours.near_grazing() && growth(&ours) < GROWTH && !is_narrow(&case, &events));
@@ -468,7 +468,7 @@ proptest! {
         // A lasting contact is elastic, or compliant; both have springs, and none begins on an impact wall.
         let law = Law::both(1.0, 0.0);
         let mut trajectory = Trajectory::new(&flow, law, case.start);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         let before = energy(trajectory.state());
         for _ in 0..3 {
             prop_assume!(trajectory.advance_period(&mut events).is_ok());

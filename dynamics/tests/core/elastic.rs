@@ -5,7 +5,7 @@ use crate::common::linear::{Linear, invariants, invariants_of, product, with_wal
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 /// Neither is of meaning to an elastic wall.
 const LAW: Law = Law { restitution: [0.5; 2], mesh_speed: [0.01; 2] };
@@ -79,7 +79,7 @@ fn a_bilinear_oscillator_closes_over_two_linear_flights() {
 }
 
 /// The tangents of a period, and where it ends.
-fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<Happening>) {
+fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<GapEvent>) {
     let mut trajectory = Trajectory::with_tangents(flow, LAW, [start[0], start[1], 0.0, 0.0], UNITS);
     let mut events = Vec::new();
     trajectory.advance_period(&mut events).expect("an ordinary cell");
@@ -159,7 +159,7 @@ fn a_start_on_the_wall_goes_where_the_load_leads() {
         let Bilinear { oscillator, .. } = bilinear(free, 0.0, 50.0, 2.0);
         let flow = Flow::new(&oscillator);
         let mut trajectory = Trajectory::new(&flow, LAW, REST);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         trajectory.advance_to(0.1, &mut events).expect("an ordinary cell");
         assert_eq!(trajectory.meshing(), behind.then_some(Side::Right), "load {load}, force {force}");
         assert_eq!(trajectory.state()[0] > 0.0, behind);

@@ -5,7 +5,7 @@ use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, REST
 use rattlemap_dynamics::orbit::{
     Budget, Class, EventKind, Measured, Orbit, Settings, Status, analyse_flow, measure,
 };
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 /// `x'' + 2 gamma x' + x = cos(omega t)` below a wall at `sigma`, and a body that stands apart and
 /// is damped, so that no multiplier is its own 1.
@@ -234,7 +234,7 @@ fn a_ball_comes_to_rest_on_a_floor_at_zero() {
         let flow = Flow::new(&oscillator);
         let law = Law::both(e, 0.0);
         let mut trajectory = Trajectory::new(&flow, law, [floor, -v, 0.0, 0.0]);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         (0..3).for_each(|_| trajectory.advance_period(&mut events).unwrap());
         let end = events.pop().unwrap();
         assert_eq!(end.kind, EventKind::MeshStart, "floor {floor}");

@@ -3,7 +3,7 @@
 use crate::common::{REST, apart, flow_of, paper};
 use rattlemap_dynamics::model::{GearPair, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Class, EventKind, Orbit, Settings, Status, analyse, measure};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 use rattlemap_dynamics::stability::pitchfork;
 
 fn orbit(e: f64) -> Orbit {
@@ -15,11 +15,11 @@ fn event_near(e: f64, t: f64) -> (f64, EventKind, Side, State, State) {
     let pair = GearPair::paper(e);
     let flow = flow_of(&pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
-    let mut met: Vec<Happening> = Vec::new();
+    let mut met: Vec<GapEvent> = Vec::new();
     while (trajectory.period() as f64) * flow.period < t + 1.0 {
         trajectory.advance_period(&mut met).unwrap();
     }
-    let time = |h: &Happening| h.period as f64 * flow.period + h.t;
+    let time = |h: &GapEvent| h.period as f64 * flow.period + h.t;
     let h = met.iter().min_by(|a, b| (time(a) - t).abs().total_cmp(&(time(b) - t).abs())).unwrap();
     (time(h), h.kind, h.side, flow.to_state(h.before), flow.to_state(h.after))
 }

@@ -4,7 +4,7 @@ use crate::common::{departure, domain_after, mirrored_symbol, negated, paper, si
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::{DomainKind, Flow};
 use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Stop, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
 use rayon::prelude::*;
 
 /// Events for which two computations of one motion are compared. Beyond, what differs by
@@ -60,7 +60,7 @@ fn flow_of(pair: &GearPair) -> Flow {
 }
 
 /// Some periods of events, or those up to a stop; a stop must not be for want of finiteness.
-fn events_of(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> Result<Vec<Happening>, TestCaseError> {
+fn events_of(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> Result<Vec<GapEvent>, TestCaseError> {
     let mut trajectory = Trajectory::new(flow, pair.law(), y);
     let mut events = Vec::new();
     for _ in 0..periods {
@@ -76,7 +76,7 @@ fn events_of(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> Result<Vec
 }
 
 /// Time from one event to the next.
-fn between(flow: &Flow, from: &Happening, to: &Happening) -> f64 {
+fn between(flow: &Flow, from: &GapEvent, to: &GapEvent) -> f64 {
     (to.period - from.period) as f64 * flow.period + (to.t - from.t)
 }
 
@@ -202,7 +202,7 @@ proptest! {
         prop_assume!(events.iter().all(|event| (pair.e * event.before[1].abs() - pair.mesh_speed).abs() > 1e-7));
 
         let mut mirror = Trajectory::new(&flow, pair.law(), negated(state));
-        let mut images: Vec<Happening> = Vec::new();
+        let mut images: Vec<GapEvent> = Vec::new();
         mirror.advance_to(half, &mut images).expect("the original did not stop");
         prop_assert!(images.len() == events.len() || events.len() > COMPARED);
         for (image, event) in images.iter().zip(&events).take(COMPARED) {
@@ -226,7 +226,7 @@ proptest! {
     fn a_period_may_be_cut_anywhere(pair in pairs(), y in starts(), cuts in prop::array::uniform3(0.0..1.0f64)) {
         let flow = flow_of(&pair);
         let mut whole = Trajectory::with_tangents(&flow, pair.law(), y, UNITS);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         prop_assume!(whole.advance_period(&mut events).is_ok() && !whole.near_grazing());
         let growth = whole.tangents().iter().flatten().fold(1.0f64, |m, x| m.max(x.abs()));
         prop_assume!(growth < 1e4);
@@ -299,7 +299,7 @@ fn pressing_that_hardly_begins_ceases() {
         let flow = flow_of(&pair);
         let events = events_of(&flow, &pair, start, 1).expect("no stop");
         let meshing = flow.domain(DomainKind::Meshing(Side::Right));
-        let ends = |event: &&Happening| event.kind == EventKind::MeshEnd && event.side == Side::Right;
+        let ends = |event: &&GapEvent| event.kind == EventKind::MeshEnd && event.side == Side::Right;
         for end in events.iter().filter(ends).filter(|end| end.before[0] < pair.b) {
             let (sin, cos) = (pair.omega * end.t).sin_cos();
             let pressing = meshing.acceleration(&end.before, &[cos, sin]);

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, Side};
-use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// Orbits of one impact in `n` periods of one oscillator, at any stop position.
@@ -113,7 +113,7 @@ impl Family {
     }
 
     /// Events and end of `n` periods of the reference from the orbit's state at phase 0.
-    fn turn(&self, flow: &Flow, orbit: &Impacting) -> (Vec<Happening>, [f64; 2]) {
+    fn turn(&self, flow: &Flow, orbit: &Impacting) -> (Vec<GapEvent>, [f64; 2]) {
         let [x, v] = self.strobe(orbit);
         let mut trajectory = Trajectory::new(flow, self.law(), [x, v, 0.0, 0.0]);
         let mut events = Vec::new();
@@ -249,7 +249,7 @@ fn contact_free_motion_grazes_at_its_amplitude() {
             for (share, hits) in [(1.0 + beyond, false), (1.0 - beyond, true)] {
                 let flow = family.flow(amplitude.abs() * share);
                 let mut trajectory = Trajectory::new(&flow, family.law(), [x, v, 0.0, 0.0]);
-                let mut events: Vec<Happening> = Vec::new();
+                let mut events: Vec<GapEvent> = Vec::new();
                 trajectory.advance_period(&mut events).expect("an ordinary cell");
                 assert_eq!(!events.is_empty(), hits, "gamma {gamma}, omega {omega}, {share}: {events:?}");
             }

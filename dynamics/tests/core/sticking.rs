@@ -4,7 +4,7 @@ use crate::common::linear::{Linear, with_wall};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, GearPair, Law, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse_flow, measure};
-use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 
 /// What a cell of a map may take.
 const BUDGET: Budget = Budget {
@@ -43,7 +43,7 @@ fn lands(gamma: f64, omega: f64, from: f64) -> f64 {
     0.5 * (lo + hi)
 }
 
-fn events(flow: &Flow, law: Law, start: State, periods: u32) -> Vec<Happening> {
+fn events(flow: &Flow, law: Law, start: State, periods: u32) -> Vec<GapEvent> {
     let mut trajectory = Trajectory::new(flow, law, start);
     let mut events = Vec::new();
     (0..periods).for_each(|_| trajectory.advance_period(&mut events).expect("an ordinary cell"));
@@ -98,7 +98,7 @@ fn a_bouncing_ball_forgets_its_impacts_on_the_table() {
         let flow = Flow::new(&ball(gamma, 1.0));
         let events = events(&flow, Law::both(e, 0.0), [-0.05, 0.0, 0.0, 0.0], 6);
         let leaves = (-1.0f64 / gamma).acos();
-        let ends: Vec<&Happening> = events.iter().filter(|event| event.kind == EventKind::MeshEnd).collect();
+        let ends: Vec<&GapEvent> = events.iter().filter(|event| event.kind == EventKind::MeshEnd).collect();
         assert!(ends.len() >= 4, "gamma = {gamma}: {}", ends.len());
         assert!(ends.iter().all(|end| near(end.t, leaves, 1e-13)), "gamma = {gamma}: {ends:?}");
         let first = events.iter().position(|event| event.kind == EventKind::MeshEnd).expect("it leaves");
@@ -124,7 +124,7 @@ fn a_ball_stays_on_a_table_shaken_gently() {
             ([0.2, 0.3, 0.0, 0.0], Law::both(0.0, 0.0)),
         ] {
             let mut trajectory = Trajectory::new(&flow, law, start);
-            let mut events: Vec<Happening> = Vec::new();
+            let mut events: Vec<GapEvent> = Vec::new();
             (0..200).for_each(|_| trajectory.advance_period(&mut events).expect("an ordinary cell"));
             let last = events.last().expect("it lands");
             assert_eq!(
@@ -219,7 +219,7 @@ fn tangents_are_derivatives_through_sticking() {
         };
         let unit = |j: usize| std::array::from_fn(|i| f64::from(u8::from(i == j)));
         let mut carrier = settled.at::<4>(y, [0, 1, 2, 3].map(unit));
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         carrier.advance_period(&mut events).expect("an ordinary cell");
         assert!(events.iter().any(|event| event.kind == EventKind::MeshStart), "{events:?}");
         let (mut off, mut size) = (0.0f64, 0.0f64);
@@ -272,7 +272,7 @@ fn nothing_begins_behind_a_rigid_wall() {
     for (w, kind) in [(2.0, Some(EventKind::Impact)), (0.0, Some(EventKind::MeshStart)), (-2.0, None)] {
         let mut trajectory = Trajectory::new(&flow, law, [1.1, w, 0.2, 0.0]);
         assert_eq!(trajectory.state(), [0.7, w, 0.2, 0.0]);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         trajectory.advance_to(1e-3, &mut events).expect("an ordinary cell");
         assert_eq!(
             events.first().map(|event| (event.kind, event.t)),

@@ -3,7 +3,7 @@
 use crate::common::REST;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State, Stops};
-use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 
 fn stops(e: f64) -> Stops {
     Stops {
@@ -21,11 +21,11 @@ fn stops(e: f64) -> Stops {
 }
 
 /// Time since the start.
-fn time(flow: &Flow, event: &Happening) -> f64 {
+fn time(flow: &Flow, event: &GapEvent) -> f64 {
     event.period as f64 * flow.period + event.t
 }
 
-fn events(flow: &Flow, law: Law, from: State, periods: u64) -> Vec<Happening> {
+fn events(flow: &Flow, law: Law, from: State, periods: u64) -> Vec<GapEvent> {
     let mut trajectory = Trajectory::new(flow, law, from);
     let mut events = Vec::new();
     for _ in 0..periods {
@@ -206,7 +206,7 @@ fn a_throw_grazes_the_other_wall() {
     // Exactly there, `v^2 / (2 g) = 1`, rounding decides: no event, or an impact at the root
     // of rounding, which is harmless and flagged.
     let mut trajectory = Trajectory::new(&flow, law, [0.5, -2.0, 0.0, 0.0]);
-    let mut events: Vec<Happening> = Vec::new();
+    let mut events: Vec<GapEvent> = Vec::new();
     trajectory.advance_to(1.5, &mut events).expect("an ordinary cell");
     assert!(trajectory.near_grazing());
     assert!(events.iter().all(|event| event.before[1].abs() < 1e-7), "{events:?}");

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::common::{REST, apart, flow_of, negated, paper, sign, strobe, work_since};
 use rattlemap_dynamics::model::{GearPair, Side, State};
 use rattlemap_dynamics::orbit::{Budget, Class, Settings, Status, analyse, measure, measure_until};
-use rattlemap_dynamics::reference::{EVENTS_PER_PERIOD_CAP, Happening, Stop, Trajectory, Work};
+use rattlemap_dynamics::reference::{EVENTS_PER_PERIOD_CAP, GapEvent, Stop, Trajectory, Work};
 use rayon::prelude::*;
 
 /// Steps a period may take, besides those for its events: several per radian of the fastest
@@ -149,7 +149,7 @@ fn starts_obey_their_rules() {
         let pair = GearPair { force, ..pair };
         let flow = flow_of(&pair);
         let mut trajectory = Trajectory::new(&flow, pair.law(), start);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         trajectory.advance_to(1e-9, &mut events).expect("an ordinary cell");
         (trajectory.meshing(), events.first().map(|event| event.after[1]))
     };

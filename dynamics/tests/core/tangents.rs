@@ -8,7 +8,7 @@ use crate::common::{REST, flow_of, paper, strobe};
 use nalgebra::Matrix4;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 
 /// Half the width of the central differences.
 const STEP: f64 = 1e-6;
@@ -21,7 +21,7 @@ fn matrix(columns: [State; 4]) -> Matrix4<f64> {
 }
 
 /// The derivative of the strobe map over some periods, carried along, with its events.
-fn carried(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> (Matrix4<f64>, Vec<Happening>) {
+fn carried(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> (Matrix4<f64>, Vec<GapEvent>) {
     let mut trajectory = Trajectory::with_tangents(flow, pair.law(), y, UNITS);
     let mut events = Vec::new();
     for _ in 0..periods {
