@@ -12,19 +12,19 @@ mod budget;
 mod cell;
 mod instant;
 mod itinerary;
-mod prospects;
 mod reading;
 mod recurrence;
+mod search_filter;
 #[cfg(test)]
 mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, SHOWN_PERIODS, analyse, analyse_flow, analyse_over, analyse_until, status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, analyse, analyse_flow, analyse_over, analyse_until, status_of,
 };
-pub use approach::{LINEAR, SHOWN_CYCLES};
+pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
-pub use cell::{Measured, NEUTRAL_ORDER, measure, measure_until};
+pub use cell::{Measurement, NEUTRAL_ORDER, measure, measure_until};
 pub use instant::{LONGEST_TIME, state_at};
 pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;

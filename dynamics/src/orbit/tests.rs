@@ -1,6 +1,6 @@
 //! Tests of whole cells: the reported class is that of the motion which the start reaches.
 
-use super::{Budget, Class, Measured, Settings, Status, analyse, measure};
+use super::{Budget, Class, Measurement, Settings, Status, analyse, measure};
 use crate::flow::Flow;
 use crate::model::GearPair;
 
@@ -14,7 +14,7 @@ fn budget(early_stop: bool, transient_periods: u32) -> Budget {
     }
 }
 
-fn cell(pair: &GearPair, budget: &Budget) -> Measured {
+fn cell(pair: &GearPair, budget: &Budget) -> Measurement {
     measure(&Flow::new(&pair.oscillator().unwrap()), pair.law(), [0.0; 4], budget)
 }
 

@@ -86,7 +86,12 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Processes a contact without an impact: motion behind an elastic wall, or rest on a rigid one. Returns false if
     /// there is an impact.
     #[inline(never)]
-    fn continues_without_impact(&mut self, contact: Contact, side: Side, observer: &mut impl Observer) -> bool {
+    fn continues_without_impact(
+        &mut self,
+        contact: Contact,
+        side: Side,
+        observer: &mut impl Observer,
+    ) -> bool {
         match contact {
             Contact::Elastic => self.go_behind(side, observer),
             Contact::Rigid if self.sticks(side) => self.stick(side, observer),

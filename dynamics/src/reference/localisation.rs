@@ -104,8 +104,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 Crossing::PressingEnds(_) => self.pressing_root(linear, &expansion, u),
             };
             let next = expansion.start + root.unwrap_or(f64::NAN);
-            let is_within =
-                next >= lo * (1.0 - BRACKET_ROUNDING) && next <= hi * (1.0 + BRACKET_ROUNDING);
+            let is_within = next >= lo * (1.0 - BRACKET_ROUNDING) && next <= hi * (1.0 + BRACKET_ROUNDING);
             if root.is_some_and(|v| v.abs() <= EXPANSION_REACH) && is_within {
                 return Some((expansion, next.clamp(lo, hi)));
             }

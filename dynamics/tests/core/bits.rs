@@ -7,7 +7,7 @@
 use crate::common::REST;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::GearPair;
-use rattlemap_dynamics::orbit::{Budget, Measured, Settings, measure};
+use rattlemap_dynamics::orbit::{Budget, Measurement, Settings, measure};
 use rayon::prelude::*;
 
 /// Whether this is a target that the table was made on.
@@ -24,7 +24,7 @@ fn cells() -> Vec<GearPair> {
     (0..64).map(cell).collect()
 }
 
-fn measured(pair: &GearPair) -> Measured {
+fn measured(pair: &GearPair) -> Measurement {
     let budget = Budget {
         settings: Settings { transient_periods: 200, ..Settings::default() },
         early_stop: true,
@@ -36,7 +36,7 @@ fn measured(pair: &GearPair) -> Measured {
 }
 
 /// Period (0: none), word, then the bits of exponent and strobe state.
-fn row(measured: &Measured) -> String {
+fn row(measured: &Measurement) -> String {
     let [lyapunov, _] = measured.lyapunov.unwrap_or([f64::NAN; 2]);
     let bits = [lyapunov].into_iter().chain(measured.strobe).map(|x| format!("{:016x}", x.to_bits()));
     let word = measured.word.as_ref().map(ToString::to_string).unwrap_or_default();

@@ -3,7 +3,7 @@
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, REST, Side, State};
 use rattlemap_dynamics::orbit::{
-    Budget, Class, EventKind, Measured, Orbit, Settings, Status, analyse_flow, measure,
+    Budget, Class, EventKind, Measurement, Orbit, Settings, Status, analyse_flow, measure,
 };
 use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
@@ -308,7 +308,7 @@ fn all_kinds() -> Vec<(Oscillator, Law, State)> {
     list
 }
 
-fn measured((oscillator, law, start): &(Oscillator, Law, State)) -> Measured {
+fn measured((oscillator, law, start): &(Oscillator, Law, State)) -> Measurement {
     measure(&Flow::new(oscillator), *law, *start, &budget())
 }
 

@@ -114,9 +114,9 @@ fn orbits_next_to_the_pitchfork_are_decided_early() {
     for (e, symmetric) in [(0.541, true), (0.543, false)] {
         let pair = GearPair::paper(e);
         let measured = measure(&flow_of(&pair), pair.law(), REST, &budget);
-        let periods = measured.periods_run + measured.periods_beside;
+        let periods = measured.periods_run + measured.search_periods;
         assert_eq!((measured.period, measured.symmetric), (Some(1), Some(symmetric)), "{e}");
-        // Measured 101 and 38, of 528 to wait for.
+        // Measurement 101 and 38, of 528 to wait for.
         assert!(periods < 200, "{e}: {periods}");
     }
     for (e, symmetric) in [(0.541, true), (0.543, false)] {

@@ -304,7 +304,7 @@ fn no_drift_until(periods: u64) {
         let late = strobe(&flow, &pair, early, periods - 10_000).expect("an ordinary cell");
         let drift = apart(early, late);
         println!("e = {e}, omega = {omega}: drift {drift:.1e}");
-        // Measured 2.5e-14; four times that.
+        // Measurement 2.5e-14; four times that.
         assert!(drift < 1e-13, "e = {e}, omega = {omega}: {early:?} became {late:?}");
     });
 }

@@ -112,7 +112,7 @@ fn tangents_survive_the_closing_of_a_chatter_series() {
 /// Period by period or all at once, the monodromy matrix is the same product.
 #[test]
 fn tangents_compose() {
-    // Measured 3.8e-16, 3.5e-16 and 2.4e-14.
+    // Measurement 3.8e-16, 3.5e-16 and 2.4e-14.
     for (e, omega, agreement) in [(0.56, 5.6, 2e-15), (0.0, 5.6, 2e-15), (0.2, 2.5, 1e-13)] {
         let pair = paper(e, omega);
         let flow = flow_of(&pair);
