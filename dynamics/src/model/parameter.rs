@@ -134,21 +134,71 @@ impl Parameter {
     }
 }
 
-/// Defines `TABLE`, the parameters of a model that is a struct of numbers, and `ACCESSORS`, a function per
-/// parameter that returns its field.
-macro_rules! parameters {
-    ($model:ident: $($name:literal $field:ident $default:expr, $range:ident, $shapes:ident, $meaning:literal;)*) => {
-        const TABLE: &[Parameter] = &[$(Parameter {
-            name: std::borrow::Cow::Borrowed($name),
-            meaning: std::borrow::Cow::Borrowed($meaning),
-            default: $default,
-            range: Range::$range,
-            shapes: Shapes::$shapes,
-        }),*];
-        const ACCESSORS: &[fn(&mut $model) -> &mut f64] = &[$(|model| &mut model.$field),*];
+/// Defines a model that is a struct of numbers: the struct, its table `PARAMETERS`, its contact law, and a
+/// constructor that takes the restitution `e` and uses the defaults of all other parameters.
+macro_rules! model {
+    ($(#[$doc:meta])* $model:ident, $(#[$new_doc:meta])* $new:ident:
+     $($name:literal $field:ident $default:expr, $range:ident, $shapes:ident, $meaning:literal;)*) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $model {
+            $(#[doc = $meaning] pub $field: f64,)*
+        }
+
+        impl $model {
+            /// All parameters.
+            pub const PARAMETERS: &'static [Parameter] = &[$(Parameter {
+                name: std::borrow::Cow::Borrowed($name),
+                meaning: std::borrow::Cow::Borrowed($meaning),
+                default: $default,
+                range: Range::$range,
+                shapes: Shapes::$shapes,
+            }),*];
+
+            $(#[$new_doc])*
+            pub fn $new(e: f64) -> $model {
+                $(let $field = Option::<f64>::unwrap_or($default, e);)*
+                $model { $($field),* }
+            }
+
+            /// Implements [`Model::law`].
+            pub fn law(&self) -> Law {
+                Law::both(self.e, self.mesh_speed)
+            }
+
+            fn field(&mut self, index: usize) -> &mut f64 {
+                [$(&mut self.$field),*].into_iter().nth(index).expect("the index of a parameter")
+            }
+        }
     };
 }
-pub(super) use parameters;
+pub(super) use model;
+
+/// The methods of [`Model`](super::Model) that are the same for all models which [`model`] defines.
+macro_rules! model_methods {
+    () => {
+        fn parameters(&self) -> &[Parameter] {
+            Self::PARAMETERS
+        }
+
+        fn value(&self, index: usize) -> f64 {
+            *{ *self }.field(index)
+        }
+
+        fn assign(&mut self, index: usize, value: f64) {
+            *self.field(index) = value;
+        }
+
+        fn oscillator(&self) -> Result<Oscillator, ModelError> {
+            self.oscillator()
+        }
+
+        fn law(&self) -> Law {
+            self.law()
+        }
+    };
+}
+pub(super) use model_methods;
 
 /// An error in setting a parameter.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -1,36 +1,15 @@
 //! An oscillator of one degree of freedom between stops, which can be solved by hand.
 
-use super::parameter::parameters;
+use super::parameter::{model, model_methods};
 use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
 
-/// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
-///
-/// With `r = k = F = 0` flights are straight lines and every event is known in closed form. Tests use that.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stops {
-    /// Mass, > 0.
-    pub m: f64,
-    /// Damping, >= 0.
-    pub r: f64,
-    /// Stiffness, >= 0.
-    pub k: f64,
-    /// Damping of a stop in lasting contact, >= 0.
-    pub stop_damping: f64,
-    /// Stiffness of a stop in lasting contact, >= 0.
-    pub stop_stiffness: f64,
-    /// Force amplitude.
-    pub force: f64,
-    /// Excitation frequency, > 0.
-    pub omega: f64,
-    /// Half distance of the stops, > 0.
-    pub b: f64,
-    /// Coefficient of restitution, 0 to 1.
-    pub e: f64,
-    /// Leaving speed at or below which a pressed contact lasts, >= 0.
-    pub mesh_speed: f64,
-}
-
-parameters! { Stops:
+model! {
+    /// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
+    ///
+    /// With `r = k = F = 0` flights are straight lines and every event is known in closed form. Tests use that.
+    Stops,
+    /// Returns the model with all parameters at their defaults and restitution `e`, `0 <= e <= 1`.
+    with_restitution:
     "m" m Some(1.0), Positive, Oscillator, "mass";
     "r" r Some(0.0), NonNegative, Oscillator, "damping";
     "k" k Some(0.0), NonNegative, Oscillator, "stiffness";
@@ -44,25 +23,6 @@ parameters! { Stops:
 }
 
 impl Stops {
-    /// All parameters.
-    pub const PARAMETERS: &'static [Parameter] = TABLE;
-
-    /// Returns the model with all parameters at their defaults and restitution `e`, `0 <= e <= 1`.
-    pub fn with_restitution(e: f64) -> Stops {
-        Stops {
-            m: 1.0,
-            r: 0.0,
-            k: 0.0,
-            stop_damping: 1.0,
-            stop_stiffness: 1000.0,
-            force: 1.0,
-            omega: 1.0,
-            b: 0.5,
-            e,
-            mesh_speed: 0.01,
-        }
-    }
-
     /// Implements [`Model::oscillator`]. The second degree of freedom is a unit mass without forces.
     ///
     /// # Errors
@@ -89,14 +49,11 @@ impl Stops {
         oscillator.validate()?;
         Ok(oscillator)
     }
-
-    /// Implements [`Model::law`].
-    pub fn law(&self) -> Law {
-        Law::both(self.e, self.mesh_speed)
-    }
 }
 
 impl Model for Stops {
+    model_methods!();
+
     fn name(&self) -> &str {
         "stops"
     }
@@ -105,40 +62,7 @@ impl Model for Stops {
         "Oscillator between stops"
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        TABLE
-    }
-
-    fn value(&self, index: usize) -> f64 {
-        *ACCESSORS[index](&mut { *self })
-    }
-
-    fn assign(&mut self, index: usize, value: f64) {
-        *ACCESSORS[index](self) = value;
-    }
-
-    fn oscillator(&self) -> Result<Oscillator, ModelError> {
-        self.oscillator()
-    }
-
-    fn law(&self) -> Law {
-        self.law()
-    }
-
     fn state_names(&self) -> Vec<&str> {
         vec!["x", "v"]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn with_restitution_uses_the_defaults_of_the_table() {
-        let stops = Stops::with_restitution(0.5);
-        for (i, parameter) in TABLE.iter().enumerate() {
-            assert_eq!(stops.value(i), parameter.default.unwrap_or(0.5), "{}", parameter.name);
-        }
     }
 }
