@@ -2,47 +2,45 @@
 //!
 //! # The argument
 //!
-//! Let `f > 0` be the distance from an event on a step of length `h`, and `u` in `[0, 1]` the fraction of
-//! the step. Value, slope and curvature at both ends are known exactly. Their Hermite quintic `p`
-//! satisfies
+//! Let `f > 0` be the distance from an event on a step of length `h`, and `u` in `[0, 1]` the fraction of the step.
+//! Value, slope and curvature at both ends are known exactly. Their Hermite quintic `p` satisfies
 //!
 //! ```text
 //! f(u) = p(u) + u^3 (1-u)^3 h^6 f^(6)(xi) / 720,
 //! ```
 //!
-//! and `u^3 (1-u)^3 = B(u) / 20` with `B` the middle Bernstein polynomial of degree 6. Let
-//! `c_0 .. c_6` be the Bernstein coefficients of `p` in degree 6, and `eps = h^6 max|f^(6)| / 14400`.
-//! Then `f` lies between the polynomials that have `c_3 - eps` and `c_3 + eps` in place of `c_3`. So:
+//! and `u^3 (1-u)^3 = B(u) / 20` with `B` the middle Bernstein polynomial of degree 6. Let `c_0 .. c_6` be the
+//! Bernstein coefficients of `p` in degree 6, and `eps = h^6 max|f^(6)| / 14400`. Then `f` lies between the
+//! polynomials that have `c_3 - eps` and `c_3 + eps` in place of `c_3`. So:
 //!
 //! * If all coefficients and `c_3 - eps` are positive, `f` has no root: the step is clear.
-//! * If the coefficients of both bounding polynomials change sign once, from `+` to `-`, each has
-//!   exactly one root (Descartes), and all roots of `f` lie between these two. If also `f' < 0` there,
-//!   `f` has exactly one root: a crossing.
-//! * Otherwise, for example near grazing, the step is halved. Each halving divides `eps` by 64.
-//!   It ends at the latest when the undecided distance is below rounding.
+//! * If the coefficients of both bounding polynomials change sign once, from `+` to `-`, each has exactly one root
+//!   (Descartes), and all roots of `f` lie between these two. If also `f' < 0` there, `f` has exactly one root: a
+//!   crossing.
+//! * Otherwise, for example near grazing, the step is halved. Each halving divides `eps` by 64. It ends at the latest
+//!   when the undecided distance is below rounding.
 //!
 //! `f' < 0` on the bracket is shown from an approximate root `g` of `p`. With `s = -p'(g)` and
-//! `K = 20 max|second differences of p's coefficients| >= max|p''|`, `p' <= -s/2` within
-//! `D = s / (2K)` of `g`. With `|B| <= beta` and `|B'| <= beta'` there, the bounding polynomials have
-//! slopes below `-(s/2 - beta' eps)`, so their roots lie within `D` of `g` if
-//! `|p(g)| + beta eps < D (s/2 - beta' eps)`. The slope of `f` differs from `p'` by less than `1.08 eps`
-//! (the sharp constant for the quintic's first derivative is `sqrt(5)/30000 h^5 max|f^(6)|`).
+//! `K = 20 max|second differences of p's coefficients| >= max|p''|`, `p' <= -s/2` within `D = s / (2K)` of `g`. With
+//! `|B| <= beta` and `|B'| <= beta'` there, the bounding polynomials have slopes below `-(s/2 - beta' eps)`, so their
+//! roots lie within `D` of `g` if `|p(g)| + beta eps < D (s/2 - beta' eps)`. The slope of `f` differs from `p'` by
+//! less than `1.08 eps` (the sharp constant for the quintic's first derivative is `sqrt(5)/30000 h^5 max|f^(6)|`).
 //!
-//! A simpler test usually suffices. If all second differences of `p`'s coefficients show `f'' < 0` on the
-//! whole step, or all first differences show `f' < 0`, and `f` ends below zero, `f` has one root after
-//! the start. The curvature of `f` differs from `p''` by at most `7.5 eps` (the sharp constant of the
-//! second derivative is `1/1920 h^4 max|f^(6)|`).
+//! A simpler test usually suffices. If all second differences of `p`'s coefficients show `f'' < 0` on the whole step,
+//! or all first differences show `f' < 0`, and `f` ends below zero, `f` has one root after the start. The curvature
+//! of `f` differs from `p''` by at most `7.5 eps` (the sharp constant of the second derivative is
+//! `1/1920 h^4 max|f^(6)|`).
 //!
-//! A start on the wall is a root of order `m` at `u = 0`. Division by `u^m` drops `c_i` for `i < m` and
-//! multiplies the others by positive numbers. So the tests are the same, and start at `i = m`.
+//! A start on the wall is a root of order `m` at `u = 0`. Division by `u^m` drops `c_i` for `i < m` and multiplies
+//! the others by positive numbers. So the tests are the same, and start at `i = m`.
 
 use wide::{CmpGt, CmpLt, f64x4};
 
 use crate::fused::fma;
 
-/// Bernstein coefficients `c_0 .. c_6` of the quintic through value, slope and curvature of a function at
-/// both ends of a step. All but `c_0` are stored as differences from `c_0`. The differences keep their
-/// relative accuracy on steps that change the value by far less than an ulp.
+/// Bernstein coefficients `c_0 .. c_6` of the quintic through value, slope and curvature of a function at both ends
+/// of a step. All but `c_0` are stored as differences from `c_0`. The differences keep their relative accuracy on
+/// steps that change the value by far less than an ulp.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bernstein {
     start: f64,
@@ -53,8 +51,8 @@ pub(crate) struct Bernstein {
 }
 
 impl Bernstein {
-    /// Builds the quintic of a function that starts at zero from `h f'` and `h^2 f''` at the left end, the
-    /// value at the right end, and `h f'` and `h^2 f''` there.
+    /// Builds the quintic of a function that starts at zero from `h f'` and `h^2 f''` at the left end, the value at
+    /// the right end, and `h f'` and `h^2 f''` there.
     pub(crate) fn from_zero(s0: f64, a0: f64, rise: f64, s1: f64, a1: f64) -> Bernstein {
         let (b2, b3) = (0.4 * s0 + 0.05 * a0, rise - 0.4 * s1 + 0.05 * a1);
         let c1 = s0 * (1.0 / 6.0);
@@ -85,8 +83,8 @@ impl Bernstein {
         Bernstein { start, low, high }
     }
 
-    /// Whether the function certainly stays above `floor` and below `ceiling` on the step, without the first
-    /// `order` coefficients. It is faster than [`range`](Self::range).
+    /// Whether the function certainly stays above `floor` and below `ceiling` on the step, without the first `order`
+    /// coefficients. It is faster than [`range`](Self::range).
     #[inline(always)]
     pub(crate) fn between(&self, order: usize, remainder: f64, floor: f64, ceiling: f64) -> [bool; 2] {
         let blur = MIDDLE * f64x4::splat(remainder);
@@ -103,7 +101,6 @@ impl Bernstein {
         [above == ALL_BITS && (order > 0 || least < 0.0), below == ALL_BITS && (order > 0 || most > 0.0)]
     }
 
-    /// Returns the value at the end of the step.
     #[inline(always)]
     pub(crate) fn end(&self) -> f64 {
         self.start + self.high.to_array()[1]
@@ -133,7 +130,6 @@ impl Bernstein {
 /// Selects `c_3` of `c_1 .. c_4`.
 const MIDDLE: f64x4 = f64x4::new([0.0, 0.0, 1.0, 0.0]);
 
-/// Returns the smallest of four numbers.
 #[inline(always)]
 fn smallest(x: f64x4) -> f64 {
     let [a, b, c, d] = x.to_array();
@@ -146,15 +142,14 @@ fn lower(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// Returns the larger of two numbers.
 #[inline(always)]
 fn upper(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Rounding error of a Bernstein coefficient, relative to the values at the ends. The proof holds for the
-/// rounded state. Near resonance, with displacements far larger than the gap, the state itself has the rounding
-/// error of the displacements.
+/// Rounding error of a Bernstein coefficient, relative to the values at the ends. The proof holds for the rounded
+/// state. Near resonance, with displacements far larger than the gap, the state itself has the rounding error of the
+/// displacements.
 const COEFFICIENT_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// The roots of a function on a step.
@@ -181,8 +176,8 @@ pub(crate) struct Bracket {
 
 /// Finds the roots of the distance `sign * (f - level)` on a step.
 ///
-/// `order` is the order of its root at the start, 0 if it is positive there; `remainder` is `eps` of the
-/// module's argument.
+/// `order` is the order of its root at the start, 0 if it is positive there; `remainder` is `eps` of the module's
+/// argument.
 #[inline(always)]
 pub(crate) fn judge(f: &Bernstein, level: f64, sign: f64, order: usize, remainder: f64) -> Verdict {
     let wide = f64x4::splat(sign);
@@ -231,9 +226,9 @@ fn bits(low: f64x4, high: f64x4) -> u32 {
 /// A step may be doubled if the distance exceeds the remainder by this factor, `2^6`.
 pub(crate) const ROOMY: f64 = 64.0;
 
-/// Returns the index of the first coefficient that is not positive, if both bounding polynomials change sign
-/// exactly once. The bits of `above` and `below` mark the coefficients that are positive and negative; only
-/// the middle one may be neither.
+/// Returns the index of the first coefficient that is not positive, if both bounding polynomials change sign exactly
+/// once. The bits of `above` and `below` mark the coefficients that are positive and negative; only the middle one
+/// may be neither.
 #[inline(always)]
 fn turn(above: u32, below: u32, first: usize) -> Option<usize> {
     let begin = first.max(1);

@@ -2,40 +2,37 @@
 //!
 //! # Coordinates
 //!
-//! Each domain is `M x'' + C x' + K x = force cos(omega t) + load`. The flow uses the coordinates
-//! `q = (z, w, x, v)`: the gap `z = g . x`, its rate `w`, and the displacement [`Oscillator::other`] with
-//! its velocity. Because the gap is a coordinate, a contact puts it on the wall exactly, and no event
-//! depends on a small difference of large numbers. Together with the forcing phasor and a constant,
-//! `q` obeys an autonomous linear system
+//! Each domain is `M x'' + C x' + K x = force cos(omega t) + load`. The flow uses the coordinates `q = (z, w, x, v)`:
+//! the gap `z = g . x`, its rate `w`, and the displacement [`Oscillator::other`] with its velocity. Because the gap
+//! is a coordinate, a contact puts it on the wall exactly, and no event depends on a small difference of large
+//! numbers. Together with the forcing phasor and a constant, `q` obeys an autonomous linear system
 //!
 //! ```text
 //! a = (z, w, x, v, cos, sin, 1),     a' = G a
 //! ```
 //!
-//! whose exponential is the whole flow, including the forced response. No steady-state response is
-//! subtracted, so resonance needs no special case, and neither do critically damped, overdamped or
-//! rigid-body modes.
+//! whose exponential is the whole flow, including the forced response. No steady-state response is subtracted, so
+//! resonance needs no special case, and neither do critically damped, overdamped or rigid-body modes.
 //!
 //! # Evaluation
 //!
-//! [`LinearFlow`] computes propagators from one Taylor table `(G h)^n / n!` for a step `h` with
-//! `|G| h <= 1.6`; at order 22 the remainder is below `2e-18`. Every propagator is stored minus the
-//! identity, so that short flights keep their relative accuracy. Stored are the propagators of
-//! `h, h/2, h/4, ...`, of a few longer steps, and of a fine grid of instants. From the grid a short
-//! series reaches any instant.
+//! [`LinearFlow`] computes propagators from one Taylor table `(G h)^n / n!` for a step `h` with `|G| h <= 1.6`; at
+//! order 22 the remainder is below `2e-18`. Every propagator is stored minus the identity, so that short flights keep
+//! their relative accuracy. Stored are the propagators of `h, h/2, h/4, ...`, of a few longer steps, and of a fine
+//! grid of instants. From the grid a short series reaches any instant.
 //!
 //! # Bounds on derivatives
 //!
-//! Every derivative `y^(n)` of a solution solves the same equations with the force amplitude
-//! multiplied by `omega^n` and no load. Damping cannot increase its energy `2 E = v M v + x K x`, so
+//! Every derivative `y^(n)` of a solution solves the same equations with the force amplitude multiplied by `omega^n`
+//! and no load. Damping cannot increase its energy `2 E = v M v + x K x`, so
 //!
 //! ```text
 //! sqrt(2 E_n(t + s)) <= sqrt(2 E_n(t)) + s omega^n sqrt(force M^-1 force)
 //! |z^(n+1)(t + s)|   <= sqrt(g M^-1 g) sqrt(2 E_n(t + s))        (Cauchy-Schwarz)
 //! ```
 //!
-//! The bound holds at resonance and without damping, and costs one square root. It is tight for slow
-//! motion: a stiff meshing spring that is not excited does not shorten the step.
+//! The bound holds at resonance and without damping, and costs one square root. It is tight for slow motion: a stiff
+//! meshing spring that is not excited does not shorten the step.
 
 mod columns;
 mod constrained;
@@ -74,8 +71,7 @@ pub enum DomainKind {
 
 /// The exact flow of one oscillator in all three domains.
 ///
-/// It does not depend on the contact law, so cells that differ only in restitution or meshing speed share
-/// one flow.
+/// It does not depend on the contact law, so cells that differ only in restitution or meshing speed share one flow.
 #[derive(Clone, Debug)]
 pub struct Flow {
     /// Forcing period `2 pi / omega`.
@@ -88,8 +84,8 @@ pub struct Flow {
     pub length: f64,
     /// Scale of speed: the scale of length times the rate of free motion.
     pub(crate) speed: f64,
-    /// The largest power of two up to `omega`. Velocities divided by it are comparable with displacements,
-    /// and the division is exact.
+    /// The largest power of two up to `omega`. Velocities divided by it are comparable with displacements, and the
+    /// division is exact.
     pub(crate) rate: f64,
     pub(crate) contacts: [Contact; 2],
     /// Change of `v` per unit of approach speed that the contact impulse removes.
@@ -97,7 +93,6 @@ pub struct Flow {
     /// Decrease of `w'` and `v'` per unit of `w` by the damper behind each elastic wall.
     pub(crate) dampers: [[f64; 2]; 2],
     gap: [f64; 2],
-    /// [`Oscillator::other`].
     other: usize,
     pub(crate) degrees: usize,
     mass: [[f64; 2]; 2],
@@ -183,8 +178,8 @@ impl Flow {
         self.symmetric && law.is_symmetric()
     }
 
-    /// Returns the stable steady motion that touches no wall, if there is one. It may require that one degree
-    /// of freedom is at rest.
+    /// Returns the stable steady motion that touches no wall, if there is one. It may require that one degree of
+    /// freedom is at rest.
     pub fn non_impacting(&self) -> Option<&NonImpacting> {
         self.non_impacting.as_ref()
     }
@@ -235,15 +230,15 @@ impl Flow {
         0.5 * (m1 * y[1] * y[1] + m2 * y[3] * y[3] + 2.0 * m * y[1] * y[3])
     }
 
-    /// Returns the momentum `M v . (-g_2, g_1)`, which impacts conserve. For two colliding bodies,
-    /// `z = x1 - x2`, it is the sum of their momenta.
+    /// Returns the momentum `M v . (-g_2, g_1)`, which impacts conserve. For two colliding bodies, `z = x1 - x2`, it
+    /// is the sum of their momenta.
     pub fn momentum(&self, y: State) -> f64 {
         let ([[m1, m], [_, m2]], [g0, g1]) = (self.mass, self.gap);
         g0 * (m2 * y[3] + m * y[1]) - g1 * (m1 * y[1] + m * y[3])
     }
 
-    /// Returns the state after a time `tau >= 0` in one domain, starting at forcing phase `phase` in radians.
-    /// Walls are ignored.
+    /// Returns the state after a time `tau >= 0` in one domain, starting at forcing phase `phase` in radians. Walls
+    /// are ignored.
     pub fn propagate(&self, kind: DomainKind, y: State, phase: f64, tau: f64) -> State {
         let (sin, cos) = phase.sin_cos();
         let q = self.domain(kind).propagate(self.to_gap(y), [cos, sin], tau);

@@ -1,10 +1,9 @@
 //! Models of piecewise-linear oscillators between two walls.
 //!
-//! A [`Model`] has named parameters. Two models are built in: [`GearPair`], and [`Stops`], which can be
-//! solved by hand. From its parameters a model derives an [`Oscillator`] and a contact [`Law`]. An
-//! oscillator is a mass matrix, three linear domains with harmonic forcing, a gap that is linear in the
-//! displacements, and two walls. Flow, reference and stability use only the oscillator and the law;
-//! scenes, maps and files use only the trait.
+//! A [`Model`] has named parameters. Two models are built in: [`GearPair`], and [`Stops`], which can be solved by
+//! hand. From its parameters a model derives an [`Oscillator`] and a contact [`Law`]. An oscillator is a mass matrix,
+//! three linear domains with harmonic forcing, a gap that is linear in the displacements, and two walls. Flow,
+//! reference and stability use only the oscillator and the law; scenes, maps and files use only the trait.
 
 mod gear_pair;
 mod non_impacting;

@@ -1,10 +1,9 @@
 //! The class of a motion, its cycle and its events.
 //!
-//! [`analyse`] integrates a transient and then searches the strobe states for recurrences. Each
-//! candidate period is confirmed in two ways: Newton's method must find a stable cycle nearby, and
-//! the trajectory must approach that cycle. Recurrence alone is no proof, because a decaying spiral
-//! comes close to itself at lags that are not its period. The period of a confirmed cycle is its
-//! smallest divisor after which the cycle closes.
+//! [`analyse`] integrates a transient and then searches the strobe states for recurrences. Each candidate period is
+//! confirmed in two ways: Newton's method must find a stable cycle nearby, and the trajectory must approach that
+//! cycle. Recurrence alone is no proof, because a decaying spiral comes close to itself at lags that are not its
+//! period. The period of a confirmed cycle is its smallest divisor after which the cycle closes.
 
 mod analysis;
 mod approach;
@@ -20,7 +19,7 @@ mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, analyse, analyse_flow, analyse_over, analyse_until, status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, analyse, analyse_flow, analyse_until, status_of,
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
@@ -87,8 +86,7 @@ impl Class {
     }
 }
 
-/// How the integration of a cell ended. `Failed` cells have a status that is a
-/// [failure](Status::is_failure).
+/// How the integration of a cell ended. `Failed` cells have a status that is a [failure](Status::is_failure).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// No remarks.

@@ -1,14 +1,14 @@
 //! The reference: an event-driven f64 integrator on the exact flow.
 //!
 //! A [`Trajectory`] is the motion of one oscillator. Between events it takes the longest steps that
-//! [`crate::certificate`] can prove to be free of events. A step with an event ends at the event, which
-//! is located to rounding on the exact flow. There is no time-stepping error and no event is missed.
+//! [`crate::certificate`] can prove to be free of events. A step with an event ends at the event, which is located to
+//! rounding on the exact flow. There is no time-stepping error and no event is missed.
 //!
 //! # Cost
 //!
-//! A clear step costs four 4 x 7 products: for its end, its bound and its certificate. An event adds ten,
-//! a root search on one short polynomial, and the contact law. A short flight from a wall and back
-//! (`short_flight.rs`) costs six in total, and its series is its certificate.
+//! A clear step costs four 4 x 7 products: for its end, its bound and its certificate. An event adds ten, a root
+//! search on one short polynomial, and the contact law. A short flight from a wall and back (`short_flight.rs`) costs
+//! six in total, and its series is its certificate.
 //!
 //! # Ends
 //!
@@ -75,8 +75,7 @@ impl Mode {
     }
 }
 
-/// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy
-/// matrix.
+/// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'f, const N: usize = 0> {
     flow: &'f Flow,
@@ -106,7 +105,6 @@ pub struct Trajectory<'f, const N: usize = 0> {
     meshing_time: f64,
     near_grazing: bool,
     work: Work,
-    /// Upper limits of `work`.
     allowance: Allowance<'f>,
 }
 
@@ -196,7 +194,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self
     }
 
-    /// Returns the remaining allowed work.
     pub(crate) fn allowance(&self) -> Allowance<'f> {
         self.allowance.after(self.work)
     }

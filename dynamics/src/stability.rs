@@ -1,18 +1,18 @@
-//! Stability of periodic orbits: monodromy matrix, Floquet multipliers, Newton's method on the strobe
-//! map, and Lyapunov exponents.
+//! Stability of periodic orbits: monodromy matrix, Floquet multipliers, Newton's method on the strobe map, and
+//! Lyapunov exponents.
 //!
-//! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the
-//! product of flow and saltation matrices, and is integrated as four tangent vectors. For orbits that may
-//! be their own mirror image the half-period map `Q(y) = -P_{T/2}(y)` is used instead. Since `P = Q^2`, at
-//! a pitchfork, where a multiplier of `P` is `+1`, that of `Q` is `-1`, and `Q' - I` stays regular.
+//! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the product of flow
+//! and saltation matrices, and is integrated as four tangent vectors. For orbits that may be their own mirror image
+//! the half-period map `Q(y) = -P_{T/2}(y)` is used instead. Since `P = Q^2`, at a pitchfork, where a multiplier of
+//! `P` is `+1`, that of `Q` is `-1`, and `Q' - I` stays regular.
 
 mod exponent;
 mod newton;
 mod unit_circle;
 
 pub use exponent::{Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
+pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
-pub use newton::{pitchfork, refine};
 
 use nalgebra::linalg::Schur;
 use nalgebra::{Matrix4, Vector4};
@@ -225,8 +225,8 @@ fn modulus([re, im]: [f64; 2]) -> f64 {
     re.hypot(im)
 }
 
-/// Numerical error of `ln |mu|` per forcing period for a multiplier `mu` of 1: the square root of rounding, for a double
-/// eigenvalue.
+/// Numerical error of `ln |mu|` per forcing period for a multiplier `mu` of 1: the square root of rounding, for a
+/// double eigenvalue.
 const NEUTRAL: f64 = 1e-7;
 
 /// Largest number of sweeps of the QR iteration.

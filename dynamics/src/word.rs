@@ -60,8 +60,8 @@ impl Word {
         self.0.iter().map(|&s| char::from(s)).collect()
     }
 
-    /// Returns the composition of maps as the paper prints it: last flight first, repeated ones as
-    /// powers. `2356` is `P_{6532}`, and `13554622` is `P_{1 2^2 6 4 5^2 3}`.
+    /// Returns the composition of maps as the paper prints it: last flight first, repeated ones as powers. `2356` is
+    /// `P_{6532}`, and `13554622` is `P_{1 2^2 6 4 5^2 3}`.
     ///
     /// A cycle with meshing on the right ends with it, as in the paper.
     pub fn paper_notation(&self) -> String {

@@ -1,5 +1,5 @@
-//! The matrix type of propagators, vector fields and Taylor terms: 4 x 7, on
-//! `a = (z, w, x, v, cos, sin, 1)`, and the rotation of the phasor.
+//! The matrix type of propagators, vector fields and Taylor terms: 4 x 7, on `a = (z, w, x, v, cos, sin, 1)`, and the
+//! rotation of the phasor.
 
 use nalgebra::Matrix4;
 use wide::f64x4;
@@ -27,7 +27,6 @@ impl Columns {
         }
     }
 
-    /// Returns the 7 x 7 matrix.
     pub(super) fn matrix(&self) -> Generator {
         let mut matrix = Generator::zeros();
         for (j, column) in self.columns.iter().enumerate() {
@@ -43,7 +42,6 @@ impl Columns {
         matrix
     }
 
-    /// Returns one row of the matrix.
     pub(super) fn row(&self, i: usize) -> [f64; 7] {
         self.columns.map(|column| column.to_array()[i])
     }
@@ -89,7 +87,6 @@ impl Columns {
         }
     }
 
-    /// Returns a multiple of the matrix.
     pub(super) fn scaled(&self, factor: f64) -> Columns {
         Columns {
             columns: self.columns.map(|column| column * f64x4::splat(factor)),
@@ -181,7 +178,6 @@ impl Columns {
         self.columns[4].mul_add(cos, self.columns[5].mul_add(sin, load))
     }
 
-    /// Multiplies a phasor by the rotation.
     #[inline(always)]
     pub(crate) fn rotate(&self, p: &Phasor) -> Phasor {
         let [c, s] = self.rotation;

@@ -1,16 +1,16 @@
 //! Motion at rest on a rigid wall.
 //!
-//! The wall cancels the free acceleration `p` of the gap, which is linear in the state, by a force along the
-//! gap row: `z' = w' = 0`, and the other displacement `x` obeys `v' = v'_free + kick p`. That is motion along
-//! the direction `t` with `g . t = 0` and the component 1 for `x`:
+//! The wall cancels the free acceleration `p` of the gap, which is linear in the state, by a force along the gap row:
+//! `z' = w' = 0`, and the other displacement `x` obeys `v' = v'_free + kick p`. That is motion along the direction
+//! `t` with `g . t = 0` and the component 1 for `x`:
 //!
 //! ```text
 //! m x'' + c x' + k x = f cos(omega t) + load,    m = t M t, c = t C t, k = t K t, f = t . force
 //! p = a_x x + a_v v + a_cos cos(omega t) + constant
 //! ```
 //!
-//! Its energy `2 E_5 = m x^(6)^2 + k x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of
-//! motion, the energy bounds the derivative that the certificate needs:
+//! Its energy `2 E_5 = m x^(6)^2 + k x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of motion,
+//! the energy bounds the derivative that the certificate needs:
 //!
 //! ```text
 //! |p^(6)| <= reach sqrt(2 E_5) + |a_cos| omega^6 + |a_v f / m| omega^5

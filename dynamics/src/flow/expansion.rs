@@ -1,9 +1,9 @@
 //! The motion near any instant of a step, as a short Taylor polynomial.
 //!
-//! The grid stores the propagators of every sixteenth of the Taylor step, and of whole Taylor steps. One
-//! of each reaches within a thirty-second of any instant. From there eight terms of the Taylor series
-//! reach rounding, with some margin: `(1.6 * 0.035)^9 / 9! < 2e-17`. An event needs one such polynomial,
-//! both to find the root and for the state there.
+//! The grid stores the propagators of every sixteenth of the Taylor step, and of whole Taylor steps. One of each
+//! reaches within a thirty-second of any instant. From there eight terms of the Taylor series reach rounding, with
+//! some margin: `(1.6 * 0.035)^9 / 9! < 2e-17`. An event needs one such polynomial, both to find the root and for the
+//! state there.
 
 use wide::f64x4;
 
@@ -18,15 +18,15 @@ const PARTS: usize = 16;
 /// Length of a part, in Taylor steps.
 pub(super) const FINEST_PART: f64 = 1.0 / PARTS as f64;
 
-/// The propagators of every fourth part and of the first three are sums of the series; the others are
-/// products of two of these.
+/// The propagators of every fourth part and of the first three are sums of the series; the others are products of two
+/// of these.
 const COARSER: usize = 4;
 
 /// Terms of the local series.
 pub(crate) const TERMS: usize = 8;
 
-/// Distance from a grid point up to which the local series is valid, in Taylor steps. It exceeds half a
-/// part, for roots just beyond the middle between two grid points.
+/// Distance from a grid point up to which the local series is valid, in Taylor steps. It exceeds half a part, for
+/// roots just beyond the middle between two grid points.
 pub(crate) const EXPANSION_REACH: f64 = 0.035;
 
 /// `1.5 * 2^52`: added to a small number, it leaves the nearest integer in the last bits.
@@ -76,7 +76,6 @@ pub(crate) struct Expansion {
 }
 
 impl Grid {
-    /// Returns the number of stored propagators.
     pub(super) fn stored(&self) -> usize {
         self.parts.capacity() + self.wholes.capacity()
     }
@@ -154,8 +153,8 @@ impl Grid {
 }
 
 impl Expansion {
-    /// Returns the coefficients of the change of the gap since the start, in powers of the time from the grid
-    /// point in Taylor steps.
+    /// Returns the coefficients of the change of the gap since the start, in powers of the time from the grid point
+    /// in Taylor steps.
     #[inline(always)]
     pub(crate) fn gap(&self) -> [f64; TERMS + 1] {
         let mut series = [self.moved.to_array()[0]; TERMS + 1];

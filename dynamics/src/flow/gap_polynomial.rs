@@ -6,8 +6,8 @@ use super::columns::Columns;
 use super::{Gap, Phasor};
 use crate::certificate::Bernstein;
 
-/// The matrix that maps `a = (z, w, x, v, cos, sin, 1)` to the Bernstein coefficients of the gap's Hermite
-/// quintic. The coefficients are linear in `a`, because values, slopes and curvatures at both ends are.
+/// The matrix that maps `a = (z, w, x, v, cos, sin, 1)` to the Bernstein coefficients of the gap's Hermite quintic.
+/// The coefficients are linear in `a`, because values, slopes and curvatures at both ends are.
 #[derive(Clone, Debug)]
 pub(crate) struct GapPolynomial {
     columns: [[f64x4; 2]; 7],

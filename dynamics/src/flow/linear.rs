@@ -31,7 +31,6 @@ const COARSE_LEVELS: usize = 3;
 /// Precomputed data of steps of one length.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
-    /// Step length.
     pub(crate) h: f64,
     /// Step length in Taylor steps, and its sixth power.
     pub(crate) u: f64,
@@ -42,7 +41,6 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    /// Returns state and phasor at the end of the step.
     #[inline(always)]
     pub(crate) fn end(&self, q: &Gap, phasor: &Phasor) -> (Gap, Phasor) {
         let moved = self.propagator.apply(q, phasor);
@@ -58,7 +56,6 @@ pub struct LinearFlow {
     pub(crate) rate: f64,
     /// The Taylor step: the unit of time of the series below.
     pub(crate) unit: f64,
-    /// Inverse of the Taylor step.
     pub(crate) per_unit: f64,
     /// Angle of the forcing over a Taylor step.
     pub(crate) turn: f64,
@@ -75,8 +72,8 @@ pub struct LinearFlow {
     pub(crate) short_flight: ShortFlight,
     /// Columns of the vector field `(w, w', v, v')`.
     field: Columns,
-    /// Rows of `z'', z''', z''''` on `a`. For motion on a rigid wall: rows of the acceleration that the wall
-    /// cancels, and of its first two derivatives.
+    /// Rows of `z'', z''', z''''` on `a`. For motion on a rigid wall: rows of the acceleration that the wall cancels,
+    /// and of its first two derivatives.
     gap_rates: [[f64; 7]; 3],
     /// Bound on `z^(6)`, for the gap itself; zero for motion on a rigid wall.
     pub(crate) gap_bound: EnergyBound,
@@ -155,7 +152,6 @@ impl LinearFlow {
         linear
     }
 
-    /// Returns the step of a level, if it is stored.
     #[inline(always)]
     pub(crate) fn step(&self, level: usize) -> Option<&Step> {
         self.steps.get(level)

@@ -1,9 +1,9 @@
 //! Short flights from a wall, whose Taylor series proves when they end.
 //!
-//! The distance from the wall is `z(v) = v P(v)`, `v` in Taylor steps. Up to an eighth of a Taylor step,
-//! twelve terms reach rounding, in the speeds, too: `0.2^12 / 12! < 1e-17`. If the second coefficient
-//! outweighs all later ones, the gap is accelerated towards the wall until the root of `P`. Then that root
-//! is the first return, and the contact is pressed until then.
+//! The distance from the wall is `z(v) = v P(v)`, `v` in Taylor steps. Up to an eighth of a Taylor step, twelve terms
+//! reach rounding, in the speeds, too: `0.2^12 / 12! < 1e-17`. If the second coefficient outweighs all later ones,
+//! the gap is accelerated towards the wall until the root of `P`. Then that root is the first return, and the contact
+//! is pressed until then.
 
 use wide::f64x4;
 
@@ -70,7 +70,6 @@ impl Powers {
         Powers { low: f64x4::from([1.0, v, square, square * v]), fourth: f64x4::splat(square * square) }
     }
 
-    /// Sums a series over these powers.
     #[inline(always)]
     fn sum(&self, c: &Series) -> f64 {
         let [a, b, c, d] = (c[2].mul_add(self.fourth, c[1]).mul_add(self.fourth, c[0]) * self.low).to_array();
@@ -108,8 +107,8 @@ impl ShortFlight {
 }
 
 impl FlightSeries {
-    /// Returns the time of the gap's first return to its start, in Taylor steps. Returns none if the series
-    /// does not prove that, or if the gap may go farther than `width`.
+    /// Returns the time of the gap's first return to its start, in Taylor steps. Returns none if the series does not
+    /// prove that, or if the gap may go farther than `width`.
     #[inline(always)]
     pub(crate) fn first_return(&self, width: f64) -> Option<f64> {
         let [c1, c2, c3, c4] = self.gap[0].to_array();
@@ -147,8 +146,8 @@ impl FlightSeries {
         None
     }
 
-    /// Returns the change of `(w, x, v)` up to the time `v` in Taylor steps; `per_unit` is the number of Taylor
-    /// steps in a unit of time.
+    /// Returns the change of `(w, x, v)` up to the time `v` in Taylor steps; `per_unit` is the number of Taylor steps
+    /// in a unit of time.
     #[inline(always)]
     pub(crate) fn changes(&self, v: f64, per_unit: f64) -> [f64; 3] {
         let powers = Powers::of(v);

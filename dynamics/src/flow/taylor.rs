@@ -5,8 +5,8 @@ use super::columns::Columns;
 /// Terms of the Taylor table: the remainder is below `1.6^23 / 23! < 2e-18`.
 pub(super) const ORDER: usize = 22;
 
-/// Largest `|G| h` for which the Taylor table is used. A larger one loses digits by cancellation. A smaller one
-/// needs more steps: from 0.8 to 1.6, steps per period fall by a third and instructions by 7 %.
+/// Largest `|G| h` for which the Taylor table is used. A larger one loses digits by cancellation. A smaller one needs
+/// more steps: from 0.8 to 1.6, steps per period fall by a third and instructions by 7 %.
 pub(crate) const RADIUS: f64 = 1.6;
 
 /// Returns the terms `(G unit)^(n+1) / (n+1)!` of the propagator, minus the identity.

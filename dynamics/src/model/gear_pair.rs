@@ -13,8 +13,8 @@ model! {
     /// m2 x2'' + r2 x2' + k2 x2 = 0
     /// ```
     ///
-    /// Meshing on side `s` (12), (13) adds the contact force `r w + k (z - s b)`,
-    /// `w = v1 - v2`, with opposite signs to both. All quantities are dimensionless.
+    /// Meshing on side `s` (12), (13) adds the contact force `r w + k (z - s b)`, `w = v1 - v2`, with opposite signs
+    /// to both. All quantities are dimensionless.
     GearPair,
     /// Returns the values of Table 1 with restitution `e`, `0 <= e <= 1`.
     paper:

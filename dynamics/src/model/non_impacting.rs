@@ -1,15 +1,14 @@
 //! Steady motion that never touches a wall.
 //!
-//! Free motion is the sum of a steady response `x_s` and a transient `q = x - x_s`, which obeys the
-//! free equations without force or load. The transient's energy `2 E = q' M q' + q K q` never grows, so
-//! the gap stays within
+//! Free motion is the sum of a steady response `x_s` and a transient `q = x - x_s`, which obeys the free equations
+//! without force or load. The transient's energy `2 E = q' M q' + q K q` never grows, so the gap stays within
 //!
 //! ```text
 //! |z - z_0| <= |g . X| + sqrt(2 E g K^-1 g),   z_0 = g . K^-1 load
 //! ```
 //!
-//! for all time, with `X` the complex amplitude of the steady response (Cauchy-Schwarz in the
-//! inner product of K). If that interval lies between the walls, the motion has no further event.
+//! for all time, with `X` the complex amplitude of the steady response (Cauchy-Schwarz in the inner product of K). If
+//! that interval lies between the walls, the motion has no further event.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 
@@ -64,8 +63,8 @@ impl NonImpacting {
         Some(NonImpacting { steady, mass, stiffness, reach, exponent, resting: None })
     }
 
-    /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing
-    /// moves between the walls, stays at rest. The one at rest may be undamped.
+    /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
+    /// the walls, stays at rest. The one at rest may be undamped.
     pub fn beside_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
             let Oscillator { gap, force, free, mass, .. } = *oscillator;
@@ -148,8 +147,8 @@ mod tests {
 
     #[test]
     fn the_gear_pair_has_non_impacting_motion_above_a_frequency() {
-        // The supports are not coupled, and the force acts on gear 1 alone. The decay rates r / (2 m) are
-        // 0.15 for gear 1 and 0.3 for gear 2.
+        // The supports are not coupled, and the force acts on gear 1 alone. The decay rates r / (2 m) are 0.15 for
+        // gear 1 and 0.3 for gear 2.
         let motion = NonImpacting::new(&pair(11.0).oscillator().unwrap()).unwrap();
         assert!((motion.exponent() + 0.15).abs() < 1e-12);
         let p = Complex::from(50.0) / Complex::new(30.0 - 2.0 * 121.0, 0.6 * 11.0);

@@ -62,8 +62,8 @@ pub enum OscillatorError {
 
 /// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + load`.
 ///
-/// Damping and stiffness are symmetric and positive semidefinite. The energy bounds of the event
-/// certificate need that (see [`crate::flow`]).
+/// Damping and stiffness are symmetric and positive semidefinite. The energy bounds of the event certificate need
+/// that (see [`crate::flow`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
     /// Damping matrix.
@@ -80,22 +80,21 @@ const LEAST_LENGTH: f64 = 1e-150;
 /// The contact type of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contact {
-    /// An impact, `w+ = -e w-`. A pressed contact with a low leaving speed lasts, and then moves on a
-    /// spring and a damper behind the wall.
+    /// An impact, `w+ = -e w-`. A pressed contact with a low leaving speed lasts, and then moves on a spring and a
+    /// damper behind the wall.
     Impact,
-    /// An impact on a rigid wall. A pressed contact that has come to rest sticks to the wall until the
-    /// load pulls it off.
+    /// An impact on a rigid wall. A pressed contact that has come to rest sticks to the wall until the load pulls it
+    /// off.
     Rigid,
     /// No impact: the motion continues behind the wall, and the state is continuous.
     Elastic,
 }
 
-/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may
-/// be missing.
+/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillator {
-    /// Degrees of freedom: 1 or 2. With 1, the second displacement has a mass of 1, no forces and no part in
-    /// the gap, and its state is 0.
+    /// Degrees of freedom: 1 or 2. With 1, the second displacement has a mass of 1, no forces and no part in the gap,
+    /// and its state is 0.
     pub degrees: usize,
     /// Mass matrix, symmetric and positive definite.
     pub mass: [[f64; 2]; 2],
@@ -125,8 +124,8 @@ impl Oscillator {
         self.walls[side.index()]
     }
 
-    /// Returns the index of the displacement that is a coordinate together with the gap: the one with the
-    /// smaller entry in the gap row, the second if both are equal.
+    /// Returns the index of the displacement that is a coordinate together with the gap: the one with the smaller
+    /// entry in the gap row, the second if both are equal.
     pub fn other(&self) -> usize {
         usize::from(self.gap[0].abs() >= self.gap[1].abs())
     }
@@ -217,7 +216,7 @@ impl Oscillator {
     }
 
     /// Whether a wall exists and motion can continue behind it.
-    pub(crate) fn has_motion_behind(&self, side: Side) -> bool {
+    fn has_motion_behind(&self, side: Side) -> bool {
         self.wall(side).is_finite() && self.contacts[side.index()] != Contact::Rigid
     }
 
@@ -305,13 +304,13 @@ impl Oscillator {
     /// max(|wall|, |D force|, |D load|),   D = (K + omega^2 M)^-1
     /// ```
     ///
-    /// over the existing walls and both displacements, with `K` and `load` of free motion. `D force` is the
-    /// forced deflection without the effects of resonance and damping. `D load` is the static deflection; for a
-    /// soft spring or none it is the distance that the load moves a mass in a radian of the forcing. The scale
-    /// is finite for every oscillator.
+    /// over the existing walls and both displacements, with `K` and `load` of free motion. `D force` is the forced
+    /// deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
+    /// or none it is the distance that the load moves a mass in a radian of the forcing. The scale is finite for
+    /// every oscillator.
     ///
-    /// A factor on `walls`, `force` and `load` that is a power of two multiplies the scale exactly. A change of
-    /// the unit of time does not change it.
+    /// A factor on `walls`, `force` and `load` that is a power of two multiplies the scale exactly. A change of the
+    /// unit of time does not change it.
     pub fn length_scale(&self) -> f64 {
         let [right, left] = self.walls;
         let half = 0.5 * (right - left);
@@ -323,7 +322,6 @@ impl Oscillator {
         walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
     }
 
-    /// Returns the largest displacement of `(K + omega^2 M)^-1 force`.
     fn deflection(&self, force: [f64; 2]) -> f64 {
         let [[k1, k], [_, k2]] = self.free.stiffness;
         let [[m1, m], [_, m2]] = self.mass;
@@ -334,8 +332,8 @@ impl Oscillator {
         ((b * f1 - k * f2) / determinant).abs().max(((a * f2 - k * f1) / determinant).abs())
     }
 
-    /// Whether the walls and the domains behind them are mirror images, so that `(y, t) -> (-y, t + T/2)`
-    /// maps solutions to solutions.
+    /// Whether the walls and the domains behind them are mirror images, so that `(y, t) -> (-y, t + T/2)` maps
+    /// solutions to solutions.
     pub fn mirror_symmetric(&self) -> bool {
         let mirrored = |domain: &Domain| Domain { load: domain.load.map(|value| -value), ..*domain };
         self.walls[0] == -self.walls[1]
@@ -393,8 +391,7 @@ fn require(
 /// The contact law: the parameters of a cell that its flow does not depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
-    /// Coefficient of restitution `e`, 0 to 1, of the right and the left wall: `w+ = -e w-`. Elastic walls
-    /// ignore it.
+    /// Coefficient of restitution `e`, 0 to 1, of the right and the left wall: `w+ = -e w-`. Elastic walls ignore it.
     pub restitution: [f64; 2],
     /// Leaving speed `e |w-|`, >= 0, at or below which a pressed contact with the right or left wall lasts.
     pub mesh_speed: [f64; 2],

@@ -20,9 +20,9 @@ pub enum ModelError {
 
 /// A model with the values of its parameters: one cell of a map.
 ///
-/// Scenes set parameters by name; engines use the oscillator and the law. [`Parameter::shapes`] says
-/// which of the two depends on a parameter, so that a map computes one flow per distinct oscillator.
-/// An implementation must be `Clone` and `PartialEq`; then `Box<dyn Model>` is, too.
+/// Scenes set parameters by name; engines use the oscillator and the law. [`Parameter::shapes`] says which of the two
+/// depends on a parameter, so that a map computes one flow per distinct oscillator. An implementation must be `Clone`
+/// and `PartialEq`; then `Box<dyn Model>` is, too.
 pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the name in scenes.
     fn name(&self) -> &str;
@@ -64,8 +64,8 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
     /// Returns the contact law.
     fn law(&self) -> Law;
 
-    /// Returns the names of the state's components: displacement and velocity of each degree of freedom.
-    /// A model of one degree of freedom uses the first half of a [`State`](super::State); the other half is 0.
+    /// Returns the names of the state's components: displacement and velocity of each degree of freedom. A model of
+    /// one degree of freedom uses the first half of a [`State`](super::State); the other half is 0.
     fn state_names(&self) -> Vec<&str>;
 
     /// Returns the name of the moving body of each degree of freedom. The default is the displacement's name.

@@ -56,29 +56,17 @@ const APPROACH_CYCLE_CAP: f64 = 4000.0;
 ///
 /// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is confirmed. It is `chaotic`
 /// if the exponent exceeds zero by three standard errors and nearby motions have separated by a factor of `e^40` or
-/// more. If neither holds after the observed periods, windows of twice the length follow, up to 32,768 periods;
-/// after that it is undecided.
+/// more. If neither holds after the observed periods, windows of twice the length follow, up to 32,768 periods; after
+/// that it is undecided.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
 pub fn analyse(model: &dyn Model, start: State, settings: &Settings) -> Result<Orbit, ModelError> {
-    analyse_over(model, start, settings, EVENT_PERIODS)
+    Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, EVENT_PERIODS))
 }
 
-/// Classifies a motion like [`analyse`], and lists the events of the last `event_periods` of aperiodic motion.
-///
-/// # Errors
-/// [`ModelError`] if the model is not valid.
-pub fn analyse_over(
-    model: &dyn Model,
-    start: State,
-    settings: &Settings,
-    event_periods: u32,
-) -> Result<Orbit, ModelError> {
-    Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, event_periods))
-}
-
-/// Classifies a motion like [`analyse_over`]; returns none if `halt` was raised.
+/// Classifies a motion like [`analyse`], and lists the events of the last `event_periods` of aperiodic motion. Returns
+/// none if `halt` was raised.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -95,7 +83,8 @@ pub fn analyse_until(
     Ok((!allowance.is_halted()).then_some(orbit))
 }
 
-/// Classifies a motion like [`analyse_over`], with a flow that the caller has computed.
+/// Classifies a motion like [`analyse`], with a flow that the caller has computed, and lists the events of the last
+/// `event_periods` of aperiodic motion.
 pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
     Analysis { flow, law, settings, event_periods, allowance: ALLOWANCE }.orbit(start)
 }
@@ -345,8 +334,8 @@ impl Analysis<'_> {
         Ok((is_nearer && self.stays(trajectory, &mut ahead, cycle, metric)?).then_some(last))
     }
 
-    /// Whether a trajectory near a cycle stays there. A chaotic motion can come closer by chance, so the trajectory is
-    /// integrated until [`stays`] holds.
+    /// Whether a trajectory near a cycle stays there. A chaotic motion can come closer by chance, so the trajectory
+    /// is integrated until [`stays`] holds.
     fn stays(
         &self,
         seed: &Trajectory<'_>,
@@ -384,8 +373,8 @@ impl Analysis<'_> {
         let first = trajectory.clone();
         let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
         let closes = trajectory.is_in_domain_of(&first) || reading.on_strobe;
-        // The symbol of the first flight depends on the wall that `seed` came from. If the cycle comes from another wall,
-        // a second turn has the right symbol.
+        // The symbol of the first flight depends on the wall that `seed` came from. If the cycle comes from another
+        // wall, a second turn has the right symbol.
         if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
         }

@@ -1,11 +1,12 @@
 //! A test whether a motion near a stable cycle converges to it.
 //!
-//! A motion near a stable cycle may still leave it, because of a grazing impact, a fold of the strobe map, or an impact
-//! that turns into meshing. So the test uses only the strobe states of the motion itself. As long as the sequence
-//! of events does not change, the motion stays on one branch of the strobe map, and the monodromy matrix maps each
-//! deviation from the cycle to the next one. Consider the convex hull of the origin and the earlier deviations. If
-//! the present deviation lies in it, the matrix maps the hull into itself. Then all later deviations lie in the hull,
-//! too, and the motion stays on its branch. That happens after a few cycles, or after one turn of a spiral.
+//! A motion near a stable cycle may still leave it, because of a grazing impact, a fold of the strobe map, or an
+//! impact that turns into meshing. So the test uses only the strobe states of the motion itself. As long as the
+//! sequence of events does not change, the motion stays on one branch of the strobe map, and the monodromy matrix
+//! maps each deviation from the cycle to the next one. Consider the convex hull of the origin and the earlier
+//! deviations. If the present deviation lies in it, the matrix maps the hull into itself. Then all later deviations
+//! lie in the hull, too, and the motion stays on its branch. That happens after a few cycles, or after one turn of a
+//! spiral.
 
 use nalgebra::Vector4;
 
@@ -27,11 +28,12 @@ pub const BRANCH_CYCLES: usize = 4;
 pub(super) const HULL_CYCLES: usize = 64;
 
 /// Largest distance of the present deviation from the hull, relative to the deviation. In directions that have
-/// decayed, it never lies exactly inside. With 0.2, three cells of the main map are assigned to cycles that they leave.
+/// decayed, it never lies exactly inside. With 0.2, three cells of the main map are assigned to cycles that they
+/// leave.
 const HULL_DISTANCE: f64 = 0.1;
 
-/// Distance from the hull that is always allowed, relative to the size of the motion. Thresholds are very rarely
-/// that close. Without it a map takes 5 % more periods.
+/// Distance from the hull that is always allowed, relative to the size of the motion. Thresholds are very rarely that
+/// close. Without it a map takes 5 % more periods.
 const LEAST_HULL_DISTANCE: f64 = 1e-4;
 
 /// Largest number of steps in the search for the nearest point of a hull.
@@ -65,8 +67,8 @@ pub(super) fn stays(
 
 /// Whether a point lies in the convex hull of the origin and of `corners`, or within the allowed distance of it.
 ///
-/// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step goes from the nearest point so far towards the corner
-/// that lies farthest beyond it, whose position also bounds the distance from below.
+/// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step goes from the nearest point so far towards the corner that
+/// lies farthest beyond it, whose position also bounds the distance from below.
 fn is_in_hull(point: &Vector4<f64>, corners: &[Vector4<f64>], metric: &Metric) -> bool {
     let target = metric.scaled(point);
     let allowed = (HULL_DISTANCE * target.norm()).max(LEAST_HULL_DISTANCE);

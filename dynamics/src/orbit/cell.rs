@@ -247,8 +247,8 @@ impl<'a> CellRun<'a> {
         let metric = Metric::of(window, self.analysis.flow);
         let near = if is_last { RECURRENCE_DISTANCE } else { EARLY_STOP_DISTANCE };
         if is_last {
-            // The last check ignores the others, so that a cell which uses its whole budget has the same class with and
-            // without early stops.
+            // The last check ignores the others, so that a cell which uses its whole budget has the same class with
+            // and without early stops.
             self.cycle = None;
         }
         if let Some(orbit) = self.approached(&metric, near)? {
@@ -307,8 +307,8 @@ impl<'a> CellRun<'a> {
         Ok(None)
     }
 
-    /// Returns the orbit of the last cycle that was found, if the strobe states approach it and [`stays`] holds. Within
-    /// the distance `near` a larger tolerance applies.
+    /// Returns the orbit of the last cycle that was found, if the strobe states approach it and [`stays`] holds.
+    /// Within the distance `near` a larger tolerance applies.
     fn approached(&self, metric: &Metric, near: f64) -> Result<Option<Orbit>, Stop> {
         let Some(found) = &self.cycle else { return Ok(None) };
         let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_strobe_of(found));
@@ -396,8 +396,8 @@ impl<'a> CellRun<'a> {
         }
     }
 
-    /// Builds the results of aperiodic motion over the last observed periods. For chaos the exponent must exceed zero by
-    /// `errors` standard errors.
+    /// Builds the results of aperiodic motion over the last observed periods. For chaos the exponent must exceed zero
+    /// by `errors` standard errors.
     fn aperiodic(&self, errors: f64) -> Measurement {
         let settings = &self.budget.settings;
         let from = self.strobes.len() - 1 - settings.observed_periods as usize;

@@ -1,7 +1,7 @@
 //! The sequence of events in a forcing period, as a number.
 //!
-//! The strobe map is smooth as long as the sequence of events does not change. So the itinerary identifies a
-//! branch of the strobe map.
+//! The strobe map is smooth as long as the sequence of events does not change. So the itinerary identifies a branch
+//! of the strobe map.
 
 use crate::flow::Flow;
 use crate::model::Side;

@@ -6,8 +6,8 @@
 //! - The motion escapes: the distance between strobe states one cycle apart grows, or a tangent vector grows.
 //! - The recurrence is known: an earlier search found an unstable cycle here, or failed here.
 //!
-//! The tests do not affect motion that converges to a stable cycle. Its recurrences shrink, but its distances from other
-//! cycles and from the starts of earlier searches do not.
+//! The tests do not affect motion that converges to a stable cycle. Its recurrences shrink, but its distances from
+//! other cycles and from the starts of earlier searches do not.
 
 use super::recurrence::Metric;
 use crate::model::State;
@@ -16,20 +16,20 @@ use crate::stability::{Cycle, Exponent, LARGEST_MULTIPLIER, StrobeMap};
 /// Distances of recurrences below this are near rounding and need not shrink.
 const RECURRENCE_ROUNDING: f64 = 1e-7;
 
-/// Largest distance of a known cycle that explains a recurrence, in units of the recurrence's distance: a multiplier that
-/// differs from 1 by a quarter makes recurrences of a quarter of the distance.
+/// Largest distance of a known cycle that explains a recurrence, in units of the recurrence's distance: a multiplier
+/// that differs from 1 by a quarter makes recurrences of a quarter of the distance.
 const EXPLAINED_RATIO: f64 = 4.0;
 
 /// Number of cycles over which the growth of a tangent vector is tested, if another check follows.
 const ESCAPE_CYCLES: usize = 2;
 
-/// Number of cycles over which that growth is tested at the last check. Near a stable cycle a vector may stretch once,
-/// while it turns from displacements to velocities, but by less than `2^8`.
+/// Number of cycles over which that growth is tested at the last check. Near a stable cycle a vector may stretch
+/// once, while it turns from displacements to velocities, but by less than `2^8`.
 const LAST_ESCAPE_CYCLES: usize = 8;
 
-/// Returns the distance between the last strobe state and that of `lag` periods ago, if it is smaller than the distance
-/// one lag earlier. With a lag of more than one period, whose search is expensive, that distance must also be smaller than
-/// the one before it, if there is one. Returns none if there are fewer than two lags.
+/// Returns the distance between the last strobe state and that of `lag` periods ago, if it is smaller than the
+/// distance one lag earlier. With a lag of more than one period, whose search is expensive, that distance must also
+/// be smaller than the one before it, if there is one. Returns none if there are fewer than two lags.
 pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Option<f64> {
     let last = strobes.len() - 1;
     let distance = |back: usize| {
@@ -41,15 +41,16 @@ pub(super) fn contraction(strobes: &[State], lag: usize, metric: &Metric) -> Opt
     (now <= before && is_steady() || now <= RECURRENCE_ROUNDING).then_some(now)
 }
 
-/// Whether a tangent vector has grown by more than is possible near a stable cycle, over the last two cycles, or the last
-/// eight if this is the last check.
+/// Whether a tangent vector has grown by more than is possible near a stable cycle, over the last two cycles, or the
+/// last eight if this is the last check.
 pub(super) fn escapes(exponent: &Exponent, period: u32, is_last: bool) -> bool {
     let cycles = if is_last { LAST_ESCAPE_CYCLES } else { ESCAPE_CYCLES };
     let growth = exponent.recent_growth(cycles * period as usize);
     growth.is_some_and(|growth| growth > cycles as f64 * LARGEST_MULTIPLIER.ln())
 }
 
-/// Whether the growth of a tangent vector, as a logarithm, is more than the stretch that is possible near a stable cycle.
+/// Whether the growth of a tangent vector, as a logarithm, is more than the stretch that is possible near a stable
+/// cycle.
 pub(super) fn exceeds_stretch(growth: Option<f64>) -> bool {
     growth.is_some_and(|growth| growth > LAST_ESCAPE_CYCLES as f64 * LARGEST_MULTIPLIER.ln())
 }

@@ -50,8 +50,8 @@ fn a_cycle_that_the_motion_leaves_is_not_reported() {
     }
 }
 
-/// The strobe lies 0.0002 after a start of meshing. While strobe states lie behind the wall, the strobe map has
-/// a fixed point in front of the wall, which is not a cycle.
+/// The strobe lies 0.0002 after a start of meshing. While strobe states lie behind the wall, the strobe map has a
+/// fixed point in front of the wall, which is not a cycle.
 #[test]
 fn a_fixed_point_in_another_domain_is_no_cycle() {
     let pair = paper(0.22504892367906065, 3.475538160469667);

@@ -27,7 +27,6 @@ impl<'a> Allowance<'a> {
         Allowance { halt: Some(halt), ..self }
     }
 
-    /// Subtracts work from the limits.
     pub(crate) fn after(self, work: Work) -> Allowance<'a> {
         Allowance {
             steps: self.steps.saturating_sub(work.steps),
@@ -36,7 +35,6 @@ impl<'a> Allowance<'a> {
         }
     }
 
-    /// Whether the stop flag is raised.
     pub(crate) fn is_halted(&self) -> bool {
         self.halt.is_some_and(|halt| halt.load(Ordering::Relaxed))
     }

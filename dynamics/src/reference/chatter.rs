@@ -4,8 +4,8 @@ use super::{EventKind, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow, Phasor, RADIUS};
 use crate::model::{Contact, Side};
 
-/// Longest duration of a series that is replaced by its closed form, in Taylor steps of free motion. The error of
-/// the closed form is of third order in the duration.
+/// Longest duration of a series that is replaced by its closed form, in Taylor steps of free motion. The error of the
+/// closed form is of third order in the duration.
 const CLOSING_DURATION: f64 = 1e-4;
 
 /// The closing duration as an angle, in radians of the fastest rate of free motion.
@@ -94,9 +94,9 @@ impl<const N: usize> Trajectory<'_, N> {
         let pressing_at_end = pressing + duration * pressing_rate;
         let is_rigid = flow.contacts[side.index()] == Contact::Rigid;
         self.tangents = self.tangents.map(|[dz, dw, dx, dv]| {
-            // A neighbouring motion leaves the wall `later`, at another speed and under another pressing acceleration,
-            // and its series ends `late`. `behind` is the difference of its gap's rate at the end of this series. It
-            // is 0 on a rigid wall, where the neighbour comes to rest, too.
+            // A neighbouring motion leaves the wall `later`, at another speed and under another pressing
+            // acceleration, and its series ends `late`. `behind` is the difference of its gap's rate at the end of
+            // this series. It is 0 on a rigid wall, where the neighbour comes to rest, too.
             let (dx, dv) = (dx + kick * dz, dv + kick * dw);
             let later = s * dz / leaving;
             let leaves = -s * dw - (pressing + sliding.damping * leaving) * later;

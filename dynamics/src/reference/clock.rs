@@ -20,13 +20,11 @@ impl Clock {
         self.time
     }
 
-    /// Sets the time exactly.
     #[inline(always)]
     pub(super) fn set(&mut self, time: f64) {
         *self = Self { time, error: 0.0 };
     }
 
-    /// Adds a step.
     #[inline(always)]
     pub(super) fn advance(&mut self, step: f64) {
         let step = step + self.error;

@@ -5,8 +5,8 @@ use super::{Crossing, EventKind, GapEvent, Mode, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow};
 use crate::model::{Contact, Side};
 
-/// Approach speeds below this, relative to the scale of length and the rate of free motion, count as near grazing
-/// if the load pulls away from the wall. The saltation matrix is proportional to the inverse of the approach speed.
+/// Approach speeds below this, relative to the scale of length and the rate of free motion, count as near grazing if
+/// the load pulls away from the wall. The saltation matrix is proportional to the inverse of the approach speed.
 pub const GRAZING_SPEED: f64 = 4e-5;
 
 /// The gradient of the gap in gap coordinates.
@@ -266,8 +266,8 @@ impl<const N: usize> Trajectory<'_, N> {
         true
     }
 
-    /// Processes a gap that is on a wall, or beyond it by rounding: a contact if the gap closes, otherwise a start from
-    /// the wall.
+    /// Processes a gap that is on a wall, or beyond it by rounding: a contact if the gap closes, otherwise a start
+    /// from the wall.
     fn touch(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
         let closing = side.sign() * self.q[1];
@@ -283,8 +283,8 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     /// Sets the near-grazing flag for a gap that touches a wall within rounding. There are two exceptions: an elastic
-    /// wall, where the linearisation is valid with and without contact, and a gap that has just left a rigid wall, which
-    /// moves very slowly at first.
+    /// wall, where the linearisation is valid with and without contact, and a gap that has just left a rigid wall,
+    /// which moves very slowly at first.
     #[cold]
     pub(super) fn note_grazing(&mut self) {
         let [right, left] = self.flow.walls.map(|wall| (self.q[0] - wall).abs());
@@ -295,8 +295,8 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Takes the shortest step although it is undecided: a contact on it is within rounding of grazing. If the step ends
-    /// beyond a wall there is a contact, otherwise no event.
+    /// Takes the shortest step although it is undecided: a contact on it is within rounding of grazing. If the step
+    /// ends beyond a wall there is a contact, otherwise no event.
     pub(super) fn settle_graze(
         &mut self,
         linear: &LinearFlow,

@@ -1,17 +1,17 @@
 //! Elastic walls: the state is continuous there.
 //!
 //! On the wall both vector fields differ only by the damper `c` behind it, `f+ - f- = -(c w) M^-1 g`. In the
-//! saltation matrix `w` cancels: it is `S = I - c M^-1 g n^T` on the way in and `S = I + c M^-1 g n^T` on the way out,
-//! exactly and at any speed. So a crossing of an elastic wall is never too near to grazing, and without a damper the
-//! strobe map is continuously differentiable there.
+//! saltation matrix `w` cancels: it is `S = I - c M^-1 g n^T` on the way in and `S = I + c M^-1 g n^T` on the way
+//! out, exactly and at any speed. So a crossing of an elastic wall is never too near to grazing, and without a damper
+//! the strobe map is continuously differentiable there.
 
 use super::{EventKind, Observer, Trajectory};
 use crate::flow::DomainKind;
 use crate::model::Side;
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Processes free motion that reaches an elastic wall. If the speed is zero, the gap's first derivative that is not
-    /// zero decides whether the motion continues behind the wall.
+    /// Processes free motion that reaches an elastic wall. If the speed is zero, the gap's first derivative that is
+    /// not zero decides whether the motion continues behind the wall.
     #[inline(never)]
     pub(super) fn go_behind(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);

@@ -76,7 +76,8 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Finds the only root in a bracket to rounding. Returns an expansion near it and its time from here in Taylor
     /// steps.
     ///
-    /// The series is of the change of the gap, so that flights from a wall keep their relative accuracy at any length.
+    /// The series is of the change of the gap, so that flights from a wall keep their relative accuracy at any
+    /// length.
     #[inline(always)]
     fn locate(
         &mut self,
@@ -114,7 +115,8 @@ impl<const N: usize> Trajectory<'_, N> {
             } else {
                 hi = u;
             }
-            // If the slope is so small that rounding moves the root, Newton's method does not converge, but bisection ends.
+            // If the slope is so small that rounding moves the root, Newton's method does not converge, but bisection
+            // ends.
             if hi - lo <= BRACKET_ROUNDING * hi.max(BRACKET_ROUNDING * h) {
                 return Some((expansion, u));
             }
@@ -177,7 +179,6 @@ fn root_near(c: &[f64; TERMS + 1], v: f64, u: f64) -> Option<f64> {
     None
 }
 
-/// Sums a series.
 #[inline(always)]
 fn sum(c: &[f64; TERMS + 1], v: f64) -> f64 {
     let square = v * v;

@@ -1,5 +1,5 @@
-//! Short flights from a wall and back to it: chatter, and contact onsets. They are half of all flights if impacts
-//! are dense.
+//! Short flights from a wall and back to it: chatter, and contact onsets. They are half of all flights if impacts are
+//! dense.
 
 use super::{Crossing, Mode, Observer, Stop, Trajectory};
 use crate::flow::{LONGEST_SHORT_FLIGHT, LinearFlow, turned};

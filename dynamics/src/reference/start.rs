@@ -11,8 +11,8 @@ const ON_WALL: f64 = 1e-9;
 impl<'f> Trajectory<'f, 0> {
     /// Starts a trajectory at phase 0 in the state `y`.
     ///
-    /// A gap behind a wall means meshing. A gap behind a rigid wall is moved onto the wall. A closing gap on a wall is a
-    /// contact.
+    /// A gap behind a wall means meshing. A gap behind a rigid wall is moved onto the wall. A closing gap on a wall
+    /// is a contact.
     pub fn new(flow: &'f Flow, law: Law, y: State) -> Self {
         Self::with_tangents(flow, law, y, [])
     }
@@ -135,8 +135,8 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         (self.mode, self.origin, self.from_wall) == (other.mode, other.origin, other.from_wall)
     }
 
-    /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different, unless
-    /// the gap lies on the wall.
+    /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different,
+    /// unless the gap lies on the wall.
     pub(crate) fn is_in_domain_of(&self, other: &Trajectory<'_, N>) -> bool {
         let is_between = |side: Side| {
             let wall = self.flow.wall(side);

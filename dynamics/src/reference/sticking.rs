@@ -1,9 +1,9 @@
 //! Rigid walls: a pressed contact that has come to rest sticks until the load pulls it off.
 //!
 //! While it sticks, `z = wall` and `w = 0` exactly, and the other displacement follows the constrained motion
-//! (`flow/constrained.rs`). The wall cancels the acceleration `p` of the gap. When `p` no longer points into the wall,
-//! the gap leaves it, from rest and with zero acceleration. State and vector field are continuous there, so tangents do
-//! not jump.
+//! (`flow/constrained.rs`). The wall cancels the acceleration `p` of the gap. When `p` no longer points into the
+//! wall, the gap leaves it, from rest and with zero acceleration. State and vector field are continuous there, so
+//! tangents do not jump.
 
 use super::{EventKind, Mode, Observer, StepVerdict, Stop, Trajectory};
 use crate::flow::{DomainKind, Gap};
@@ -30,8 +30,8 @@ impl<const N: usize> Trajectory<'_, N> {
     /// Comes to rest on a rigid wall.
     ///
     /// Neighbouring motions reach the wall earlier or later and come to rest, too. The approach speed cancels in
-    /// `S = R + (f+ - R f-) n^T / (n f-)`, where `R` is the impact that stops the gap. What remains is the displacement
-    /// of the other coordinate, and its damping by the gap's velocity.
+    /// `S = R + (f+ - R f-) n^T / (n f-)`, where `R` is the impact that stops the gap. What remains is the
+    /// displacement of the other coordinate, and its damping by the gap's velocity.
     #[inline(never)]
     pub(super) fn stick(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
@@ -56,8 +56,8 @@ impl<const N: usize> Trajectory<'_, N> {
         self.level[1] = self.flow.domain(DomainKind::Meshing(side)).taylor_level;
     }
 
-    /// Takes one step at rest on a rigid wall, which ends if the pressing acceleration vanishes. The caller has counted
-    /// the first trial.
+    /// Takes one step at rest on a rigid wall, which ends if the pressing acceleration vanishes. The caller has
+    /// counted the first trial.
     #[cold]
     #[inline(never)]
     pub(super) fn step_at_rest(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {

@@ -3,8 +3,8 @@
 use super::Trajectory;
 use crate::flow::Gap;
 
-/// Speeds below this at an event, relative to the scale of length and the rate of free motion, make the
-/// linearisation meaningless.
+/// Speeds below this at an event, relative to the scale of length and the rate of free motion, make the linearisation
+/// meaningless.
 pub const NO_SPEED: f64 = 1e-14;
 
 /// Tangents larger than this or smaller than its inverse are rescaled.

@@ -38,7 +38,6 @@ impl Exponent {
         Some(self.growth[from..].iter().sum())
     }
 
-    /// Returns the number of recorded periods.
     pub(crate) fn periods(&self) -> usize {
         self.growth.len()
     }

@@ -1,11 +1,10 @@
-//! Newton's method on the strobe map, and the pitchfork of a symmetric orbit.
+//! Newton's method on the strobe map.
 
 use nalgebra::{Matrix4, Vector4};
 
 use super::unit_circle::lies_within_unit_circle;
 use super::{Cycle, Image, StrobeMap, balanced, multipliers};
-use crate::flow::Flow;
-use crate::model::{Model, State};
+use crate::model::State;
 use crate::reference::{Trajectory, Work};
 
 /// Limits of one Newton search.
@@ -18,11 +17,11 @@ struct SearchLimits {
     stops_at_unstable: bool,
 }
 
-/// Limits of a full search.
 const FULL_SEARCH: SearchLimits = SearchLimits { steps: 40, trials: 12, stops_at_unstable: false };
 
 /// Limits of a quick search for a stable orbit near the motion, which can be repeated later. Of 343 orbits found in
-/// 400 cells along a map's borders, 4 needed more. With full searches, the failed ones were seven tenths of all periods.
+/// 400 cells along a map's borders, 4 needed more. With full searches, the failed ones were seven tenths of all
+/// periods.
 const QUICK_SEARCH: SearchLimits = SearchLimits { steps: 12, trials: 3, stops_at_unstable: true };
 
 /// If the map expands by more than this factor, no stable orbit is nearby.
@@ -66,7 +65,6 @@ impl Newton {
         self.half_periods.div_ceil(2)
     }
 
-    /// Returns the work of all integrations.
     pub(crate) fn work(&self) -> Work {
         self.work
     }
@@ -190,8 +188,8 @@ fn in_displacements(y: &Vector4<f64>, rate: f64) -> Vector4<f64> {
     Vector4::new(y[0], y[1] / rate, y[2], y[3] / rate)
 }
 
-/// Solves `(P' - I) step = -residual` by least squares, with velocities divided by `rate`, so that the result does not
-/// depend on the unit of time.
+/// Solves `(P' - I) step = -residual` by least squares, with velocities divided by `rate`, so that the result does
+/// not depend on the unit of time.
 fn newton_step(image: &Image, residual: &Vector4<f64>) -> Option<Vector4<f64>> {
     let step = balanced_step(&image.balanced(), &in_displacements(residual, image.rate))?;
     Some(in_displacements(&step, image.rate.recip()))
@@ -229,53 +227,11 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
     })
 }
 
-/// Finds the value of `parameter` in `[lo, hi]` at which the symmetric period-1 orbit of a model has a pitchfork: a
-/// multiplier of the half-period map crosses -1, that is `det(Q' + I) = 0`. The orbit is continued from `guess`, its
-/// state at `lo`.
-///
-/// Returns none if the orbit is lost or the determinant does not change sign.
-pub fn pitchfork(model: &dyn Model, parameter: &str, lo: f64, hi: f64, guess: State) -> Option<f64> {
-    let mut state = guess;
-    let mut test = |value: f64| -> Option<f64> {
-        let mut model = model.clone_model();
-        model.set(parameter, value).ok()?;
-        let flow = Flow::of(&*model).ok()?;
-        let map = StrobeMap::MirroredHalves(1);
-        let seed = Trajectory::new(&flow, model.law(), state);
-        let cycle = refine(&seed, map)?;
-        state = cycle.state;
-        let image = map.apply(&seed, state).ok()?;
-        Some((image.derivative() + Matrix4::identity()).determinant())
-    };
-    let (mut a, mut b) = (lo, hi);
-    let (mut at_a, mut at_b) = (test(a)?, test(b)?);
-    if at_a * at_b > 0.0 {
-        return None;
-    }
-    // Regula falsi with the Illinois rule.
-    for _ in 0..100 {
-        if (b - a).abs() <= 1e-12 * b.abs().max(1e-12) {
-            break;
-        }
-        let c = (a * at_b - b * at_a) / (at_b - at_a);
-        let at_c = test(c)?;
-        if at_c == 0.0 || (c - b).abs() <= 1e-13 {
-            return Some(c);
-        }
-        if at_c * at_b < 0.0 {
-            (a, at_a) = (b, at_b);
-        } else {
-            at_a *= 0.5;
-        }
-        (b, at_b) = (c, at_c);
-    }
-    Some(b)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::GearPair;
+    use crate::flow::Flow;
+    use crate::model::{GearPair, Model};
 
     fn seed_of<'f>(flow: &'f Flow, pair: &GearPair, periods: u32) -> Trajectory<'f> {
         let mut seed = Trajectory::new(flow, pair.law(), [0.0; 4]);

@@ -1,7 +1,7 @@
 //! A test whether all eigenvalues lie within the unit circle, without computing them.
 //!
-//! It uses the characteristic polynomial (Faddeev and LeVerrier) and the criterion of Schur and Cohn,
-//! about a hundred multiplications.
+//! It uses the characteristic polynomial (Faddeev and LeVerrier) and the criterion of Schur and Cohn, about a hundred
+//! multiplications.
 
 use nalgebra::Matrix4;
 
