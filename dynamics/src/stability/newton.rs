@@ -231,7 +231,7 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
 mod tests {
     use super::*;
     use crate::flow::Flow;
-    use crate::model::{GearPair, Model};
+    use crate::model::GearPair;
 
     fn seed_of<'f>(flow: &'f Flow, pair: &GearPair, periods: u32) -> Trajectory<'f> {
         let mut seed = Trajectory::new(flow, pair.law(), [0.0; 4]);
