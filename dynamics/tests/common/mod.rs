@@ -64,7 +64,8 @@ pub(crate) fn events(flow: &Flow, law: Law, from: State, periods: u64) -> Vec<Ga
     events
 }
 
-/// Returns the columns of the derivative of a map by central differences of fourth order with the steps `h` and `2 h`.
+/// Returns the columns of the derivative of a map by central differences of fourth order with the steps `h` and
+/// `2 h`.
 pub(crate) fn differences(map: impl Fn(State) -> State, y: State, h: f64) -> [State; 4] {
     std::array::from_fn(|j| {
         let central = |h: f64| -> State {

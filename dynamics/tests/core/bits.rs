@@ -1,7 +1,8 @@
 //! The results of gear pairs must not change by a bit.
 //!
-//! `data/gear_pair_bits.csv` was computed on x86-64 Linux with `avx2` and `fma`, the settings of `.cargo/config.toml`.
-//! There every bit must agree. On other targets rounding differs, and only period and word must agree.
+//! `data/gear_pair_bits.csv` was computed on x86-64 Linux with `avx2` and `fma`, the settings of
+//! `.cargo/config.toml`. There every bit must agree. On other targets rounding differs, and only period and word must
+//! agree.
 
 use crate::common::{BUDGET, REST, flow_of};
 use rattlemap_dynamics::model::GearPair;

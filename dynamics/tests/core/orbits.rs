@@ -56,8 +56,8 @@ fn banded_chaos_after_a_grazing_bifurcation_is_chaotic() {
     }
 }
 
-/// A chaotic band with a width of 1 % of the motion lies near a stable cycle. From one check to the next, the motion may
-/// come closer to the cycle by chance.
+/// A chaotic band with a width of 1 % of the motion lies near a stable cycle. From one check to the next, the motion
+/// may come closer to the cycle by chance.
 #[test]
 fn a_chaotic_band_near_a_stable_cycle_is_chaotic() {
     let narrow = GearPair {
@@ -101,8 +101,8 @@ fn a_slow_approach_is_recognised_after_any_transient() {
 
 #[test]
 fn an_escape_from_an_unstable_cycle_is_not_chaos() {
-    // The motion starts on the symmetric orbit, which is unstable here. Nearby motions separate for hundreds of periods
-    // until the unsymmetric orbit is reached.
+    // The motion starts on the symmetric orbit, which is unstable here. Nearby motions separate for hundreds of
+    // periods until the unsymmetric orbit is reached.
     let below = orbit(&GearPair::paper(0.541));
     let pair = GearPair::paper(0.545);
     let symmetric = below.strobe;

@@ -139,8 +139,8 @@ fn rigid(pair: &GearPair) -> Oscillator {
     Oscillator { contacts: [Contact::Rigid; 2], ..pair.oscillator().expect("valid") }
 }
 
-/// Sticking gears obey `(m1 + m2) x2'' + (r1 + r2) x2' + (k1 + k2) x2 = F cos - k1 wall`. They part when their relative
-/// acceleration vanishes.
+/// Sticking gears obey `(m1 + m2) x2'' + (r1 + r2) x2' + (k1 + k2) x2 = F cos - k1 wall`. They part when their
+/// relative acceleration vanishes.
 #[test]
 fn gears_that_stick_move_as_one_body() {
     let mut contacts = 0;

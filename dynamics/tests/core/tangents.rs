@@ -80,8 +80,8 @@ fn tangents_are_derivatives_of_the_strobe_map() {
     }
 }
 
-/// The jump over an infinite series of impacts lasts up to `1e-4` Taylor steps, and its tangents are of second order in
-/// that. The measured difference is at most 2e-7; tangents of first order would differ by 1e-4.
+/// The jump over an infinite series of impacts lasts up to `1e-4` Taylor steps, and its tangents are of second order
+/// in that. The measured difference is at most 2e-7; tangents of first order would differ by 1e-4.
 #[test]
 fn tangents_are_derivatives_through_infinite_chatter() {
     for (e, omega) in [(0.2, 1.5), (0.5, 1.5), (0.2, 2.5), (0.5, 1.0)] {
