@@ -161,7 +161,8 @@ impl Flow {
             degrees: oscillator.degrees,
             mass: oscillator.mass,
             symmetric: oscillator.mirror_symmetric(),
-            non_impacting: NonImpacting::new(oscillator).or_else(|| NonImpacting::beside_rest(oscillator)),
+            non_impacting: NonImpacting::new(oscillator)
+                .or_else(|| NonImpacting::with_one_at_rest(oscillator)),
             free,
             meshing,
         }

@@ -203,7 +203,7 @@ impl Cycle {
 
     /// Returns the cycle without the multipliers of the degree of freedom `resting`, which is at rest and does not
     /// affect the other.
-    pub(crate) fn beside_rest(&self, resting: usize) -> Option<Cycle> {
+    pub(crate) fn without_resting(&self, resting: usize) -> Option<Cycle> {
         let mut monodromy = self.monodromy;
         for i in [2 * resting, 2 * resting + 1] {
             monodromy.row_mut(i).fill(0.0);

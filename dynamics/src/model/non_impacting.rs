@@ -65,7 +65,7 @@ impl NonImpacting {
 
     /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
     /// the walls, stays at rest. The one at rest may be undamped.
-    pub fn beside_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
+    pub fn with_one_at_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
             let Oscillator { gap, force, free, mass, .. } = *oscillator;
             let moving = 1 - resting;
@@ -165,7 +165,7 @@ mod tests {
         let undamped = GearPair { r1: 0.0, ..pair(11.0) };
         assert!(NonImpacting::new(&undamped.oscillator().unwrap()).is_none());
         assert!(
-            NonImpacting::beside_rest(&undamped.oscillator().unwrap()).is_none(),
+            NonImpacting::with_one_at_rest(&undamped.oscillator().unwrap()).is_none(),
             "the force moves gear 1"
         );
     }
@@ -177,7 +177,7 @@ mod tests {
         for (r2, k2) in [(0.0, 20.0), (0.6, 0.0), (0.0, 0.0)] {
             let oscillator = GearPair { r2, k2, ..pair(11.0) }.oscillator().unwrap();
             assert!(NonImpacting::new(&oscillator).is_none());
-            let motion = NonImpacting::beside_rest(&oscillator).unwrap();
+            let motion = NonImpacting::with_one_at_rest(&oscillator).unwrap();
             let off = std::array::from_fn::<_, 4, _>(|i| (motion.steady()[i] - whole.steady()[i]).abs());
             assert!(motion.resting() == Some(1) && off.iter().all(|&x| x < 1e-15), "{off:?}");
             assert!((motion.exponent() + 0.15).abs() < 1e-12);

@@ -192,7 +192,12 @@ impl Oscillator {
             finite(|| format!("entry {} of the gap row", i + 1), entry)?;
         }
         let largest = self.gap[1 - self.other()];
-        require(largest != 0.0, || "the largest entry of the gap row".to_owned(), largest, "not 0")?;
+        require(
+            largest != 0.0,
+            || "the largest entry of the gap row".to_owned(),
+            largest,
+            "different from 0",
+        )?;
         for (i, force) in self.force.into_iter().enumerate() {
             finite(|| format!("force {}", i + 1), force)?;
         }
@@ -443,7 +448,10 @@ mod tests {
         };
         assert_eq!(slip(|o| o.mass[1][1] = 0.0), "mass 2 = 0: it must be finite and greater than 0");
         assert_eq!(slip(|o| o.omega = f64::NAN), "omega = NaN: it must be finite and greater than 0");
-        assert_eq!(slip(|o| o.gap = [0.0; 2]), "the largest entry of the gap row = 0: it must be not 0");
+        assert_eq!(
+            slip(|o| o.gap = [0.0; 2]),
+            "the largest entry of the gap row = 0: it must be different from 0"
+        );
         assert_eq!(slip(|o| o.gap[1] = f64::NAN), "entry 2 of the gap row = NaN: it must be a finite number");
         assert_eq!(slip(|o| o.degrees = 3), "degrees of freedom = 3: it must be 1 or 2");
         assert_eq!(

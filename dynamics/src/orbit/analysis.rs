@@ -65,8 +65,8 @@ pub fn analyse(model: &dyn Model, start: State, settings: &Settings) -> Result<O
     Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, EVENT_PERIODS))
 }
 
-/// Classifies a motion like [`analyse`], and lists the events of the last `event_periods` of aperiodic motion. Returns
-/// none if `halt` was raised.
+/// Classifies a motion like [`analyse`], and lists the events of the last `event_periods` of aperiodic motion.
+/// Returns none if `halt` was raised.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -186,7 +186,7 @@ impl Analysis<'_> {
         let cycle = self.maps(1).into_iter().find_map(|map| newton.refine(&steady, map));
         let of = |cycle: Cycle| {
             let cycle = match motion.resting() {
-                Some(resting) => cycle.beside_rest(resting).unwrap_or(cycle),
+                Some(resting) => cycle.without_resting(resting).unwrap_or(cycle),
                 None => cycle,
             };
             Ok(self.periodic(&self.read(&steady, &cycle)?, &cycle, 0.0))

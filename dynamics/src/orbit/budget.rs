@@ -24,7 +24,8 @@ const CLASS_CHAOS_ERRORS: f64 = 5.0;
 /// chaos count as chaotic; with half of the budget 33, with all of it 17.
 const EARLY_CHAOS_EIGHTHS: u32 = 3;
 
-/// That share if the exponent is not reported: 46 cells of 20,000.
+/// Share of the budget, in eighths, after which a cell may stop early as chaotic if its exponent is not reported.
+/// Then 46 cells of 20,000 with transient chaos count as chaotic.
 const CLASS_CHAOS_EIGHTHS: u32 = 2;
 
 /// Least number of periods that an exponent is averaged over before an early stop.

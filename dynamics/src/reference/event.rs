@@ -16,16 +16,18 @@ pub const STEPS_PER_PERIOD_CAP: u64 = 20_000_000;
 pub enum Stop {
     /// More than [`EVENTS_PER_PERIOD_CAP`] events in one period, or more events than the
     /// [`Allowance`](super::Allowance).
-    #[error("more than {EVENTS_PER_PERIOD_CAP} events in one forcing period, or than one cell is allowed")]
+    #[error(
+        "more than {EVENTS_PER_PERIOD_CAP} events in one forcing period, or more events than one cell may take"
+    )]
     CapEvents,
     /// A root that does not converge, or more than [`STEPS_PER_PERIOD_CAP`] steps in one period.
     #[error("more than {STEPS_PER_PERIOD_CAP} steps in one forcing period, or a root that does not converge")]
     CapRoot,
     /// More steps in total than the [`Allowance`](super::Allowance).
-    #[error("too stiff: more steps than one cell is allowed")]
+    #[error("too stiff: more steps than one cell may take")]
     TooStiff,
     /// The state is not finite.
-    #[error("the state is not finite any more")]
+    #[error("the state is not finite")]
     NonFinite,
 }
 
@@ -62,7 +64,7 @@ pub struct GapEvent {
 /// Receives the events of a trajectory. `()` ignores them, a vector stores them.
 pub trait Observer {
     /// Receives one event. Events come in order of time.
-    fn event(&mut self, happening: &GapEvent);
+    fn event(&mut self, event: &GapEvent);
 }
 
 impl Observer for () {
@@ -71,8 +73,8 @@ impl Observer for () {
 }
 
 impl Observer for Vec<GapEvent> {
-    fn event(&mut self, happening: &GapEvent) {
-        self.push(*happening);
+    fn event(&mut self, event: &GapEvent) {
+        self.push(*event);
     }
 }
 

@@ -20,8 +20,7 @@ struct SearchLimits {
 const FULL_SEARCH: SearchLimits = SearchLimits { steps: 40, trials: 12, stops_at_unstable: false };
 
 /// Limits of a quick search for a stable orbit near the motion, which can be repeated later. Of 343 orbits found in
-/// 400 cells along a map's borders, 4 needed more. With full searches, the failed ones were seven tenths of all
-/// periods.
+/// 400 cells along a map's borders, 4 needed more. Failed full searches took seven tenths of all periods.
 const QUICK_SEARCH: SearchLimits = SearchLimits { steps: 12, trials: 3, stops_at_unstable: true };
 
 /// If the map expands by more than this factor, no stable orbit is nearby.
@@ -40,7 +39,7 @@ const SVD_CAP: usize = 1000;
 /// Residuals below this, relative to the state, are rounding errors.
 const CONVERGED: f64 = 1e-13;
 
-/// Residual, relative to the state, below which the multipliers are those of the orbit to about a quarter.
+/// Residual, relative to the state, below which the multipliers differ from those of the orbit by at most a quarter.
 const MULTIPLIER_RESIDUAL: f64 = 1e-3;
 
 /// Largest multiplier, at that residual, from which the orbit is certainly unstable.

@@ -116,7 +116,7 @@ fn orbits_next_to_the_pitchfork_are_decided_early() {
         let measured = measure(&flow_of(&pair), pair.law(), REST, &BUDGET);
         let periods = measured.periods_run + measured.search_periods;
         assert_eq!((measured.period, measured.symmetric), (Some(1), Some(symmetric)), "{e}");
-        // They need 101 and 38 periods of 528.
+        // The orbits are decided after 101 and 38 periods; the full budget is 528.
         assert!(periods < 200, "{e}: {periods}");
         let orbit = orbit(e);
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e}");

@@ -289,7 +289,7 @@ fn meshing_with_hardly_any_pressing_ends() {
     let start =
         [0.385_414_006_558_098_93, 3.661_243_976_023_188_7, 0.328_508_820_108_546_65, 3.661_243_974_235_642];
     let mut ends_in_onset = 0;
-    // Pressing of 1e-13 to 1e-3 of the acceleration. With 0, meshing once did not end.
+    // The pressing acceleration is 0, or 1e-13 to 1e-3 of the total.
     for k in 0..=400 {
         let more = if k == 0 { 0.0 } else { 10f64.powf(-13.0 + f64::from(k) / 40.0) };
         let pair = GearPair { force: pair.force * (1.0 + more), ..pair };

@@ -18,7 +18,7 @@ fn step_budget(pair: &GearPair, work: Work) -> f64 {
     let damping = (p.r1 / p.m1).max(p.r2 / p.m2) + p.r * by_mass;
     let rate = stiffness.sqrt() + damping + p.omega;
     let period = std::f64::consts::TAU / p.omega;
-    // Each grazing costs the halvings of a step down to rounding.
+    // At each grazing a step is halved many times.
     400.0 + 8.0 * rate * period + 60.0 * work.events as f64
 }
 
