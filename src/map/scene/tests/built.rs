@@ -1,5 +1,5 @@
 use rattlemap_dynamics::model::{
-    Boxed, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Stops,
+    CloneModel, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Stops,
 };
 
 use super::*;
