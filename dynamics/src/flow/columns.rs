@@ -138,8 +138,8 @@ impl Columns {
         let sum = sum.map(|column| column * wide);
         tangents.map(|t| {
             let [t0, t1, t2, t3] = t.map(f64x4::splat);
-            let moved = sum[0].mul_add(t0, sum[1] * t1) + sum[2].mul_add(t2, sum[3] * t3);
-            (f64x4::from(t) + moved).to_array()
+            let change = sum[0].mul_add(t0, sum[1] * t1) + sum[2].mul_add(t2, sum[3] * t3);
+            (f64x4::from(t) + change).to_array()
         })
     }
 

@@ -69,7 +69,7 @@ pub(crate) struct Expansion {
     /// Time from the start to the grid point, in Taylor steps.
     pub(crate) start: f64,
     /// Change of the state from the start to the grid point.
-    moved: f64x4,
+    change: f64x4,
     q: f64x4,
     terms: [f64x4; TERMS],
     phasor: Phasor,
@@ -116,22 +116,22 @@ impl Grid {
     pub(crate) fn expansion(&self, q: &Gap, phasor: &Phasor, u: f64) -> Expansion {
         let (instant, whole, part) = self.nearest(u);
         let start = f64x4::from(*q);
-        let (mut moved, mut p) = (f64x4::ZERO, *phasor);
+        let (mut change, mut p) = (f64x4::ZERO, *phasor);
         let mut here = *q;
         if whole > 0 {
             let step = &self.wholes[whole];
-            moved = step.apply(&here, &p);
+            change = step.apply(&here, &p);
             p = step.carry_phasor(&p);
-            here = (start + moved).to_array();
+            here = (start + change).to_array();
         }
         let step = &self.parts[part];
-        moved += step.apply(&here, &p);
+        change += step.apply(&here, &p);
         p = step.carry_phasor(&p);
-        let there = start + moved;
+        let there = start + change;
         let here = there.to_array();
         Expansion {
             start: instant,
-            moved,
+            change,
             q: there,
             terms: std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p)),
             phasor: p,
@@ -157,7 +157,7 @@ impl Expansion {
     /// in Taylor steps.
     #[inline(always)]
     pub(crate) fn gap(&self) -> [f64; TERMS + 1] {
-        let mut series = [self.moved.to_array()[0]; TERMS + 1];
+        let mut series = [self.change.to_array()[0]; TERMS + 1];
         for (coefficient, term) in series[1..].iter_mut().zip(&self.terms) {
             *coefficient = term.to_array()[0];
         }

@@ -43,8 +43,8 @@ pub(crate) struct Step {
 impl Step {
     #[inline(always)]
     pub(crate) fn end(&self, q: &Gap, phasor: &Phasor) -> (Gap, Phasor) {
-        let moved = self.propagator.apply(q, phasor);
-        ((f64x4::from(*q) + moved).to_array(), self.propagator.carry_phasor(phasor))
+        let change = self.propagator.apply(q, phasor);
+        ((f64x4::from(*q) + change).to_array(), self.propagator.carry_phasor(phasor))
     }
 }
 
@@ -197,7 +197,7 @@ impl LinearFlow {
 
     /// Returns the fundamental matrix `exp(A tau)` in gap coordinates.
     pub fn fundamental(&self, tau: f64) -> Matrix4<f64> {
-        Matrix4::identity() + self.departure(tau).fixed_view::<4, 4>(0, 0)
+        Matrix4::identity() + self.propagator_minus_identity(tau).fixed_view::<4, 4>(0, 0)
     }
 
     /// Returns the state after any time `tau >= 0`.
@@ -205,12 +205,12 @@ impl LinearFlow {
     /// It scales and squares the Taylor table. The error is that of rounding in `|G| tau`.
     pub fn propagate(&self, q: Gap, phasor: Phasor, tau: f64) -> Gap {
         let a = SMatrix::<f64, 7, 1>::from([q[0], q[1], q[2], q[3], phasor[0], phasor[1], 1.0]);
-        let moved = self.departure(tau) * a;
-        std::array::from_fn(|i| q[i] + moved[i])
+        let change = self.propagator_minus_identity(tau) * a;
+        std::array::from_fn(|i| q[i] + change[i])
     }
 
     /// Returns `exp(G tau)` minus the identity, which loses fewer digits in squaring than `exp(G tau)`.
-    fn departure(&self, tau: f64) -> Generator {
+    fn propagator_minus_identity(&self, tau: f64) -> Generator {
         let doublings = (self.rate * tau / DOUBLING_RADIUS).log2().ceil().max(0.0) as i32;
         let u = tau / self.unit * 0.5f64.powi(doublings);
         let part = partial_sum(&self.table, u).matrix();
@@ -221,7 +221,7 @@ impl LinearFlow {
     #[cfg(test)]
     pub(super) fn pressing_derivative(&self, q: &Gap, phasor: &Phasor, tau: f64, n: u32) -> f64 {
         let a = SMatrix::<f64, 7, 1>::from([q[0], q[1], q[2], q[3], phasor[0], phasor[1], 1.0]);
-        let later = a + self.departure(tau) * a;
+        let later = a + self.propagator_minus_identity(tau) * a;
         let derivative = (0..n).fold(later, |a, _| self.generator * a);
         SMatrix::<f64, 1, 7>::from(self.gap_rates[0]).dot(&derivative.transpose())
     }

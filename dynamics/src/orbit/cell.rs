@@ -115,7 +115,7 @@ fn measure_within(
         newton: Newton::default(),
         reading_periods: Cell::new(0),
     };
-    run.run(start).unwrap_or_else(|stop| run.stopped(stop))
+    run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)))
 }
 
 /// A cycle that Newton's method has found.
@@ -202,7 +202,7 @@ impl<'a> CellRun<'a> {
         let stages = [chaos_from, budget, last].into_iter().filter(|&stage| now < stage && stage <= last);
         *next_check = next.min(stages.min().unwrap_or(last));
         let is_last = now == budget || now == last;
-        if let Some(orbit) = self.settled(&trajectory.carrying([]), is_last)? {
+        if let Some(orbit) = self.confirmed_orbit(&trajectory.carrying([]), is_last)? {
             let strobe = if is_last { trajectory.state() } else { orbit.strobe };
             return Ok(Some(self.periodic(orbit, strobe)));
         }
@@ -241,7 +241,7 @@ impl<'a> CellRun<'a> {
     }
 
     /// Returns the orbit of a cycle that the strobe states approach.
-    fn settled(&mut self, seed: &Trajectory<'a>, is_last: bool) -> Result<Option<Orbit>, Stop> {
+    fn confirmed_orbit(&mut self, seed: &Trajectory<'a>, is_last: bool) -> Result<Option<Orbit>, Stop> {
         let max_period = self.budget.settings.max_period;
         let window = &self.strobes[self.strobes.len().saturating_sub(2 * max_period as usize + 1)..];
         let metric = Metric::of(window, self.analysis.flow);
@@ -251,7 +251,7 @@ impl<'a> CellRun<'a> {
             // and without early stops.
             self.cycle = None;
         }
-        if let Some(orbit) = self.approached(&metric, near)? {
+        if let Some(orbit) = self.orbit_of_last_cycle(&metric, near)? {
             return Ok(Some(orbit));
         }
         // While the motion approaches a cycle, no other one is searched.
@@ -297,7 +297,7 @@ impl<'a> CellRun<'a> {
                     // The next check shows whether the motion approaches it.
                     self.approaches = true;
                     self.cycle = Some(found);
-                    let orbit = self.approached(&metric, near)?;
+                    let orbit = self.orbit_of_last_cycle(&metric, near)?;
                     if orbit.is_some() || !is_last {
                         return Ok(orbit);
                     }
@@ -309,7 +309,7 @@ impl<'a> CellRun<'a> {
 
     /// Returns the orbit of the last cycle that was found, if the strobe states approach it and [`stays`] holds.
     /// Within the distance `near` a larger tolerance applies.
-    fn approached(&self, metric: &Metric, near: f64) -> Result<Option<Orbit>, Stop> {
+    fn orbit_of_last_cycle(&self, metric: &Metric, near: f64) -> Result<Option<Orbit>, Stop> {
         let Some(found) = &self.cycle else { return Ok(None) };
         let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_strobe_of(found));
         let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
@@ -428,11 +428,6 @@ impl<'a> CellRun<'a> {
     fn neutral_growth(&self) -> f64 {
         let from = f64::from(self.budget.exponent_from().max(1));
         NEUTRAL_ORDER * ((self.strobes.len() - 1) as f64 / from).ln()
-    }
-
-    /// Builds the results of a cell that could not be continued.
-    fn stopped(&self, stop: Stop) -> Measurement {
-        self.without_results(status_of(stop))
     }
 
     /// Builds a measurement with the last strobe state and the numbers of periods only.

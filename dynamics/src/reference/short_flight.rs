@@ -17,9 +17,9 @@ impl<const N: usize> Trajectory<'_, N> {
     /// probably a short flight.
     #[inline(always)]
     pub(super) fn expects_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
-        let gained = pressing * linear.unit;
-        2.0 * leaving < TRIED_SHARE * LONGEST_SHORT_FLIGHT * gained
-            && gained > LEAST_PRESSING * self.flow.speed
+        let speed_change = pressing * linear.unit;
+        2.0 * leaving < TRIED_SHARE * LONGEST_SHORT_FLIGHT * speed_change
+            && speed_change > LEAST_PRESSING * self.flow.speed
             && leaving > 0.0
     }
 
