@@ -133,7 +133,7 @@ pub(super) fn has_elastic_or_rigid_wall(contacts: [Contact; 2], walls: [f64; 2])
 fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> {
     let beside_rest = || {
         let is_alone = oscillator.degrees == 1;
-        is_alone.then(|| model::NonImpacting::beside_rest(oscillator)).flatten()
+        is_alone.then(|| model::NonImpacting::with_one_at_rest(oscillator)).flatten()
     };
     model::NonImpacting::new(oscillator).or_else(beside_rest)
 }

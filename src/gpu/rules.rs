@@ -3,7 +3,7 @@
 
 use super::Precision;
 use rattlemap_dynamics::orbit::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, ON_STROBE_TURNS, SHOWN_CYCLES,
+    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEUTRAL_ORDER, ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
@@ -76,7 +76,7 @@ pub(super) fn declarations(precision: Precision) -> String {
          const OCTAVE: f32 = f32({OCTAVE}u);\nconst NEAR: u32 = {NEAR}u;\nconst RESOLVED: u32 = {resolved}u;\n\
          const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst MOST_FAILED_SEARCHES: u32 = {MOST_FAILED_SEARCHES}u;\n\
          const GRAZING_SPEED: Real = {GRAZING_SPEED:?};\nconst NO_SPEED: Real = {NO_SPEED:?};\nconst NO_THRESHOLD: Real = {NO_THRESHOLD:?};\n\
-         const TRAIL: u32 = {TRAIL}u;\nconst LINEAR: Real = {LINEAR:?};\nconst SHOWN_CYCLES: u32 = {SHOWN_CYCLES}u;\n\
+         const TRAIL: u32 = {TRAIL}u;\nconst LINEAR: Real = {LINEAR_TOLERANCE:?};\nconst SHOWN_CYCLES: u32 = {BRANCH_CYCLES}u;\n\
          const WINDOW_SHARE: u32 = {WINDOW_SHARE}u;\nconst MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n\
          const ON_CYCLE: f32 = {ON_CYCLE:?};\nconst ON_STROBE: Real = {on_strobe:?};\n"
     )

@@ -211,7 +211,7 @@ fn searches_do_not_eat_up_what_is_saved() {
             let pair = crate::common::pair_at(&plan, id);
             let flow = flow_of(&pair);
             let measured = measure(&flow, pair.law(), REST, plan.budget());
-            [measured.periods_run, measured.periods_beside].map(f64::from)
+            [measured.periods_run, measured.search_periods].map(f64::from)
         };
         let [run, beside] =
             ids.iter().map(work).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
