@@ -1,19 +1,20 @@
-// Does motion near a cycle end on it? The reference's rule (dynamics/src/orbit/approach.rs), over the last strobes.
+// Whether motion near a cycle ends on it, by the rule of the reference (dynamics/src/orbit/approach.rs) on the last
+// strobes.
 //
-// Only what the motion itself has shown of the strobe map counts: a stable cycle need not attract it. While its cycles
-// had the cycle's events and their deviations from it followed one another as the monodromy matrix says, a deviation
-// within the convex hull of the earlier ones stays in the part of the branch that was seen.
+// Only the strobes of the motion itself count, because a stable cycle need not be the motion's limit. While the
+// motion has the events of the cycle, and each deviation from the cycle follows from the last by the monodromy
+// matrix, a deviation within the convex hull of the earlier ones stays in the visited part of the branch.
 
-// Departures from the linear map, as a share of the deviation, that are small; where the motion is as near as `BENT_WITHIN`,
-// it may be off by all of the deviation.
+// A departure from the linear map may be this share of the deviation (LINEAR). Within `BENT_WITHIN` of the cycle,
+// relative to the motion, it may be all of the deviation.
 const BENT_WITHIN: Real = 5e-4;
-// How far outside of the hull a deviation may lie, as a share of itself, or relative to the motion.
+// How far outside the hull a deviation may lie: as a share of itself, or relative to the motion.
 const OUTSIDE: Real = 0.1;
 const HAIR: Real = 1e-4;
-// Steps towards the nearest point of a hull.
+// Most steps towards the nearest point of a hull.
 const HULL_STEPS: u32 = 32u;
 
-// Notes a strobe of the motion, and the events of the period before it.
+// Stores a strobe of the motion, and the events of the period before it.
 fn leave_trail(itinerary: u32) {
     noted.passed += 1u;
     let place = noted.passed % TRAIL;
@@ -25,16 +26,16 @@ fn trail(strobe: u32) -> array<Real, 4> {
     return motions[lane].trail[strobe % TRAIL];
 }
 
-// Cycles of the candidate's period, at most, that the trail holds.
+// Returns the number of cycles of the candidate's period that the trail holds.
 fn cycles_on_trail() -> u32 {
     return (min(noted.passed, TRAIL) - 1u) / tally.candidate;
 }
 
-// One more period of the cycle has been read, the `read`-th: for how many of its last cycles has the motion had the
-// same events in it?
+// Updates the number of the motion's last cycles with the same events, after the `read`-th period of the cycle has
+// been read.
 fn compare_itineraries(itinerary: u32, read: u32) {
     let is_own = noted.refinements == 0u;
-    // What is read along the motion is its last cycle.
+    // A cycle that is read along the motion is itself the motion's last cycle.
     let most = min(noted.shown, cycles_on_trail());
     var cycles = select(0u, 1u, is_own);
     while cycles < most {
@@ -49,12 +50,12 @@ fn compare_itineraries(itinerary: u32, read: u32) {
     noted.shown = min(noted.shown, cycles);
 }
 
-// Cycles of a period that the motion must have shown.
+// Returns the cycles of a period that the motion must have completed.
 fn cycles_to_show(period: u32) -> u32 {
     return min(SHOWN_CYCLES, (TRAIL - 1u) / period);
 }
 
-// Whether the same events have followed one another for as long as a cycle must show, but for the one to be read.
+// Whether the same events have recurred for the cycles that are required, without the one to be read.
 fn repeats_itself(period: u32) -> bool {
     if !EXPONENT {
         return true;
@@ -70,7 +71,7 @@ fn repeats_itself(period: u32) -> bool {
     return true;
 }
 
-// Whether the motion, which is at the end of its trail, stays by the cycle that has been read.
+// Whether the motion, which is at the end of its trail, stays near the cycle that has been read.
 fn stays(to: array<Real, 4>) -> bool {
     let present = difference(trail(noted.passed), to);
     let bend = select(LINEAR, Real(1.0), size_of(present) < BENT_WITHIN);
@@ -90,10 +91,10 @@ fn stays(to: array<Real, 4>) -> bool {
     return cycles >= cycles_to_show(tally.candidate) && is_in_hull(present, cycles, to);
 }
 
-// Whether a deviation lies within the convex hull of the origin and of those before it, or nearly so.
+// Whether a deviation lies within the convex hull of the origin and the earlier deviations, or nearly so.
 //
-// E. G. Gilbert, SIAM J. Control 4 (1966) 61: from the nearest point so far to the corner that lies farthest beyond it;
-// how far that is bounds the distance from below.
+// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step leads from the nearest point so far towards the corner that
+// lies farthest beyond it. That corner also gives a lower bound of the distance.
 fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
     let target_point = in_units(point);
     let allowed = max(OUTSIDE * sqrt(dot(target_point, target_point)), HAIR);
@@ -122,13 +123,14 @@ fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
     return false;
 }
 
-// How far it is from the deviation before: slow motion hardly moves, and the steps of the search would be short.
+// Returns the distance from the deviation before. In slow motion this decides at once; the steps of the search would
+// be short.
 fn distance_from_last(point: vec4<Real>, to: array<Real, 4>) -> Real {
     let off = in_units(difference(trail(noted.passed - tally.candidate), to)) - point;
     return sqrt(dot(off, off));
 }
 
-// A deviation in units of the motion.
+// Returns a deviation in units of the motion.
 fn in_units(u: array<Real, 4>) -> vec4<Real> {
     let rate = unit_of_rates();
     let position = max(seen.position_scale, Real(1e-30));

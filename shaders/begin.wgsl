@@ -1,4 +1,4 @@
-// Before its first dispatch: a lane at its start.
+// Puts a lane at its start, before its first dispatch.
 
 @compute @workgroup_size(WORKGROUP)
 fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -19,7 +19,7 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     } else if motion.q[0] < walls[1] {
         begin_beyond(SIDE_LEFT);
     }
-    // What is on the trail is told by `noted.passed`.
+    // The trail needs no initial value: `strobe_count` is its length.
     motions[lane].now = motion;
     motions[lane].seen = seen;
     motions[lane].tangents = array<Real, 16>();
@@ -32,7 +32,7 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     begin_pattern();
 }
 
-// A start beyond a wall is meshing.
+// A start beyond a wall is a sustained contact.
 fn begin_beyond(side: u32) {
     motion.q[0] -= flows[cell.flow_index].walls[side];
     tally.mode = MODE_SUSTAINED + side;

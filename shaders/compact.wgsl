@@ -1,21 +1,22 @@
-// The queue of lanes that a variant has work for, or whose records are to be read: the others cost nothing, and those
-// in it keep their order, for neighbours behave alike.
+// Compaction: lists the lanes that a variant has work for, or that have ended. Other lanes then cost nothing. The
+// list keeps the order of the active list, because neighbours behave alike.
 //
-// Three passes: blocks of the active list are counted, the counts summed up, and what is left of every block
-// put in its place in the queue.
+// Three passes: count the selected lanes of each block of the active list, sum the counts, and copy each block's
+// lanes to their place.
 
 var<workgroup> block_counts: array<u32, BLOCK>;
 
-// The lane at a place of the active list, and of the queue.
+// Returns the lane at a place of the active list.
 fn active_lane(i: u32) -> u32 {
     return queue.lanes[i];
 }
 
+// Returns the lane at a place of the list of selected lanes.
 fn queued(i: u32) -> u32 {
     return queue.lanes[settings.slots + i];
 }
 
-// Whether place `i` of the active list holds a lane that this variant has work for, or one that has ended.
+// Whether place `i` of the active list holds a lane that is selected.
 fn is_left(i: u32) -> bool {
     if i >= settings.active_lanes {
         return false;
@@ -27,7 +28,7 @@ fn is_left(i: u32) -> bool {
     return running();
 }
 
-// Inclusive sums of a block's numbers.
+// Computes the inclusive sums of a block's numbers.
 fn sum_block(k: u32, own: u32) {
     block_counts[k] = own;
     workgroupBarrier();
@@ -42,7 +43,7 @@ fn sum_block(k: u32, own: u32) {
     }
 }
 
-// Each workgroup takes every `groups.x`-th block: there may be more of them than workgroups.
+// Each workgroup takes every `groups.x`-th block: there may be more blocks than workgroups.
 @compute @workgroup_size(BLOCK)
 fn count_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
     let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
@@ -55,7 +56,7 @@ fn count_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     }
 }
 
-// One workgroup: where each block's lanes go, and how many there are.
+// One workgroup computes the place of each block's lanes, and the total.
 @compute @workgroup_size(BLOCK)
 fn sum_left(@builtin(local_invocation_index) k: u32) {
     let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;

@@ -1,6 +1,6 @@
-// What a lane does at phase 0: what it checks, counts and reads.
+// Work of a lane at phase 0: what it checks, counts and reads.
 
-// Phase 0: a forcing period is complete.
+// Completes a forcing period at phase 0.
 fn begin_period() {
     tally.step = 0u;
     motion.theta = 0.0;
@@ -40,10 +40,10 @@ fn begin_period() {
         begin_counting();
     }
     let decided = settings.max_period > 0u && recurs();
-    // Reading the cycle belongs to the budget.
+    // The budget includes the periods in which the cycle is read.
     let read_by = tally.period + tally.candidate;
     let is_last = read_by == settings.periods || read_by == settings.longest;
-    // What contracts by chance in the midst of growth has not settled.
+    // A chance contraction in growing motion has not settled.
     let is_due = is_last && noted.streak >= STREAK && (noted.settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
     if read_by <= settings.longest && (is_due || (decided && early)) {
@@ -55,7 +55,7 @@ fn begin_period() {
     }
 }
 
-// The energy of the transient keeps the gap off the walls for good.
+// Whether the energy of the transient keeps the gap off the walls from now on.
 fn is_non_impacting() -> bool {
     if tally.mode != MODE_FREE || settings.max_period == 0u {
         return false;
@@ -65,7 +65,7 @@ fn is_non_impacting() -> bool {
     return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].reach;
 }
 
-// Contact-free motion of period 1, with nothing left to read.
+// Ends contact-free motion: period 1, and no cycle to read.
 fn end_non_impacting() {
     begin_counting();
     noted.cycle = 1u;
@@ -73,7 +73,7 @@ fn end_non_impacting() {
     tally.stage = STAGE_DONE;
 }
 
-// Averages start here.
+// Resets the averages and counts.
 fn begin_counting() {
     tally.impacts = 0u;
     tally.events = 0u;
@@ -96,13 +96,13 @@ fn begin_counting() {
     noted.counted_from = tally.period;
 }
 
-// The period is decided: one cycle is read from here on.
+// Starts to read one cycle of the period that was found.
 fn begin_reading() {
     begin_counting();
     tally.stage = STAGE_READING;
     tally.to_read = tally.candidate;
     noted.has_read = 1u;
-    // A cycle of even period is never compared: it cannot be symmetric.
+    // Cycles of even period cannot be their own mirror image and are not compared.
     noted.mirror = 0u;
     noted.divisor = 0u;
     noted.divisor_apart = 0u;
@@ -112,13 +112,13 @@ fn begin_reading() {
     if EXPONENT {
         set_vector_aside();
         tally.tangent_count = 4u;
-        // A displacement that there is not has no neighbours.
+        // With one displacement, x has no neighbours.
         let x = select(Real(0.0), Real(1.0), shapes[cell.flow_index].degrees > 1u);
         motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, x, 0.0, 0.0, 0.0, 0.0, x);
     }
 }
 
-// The present state with the gap measured from its middle, whatever the domain.
+// Returns the present state with the gap measured from the middle, in every domain.
 fn strobe_state() -> array<Real, 4> {
     var q = motion.q;
     if tally.mode != MODE_FREE {

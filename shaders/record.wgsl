@@ -1,4 +1,4 @@
-// What travels back: a lane's last state, read as a record.
+// Turns a lane's last state into its results.
 
 @compute @workgroup_size(WORKGROUP)
 fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -71,9 +71,8 @@ fn mesh_fraction(periods: u32) -> Real {
 }
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
-    // Contact-free motion has not been read. On a slow approach, or where rounding is amplified, a lost
-    // symmetry cannot be told from one not reached, unless it is lost by far. Every impact has an image on a
-    // cycle that is its own mirror image.
+    // Contact-free motion has not been read, and is symmetric. On a slow approach, or where rounding is amplified,
+    // the symmetry is known only if it is broken by far. On a symmetric cycle every impact has a mirror image.
     if SYMMETRY && cell.mirror == 1u {
         let has_conjugate = tally.impacts % 2u == 0u;
         let is_symmetric = noted.has_read == 0u || (is_surely_symmetric() && has_conjugate);
@@ -107,7 +106,7 @@ fn read_pattern(finding: ptr<function, Finding>) {
     var recent = tallies[lane].pattern_recent;
     var hash = vec2<u32>(tallies[lane].pattern_hash[0], tallies[lane].pattern_hash[1]);
     let first = tallies[lane].pattern[0];
-    // The last run goes on as the first: one of them is counted.
+    // The last run continues as the first: both count as one.
     if length > 1u && (recent & 7u) == (first & 7u) {
         if length > 7u {
             hash -= stretch(recent);
@@ -127,7 +126,7 @@ fn read_pattern(finding: ptr<function, Finding>) {
     }
 }
 
-// The hash so far holds all stretches of symbols but those across the word's end.
+// Adds the hash windows that span the end of the word; all others have been added.
 fn close_hash() {
     for (var n = 0u; n < 7u; n++) {
         take_symbol((tallies[lane].word[0] >> (3u * n)) & 7u);

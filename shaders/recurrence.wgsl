@@ -1,25 +1,25 @@
-// Recurrence: does the lane come back to where it was, and ever nearer?
+// Recurrence: whether the lane returns to earlier strobe states, nearer each time.
 
-// A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
-// comes within 2^-12 of a cycle by chance.
+// A lane has settled once its limit is estimated to lie within 2^-14 of the motion. Weak chaos comes within 2^-12 of
+// a cycle by chance.
 const SETTLED: f32 = 56.0;
-// 2^-4 where Newton's method shows what the limit is; `REACH` judges what it finds.
+// Distance of the limit, 2^-4 of the motion, from which Newton's method may search it. `LONGEST_NEWTON_STEP` limits
+// the result.
 const REFINABLE: f32 = 16.0;
-// Slower approaches than this, per period, are not waited for, only for a recurrence as close as
-// if they were as fast.
+// Least approach per period that is assumed before Newton's method: slower motion need not recur more closely.
 const SLOWEST: f32 = 0.008;
-// Recurrences this close, 2^-12 of the motion, need not shrink, only not grow.
+// Recurrences this close, 2^-12 of the motion, need not shrink; they must not grow.
 const SLOW: u32 = 48u;
-// A distance must have shrunk by this much (a factor of 0.7) since the last window.
+// Least shrinkage since the last window: a factor of 0.7.
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Lags of any window, at least: they are a share of the time that has passed, or a few cycles.
+// Fewest lags of a window.
 const LEAST_WINDOW: u32 = 2u;
-// Windows need not be longer than so many cycles that contract.
+// A window need not be longer than this many contracting cycles.
 const LAGS_PER_CYCLE: u32 = 4u;
 
-// Checks a strobe; true once a period is confirmed.
+// Checks a strobe. Returns true once a period is confirmed.
 fn recurs() -> bool {
     let q = strobe_state();
     widen_scales(q);
@@ -38,24 +38,24 @@ fn recurs() -> bool {
     let settled = judge_lag(found);
     noted.known_lags = noted.window;
     tallies[lane].last_distances = tallies[lane].distances;
-    // The next anchor lies at the same place of the cycle: only there do distances compare. The
-    // points of a cycle may be so close that a shorter lag seems to recur.
+    // The next anchor lies at the same point of the cycle, because distances compare only there. The points of a
+    // cycle may be so close together that a shorter lag seems to recur.
     let cycle = max(closest_lag(), 1u);
-    // A short lag that contracts is seen as well in short windows.
+    // A short lag that contracts is found in short windows, too.
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
     let lags = select(widest(), min(enough, widest()), is_fast && noted.tries == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
 
-// Units of distances: the largest strobe.
+// Raises the units of distances to the largest strobe.
 fn widen_scales(q: array<Real, 4>) {
     seen.position_scale = max(seen.position_scale, max(abs(q[0]), abs(q[2])));
     seen.rate_scale = max(seen.rate_scale, max(abs(q[1]), abs(q[3])));
 }
 
-// What a motion was before it came to its cycle is no unit of the cycle. A strobe may catch it at its
-// turning point, or midway between two.
+// Lowers the units of distances where a cycle is read, so that the motion before it does not count. A strobe may lie
+// at a turning point or midway between two.
 fn narrow_scales(q: array<Real, 4>) {
     let angle = flows[cell.flow_index].domains[0].angle;
     let position = max(abs(q[0]), abs(q[2]));
@@ -68,7 +68,7 @@ fn widest() -> u32 {
     return clamp(tally.period / WINDOW_SHARE, LEAST_WINDOW, settings.max_period);
 }
 
-// The lag that recurs best; a longer one must be better by a factor of four.
+// Returns the lag that recurs best. A longer lag must be better by a factor of four.
 fn closest_lag() -> u32 {
     return closest_of(noted.known_lags);
 }
@@ -86,8 +86,8 @@ fn closest_of(lags: u32) -> u32 {
     return best;
 }
 
-// The distance of two strobes, relative to the motion. Where strobes catch it at its turning point, their
-// rates are all rounding.
+// Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because at
+// a turning point rates are rounding error.
 fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
     let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(seen.position_scale, Real(1e-30));
     let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / unit_of_rates();
@@ -106,7 +106,7 @@ fn begin_window(q: array<Real, 4>, lags: u32) {
     tallies[lane].distances = array<u32, 16>();
 }
 
-// A distance in quarter octaves below 1, at most 255.
+// Returns a distance in quarter octaves below 1, at most 255.
 fn octaves(distance: Real) -> u32 {
     let d = f32(distance);
     if d <= 1e-19 {
@@ -123,8 +123,8 @@ fn last_distance_at(lag: u32) -> u32 {
     return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
 }
 
-// The smallest lag that recurs at all its multiples and contracts, or has reached rounding.
-// Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
+// Returns the smallest lag that recurs at all its multiples and contracts or has reached rounding; 0 if there is
+// none. Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
     // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
     let best = closest_of(noted.window);
@@ -154,20 +154,20 @@ fn shrinks(lag: u32) -> bool {
     return now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
 }
 
-// Whether the limit is near enough: strobes `d` apart that shrink by `mu` per period are
-// `d / (1 - mu)` away from it. A slow approach must come closer.
+// Whether the limit is near enough. Strobes at a distance `d` that shrinks by `mu` per period are `d / (1 - mu)` away
+// from it, so that a slow approach must come closer.
 fn has_settled(lag: u32) -> bool {
     let now = distance_at(lag);
     let shrunk = f32(now) - f32(last_distance_at(lag));
     if now >= RESOLVED {
         return true;
     }
-    // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
+    // 1 - mu, from the factor since the last anchor, `known_lags` periods ago.
     let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), 1e-6, 1.0);
     return f32(now) >= SETTLED - OCTAVE * log2(away);
 }
 
-// Whether Newton's method may show what the limit is.
+// Whether Newton's method may search the limit.
 fn is_refinable(lag: u32) -> bool {
     if !EXPONENT || settings.early_stop == 0u || noted.failed_searches >= MOST_FAILED_SEARCHES {
         return false;
@@ -181,7 +181,7 @@ fn is_refinable(lag: u32) -> bool {
 // Natural logarithm of a quarter octave.
 const QUARTER_OCTAVE: f32 = 0.1733;
 
-// Keeps the books on the candidate; true once it is settled.
+// Updates the candidate. Returns true once it has settled.
 fn judge_lag(found: u32) -> bool {
     noted.settled = 0u;
     if found == 0u {
@@ -191,15 +191,16 @@ fn judge_lag(found: u32) -> bool {
     }
     noted.streak = select(1u, noted.streak + 1u, found == tally.candidate);
     tally.candidate = found;
-    // Weak chaos contracts by chance, the oftener it is checked: ask for more of it.
+    // Weak chaos contracts by chance, and the more often it is checked: after each failure, more windows must
+    // contract.
     let windows = STREAK + noted.tries + select(0u, 2u, grows(CHAOS_ERRORS));
     let has_contracted = noted.streak >= windows;
     noted.settled = select(0u, 1u, has_contracted && has_settled(found));
     return has_contracted && (noted.settled != 0u || is_refinable(found));
 }
 
-// Half a period after the middle of a cycle of odd period: how far is the state from the mirror
-// image of the cycle's start?
+// Compares the state half a period after the middle of a cycle of odd period with the mirror image of the cycle's
+// start.
 fn compare_mirror() {
     let a = seen.anchor;
     noted.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));

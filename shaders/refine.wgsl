@@ -1,8 +1,8 @@
-// Newton's method on the strobe map: from a motion that approaches a cycle to the cycle.
+// Newton's method on the strobe map: leads a motion that approaches a cycle to the cycle.
 
-// The monodromy matrix has been read along one candidate cycle from the anchor to the present
-// strobe. Moves the lane `to` where the linearised strobe map has its fixed point, to read on from
-// there; false where that brings it no closer or is no part of the motion.
+// Moves the lane to `to`, the fixed point of the linearised strobe map, and reads on from there. The monodromy matrix
+// has been read along one candidate cycle, from the anchor to the present strobe. Returns false if the step brings
+// the lane no closer or leaves the domain.
 fn refine(to: array<Real, 4>) -> bool {
     if noted.refinements == 0u {
         noted.home_mode = tally.mode;
@@ -31,13 +31,12 @@ fn refine(to: array<Real, 4>) -> bool {
     return true;
 }
 
-// The events of the cycle that has been read: along one branch of the strobe map they are the
-// same.
+// Returns the hash of the events of the cycle that has been read. It is constant along one branch of the strobe map.
 fn branch() -> u32 {
     return mix_bits(mix_bits(tally.hash_low + tally.events) + tally.recent);
 }
 
-// Notes the events of the first reading with the present period.
+// Stores the events of the first reading with the present period.
 fn note_branch() {
     if noted.refinements == 0u || noted.branch_period != tally.candidate {
         noted.branch = branch();
@@ -46,8 +45,8 @@ fn note_branch() {
     }
 }
 
-// Whether the cycle lies on the branch on which the motion approaches it. Beyond a fold it may
-// be another motion's.
+// Whether the cycle lies on the branch on which the motion approaches it. A cycle beyond a fold may belong to another
+// motion.
 fn is_own() -> bool {
     return branch() == noted.branch && (tally.grazes == 0u || noted.refinements == 0u);
 }
@@ -60,7 +59,7 @@ fn size_of(u: array<Real, 4>) -> Real {
     return distance_between(u, array<Real, 4>(0.0, 0.0, 0.0, 0.0));
 }
 
-// What the monodromy matrix makes of a deviation.
+// Applies the monodromy matrix to a deviation.
 fn image_of(u: array<Real, 4>) -> array<Real, 4> {
     var image: array<Real, 4>;
     for (var i = 0u; i < 4u; i++) {
@@ -70,12 +69,12 @@ fn image_of(u: array<Real, 4>) -> array<Real, 4> {
     return image;
 }
 
-// Whether the gap may be there in the present domain, at a phase that is no event's. A contact onset has no bounds.
+// Whether the gap may be at `to` in the present domain, at a phase without event. The contact onset has no bounds.
 fn keeps_domain(to: array<Real, 4>) -> bool {
     return tally.mode >= MODE_ONSET || beyond(to) < 0.0;
 }
 
-// How far beyond the nearest end of the present domain the gap is there.
+// Returns how far `to` lies beyond the nearest end of the present domain; negative inside.
 fn beyond(to: array<Real, 4>) -> Real {
     if tally.mode == MODE_FREE {
         return max(to[0] - walls[0], walls[1] - to[0]);
@@ -84,7 +83,7 @@ fn beyond(to: array<Real, 4>) -> Real {
     return sign_of(side) * (walls[side] - to[0]);
 }
 
-// Back to where the lane came from.
+// Moves the lane back to where Newton's method started.
 fn give_up() {
     if noted.refinements == 0u {
         return;
@@ -92,7 +91,7 @@ fn give_up() {
     motion.q = trail(noted.passed);
     tally.mode = noted.home_mode;
     tally.origin = noted.home_origin;
-    // Newton's method does not set out from a wall.
+    // Newton's method does not start on a wall.
     tally.order = 0u;
     if tally.mode != MODE_FREE {
         motion.q[0] -= walls[side_of(tally.mode)];
@@ -104,10 +103,10 @@ fn give_up() {
     noted.refinements = 0u;
 }
 
-// `a + (1 - M)^-1 (P(a) - a)` for the anchor `a`, by elimination with row pivots.
+// Returns `a + (1 - M)^-1 (P(a) - a)` for the anchor `a`, by elimination with row pivots.
 fn fixed_point() -> array<Real, 4> {
     let present = strobe_state();
-    // Row by row, the right side last.
+    // Row by row, the right-hand side last.
     var m: array<Real, 20>;
     for (var i = 0u; i < 4u; i++) {
         for (var j = 0u; j < 4u; j++) {

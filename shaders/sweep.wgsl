@@ -1,18 +1,18 @@
-// One invocation is one lane.
+// The main loop of a lane. One invocation is one lane.
 
 var<private> cell: Cell;
-// What steps and events take.
+// State that steps and events use.
 var<private> motion: MotionNow;
 var<private> tally: TallyNow;
-// What strobes take.
+// State that strobes use.
 var<private> seen: Seen;
 var<private> noted: Noted;
 // Index of this lane.
 var<private> lane: u32;
-// Loop iterations of this dispatch.
+// Loop iterations spent in this dispatch.
 var<private> iterations: u32;
 
-// The sum of sizes: a NaN among them makes it one.
+// Returns the sum of the sizes. It is a NaN if one of them is.
 fn sum_of_sizes(q: array<Real, 4>) -> Real {
     return (abs(q[0]) + abs(q[1])) + (abs(q[2]) + abs(q[3]));
 }
@@ -28,9 +28,9 @@ fn is_over() -> bool {
     return tally.status != STATUS_OK || tally.stage >= STAGE_READ;
 }
 
-// Whether there is work for this variant. Without the tangent vector for the exponent lanes go
-// on until they need it, and who reads a cycle reads it to its end; then they are the other variant's for good.
-// Which one has a lane must not depend on when a dispatch ends: they round differently.
+// Whether this variant has work for the lane. The variant without the exponent's tangent vector carries a lane until
+// it needs the vector, and finishes a cycle that is being read; the other variant then has the lane for good. The
+// choice must not depend on where a dispatch ends, because the variants round differently.
 fn running() -> bool {
     if is_over() || !EXPONENT {
         return !is_over();
@@ -39,7 +39,7 @@ fn running() -> bool {
     return grows == GROWTH;
 }
 
-// Takes lane `i` into registers.
+// Loads lane `i` into registers.
 fn take_up(i: u32) {
     lane = i;
     cell = cells[i];
@@ -61,7 +61,7 @@ fn put_down() {
     }
 }
 
-// Before a strobe is checked, and after: from one to the next, registers are for steps.
+// Load and store the state that strobes use: between strobes, its registers belong to the steps.
 fn recall() {
     if !KEEP {
         seen = motions[lane].seen;
@@ -76,8 +76,8 @@ fn remember() {
     }
 }
 
-// From event to event to the next stop phase; false if the lane or its share of this dispatch ends
-// before. Lanes wait for each other where chatter begins, too.
+// Follows the motion to the next stop phase. Returns false if the lane or its iterations in this dispatch end before.
+// Lanes wait for each other where chatter begins, too.
 fn fly_to_stop_phase() -> bool {
     if CHATTER {
         while running() && iterations < settings.iterations {
@@ -94,7 +94,7 @@ fn fly_to_stop_phase() -> bool {
     return false;
 }
 
-// From event to event to the next stop phase, or to an impact from which chatter is to be followed.
+// Follows the motion to the next stop phase, or to an impact that begins a series of short flights.
 fn flight_to_chatter() -> bool {
     chatters = false;
     while running() && !chatters && iterations < settings.iterations {
@@ -121,11 +121,10 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     fetch_constants();
     fetch_tangent();
     if motion.bound == 0.0 {
-        // A start: no pass has bounded it yet.
+        // A start: no pass has computed the bound yet.
         renew_bound();
     }
-    // Scanning, acting and checking strobes are separate, so that lanes scan together, act
-    // together and check together.
+    // Scans, events and strobes are in separate loops, so that lanes do the same work at the same time.
     while running() && iterations < settings.iterations {
         if fly_to_stop_phase() {
             recall();
