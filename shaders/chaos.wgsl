@@ -8,11 +8,11 @@ const DOUBT: Real = 1.0;
 
 // Whether growth is certain and no recurrence contracts. Checked when a block is complete.
 fn is_chaos() -> bool {
-    if noted.block_periods > 0u || noted.blocks < FEWEST_BLOCKS || noted.streak >= STREAK || tally.period < settings.chaos_from {
+    if search.block_periods > 0u || search.blocks < FEWEST_BLOCKS || search.streak >= STREAK || tally.period < settings.chaos_from {
         return false;
     }
     // A cycle that was read without success has interrupted the averages.
-    if tally.period < noted.counted_from + LEAST_COUNTED && tally.period < settings.periods {
+    if tally.period < search.counting_start + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
     let errors = select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods);
@@ -21,7 +21,7 @@ fn is_chaos() -> bool {
 
 // Whether the exponent exceeds zero by a number of standard errors.
 fn grows(errors: Real) -> bool {
-    if !EXPONENT || noted.blocks < 2u {
+    if !EXPONENT || search.blocks < 2u {
         return false;
     }
     let growth = mean_growth();
@@ -33,10 +33,10 @@ fn grows(errors: Real) -> bool {
 // s; 0 1` by d = ULP, which gives growth of sqrt(s ULP); s of one event is at most 1.
 fn outgrows(errors: Real) -> bool {
     let growth = mean_growth();
-    let periods = noted.blocks * settings.exponent_block;
+    let periods = search.blocks * settings.exponent_block;
     let began = max(settings.exponent_from, 1u);
     let neutral = NEUTRAL_ORDER * log(f32(began + periods) / f32(began));
-    let events_per_period = Real(tally.events) / Real(max(tally.period - noted.counted_from, 1u));
+    let events_per_period = Real(tally.events) / Real(max(tally.period - search.counting_start, 1u));
     let rounding = sqrt(events_per_period * events_per_period * ULP);
     return (growth.x - errors * growth.y - rounding) * Real(periods) > Real(neutral);
 }
@@ -45,22 +45,22 @@ fn outgrows(errors: Real) -> bool {
 fn escapes(errors: Real) -> bool {
     // A lane that has just been moved off a cycle was near a saddle. A single lag can be near by chance, but not all
     // its multiples.
-    var is_near_saddle = noted.known_lags == 0u;
+    var is_near_saddle = search.known_lags == 0u;
     var rests = false;
-    for (var lag = 1u; 2u * lag <= noted.known_lags && !rests; lag++) {
+    for (var lag = 1u; 2u * lag <= search.known_lags && !rests; lag++) {
         var nearest = 255u;
-        for (var multiple = lag; multiple <= noted.known_lags && nearest >= NEAR; multiple += lag) {
+        for (var multiple = lag; multiple <= search.known_lags && nearest >= RECURRENCE_LIMIT; multiple += lag) {
             iterations += 1u;
             nearest = min(nearest, last_distance_at(multiple));
         }
-        is_near_saddle = is_near_saddle || nearest >= NEAR;
-        rests = nearest >= RESOLVED;
+        is_near_saddle = is_near_saddle || nearest >= RECURRENCE_LIMIT;
+        rests = nearest >= WITHIN_ROUNDING;
     }
     // Rounding holds a motion that rests on a cycle: its growth is not chaos.
     if rests {
         return true;
     }
     let growth = mean_growth();
-    let periods = Real(noted.blocks * settings.exponent_block);
+    let periods = Real(search.blocks * settings.exponent_block);
     return is_near_saddle && (growth.x - errors * growth.y) * periods < ESCAPE_GROWTH;
 }

@@ -34,7 +34,7 @@ fn close_chatter(side: u32, u: Real) {
     let damping = kick * row[3] - row[1];
     let lasts = whole * (1.0 - (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole);
     // A sequence that a stop phase interrupts continues impact by impact, until it fits before the next one.
-    if lasts <= 0.0 || lasts >= to_stop_phase(next_stop_phase()) {
+    if lasts <= 0.0 || lasts >= steps_to_stop_phase(next_stop_phase()) {
         return;
     }
     let across = here.x_row;
@@ -70,7 +70,7 @@ fn close_chatter(side: u32, u: Real) {
     tally.order = 2u;
     if is_rigid(side) {
         tally.mode = MODE_STUCK + side;
-        tally.order = held_order(side);
+        tally.order = stuck_order(side);
     }
     enter(domain_of(tally.mode));
 }
@@ -117,7 +117,7 @@ fn follow_chatter(side: u32) {
     for (var n = 0u; n < SHORT_FLIGHTS; n++) {
         expand_short();
         let t = short_flight();
-        if !(t > 0.0 && elapsed + t < 1.0 && t < to_stop_phase(next_stop_phase())) {
+        if !(t > 0.0 && elapsed + t < 1.0 && t < steps_to_stop_phase(next_stop_phase())) {
             break;
         }
         let end = short_end(t);
@@ -255,6 +255,6 @@ fn carry_over_short(t: Real, end: End, removed: Real) {
         set_tangent(i, saltate(glide_short(tangent(i), t)));
     }
     if tally.tangent_count == 1u {
-        tame();
+        rescale_tangent();
     }
 }

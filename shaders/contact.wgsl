@@ -76,7 +76,7 @@ struct Jump {
     normal: array<Real, 4>,
     rate: Real,
     // Factor of the gap's rate, and change of the rate of x per unit of the gap's rate.
-    kept: Real,
+    rate_factor: Real,
     kick: Real,
     // Leaving speed of an impact after which the load presses the gap back.
     pressed_back: Real,
@@ -170,8 +170,8 @@ fn onset_ends(side: u32) -> Jump {
 }
 
 fn count_event(side: u32) {
-    note_symbol(side);
-    note_strobe();
+    add_symbol(side);
+    count_on_strobe();
     // Meshing that ends before the wall is reached belongs to another branch: its mode differs.
     tally.itinerary = mix_bits(tally.itinerary + 2u * tally.mode + side + 1u);
     tally.origin = side;

@@ -277,7 +277,7 @@ fn careful() -> bool {
     iterations += 1u;
     expand();
     if sticks() {
-        expand_held();
+        expand_stuck();
     }
     if KINDS && tally.order == 3u {
         // The gap has just been released.
@@ -288,7 +288,7 @@ fn careful() -> bool {
         derivative_bound(120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
     if sticks() {
-        motion.bound = held_bound();
+        motion.bound = stuck_bound();
     }
     if is_onset() {
         pressing_bound =
@@ -304,7 +304,7 @@ fn careful() -> bool {
         }
     }
     let stop = next_stop_phase();
-    let part = to_stop_phase(stop) * substeps;
+    let part = steps_to_stop_phase(stop) * substeps;
     let lands = part <= 1.0 && tally.step + 1u == stop;
     let len = min(part, Real(1.0));
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
@@ -333,12 +333,12 @@ fn careful() -> bool {
     check_finite();
     turn_phasor(found.tau);
     crossing = Crossing();
-    let flown = Pull(here.gap_row, here.x_row, here.share, here.angle);
+    let flight_pull = Pull(here.gap_row, here.x_row, here.share, here.angle);
     if found.event {
         act(found.second, found.tau);
     }
     if EXPONENT {
-        carry_tangents(flown, found.tau, held);
+        carry_tangents(flight_pull, found.tau, held);
     }
     return tally.step >= stop;
 }
@@ -385,7 +385,7 @@ fn act(second: bool, tau: Real) {
         enter(domain_of(jump.mode));
     }
     if sticks() {
-        tally.order = held_order(side);
+        tally.order = stuck_order(side);
     }
     if EXPONENT && jump.event {
         crossing.jump = jump;

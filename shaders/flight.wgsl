@@ -4,7 +4,7 @@
 // in units of the step. It is negative if the bound cannot show that. Quintic Hermite interpolation in Bernstein form
 // of degree 6; the remainder is at most `eps` times the middle basis polynomial. If the step starts on the wall
 // (`leaves`), that root is divided out, and its coefficient is dropped.
-fn room(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
+fn clearance(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
     let c1 = f0 + s0 * (1.0 / 6.0);
     let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
     let c3 = 0.5 * ((f0 + 0.4 * s0 + 0.05 * a0) + (f1 - 0.4 * s1 + 0.05 * a1));
@@ -54,7 +54,7 @@ fn scan() -> u32 {
     var n = tally.step;
     var bound = motion.bound;
     var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + row[5]);
-    if tally.cut == 1u {
+    if tally.is_scan_interrupted == 1u {
         a = motion.bend;
     }
     var taken = 0u;
@@ -90,7 +90,7 @@ fn scan() -> u32 {
         let c1 = sheared - half * s1;
         let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + row[5]);
         let bound1 = bound + growth;
-        if !(room(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
+        if !(clearance(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
             break;
         }
         if GROWTH {
@@ -127,7 +127,7 @@ fn scan() -> u32 {
     // The next dispatch must continue with the same bits, wherever this one ends; computed anew, the value might
     // round differently.
     motion.bend = a;
-    tally.cut = select(0u, 1u, verdict == SCAN_BUDGET);
+    tally.is_scan_interrupted = select(0u, 1u, verdict == SCAN_BUDGET);
     tally.step = n;
     tally.passes_in_period += taken;
     tally.order = select(0u, 1u, leaves);

@@ -39,12 +39,12 @@ struct Flow {
     speed: Real,
     // Longest infinite series of impacts that is closed by its limit, in free steps.
     closing: Real,
-    // Contact-free motion. `steady`: steady state at phase 0, in lane units. `reach`: size of the transient (by the
-    // free domain's energy form) below which no contact will follow; negative if there is no such size. `decay`:
+    // Contact-free motion. `steady`: steady state at phase 0, in lane units. `contact_free_size`: size of the transient (by the
+    // free domain's energy form) below which no contact will follow; negative if there is no such size. `transient_growth`:
     // growth of the transient per period, in octaves.
     steady: array<Real, 4>,
-    reach: Real,
-    decay: Real,
+    contact_free_size: Real,
+    transient_growth: Real,
     // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` that measures the gap from that
     // wall.
     pressing: array<array<Real, 6>, 2>,
@@ -87,7 +87,7 @@ struct Settings {
     slots: u32,
     // Length of the active list, and the place in it from which lanes have yet to begin.
     active_lanes: u32,
-    fresh: u32,
+    first_new: u32,
     // Forcing periods to integrate, and the number that undecided lanes get.
     periods: u32,
     longest: u32,
@@ -243,7 +243,7 @@ struct Search {
     return_distance: u32,
     earlier_return_distance: u32,
     // Newton steps towards the cycle; hash of the events on it before the first step, and the period of that cycle.
-    refinements: u32,
+    newton_steps: u32,
     branch: u32,
     branch_period: u32,
     // MODE_* and SIDE_* of the motion where Newton's method started.
@@ -347,7 +347,7 @@ const STAGE_DONE: u32 = 3u;
 @group(0) @binding(9) var<storage, read> starts: array<array<Real, 4>>;
 @group(0) @binding(10) var<storage, read_write> readings: array<Reading>;
 @group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
-@group(0) @binding(12) var<storage, read_write> starts_of_blocks: array<u32>;
+@group(0) @binding(12) var<storage, read_write> block_starts: array<u32>;
 
 // What governs the motion. All modes but the first are followed by the side: mode + SIDE_*.
 const MODE_FREE: u32 = 0u;

@@ -35,7 +35,7 @@ fn advance_phase(part: Real) {
 }
 
 // Returns the free steps to the next stop phase; 1 stands for "one or more".
-fn to_stop_phase(stop: u32) -> Real {
+fn steps_to_stop_phase(stop: u32) -> Real {
     if tally.step + 1u < stop {
         return 1.0;
     }
@@ -46,6 +46,6 @@ fn to_stop_phase(stop: u32) -> Real {
 // read and may be its own mirror image.
 fn next_stop_phase() -> u32 {
     let steps = shape.steps;
-    let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
+    let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.periods_to_read == tally.candidate + 1u;
     return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
 }

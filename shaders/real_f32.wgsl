@@ -28,6 +28,6 @@ const AT_REST: u32 = 64u;
 // by the square root of rounding.
 const NEUTRAL: Real = 1e-3;
 // Distance from the cycle, relative to the motion, at which Newton's method stops.
-const REFINED: f32 = 1e-5;
+const NEWTON_CONVERGED: f32 = 1e-5;
 // Squarings of the monodromy matrix. With more, the smaller entries of a Jordan block would underflow.
 const SQUARINGS: u32 = 20u;

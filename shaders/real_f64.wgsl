@@ -24,11 +24,11 @@ fn is_bounded(size: Real) -> bool {
 
 // Recurrence distance that is rounding error, in quarter octaves below 1: a motion this near to its last strobes is
 // at rest.
-const AT_REST: u32 = RESOLVED;
+const AT_REST: u32 = WITHIN_ROUNDING;
 // A multiplier within this of 1, in octaves per period, counts as 1. A double multiplier, as of a free body, scatters
 // by the square root of rounding.
 const NEUTRAL: Real = 1e-7;
 // Distance from the cycle, relative to the motion, at which Newton's method stops.
-const REFINED: f32 = 1e-10;
+const NEWTON_CONVERGED: f32 = 1e-10;
 // Squarings of the monodromy matrix: enough for the spectral radius to the last digits.
 const SQUARINGS: u32 = 40u;

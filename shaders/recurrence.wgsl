@@ -23,35 +23,35 @@ const LAGS_PER_CYCLE: u32 = 4u;
 fn recurs() -> bool {
     let q = strobe_state();
     widen_scales(q);
-    if noted.window == 0u {
+    if search.window == 0u {
         begin_window(q, widest());
         return false;
     }
-    let lag = tally.period - noted.anchor_period;
-    let apart = octaves(distance_between(q, seen.anchor));
+    let lag = tally.period - search.anchor_period;
+    let apart = octaves(distance_between(q, measures.anchor));
     tallies[lane].distances[(lag - 1u) / 4u] |= apart << (8u * ((lag - 1u) % 4u));
-    if lag < noted.window {
+    if lag < search.window {
         return false;
     }
     let found = contracting_lag();
     let is_fast = found > 0u && shrinks(found);
     let settled = judge_lag(found);
-    noted.known_lags = noted.window;
+    search.known_lags = search.window;
     tallies[lane].last_distances = tallies[lane].distances;
     // The next anchor lies at the same point of the cycle, because distances compare only there. The points of a
     // cycle may be so close together that a shorter lag seems to recur.
     let cycle = max(closest_lag(), 1u);
     // A short lag that contracts is found in short windows, too.
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
-    let lags = select(widest(), min(enough, widest()), is_fast && noted.tries == 0u);
+    let lags = select(widest(), min(enough, widest()), is_fast && search.failed_readings == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
 
 // Raises the units of distances to the largest strobe.
 fn widen_scales(q: array<Real, 4>) {
-    seen.position_scale = max(seen.position_scale, max(abs(q[0]), abs(q[2])));
-    seen.rate_scale = max(seen.rate_scale, max(abs(q[1]), abs(q[3])));
+    measures.position_scale = max(measures.position_scale, max(abs(q[0]), abs(q[2])));
+    measures.rate_scale = max(measures.rate_scale, max(abs(q[1]), abs(q[3])));
 }
 
 // Lowers the units of distances where a cycle is read, so that the motion before it does not count. A strobe may lie
@@ -60,8 +60,8 @@ fn narrow_scales(q: array<Real, 4>) {
     let angle = flows[cell.flow_index].domains[0].angle;
     let position = max(abs(q[0]), abs(q[2]));
     let rate = max(abs(q[1]), abs(q[3]));
-    seen.position_scale = min(seen.position_scale, max(position, rate / angle));
-    seen.rate_scale = min(seen.rate_scale, max(rate, angle * position));
+    measures.position_scale = min(measures.position_scale, max(position, rate / angle));
+    measures.rate_scale = min(measures.rate_scale, max(rate, angle * position));
 }
 
 fn widest() -> u32 {
@@ -70,12 +70,12 @@ fn widest() -> u32 {
 
 // Returns the lag that recurs best. A longer lag must be better by a factor of four.
 fn closest_lag() -> u32 {
-    return closest_of(noted.known_lags);
+    return closest_of(search.known_lags);
 }
 
 fn closest_of(lags: u32) -> u32 {
     var best = 0u;
-    var distance = NEAR;
+    var distance = RECURRENCE_LIMIT;
     for (var lag = 1u; lag <= lags; lag++) {
         iterations += 1u;
         if distance_at(lag) >= distance {
@@ -89,20 +89,20 @@ fn closest_of(lags: u32) -> u32 {
 // Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because at
 // a turning point rates are rounding error.
 fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
-    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(seen.position_scale, Real(1e-30));
+    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(measures.position_scale, Real(1e-30));
     let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / unit_of_rates();
     return max(p, r);
 }
 
 fn unit_of_rates() -> Real {
-    let least = flows[cell.flow_index].domains[0].angle * seen.position_scale;
-    return max(max(seen.rate_scale, least), Real(1e-30));
+    let least = flows[cell.flow_index].domains[0].angle * measures.position_scale;
+    return max(max(measures.rate_scale, least), Real(1e-30));
 }
 
 fn begin_window(q: array<Real, 4>, lags: u32) {
-    seen.anchor = q;
-    noted.anchor_period = tally.period;
-    noted.window = min(lags, settings.max_period);
+    measures.anchor = q;
+    search.anchor_period = tally.period;
+    search.window = min(lags, settings.max_period);
     tallies[lane].distances = array<u32, 16>();
 }
 
@@ -112,7 +112,7 @@ fn octaves(distance: Real) -> u32 {
     if d <= 1e-19 {
         return 255u;
     }
-    return u32(clamp(-OCTAVE * log2(d), 0.0, 255.0));
+    return u32(clamp(-PARTS_PER_OCTAVE * log2(d), 0.0, 255.0));
 }
 
 fn distance_at(lag: u32) -> u32 {
@@ -127,19 +127,19 @@ fn last_distance_at(lag: u32) -> u32 {
 // none. Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
     // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
-    let best = closest_of(noted.window);
-    for (var lag = 1u; lag <= min(noted.window, noted.known_lags); lag++) {
+    let best = closest_of(search.window);
+    for (var lag = 1u; lag <= min(search.window, search.known_lags); lag++) {
         iterations += 1u;
         let now = distance_at(lag);
         let before = last_distance_at(lag);
         let contracts = shrinks(lag) || (now >= SLOW && now >= before && lag == best);
-        if now < NEAR || !contracts {
+        if now < RECURRENCE_LIMIT || !contracts {
             continue;
         }
         var kept = true;
-        for (var multiple = 2u * lag; multiple <= noted.window; multiple += lag) {
+        for (var multiple = 2u * lag; multiple <= search.window; multiple += lag) {
             iterations += 1u;
-            kept = kept && distance_at(multiple) >= NEAR;
+            kept = kept && distance_at(multiple) >= RECURRENCE_LIMIT;
         }
         if kept {
             return lag;
@@ -151,7 +151,7 @@ fn contracting_lag() -> u32 {
 // Whether the distance at a lag has shrunk since the last window, or is rounding.
 fn shrinks(lag: u32) -> bool {
     let now = distance_at(lag);
-    return now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
+    return now >= WITHIN_ROUNDING || now >= last_distance_at(lag) + SHRUNK;
 }
 
 // Whether the limit is near enough. Strobes at a distance `d` that shrinks by `mu` per period are `d / (1 - mu)` away
@@ -159,23 +159,23 @@ fn shrinks(lag: u32) -> bool {
 fn has_settled(lag: u32) -> bool {
     let now = distance_at(lag);
     let shrunk = f32(now) - f32(last_distance_at(lag));
-    if now >= RESOLVED {
+    if now >= WITHIN_ROUNDING {
         return true;
     }
     // 1 - mu, from the factor since the last anchor, `known_lags` periods ago.
-    let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), 1e-6, 1.0);
-    return f32(now) >= SETTLED - OCTAVE * log2(away);
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(search.known_lags), 1e-6, 1.0);
+    return f32(now) >= SETTLED - PARTS_PER_OCTAVE * log2(away);
 }
 
 // Whether Newton's method may search the limit.
 fn is_refinable(lag: u32) -> bool {
-    if !EXPONENT || settings.early_stop == 0u || noted.failed_searches >= MOST_FAILED_SEARCHES {
+    if !EXPONENT || settings.early_stop == 0u || search.failed_searches >= MOST_FAILED_SEARCHES {
         return false;
     }
     let now = f32(distance_at(lag));
     let shrunk = now - f32(last_distance_at(lag));
-    let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), SLOWEST, 1.0);
-    return now >= REFINABLE - OCTAVE * log2(away) && repeats_itself(lag);
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(search.known_lags), SLOWEST, 1.0);
+    return now >= REFINABLE - PARTS_PER_OCTAVE * log2(away) && repeats_itself(lag);
 }
 
 // Natural logarithm of a quarter octave.
@@ -183,25 +183,25 @@ const QUARTER_OCTAVE: f32 = 0.1733;
 
 // Updates the candidate. Returns true once it has settled.
 fn judge_lag(found: u32) -> bool {
-    noted.settled = 0u;
+    search.is_settled = 0u;
     if found == 0u {
         tally.candidate = 0u;
-        noted.streak = 0u;
+        search.streak = 0u;
         return false;
     }
-    noted.streak = select(1u, noted.streak + 1u, found == tally.candidate);
+    search.streak = select(1u, search.streak + 1u, found == tally.candidate);
     tally.candidate = found;
     // Weak chaos contracts by chance, and the more often it is checked: after each failure, more windows must
     // contract.
-    let windows = STREAK + noted.tries + select(0u, 2u, grows(CHAOS_ERRORS));
-    let has_contracted = noted.streak >= windows;
-    noted.settled = select(0u, 1u, has_contracted && has_settled(found));
-    return has_contracted && (noted.settled != 0u || is_refinable(found));
+    let windows = STREAK + search.failed_readings + select(0u, 2u, grows(CHAOS_ERRORS));
+    let has_contracted = search.streak >= windows;
+    search.is_settled = select(0u, 1u, has_contracted && has_settled(found));
+    return has_contracted && (search.is_settled != 0u || is_refinable(found));
 }
 
 // Compares the state half a period after the middle of a cycle of odd period with the mirror image of the cycle's
 // start.
 fn compare_mirror() {
-    let a = seen.anchor;
-    noted.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
+    let a = measures.anchor;
+    search.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
 }

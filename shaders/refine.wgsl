@@ -4,16 +4,16 @@
 // has been read along one candidate cycle, from the anchor to the present strobe. Returns false if the step brings
 // the lane no closer or leaves the domain.
 fn refine(to: array<Real, 4>) -> bool {
-    if noted.refinements == 0u {
-        noted.home_mode = tally.mode;
-        noted.home_origin = tally.origin;
+    if search.newton_steps == 0u {
+        search.newton_start_mode = tally.mode;
+        search.newton_start_origin = tally.origin;
     }
-    let stalls = noted.refinements > 0u && noted.apart < noted.apart_before + SHRUNK;
-    let is_over = noted.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
+    let stalls = search.newton_steps > 0u && search.return_distance < search.earlier_return_distance + SHRUNK;
+    let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > settings.longest;
     if stalls || is_over || is_onset() || tally.order > 0u {
         return false;
     }
-    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(noted.passed)) < Real(REACH)) {
+    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(search.strobe_count)) < Real(LONGEST_NEWTON_STEP)) {
         return false;
     }
     motion.q = to;
@@ -25,8 +25,8 @@ fn refine(to: array<Real, 4>) -> bool {
         motion.q[1] = 0.0;
     }
     motion.bound = 0.0;
-    noted.refinements += 1u;
-    noted.apart_before = noted.apart;
+    search.newton_steps += 1u;
+    search.earlier_return_distance = search.return_distance;
     begin_reading();
     return true;
 }
@@ -37,18 +37,18 @@ fn branch() -> u32 {
 }
 
 // Stores the events of the first reading with the present period.
-fn note_branch() {
-    if noted.refinements == 0u || noted.branch_period != tally.candidate {
-        noted.branch = branch();
-        noted.branch_period = tally.candidate;
-        noted.apart_before = 0u;
+fn store_branch() {
+    if search.newton_steps == 0u || search.branch_period != tally.candidate {
+        search.branch = branch();
+        search.branch_period = tally.candidate;
+        search.earlier_return_distance = 0u;
     }
 }
 
 // Whether the cycle lies on the branch on which the motion approaches it. A cycle beyond a fold may belong to another
 // motion.
-fn is_own() -> bool {
-    return branch() == noted.branch && (tally.grazes == 0u || noted.refinements == 0u);
+fn is_on_branch() -> bool {
+    return branch() == search.branch && (tally.grazes == 0u || search.newton_steps == 0u);
 }
 
 fn difference(a: array<Real, 4>, b: array<Real, 4>) -> array<Real, 4> {
@@ -84,13 +84,13 @@ fn beyond(to: array<Real, 4>) -> Real {
 }
 
 // Moves the lane back to where Newton's method started.
-fn give_up() {
-    if noted.refinements == 0u {
+fn return_to_start() {
+    if search.newton_steps == 0u {
         return;
     }
-    motion.q = trail(noted.passed);
-    tally.mode = noted.home_mode;
-    tally.origin = noted.home_origin;
+    motion.q = trail(search.strobe_count);
+    tally.mode = search.newton_start_mode;
+    tally.origin = search.newton_start_origin;
     // Newton's method does not start on a wall.
     tally.order = 0u;
     if tally.mode != MODE_FREE {
@@ -100,7 +100,7 @@ fn give_up() {
         motion.q[0] = 0.0;
     }
     motion.bound = 0.0;
-    noted.refinements = 0u;
+    search.newton_steps = 0u;
 }
 
 // Returns `a + (1 - M)^-1 (P(a) - a)` for the anchor `a`, by elimination with row pivots.
@@ -112,7 +112,7 @@ fn fixed_point() -> array<Real, 4> {
         for (var j = 0u; j < 4u; j++) {
             m[5u * i + j] = select(Real(0.0), Real(1.0), i == j) - motions[lane].tangents[4u * j + i];
         }
-        m[5u * i + 4u] = present[i] - seen.anchor[i];
+        m[5u * i + 4u] = present[i] - measures.anchor[i];
     }
     for (var k = 0u; k < 4u; k++) {
         var pivot = k;
@@ -134,7 +134,7 @@ fn fixed_point() -> array<Real, 4> {
             }
         }
     }
-    var to = seen.anchor;
+    var to = measures.anchor;
     for (var i = 0u; i < 4u; i++) {
         to[i] += m[5u * i + 4u] / m[6u * i];
     }

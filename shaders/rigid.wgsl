@@ -18,7 +18,7 @@ fn is_onset() -> bool {
 }
 
 // Returns the acceleration of a gap that rests on its wall, and the motion of x.
-fn held_pull(side: u32) -> Pull {
+fn stuck_pull(side: u32) -> Pull {
     let behind = meshing_pull(side);
     return Pull(flows[cell.flow_index].pressing[side], behind.x_row, behind.share, behind.angle);
 }
@@ -29,7 +29,7 @@ fn stick(side: u32) -> Jump {
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 0.0, kick, 0.0);
     let taken = sign_of(side) * max(sign_of(side) * motion.q[1], Real(0.0));
     let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3] + kick * taken);
-    if presses(held_pull(side), side, rest) {
+    if presses(stuck_pull(side), side, rest) {
         jump.event = true;
         jump.mode = MODE_STUCK + side;
         motion.q = rest;
@@ -48,14 +48,14 @@ fn let_go(side: u32) -> Jump {
 }
 
 // Returns the order of the root of the pressing acceleration where sticking begins: 1 if the load is balanced.
-fn held_order(side: u32) -> u32 {
-    let pull = held_pull(side);
+fn stuck_order(side: u32) -> u32 {
+    let pull = stuck_pull(side);
     let pressing = acceleration(pull.gap_row, pull.share, motion.q);
     return select(0u, 1u, abs(pressing) <= balance(pull.gap_row, pull.share, motion.q));
 }
 
 // Expands the motion of x while the gap sticks. The acceleration that the wall takes up replaces the gap's series.
-fn expand_held() {
+fn expand_stuck() {
     let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
     let r = here.x_row;
     let angle = here.angle;
@@ -88,7 +88,7 @@ fn expand_held() {
 
 // Returns a bound on the sixth derivative of that acceleration over the step. It is a sum of x, its rate and the
 // forcing, whose derivatives are bounded by the energy of the differentiated motion.
-fn held_bound() -> Real {
+fn stuck_bound() -> Real {
     let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
     let square = here.angle * here.angle;
     let fifth = square * square * here.angle;

@@ -5,8 +5,8 @@ var<private> cell: Cell;
 var<private> motion: MotionNow;
 var<private> tally: TallyNow;
 // State that strobes use.
-var<private> seen: Seen;
-var<private> noted: Noted;
+var<private> measures: Measures;
+var<private> search: Search;
 // Index of this lane.
 var<private> lane: u32;
 // Loop iterations spent in this dispatch.
@@ -31,48 +31,48 @@ fn is_over() -> bool {
 // Whether this variant has work for the lane. The variant without the exponent's tangent vector carries a lane until
 // it needs the vector, and finishes a cycle that is being read; the other variant then has the lane for good. The
 // choice must not depend on where a dispatch ends, because the variants round differently.
-fn running() -> bool {
+fn has_work() -> bool {
     if is_over() || !EXPONENT {
         return !is_over();
     }
-    let grows = tally.grows == 1u || (tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from);
+    let grows = tally.carries_growth == 1u || (tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from);
     return grows == GROWTH;
 }
 
 // Loads lane `i` into registers.
-fn take_up(i: u32) {
+fn load_lane(i: u32) {
     lane = i;
     cell = cells[i];
     motion = motions[i].now;
     tally = tallies[i].now;
     iterations = 0u;
     if KEEP {
-        seen = motions[i].seen;
-        noted = tallies[i].noted;
+        measures = motions[i].measures;
+        search = tallies[i].search;
     }
 }
 
-fn put_down() {
+fn store_lane() {
     motions[lane].now = motion;
     tallies[lane].now = tally;
     if KEEP {
-        motions[lane].seen = seen;
-        tallies[lane].noted = noted;
+        motions[lane].measures = measures;
+        tallies[lane].search = search;
     }
 }
 
 // Load and store the state that strobes use: between strobes, its registers belong to the steps.
-fn recall() {
+fn load_strobe_state() {
     if !KEEP {
-        seen = motions[lane].seen;
-        noted = tallies[lane].noted;
+        measures = motions[lane].measures;
+        search = tallies[lane].search;
     }
 }
 
-fn remember() {
+fn store_strobe_state() {
     if !KEEP {
-        motions[lane].seen = seen;
-        tallies[lane].noted = noted;
+        motions[lane].measures = measures;
+        tallies[lane].search = search;
     }
 }
 
@@ -80,7 +80,7 @@ fn remember() {
 // Lanes wait for each other where chatter begins, too.
 fn fly_to_stop_phase() -> bool {
     if CHATTER {
-        while running() && iterations < settings.iterations {
+        while has_work() && iterations < settings.iterations {
             if flight_to_chatter() {
                 return true;
             }
@@ -97,7 +97,7 @@ fn fly_to_stop_phase() -> bool {
 // Follows the motion to the next stop phase, or to an impact that begins a series of short flights.
 fn flight_to_chatter() -> bool {
     chatters = false;
-    while running() && !chatters && iterations < settings.iterations {
+    while has_work() && !chatters && iterations < settings.iterations {
         if scan() == SCAN_BUDGET {
             break;
         }
@@ -117,30 +117,30 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     if i >= queue.count {
         return;
     }
-    take_up(queued(i));
+    load_lane(selected_lane(i));
     fetch_constants();
-    fetch_tangent();
+    load_tangent();
     if motion.bound == 0.0 {
         // A start: no pass has computed the bound yet.
         renew_bound();
     }
     // Scans, events and strobes are in separate loops, so that lanes do the same work at the same time.
-    while running() && iterations < settings.iterations {
+    while has_work() && iterations < settings.iterations {
         if fly_to_stop_phase() {
-            recall();
+            load_strobe_state();
             if tally.step >= shape.steps {
                 begin_period();
             } else {
                 compare_mirror();
             }
-            remember();
+            store_strobe_state();
         }
     }
     if tally.stage == STAGE_READ {
-        recall();
+        load_strobe_state();
         judge_cycle();
-        remember();
+        store_strobe_state();
     }
-    keep_tangent();
-    put_down();
+    store_tangent_now();
+    store_lane();
 }

@@ -29,12 +29,12 @@ fn store_tangent(i: u32, u: array<Real, 4>) {
 }
 
 // Loads the tangent vector at the start of a dispatch. The first dispatch with the vector initialises it.
-fn fetch_tangent() {
+fn load_tangent() {
     if GROWTH {
-        tally.grows = 1u;
+        tally.carries_growth = 1u;
         if tally.tangent_count == 0u {
             resume_growth();
-            keep_tangent();
+            store_tangent_now();
         }
         let t = motions[lane].tangents;
         tangent_now = array<Real, 4>(t[0], t[1], t[2], t[3]);
@@ -42,13 +42,13 @@ fn fetch_tangent() {
 }
 
 // Returns a vector with a part in every direction.
-fn fresh() -> array<Real, 4> {
+fn initial_tangent() -> array<Real, 4> {
     let x = select(Real(0.0), Real(0.5), shapes[cell.flow_index].degrees > 1u);
     return array<Real, 4>(0.5, 0.5, x, x);
 }
 
 // Saves the vector while a cycle is read.
-fn set_vector_aside() {
+fn save_vector() {
     if tally.tangent_count == 1u {
         motions[lane].vector = tangent_now;
     }
@@ -58,7 +58,7 @@ fn set_vector_aside() {
 // first have to turn into its direction, which adds growth: where cycles are read again and again, 0.2 per period of
 // motion whose exponent is zero.
 fn carry_vector() {
-    if noted.refinements > 0u {
+    if search.newton_steps > 0u {
         return;
     }
     let u = motions[lane].vector;
@@ -69,7 +69,7 @@ fn carry_vector() {
     }
     let size = largest(image);
     if !(size > 1e-30 && size < 1e30) {
-        motions[lane].vector = fresh();
+        motions[lane].vector = initial_tangent();
         return;
     }
     let length = unit(&image, size);
@@ -96,7 +96,7 @@ fn resume_growth() {
     tangent_now = motions[lane].vector;
 }
 
-fn keep_tangent() {
+fn store_tangent_now() {
     if GROWTH && tally.tangent_count == 1u {
         store_tangent(0u, tangent_now);
     }
@@ -149,8 +149,8 @@ var<private> crossing: Crossing;
 
 // Carries every vector over a part of a step and the event after it. A gap that was stuck has no neighbouring
 // motions.
-fn carry_tangents(flown: Pull, tau: Real, held: bool) {
-    let back = 1.0 / flown.share;
+fn carry_tangents(flight_pull: Pull, tau: Real, held: bool) {
+    let back = 1.0 / flight_pull.share;
     for (var i = 0u; i < tally.tangent_count; i++) {
         iterations += 1u;
         var u = tangent(i);
@@ -158,9 +158,9 @@ fn carry_tangents(flown: Pull, tau: Real, held: bool) {
             u[0] = 0.0;
             u[1] = 0.0;
         }
-        u[1] *= flown.share;
-        u[3] *= flown.share;
-        u = glide(flown, u, tau);
+        u[1] *= flight_pull.share;
+        u[3] *= flight_pull.share;
+        u = glide(flight_pull, u, tau);
         u[1] *= back;
         u[3] *= back;
         if crossing.jump.event {
@@ -172,7 +172,7 @@ fn carry_tangents(flown: Pull, tau: Real, held: bool) {
         set_tangent(i, u);
     }
     if tally.tangent_count == 1u {
-        tame();
+        rescale_tangent();
     }
 }
 
@@ -181,7 +181,7 @@ fn carry_tangents(flown: Pull, tau: Real, held: bool) {
 const LARGE: Real = 1099511627776.0;
 const LARGE_OCTAVES: Real = 40.0;
 
-fn tame() {
+fn rescale_tangent() {
     let u = tangent_now;
     if !(largest(u) > LARGE) {
         return;
@@ -198,9 +198,9 @@ fn largest(u: array<Real, 4>) -> Real {
 }
 
 // Carries a vector over a part `tau` of a step: the series of the unforced motion.
-fn glide(flown: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
-    let g = flown.gap_row;
-    let r = flown.x_row;
+fn glide(flight_pull: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
+    let g = flight_pull.gap_row;
+    let r = flight_pull.x_row;
     var z = u[0];
     var w = u[1];
     var x = u[2];
@@ -259,8 +259,8 @@ fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     let along = inverse * ((jump.normal[0] * u[0] + jump.normal[1] * u[1]) + (jump.normal[2] * u[2] + jump.normal[3] * u[3]));
     // The first row is the quotient of the gap's rates; written as a sum it would lose digits where `e` is small.
     return array<Real, 4>(
-        jump.kept * u[0],
-        jump.kept * u[1] + (after[1] - jump.kept * before[1]) * along,
+        jump.rate_factor * u[0],
+        jump.rate_factor * u[1] + (after[1] - jump.rate_factor * before[1]) * along,
         u[2] + (after[2] - before[2]) * along,
         u[3] + jump.kick * u[1] + (after[3] - before[3] - jump.kick * before[1]) * along,
     );
@@ -284,7 +284,7 @@ fn renormalise() -> Real {
     let size = largest(u);
     if !(size > 1e-30) {
         // Superstable: the largest loss that is distinguished. Start with a new vector.
-        set_tangent(0u, fresh());
+        set_tangent(0u, initial_tangent());
         return -100.0;
     }
     let length = unit(&u, size);
@@ -307,17 +307,17 @@ fn accumulate_growth() {
 // Adds growth over a number of periods. A block that a cycle makes longer than the others counts like them.
 fn count_growth(growth: Real, periods: u32) {
     motion.block_growth += growth;
-    noted.block_periods += periods;
-    if noted.block_periods >= settings.exponent_block {
-        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(noted.block_periods));
+    search.block_periods += periods;
+    if search.block_periods >= settings.exponent_block {
+        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(search.block_periods));
         // Squared deviations by Welford's update: sums of squares would cancel where blocks are nearly equal.
-        let blocks = Real(noted.blocks);
-        let deviation = whole - seen.growth_sum / max(blocks, 1.0);
-        seen.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
-        seen.growth_sum += whole;
+        let blocks = Real(search.blocks);
+        let deviation = whole - measures.growth_sum / max(blocks, 1.0);
+        measures.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
+        measures.growth_sum += whole;
         motion.block_growth = 0.0;
-        noted.block_periods = 0u;
-        noted.blocks += 1u;
+        search.block_periods = 0u;
+        search.blocks += 1u;
     }
 }
 
@@ -326,7 +326,7 @@ const LN_2: Real = 0.6931471805599453;
 // Returns the mean growth of the tangent vector per period, natural logarithms, and its standard error from the means
 // of blocks.
 fn mean_growth() -> vec2<Real> {
-    let blocks = Real(noted.blocks);
-    let variance = seen.growth_squares / (blocks * (blocks - 1.0));
-    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(seen.growth_sum / blocks, sqrt(variance));
+    let blocks = Real(search.blocks);
+    let variance = measures.growth_squares / (blocks * (blocks - 1.0));
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(measures.growth_sum / blocks, sqrt(variance));
 }

@@ -1,7 +1,7 @@
 // The word: one symbol for every flight, stored and hashed. The pattern: one symbol for every run of equal symbols.
 
 // Adds the symbol of a flight that ends on `side`. The first flight comes from no wall and has no symbol.
-fn note_symbol(side: u32) {
+fn add_symbol(side: u32) {
     var symbol: u32;
     if tally.mode != MODE_FREE {
         symbol = select(4u, 1u, side == SIDE_RIGHT);
@@ -19,11 +19,11 @@ fn note_symbol(side: u32) {
     tally.word_length = n + 1u;
     // Before the first symbol, `recent` is zero.
     if PATTERN && symbol != (tally.recent & 7u) {
-        note_run(symbol);
+        add_run(symbol);
     }
-    take_symbol(symbol);
+    push_symbol(symbol);
     if n >= 7u {
-        add_stretch();
+        add_hash_window();
     }
 }
 
@@ -35,38 +35,38 @@ fn begin_pattern() {
 }
 
 // Adds a symbol to the pattern. Runs are rarer than flights, so that the pattern stays in the buffer.
-fn note_run(symbol: u32) {
+fn add_run(symbol: u32) {
     let n = tallies[lane].pattern_length;
     if n < 7u * SYMBOLS_PER_NUMBER {
         tallies[lane].pattern[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
     }
-    let recent = followed_by(tallies[lane].pattern_recent, symbol);
+    let recent = append_symbol(tallies[lane].pattern_recent, symbol);
     tallies[lane].pattern_length = n + 1u;
     tallies[lane].pattern_recent = recent;
     if n >= 7u {
-        let hash = stretch(recent);
+        let hash = hash_window(recent);
         tallies[lane].pattern_hash[0] += hash.x;
         tallies[lane].pattern_hash[1] += hash.y;
     }
 }
 
-fn take_symbol(symbol: u32) {
-    tally.recent = followed_by(tally.recent, symbol);
+fn push_symbol(symbol: u32) {
+    tally.recent = append_symbol(tally.recent, symbol);
 }
 
 // Appends a symbol to the latest ones and keeps eight.
-fn followed_by(recent: u32, symbol: u32) -> u32 {
+fn append_symbol(recent: u32, symbol: u32) -> u32 {
     return ((recent << 3u) | symbol) & 0xffffffu;
 }
 
 // Adds the hash of the eight latest symbols. The sum over all windows does not depend on where the cycle starts.
-fn add_stretch() {
-    let hash = stretch(tally.recent);
+fn add_hash_window() {
+    let hash = hash_window(tally.recent);
     tally.hash_low += hash.x;
     tally.hash_high += hash.y;
 }
 
-fn stretch(recent: u32) -> vec2<u32> {
+fn hash_window(recent: u32) -> vec2<u32> {
     return vec2<u32>(mix_bits(recent), mix_bits(recent ^ 0x5bd1e995u));
 }
 
@@ -79,7 +79,7 @@ fn mix_bits(x: u32) -> u32 {
 }
 
 // Counts an event that is so close to phase 0, in turns, that it lies on the strobe.
-fn note_strobe() {
+fn count_on_strobe() {
     let turns = (Real(tally.step) + motion.theta) / Real(shapes[cell.flow_index].steps);
     if turns < ON_STROBE || 1.0 - turns < ON_STROBE {
         tally.on_strobe += 1u;

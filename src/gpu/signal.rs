@@ -14,7 +14,7 @@ struct Slot<T> {
 }
 
 impl<T: Send + 'static> Signal<T> {
-    /// The future and the callback that completes it.
+    /// Returns the future and the callback that completes it.
     pub(super) fn new() -> (Signal<T>, impl FnOnce(T) + Send + 'static) {
         let slot = Arc::new(Mutex::new(Slot { value: None, waker: None }));
         let sender = Arc::clone(&slot);
@@ -34,7 +34,7 @@ impl<T> Future for Signal<T> {
     type Output = T;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<T> {
-        // The callback only stores: a poisoned lock still holds a sound slot.
+        // The callback only stores a value: the slot of a poisoned lock is valid.
         let mut slot = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         match slot.value.take() {
             Some(value) => Poll::Ready(value),

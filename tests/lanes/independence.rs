@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use crate::common::{REST, gpu, paper};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::gpu::{Ended, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{Gpu, Lane, LaneResult, LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 
@@ -116,8 +116,8 @@ fn records_do_not_depend_on_when_lanes_are_begun() {
         }
         assert!(pollster::block_on(device.advance(&mut pool, &tables, 0)).unwrap().is_empty());
         assert_eq!(pool.under_way(), 0);
-        ended.sort_by_key(Ended::number);
-        let numbers: Vec<u32> = ended.iter().map(Ended::number).collect();
+        ended.sort_by_key(LaneResult::number);
+        let numbers: Vec<u32> = ended.iter().map(LaneResult::number).collect();
         assert_eq!(numbers, (1000..1060).collect::<Vec<_>>());
         for (ended, expected) in ended.iter().zip(&expected) {
             assert_eq!(ended.record(tables.constants()), *expected, "{precision:?}, lane {}", ended.number());

@@ -34,7 +34,7 @@ fn a_device_stops_when_it_is_told_to() {
     let (flows, laws) = ([pair.oscillator().unwrap()], [pair.law()]);
     let lanes = [Lane { flow: 0, law: 0, start: REST }; 64];
     let halt = Arc::new(AtomicBool::new(false));
-    gpu.heed(&halt);
+    gpu.stop_on(&halt);
     // Compiled before, so that it is lanes that are waited for.
     let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
     let mut pool = pollster::block_on(gpu.pool(&settings)).unwrap();

@@ -1,7 +1,7 @@
-//! Calls into wgpu that panic where a driver fails, as errors.
+//! Turns panics of wgpu, where a driver fails, into errors.
 //!
-//! wgpu 30 has no error for a device that is lost while it is waited for, and drops what it has made of a device by halves
-//! with an assertion. By then it has let go of its locks, and nothing of ours is half done.
+//! wgpu 30 returns no error if a device is lost during a wait, and panics when it drops a partly created object. It
+//! has released its locks by then, and none of our state is inconsistent.
 
 use std::cell::Cell;
 use std::ops::Deref;
@@ -9,15 +9,15 @@ use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
 thread_local! {
-    /// Whether a panic of this thread is somebody's error, and no news for the terminal.
+    /// Whether a panic of this thread becomes an error, so that it is not printed.
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
 static HOOK: Once = Once::new();
 
-/// Makes a call; if it panics, what it says, without a word on the terminal. Where panics end the process (in web pages)
-/// they do so aloud.
-pub(super) fn caught<T>(call: impl FnOnce() -> T) -> Result<T, String> {
+/// Makes a call. If it panics, returns the message as an error and prints nothing. Where panics end the process (in
+/// web pages), they do so and are printed.
+pub(super) fn catch_panic<T>(call: impl FnOnce() -> T) -> Result<T, String> {
     if cfg!(panic = "abort") {
         return Ok(call());
     }
@@ -38,16 +38,16 @@ pub(super) fn caught<T>(call: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-/// What may panic while it is dropped.
-pub(super) struct Dropped<T>(Option<T>);
+/// A value whose drop may panic.
+pub(super) struct PanicFree<T>(Option<T>);
 
-impl<T> Dropped<T> {
-    pub(super) fn new(inner: T) -> Dropped<T> {
-        Dropped(Some(inner))
+impl<T> PanicFree<T> {
+    pub(super) fn new(inner: T) -> PanicFree<T> {
+        PanicFree(Some(inner))
     }
 }
 
-impl<T> Deref for Dropped<T> {
+impl<T> Deref for PanicFree<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
@@ -55,15 +55,15 @@ impl<T> Deref for Dropped<T> {
     }
 }
 
-impl<T> Drop for Dropped<T> {
+impl<T> Drop for PanicFree<T> {
     fn drop(&mut self) {
         let inner = self.0.take();
-        // Nobody is left who could be told.
-        let _ = caught(|| drop(inner));
+        // The value is gone, so that its error concerns no caller.
+        let _ = catch_panic(|| drop(inner));
     }
 }
 
-/// The innermost cause: wgpu lists them one below the other.
+/// Returns the innermost cause, which wgpu lists last.
 fn cause(text: &str) -> String {
     text.lines()
         .map(str::trim)
@@ -86,19 +86,19 @@ mod tests {
     }
 
     #[test]
-    fn what_panics_when_it_is_dropped_does_so_unheard() {
-        drop(Dropped::new(Bomb));
+    fn a_panic_during_drop_is_silent() {
+        drop(PanicFree::new(Bomb));
     }
 
     #[test]
     fn a_panic_is_an_error_with_its_innermost_cause() {
-        assert_eq!(caught(|| 7), Ok(7));
+        assert_eq!(catch_panic(|| 7), Ok(7));
         let poll = "Error in Device::poll: Validation Error\n\nCaused by:\n  Parent device is lost\n";
-        assert_eq!(caught(|| panic!("{poll}")), Err::<(), _>("Parent device is lost".to_owned()));
-        assert_eq!(caught(|| panic!("plain")), Err::<(), _>("plain".to_owned()));
-        assert_eq!(caught(|| panic!("")), Err::<(), _>("no reason is given".to_owned()));
-        // Within another one, too.
-        assert_eq!(caught(|| caught(|| panic!("inner"))), Ok(Err::<(), _>("inner".to_owned())));
+        assert_eq!(catch_panic(|| panic!("{poll}")), Err::<(), _>("Parent device is lost".to_owned()));
+        assert_eq!(catch_panic(|| panic!("plain")), Err::<(), _>("plain".to_owned()));
+        assert_eq!(catch_panic(|| panic!("")), Err::<(), _>("no reason is given".to_owned()));
+        // Nested calls.
+        assert_eq!(catch_panic(|| catch_panic(|| panic!("inner"))), Ok(Err::<(), _>("inner".to_owned())));
         assert!(!IS_CAUGHT.get());
     }
 }
