@@ -97,7 +97,7 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
     };
     let no_device = |reason: String| GpuError::NoDevice { adapter: info.name.clone(), reason };
     let requested = catch_panic(|| adapter.request_device(&descriptor))
-        .map_err(|why| no_device(format!("the driver fails while it is opened ({why})")))?;
+        .map_err(|why| no_device(format!("the driver failed while opening it ({why})")))?;
     let (device, queue) = requested.await.map_err(|error| no_device(error.to_string()))?;
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();

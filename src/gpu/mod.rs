@@ -278,7 +278,7 @@ impl Gpu {
     fn call<T>(&self, call: impl FnOnce() -> T) -> Result<T, GpuError> {
         self.trouble.check()?;
         catch_panic(call).map_err(|message| {
-            self.trouble.note(format!("its driver fails: {message}"));
+            self.trouble.note(format!("its driver failed: {message}"));
             self.failure(GpuError::Lost { message })
         })
     }

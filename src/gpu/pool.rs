@@ -157,7 +157,7 @@ impl Pool {
         let last = variants[variants.len() - 1];
         let results = buffers.conclude(gpu, last, &bindings, self.active_list.len()).await?;
         if results.is_empty() && !gpu.is_halted() {
-            let message = "it has records of no lane that it said had ended".into();
+            let message = "it returned no results of the lanes that have ended".into();
             return Err(gpu.failure(GpuError::Lost { message }));
         }
         let mut ended = Vec::with_capacity(results.len());

@@ -101,7 +101,7 @@ impl Rounds<'_> {
             };
             let [first, second, beat] = read(gpu, sent.check, sent.bytes, sent.submission, take).await?;
             if beat <= last_beat {
-                return Err(gpu.failure(GpuError::Lost { message: "it drops what it is given to do".into() }));
+                return Err(gpu.failure(GpuError::Lost { message: "it executes no commands".into() }));
             }
             last_beat = beat;
             for (left, (now, ran)) in left.iter_mut().zip([first, second].into_iter().zip(sent.ran)) {

@@ -1,4 +1,4 @@
-//! Work of single lanes is bounded, and a device stops where it is told to.
+//! Bounds of a lane's work, and the stop flag of a device.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,9 +8,9 @@ use crate::common::{REST, paper};
 use rattlemap::gpu::{GpuError, Lane, LaneSettings, Precision};
 use rattlemap_dynamics::orbit::Status;
 
-/// Events of all periods are counted, not those of one alone.
+/// The events of all periods count together.
 #[test]
-fn a_lane_may_have_so_many_events_and_no_more() {
+fn a_lane_ends_at_its_limit_of_events() {
     let chatters = paper(0.3, 1.5);
     let settings = LaneSettings { early_stop: false, most_events: 1_000, ..LaneSettings::default() };
     for precision in Precision::ALL {
@@ -20,9 +20,9 @@ fn a_lane_may_have_so_many_events_and_no_more() {
     }
 }
 
-/// Lanes that would go on for ever, as far as anybody waits.
+/// The lanes take far longer than the test waits.
 #[test]
-fn a_device_stops_when_it_is_told_to() {
+fn a_device_stops_when_its_flag_is_set() {
     let pair = paper(0.7, 2.8);
     let mut gpu = fresh(Precision::F32);
     let settings = LaneSettings {
@@ -35,7 +35,7 @@ fn a_device_stops_when_it_is_told_to() {
     let lanes = [Lane { flow: 0, law: 0, start: REST }; 64];
     let halt = Arc::new(AtomicBool::new(false));
     gpu.stop_on(&halt);
-    // Compiled before, so that it is lanes that are waited for.
+    // Compiles the shaders first, so that the flag stops lanes.
     let tables = pollster::block_on(gpu.load(&flows, &laws, None)).unwrap();
     let mut pool = pollster::block_on(gpu.pool(&settings)).unwrap();
     std::thread::scope(|scope| {

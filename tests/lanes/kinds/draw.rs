@@ -1,4 +1,4 @@
-//! Oscillators of every kind, drawn by a seed.
+//! Random oscillators of every kind, by seed.
 
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State};
 
@@ -21,7 +21,7 @@ impl Numbers {
         all[self.next() as usize % all.len()]
     }
 
-    /// A symmetric positive definite matrix about the size of `scale`.
+    /// Returns a symmetric positive definite matrix of about the size `scale`.
     fn definite(&mut self, scale: f64) -> [[f64; 2]; 2] {
         let [a, b] = [self.between(0.3, 1.5), self.between(0.3, 1.5)];
         let c = self.one_of(&[0.0, 0.6]) * self.between(-1.0, 1.0) * (a * b).sqrt();
@@ -29,8 +29,8 @@ impl Numbers {
     }
 }
 
-/// An oscillator with its law and a start. All that a seed may draw: one or two displacements, one wall or two, each of
-/// any kind with a law of its own, loads, full masses, gap rows of which either entry is the larger.
+/// Returns an oscillator with its law and a start. It has one or two displacements; one wall or two, each of any kind
+/// with a law of its own; loads; full mass matrices; gap rows of which either entry may be the larger.
 pub(super) fn drawn(seed: u64) -> (Oscillator, Law, State) {
     let mut draw = Numbers(seed);
     let degrees = draw.one_of(&[1, 2, 2]);
@@ -55,7 +55,7 @@ pub(super) fn drawn(seed: u64) -> (Oscillator, Law, State) {
     let contacts = [0; 2].map(|_| draw.one_of(&[Contact::Impact, Contact::Rigid, Contact::Elastic]));
     let meshing = [0, 1].map(|side: usize| {
         let (k, c) = (draw.between(10.0, 400.0), draw.one_of(&[0.0, 1.0]) * draw.between(0.0, 4.0));
-        // A rigid wall asks for none.
+        // Rigid walls have no meshing domain.
         if contacts[side] == Contact::Rigid || walls[side].is_infinite() {
             return free;
         }

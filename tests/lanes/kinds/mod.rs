@@ -1,4 +1,4 @@
-//! Walls of every kind, on oscillators of every shape that a model may have.
+//! Walls of every kind, on random oscillators.
 
 mod draw;
 mod march;
@@ -26,7 +26,7 @@ fn cells() -> Vec<Cell> {
     (0..SEEDS).map(drawn).collect()
 }
 
-/// Records of oscillators, each with its own law and start.
+/// Returns the records of oscillators, each with its own law and start.
 fn run(precision: Precision, cells: &[Cell], settings: &LaneSettings) -> Result<Vec<Record>, GpuError> {
     let flows: Vec<_> = cells.iter().map(|cell| cell.0).collect();
     let laws: Vec<_> = cells.iter().map(|cell| cell.1).collect();
@@ -40,19 +40,18 @@ fn march((oscillator, law, _): &Cell, start: State, periods: u32) -> (State, Mar
     (end, march)
 }
 
-/// Whether a wall may be struck infinitely often in finite time.
+/// Whether infinitely many impacts may occur in finite time.
 fn may_chatter((oscillator, law, _): &Cell) -> bool {
     (0..2).any(|side| oscillator.contacts[side] == Contact::Rigid && law.mesh_speed[side] == 0.0)
 }
 
-/// After 20 periods every state, the impacts so far and the time in contact are those of an integrator that has nothing in
-/// common with lanes.
+/// After 20 periods the state, the impacts and the time in contact agree with those of an independent integrator.
 #[test]
-fn motion_is_that_of_plain_steps() {
+fn motion_agrees_with_plain_steps() {
     const HORIZON: u32 = 20;
     let cells = cells();
     let truth: Vec<_> = cells.par_iter().map(|cell| march(cell, cell.2, HORIZON)).collect();
-    // Measured: medians 1.7e-13 and 2.0e-7, the worst that is no chaos 1.1e-11 and 5.8e-6.
+    // Measured: medians 1.7e-13 and 2.0e-7; worst without chaos 1.1e-11 and 5.8e-6.
     for (precision, median_bar, bar, rounding) in
         [(Precision::F64, 1e-12, 1e-10, 1e-13), (Precision::F32, 1e-6, 3e-5, 1e-7)]
     {
@@ -65,14 +64,14 @@ fn motion_is_that_of_plain_steps() {
             let error = apart(record.strobe, *end);
             errors.push(error);
             if error > bar {
-                // Chaos: as far as rounding of the start takes plain steps.
+                // Chaos: a rounding error of the start must change plain steps as much.
                 let moved = self::march(cell, cell.2.map(|x| x * (1.0 + rounding)), HORIZON).0;
                 assert!(apart(moved, *end) > 0.1 * error, "{at}: off by {error:.1e}");
                 chaotic += 1;
                 continue;
             }
             let time = f64::from(HORIZON) * cell.0.period();
-            // Plain steps end infinite chatter at 1e-9 of a speed.
+            // Plain steps end infinite chatter at a speed of 1e-9.
             assert!((record.mesh_fraction - march.contact / time).abs() < bar + 1e-8, "{at}: contact");
             let counted = (record.impacts_per_period * f64::from(HORIZON)).round() as u32;
             if !may_chatter(cell) {
@@ -92,9 +91,9 @@ fn motion_is_that_of_plain_steps() {
     }
 }
 
-/// The largest multiplier of every cycle is that of differences of neighbours, by plain steps.
+/// The largest multiplier of every cycle agrees with finite differences of plain steps.
 #[test]
-fn multipliers_are_those_of_differences() {
+fn multipliers_agree_with_finite_differences() {
     let cells = cells();
     let records = run(Precision::F64, &cells, &LaneSettings::default()).unwrap();
     let of = |(seed, (record, cell)): (usize, (&Record, &Cell))| {
@@ -103,7 +102,7 @@ fn multipliers_are_those_of_differences() {
             let [x1, _, x2, _] = record.strobe;
             (cell.0.gap[0] * x1 + cell.0.gap[1] * x2 - cell.0.walls[side]).abs() > 1e-3
         });
-        // Rigid walls of neighbours of a cycle that is on one are another motion's.
+        // Neighbours of a cycle that is on a rigid wall at the strobe follow another motion.
         if !is_clear {
             return None;
         }
@@ -131,7 +130,7 @@ fn multipliers_are_those_of_differences() {
     for (seed, radius, multiplier) in found {
         let cell = &cells[seed];
         println!("seed {seed}: {radius:.6} {multiplier:.6} {:?}", cell.0.contacts);
-        // Differences know a multiplier to their step, and where it is nearly double, to the root of that.
+        // Finite differences are accurate to their step; near a double multiplier, to its square root.
         let off = (radius - multiplier).abs();
         assert!(off < 1e-4, "seed {seed}: {radius} {multiplier} {:?}", cells[seed]);
         for side in 0..2 {
@@ -142,17 +141,17 @@ fn multipliers_are_those_of_differences() {
     assert!(kinds.iter().all(|&count| count >= 8), "{kinds:?} walls of each kind");
 }
 
-/// What was compiled without elastic and rigid walls takes none.
+/// Shaders that were compiled without elastic and rigid walls refuse flows that have them.
 #[test]
-fn walls_that_are_left_out_are_refused() {
+fn excluded_walls_are_refused() {
     let rigid = cells().into_iter().find(may_chatter).unwrap();
     let settings = LaneSettings { kinds: false, ..LaneSettings::only(1) };
     let error = run(Precision::F32, &[rigid], &settings).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0 }), "{error}");
 }
-/// What a cell is, its word, exponent, impacts and time in contact are those of the reference.
+/// Class, word, exponent, impacts and time in contact agree with the reference.
 #[test]
-fn cells_are_those_of_the_reference() {
+fn records_agree_with_the_reference() {
     let cells = cells();
     let budget = Budget {
         settings: Settings::default(),
@@ -164,7 +163,7 @@ fn cells_are_those_of_the_reference() {
     let measured = |(oscillator, law, start): &Cell| measure(&Flow::new(oscillator), *law, *start, &budget);
     let truth: Vec<_> =
         cells.par_iter().map(|cell| measured_record(&measured(cell), &Needs::EVERYTHING)).collect();
-    // Measured: 2.3e-12 per unit time and 6.0e-6; of time in contact 8e-14 and 6.3e-8.
+    // Measured: 2.3e-12 per unit time and 6.0e-6; time in contact 8e-14 and 6.3e-8.
     for (precision, exponent_bar, contact_bar) in
         [(Precision::F64, 1e-10, 1e-10), (Precision::F32, 5e-5, 1e-6)]
     {
@@ -197,7 +196,7 @@ fn cells_are_those_of_the_reference() {
     }
 }
 
-/// The same motion in other units: lengths times `2^length`, times times `2^time`.
+/// Returns the motion in other units: lengths times `2^length`, times times `2^time`.
 fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) -> Cell {
     let (size, rate) = (2f64.powi(length), 2f64.powi(-time));
     let scaled = |m: [[f64; 2]; 2], by: f64| m.map(|row| row.map(|entry| entry * by));
@@ -219,7 +218,7 @@ fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) -> Cell {
     (other, law, [x1 * size, v1 * size * rate, x2 * size, v2 * size * rate])
 }
 
-/// Thresholds are relative to the motion: units that differ by powers of two leave every bit alone.
+/// Thresholds are relative to the motion: units that differ by powers of two change no bit.
 #[test]
 fn units_change_no_bit() {
     let cells = cells();
