@@ -36,7 +36,8 @@ pub struct Constants {
     pub degrees: u32,
     /// Kinds of the right and of the left wall.
     pub contacts: [Contact; 2],
-    walls: [f64; 2],
+    /// Whether a wall exists and is elastic or rigid.
+    pub(super) has_elastic_or_rigid_wall: bool,
     coordinates: Coordinates,
 }
 
@@ -69,7 +70,7 @@ impl Constants {
             mirror_symmetric: oscillator.mirror_symmetric(),
             degrees: oscillator.degrees as u32,
             contacts: oscillator.contacts,
-            walls: oscillator.walls,
+            has_elastic_or_rigid_wall: has_elastic_or_rigid_wall(oscillator),
             coordinates,
         };
         constants.flow = Flow {
@@ -113,11 +114,6 @@ impl Constants {
         q
     }
 
-    /// Whether a wall is elastic or rigid.
-    pub(super) fn has_elastic_or_rigid_wall(&self) -> bool {
-        has_elastic_or_rigid_wall(self.contacts, self.walls)
-    }
-
     /// Returns the state from lane units.
     pub fn to_state(&self, q: [f64; 4]) -> model::State {
         self.coordinates.to_state(q, self.flow.h)
@@ -125,8 +121,9 @@ impl Constants {
 }
 
 /// Whether a wall exists and is elastic or rigid.
-pub(super) fn has_elastic_or_rigid_wall(contacts: [Contact; 2], walls: [f64; 2]) -> bool {
-    contacts.iter().zip(walls).any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite())
+pub fn has_elastic_or_rigid_wall(oscillator: &model::Oscillator) -> bool {
+    let mut walls = oscillator.contacts.iter().zip(oscillator.walls);
+    walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite())
 }
 
 /// Returns the motion without contacts. With one displacement it may be known only by its rest position.

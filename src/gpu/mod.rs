@@ -41,7 +41,7 @@ pub(crate) use adapter::no_adapter;
 pub use adapter::{
     AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
 };
-pub use constants::{Constants, STEP_ANGLE};
+pub use constants::{Constants, STEP_ANGLE, has_elastic_or_rigid_wall};
 pub use error::GpuError;
 pub use pool::Pool;
 pub use precision::Precision;
@@ -61,11 +61,6 @@ use rattlemap_dynamics::orbit::Budget;
 
 /// Most events of a lane, so that their count does not overflow.
 const MOST_EVENTS: u32 = 1 << 31;
-
-/// Whether an oscillator has an elastic or a rigid wall.
-pub fn has_elastic_or_rigid_wall(oscillator: &Oscillator) -> bool {
-    constants::has_elastic_or_rigid_wall(oscillator.contacts, oscillator.walls)
-}
 
 /// Whether lanes with this meshing speed follow chatter by short flights.
 pub fn follows_chatter(oscillator: &Oscillator, mesh_speed: f64) -> bool {
@@ -265,7 +260,7 @@ impl Gpu {
         self.watcher = Some(Box::new(watcher));
     }
 
-    /// Checks a flag after this call. While it is set, [`Gpu::advance`] returns after the present round.
+    /// Checks a flag after this call. While it is set, [`Pool::advance`] returns after the present round.
     pub fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
         self.halt = Arc::clone(halt);
     }
@@ -364,7 +359,7 @@ impl Gpu {
             let next = begun..(begun + pool.room()).min(lanes.len());
             begun = next.end;
             let next: Vec<(u32, Lane)> = next.map(|i| (i as u32, lanes[i])).collect();
-            self.begin(&mut pool, tables, &next).await?;
+            pool.begin(self, tables, &next).await?;
             if pool.under_way() == 0 {
                 return Ok(records);
             }
@@ -372,7 +367,7 @@ impl Gpu {
                 return Err(GpuError::Halted);
             }
             let until = if begun < lanes.len() { pool.under_way() / 2 } else { 0 };
-            for ended in self.advance(&mut pool, tables, until).await? {
+            for ended in pool.advance(self, tables, until).await? {
                 records[ended.number() as usize] = ended.record(tables.constants());
             }
         }
@@ -423,38 +418,8 @@ impl Gpu {
         Ok(Pool::new(self, variants, settings))
     }
 
-    /// Puts lanes at their starts. All lanes of a pool are on the same tables. Each lane has a number by which its
-    /// record is recognised.
-    ///
-    /// # Errors
-    /// [`GpuError::NoSuchCell`] if a lane names a missing flow or law; [`GpuError::OutOfMemory`] if there are more
-    /// lanes than [`Pool::room`] or the device has memory for; other errors of the device. After an error, none of
-    /// the lanes has begun.
-    pub async fn begin(
-        &self,
-        pool: &mut Pool,
-        tables: &Tables,
-        lanes: &[(u32, Lane)],
-    ) -> Result<(), GpuError> {
-        pool.begin(self, tables, lanes).await
-    }
-
     /// Returns the largest number of bytes of device memory that so many lanes take.
     pub(crate) fn bytes_of_lanes(&self, lanes: usize) -> u64 {
         slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision)
-    }
-
-    /// Integrates until at most `until` lanes are under way, and returns those that have ended. The result is empty
-    /// only if a flag has stopped the device.
-    ///
-    /// # Errors
-    /// Errors of the device. The pool cannot be used afterwards.
-    pub async fn advance(
-        &self,
-        pool: &mut Pool,
-        tables: &Tables,
-        until: usize,
-    ) -> Result<Vec<LaneResult>, GpuError> {
-        pool.advance(self, tables, until).await
     }
 }

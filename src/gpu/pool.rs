@@ -74,13 +74,14 @@ impl Pool {
         self.free.append(&mut self.active_list);
     }
 
-    /// Puts lanes at their starts. The caller numbers each lane.
-    pub(super) async fn begin(
-        &mut self,
-        gpu: &Gpu,
-        tables: &Tables,
-        lanes: &[(u32, Lane)],
-    ) -> Result<(), GpuError> {
+    /// Puts lanes at their starts. All lanes of a pool are on the same tables. Each lane has a number by which its
+    /// record is recognised.
+    ///
+    /// # Errors
+    /// [`GpuError::NoSuchCell`] if a lane names a missing flow or law; [`GpuError::OutOfMemory`] if there are more
+    /// lanes than [`Pool::room`] or the device has memory for; other errors of the device. After an error, none of
+    /// the lanes has begun.
+    pub async fn begin(&mut self, gpu: &Gpu, tables: &Tables, lanes: &[(u32, Lane)]) -> Result<(), GpuError> {
         let (flows, laws) = (tables.constants.len(), tables.is_even.len());
         for (i, &(_, Lane { flow, law, .. })) in lanes.iter().enumerate() {
             if flow as usize >= flows || law as usize >= laws {
@@ -130,8 +131,12 @@ impl Pool {
         Ok(())
     }
 
-    /// Integrates until at most `until` lanes are left, and returns those that have ended.
-    pub(super) async fn advance(
+    /// Integrates until at most `until` lanes are under way, and returns those that have ended. The result is empty
+    /// only if a flag has stopped the device.
+    ///
+    /// # Errors
+    /// Errors of the device. The pool cannot be used afterwards.
+    pub async fn advance(
         &mut self,
         gpu: &Gpu,
         tables: &Tables,

@@ -91,7 +91,7 @@ impl Tables {
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows, needed, allowed });
         }
-        let is_other = |c: &Option<Constants>| c.as_ref().is_some_and(Constants::has_elastic_or_rigid_wall);
+        let is_other = |c: &Option<Constants>| c.as_ref().is_some_and(|c| c.has_elastic_or_rigid_wall);
         let flow_of_another_kind = constants.iter().position(is_other);
         let make = || Tables {
             flows: upload(gpu, "flows", &tables),

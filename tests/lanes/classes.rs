@@ -3,11 +3,11 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::gpu::{open, run, run_from_rest};
-use crate::common::paper as pair;
+use crate::common::{REST, paper as pair};
+use crate::kinds;
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Class, Status};
 
 /// The points lie within a thousandth of the motion, so that shorter lags recur, and Newton's method leaves the
@@ -78,39 +78,20 @@ fn a_cycle_below_the_resolution_has_that_status() {
     }
 }
 
-/// Returns the same motion in units of length `2^-length` and of time `2^-time`.
-fn in_units(pair: GearPair, length: i32, time: i32) -> GearPair {
-    let (length, time) = (f64::from(length).exp2(), f64::from(time).exp2());
-    GearPair {
-        r1: pair.r1 / time,
-        r2: pair.r2 / time,
-        k1: pair.k1 / (time * time),
-        k2: pair.k2 / (time * time),
-        r: pair.r / time,
-        k: pair.k / (time * time),
-        force: pair.force * length / (time * time),
-        omega: pair.omega / time,
-        b: pair.b * length,
-        mesh_speed: pair.mesh_speed * length / time,
-        ..pair
-    }
-}
-
 /// Powers of two are exact: another unit of length changes no bit. The series of the flow is truncated by a norm that
 /// adds rates to displacements, so that another unit of time may round differently.
 #[test]
 fn classes_do_not_depend_on_the_units_of_length_and_time() {
-    let plane: Vec<_> =
-        (0..24 * 24).map(|n| pair(f64::from(n % 24) / 23.0, 1.0 + 11.0 * f64::from(n / 24) / 23.0)).collect();
+    let pairs = (0..24 * 24).map(|n| pair(f64::from(n % 24) / 23.0, 1.0 + 11.0 * f64::from(n / 24) / 23.0));
+    let plane: Vec<_> = pairs.map(|pair| (pair.oscillator().unwrap(), pair.law(), REST)).collect();
+    // Whether lanes follow chatter depends on speeds, too.
+    let settings = LaneSettings::default();
     for precision in Precision::ALL {
-        let mut gpu = open(precision);
-        // Whether lanes follow chatter depends on speeds, too.
-        let settings = LaneSettings::default();
-        let expected = run_from_rest(&mut gpu, &plane, &settings);
+        let expected = kinds::run(precision, &plane, &settings).unwrap();
         for (length, time) in [(-20, 0), (20, 0), (0, -10), (0, 10), (-10, 10)] {
             let (far, long) = (f64::from(length).exp2(), f64::from(time).exp2());
-            let pairs: Vec<_> = plane.iter().map(|&pair| in_units(pair, length, time)).collect();
-            let records = run_from_rest(&mut gpu, &pairs, &settings);
+            let cells: Vec<_> = plane.iter().map(|cell| kinds::in_units(cell, length, time)).collect();
+            let records = kinds::run(precision, &cells, &settings).unwrap();
             let differ = expected.iter().zip(records).filter(|&(&expected, mut record)| {
                 record.strobe =
                     [0, 1, 2, 3].map(|i| record.strobe[i] / if i % 2 == 0 { far } else { far / long });

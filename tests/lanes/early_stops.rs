@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::common::{REST, flow_of, gpu};
+use crate::kinds::draw::Numbers;
 use rattlemap::gpu::Precision;
 use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::{Cell, Plan};
@@ -147,15 +148,8 @@ fn check_plane(by: By, side: usize) {
 
 /// Draws random cells of a plane.
 fn random_cells(side: u32, count: usize) -> Vec<u32> {
-    // SplitMix64; the library's own generator is private.
-    let mut state = 1u64;
-    let mut next = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
-    (0..count).map(|_| (next() % u64::from(side * side)) as u32).collect()
+    let mut numbers = Numbers(1);
+    (0..count).map(|_| (numbers.next() % u64::from(side * side)) as u32).collect()
 }
 
 /// The reference of classes is a run of 2,000 + 512 periods. Early stops do a tenth of the work of 400 + 128 periods

@@ -107,15 +107,15 @@ fn records_do_not_depend_on_when_lanes_begin() {
         let mut ended = Vec::new();
         // First five lanes begin, then more than the pool has slots for, then as many as have ended.
         for (from, to, left) in [(0, 5, 3), (5, 9, 6), (9, 40, 12), (40, 48, 10), (48, 60, 1), (60, 60, 0)] {
-            pollster::block_on(device.begin(&mut pool, &tables, &lanes[from..to])).unwrap();
-            let some = pollster::block_on(device.advance(&mut pool, &tables, left)).unwrap();
+            pollster::block_on(pool.begin(&device, &tables, &lanes[from..to])).unwrap();
+            let some = pollster::block_on(pool.advance(&device, &tables, left)).unwrap();
             // On dedicated hardware, `advance` returns after a few rounds.
             let is_enough = pool.under_way() <= left || (is_dedicated && !some.is_empty());
             assert!(is_enough, "{} of {left} are left", pool.under_way());
             ended.extend(some);
             assert_eq!(ended.len() + pool.under_way(), to);
         }
-        assert!(pollster::block_on(device.advance(&mut pool, &tables, 0)).unwrap().is_empty());
+        assert!(pollster::block_on(pool.advance(&device, &tables, 0)).unwrap().is_empty());
         assert_eq!(pool.under_way(), 0);
         ended.sort_by_key(LaneResult::number);
         let numbers: Vec<u32> = ended.iter().map(LaneResult::number).collect();

@@ -169,12 +169,12 @@ impl<'p> Gpu<'p> {
         };
         let count = pool.under_way() + cells.len();
         let lanes: Vec<_> = cells.iter().map(|cell| (cell.id, lane(cell, cell.flow, cell.law))).collect();
-        self.device.begin(pool, tables, &lanes).await.map_err(|error| self.error(error, count))
+        pool.begin(&self.device, tables, &lanes).await.map_err(|error| self.error(error, count))
     }
 
     pub(super) async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         let ended = match (&self.tables, &mut self.pool) {
-            (Some(tables), Some(pool)) => match self.device.advance(pool, tables, until).await {
+            (Some(tables), Some(pool)) => match pool.advance(&self.device, tables, until).await {
                 Ok(ended) => {
                     let constants = tables.constants();
                     let record = |ended: &LaneResult| (ended.number(), ended.record(constants));

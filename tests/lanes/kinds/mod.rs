@@ -1,6 +1,6 @@
 //! Walls of every kind, on random oscillators.
 
-mod draw;
+pub(super) mod draw;
 mod march;
 
 use crate::common::apart;
@@ -20,14 +20,18 @@ use rayon::prelude::*;
 
 const SEEDS: u64 = 64;
 
-type Cell = (Oscillator, Law, State);
+pub(super) type Cell = (Oscillator, Law, State);
 
 fn cells() -> Vec<Cell> {
     (0..SEEDS).map(drawn).collect()
 }
 
 /// Returns the records of oscillators, each with its own law and start.
-fn run(precision: Precision, cells: &[Cell], settings: &LaneSettings) -> Result<Vec<Record>, GpuError> {
+pub(super) fn run(
+    precision: Precision,
+    cells: &[Cell],
+    settings: &LaneSettings,
+) -> Result<Vec<Record>, GpuError> {
     let flows: Vec<_> = cells.iter().map(|cell| cell.0).collect();
     let laws: Vec<_> = cells.iter().map(|cell| cell.1).collect();
     let lanes: Vec<_> = (0..).zip(cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.2 }).collect();
@@ -197,7 +201,7 @@ fn records_agree_with_the_reference() {
 }
 
 /// Returns the motion in other units: lengths times `2^length`, times times `2^time`.
-fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) -> Cell {
+pub(super) fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) -> Cell {
     let (size, rate) = (2f64.powi(length), 2f64.powi(-time));
     let scaled = |m: [[f64; 2]; 2], by: f64| m.map(|row| row.map(|entry| entry * by));
     let domain = |domain: &Domain| Domain {
