@@ -22,9 +22,9 @@ fn close_chatter(side: u32, u: Real) {
     let rate = motion.q[3] + kick * motion.q[1];
     let closed = array<Real, 4>(motion.q[0], 0.0, motion.q[2], rate);
     // The wall takes up the acceleration of the gap; x receives its share of that force.
-    let taken = acceleration(here.gap_row, here.share, closed);
-    let v_rate = acceleration(here.x_row, here.share, closed) + kick * taken;
-    let pressing = sign * taken;
+    let wall_acceleration = acceleration(here.gap_row, here.share, closed);
+    let v_rate = acceleration(here.x_row, here.share, closed) + kick * wall_acceleration;
+    let pressing = sign * wall_acceleration;
     let whole = 2.0 * u / (pressing * (1.0 - e));
     if !(pressing > 0.0 && whole < closing) {
         return;

@@ -57,7 +57,7 @@ fn scan() -> u32 {
     if tally.is_scan_interrupted == 1u {
         a = motion.bend;
     }
-    var taken = 0u;
+    var step_count = 0u;
     var leaves = tally.order > 0u;
     // The tangent vector is carried along. While a cycle is read, four vectors are (step_columns).
     var tz = tangent_now[0];
@@ -114,7 +114,7 @@ fn scan() -> u32 {
         bound = bound1;
         theta = select(next_theta, next_theta - 1.0, wraps);
         n = next_n;
-        taken += 1u;
+        step_count += 1u;
     }
     motion.q[0] = z;
     motion.q[1] = w * substeps;
@@ -129,18 +129,18 @@ fn scan() -> u32 {
     motion.bend = a;
     tally.is_scan_interrupted = select(0u, 1u, verdict == SCAN_BUDGET);
     tally.step = n;
-    tally.passes_in_period += taken;
+    tally.passes_in_period += step_count;
     tally.order = select(0u, 1u, leaves);
     if GROWTH {
         tangent_now = array<Real, 4>(tz, tw * substeps, tx, tv * substeps);
     }
     if EXPONENT {
-        step_columns(taken);
+        step_columns(step_count);
     }
     // Whole numbers do not depend on where a dispatch ends.
     if MESH {
-        tally.mesh_right += select(0u, taken, d == 1u);
-        tally.mesh_left += select(0u, taken, d == 2u);
+        tally.mesh_right += select(0u, step_count, d == 1u);
+        tally.mesh_left += select(0u, step_count, d == 2u);
     }
     return verdict;
 }

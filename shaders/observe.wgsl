@@ -25,13 +25,13 @@ fn begin_period() {
         if EXPONENT {
             compare_itineraries(itinerary, read);
         }
-        let apart = octaves(distance_between(strobe_state(), measures.anchor));
+        let distance = octaves(distance_between(strobe_state(), measures.anchor));
         if tally.periods_to_read == 0u {
-            search.return_distance = apart;
+            search.return_distance = distance;
             tally.stage = STAGE_READ;
-        } else if tally.candidate % read == 0u && apart > search.divisor_distance {
+        } else if tally.candidate % read == 0u && distance > search.divisor_distance {
             search.divisor = read;
-            search.divisor_distance = apart;
+            search.divisor_distance = distance;
         }
         return;
     }

@@ -1,4 +1,4 @@
-// The forcing phase, kept as a whole step and a fraction, never as a time.
+// The forcing phase, stored as a whole step and a fraction, never as a time.
 
 // Computes the phasor at `theta` of a free step after step `n`, from the table and by angle addition.
 fn sync_phasor() {

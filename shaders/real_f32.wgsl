@@ -9,7 +9,7 @@ const SHORT_FACTORIAL: Real = 720.0;
 const SHORT: Real = 0.198;
 // Half a unit in the last place of 1.
 const ULP: Real = 6e-8;
-// Stretches are not halved below SHORTEST: a touch within one is taken for rounding. If the bound shows that the
+// Stretches are not halved below SHORTEST: a touch within one counts as rounding. If the bound shows that the
 // motion may pass the wall there, they are halved down to SHORTEST_STEP.
 const SHORTEST: Real = 0.001;
 const SHORTEST_STEP: Real = 1e-6;

@@ -9,7 +9,7 @@ const SHORT_FACTORIAL: Real = 39916800.0;
 const SHORT: Real = 0.191;
 // Half a unit in the last place of 1.
 const ULP: Real = 1.2e-16;
-// Stretches are not halved below SHORTEST: a touch within one is taken for rounding. If the bound shows that the
+// Stretches are not halved below SHORTEST: a touch within one counts as rounding. If the bound shows that the
 // motion may pass the wall there, they are halved down to SHORTEST_STEP.
 const SHORTEST: Real = 1e-8;
 const SHORTEST_STEP: Real = 1e-14;

@@ -28,8 +28,8 @@ fn recurs() -> bool {
         return false;
     }
     let lag = tally.period - search.anchor_period;
-    let apart = octaves(distance_between(q, measures.anchor));
-    tallies[lane].distances[(lag - 1u) / 4u] |= apart << (8u * ((lag - 1u) % 4u));
+    let distance = octaves(distance_between(q, measures.anchor));
+    tallies[lane].distances[(lag - 1u) / 4u] |= distance << (8u * ((lag - 1u) % 4u));
     if lag < search.window {
         return false;
     }
@@ -136,12 +136,12 @@ fn contracting_lag() -> u32 {
         if now < RECURRENCE_LIMIT || !contracts {
             continue;
         }
-        var kept = true;
+        var recurs_always = true;
         for (var multiple = 2u * lag; multiple <= search.window; multiple += lag) {
             iterations += 1u;
-            kept = kept && distance_at(multiple) >= RECURRENCE_LIMIT;
+            recurs_always = recurs_always && distance_at(multiple) >= RECURRENCE_LIMIT;
         }
-        if kept {
+        if recurs_always {
             return lag;
         }
     }

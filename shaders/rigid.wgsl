@@ -27,8 +27,8 @@ fn stuck_pull(side: u32) -> Pull {
 // if it is not pressed.
 fn stick(side: u32) -> Jump {
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 0.0, kick, 0.0);
-    let taken = sign_of(side) * max(sign_of(side) * motion.q[1], Real(0.0));
-    let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3] + kick * taken);
+    let removed = sign_of(side) * max(sign_of(side) * motion.q[1], Real(0.0));
+    let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3] + kick * removed);
     if presses(stuck_pull(side), side, rest) {
         jump.event = true;
         jump.mode = MODE_STUCK + side;

@@ -262,7 +262,7 @@ mod tests {
         all.sort_by_cached_key(place);
         let addresses = all.each_ref().map(|info| info.device_pci_bus_id.as_str());
         assert_eq!(addresses, ["0000:17:00.0", "0000:65:00.0", "0000:00:02.0", ""]);
-        let told = [&all[1], &all[3]].map(|info| AdapterId::of(1, info).to_string());
-        assert_eq!(told, ["1 (, PCI 0000:65:00.0)", "1 ()"]);
+        let names = [&all[1], &all[3]].map(|info| AdapterId::of(1, info).to_string());
+        assert_eq!(names, ["1 (, PCI 0000:65:00.0)", "1 ()"]);
     }
 }

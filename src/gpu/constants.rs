@@ -11,7 +11,7 @@ use rattlemap_dynamics::reference::CLOSING_ANGLE;
 
 /// Largest angle, in radians, by which the fastest mode turns in one step. The shaders' Taylor series and bounds are
 /// designed for it.
-pub const STEP_ANGLE: f64 = 1.0;
+const STEP_ANGLE: f64 = 1.0;
 
 /// Position of a missing wall, in units of length. WGSL has no infinity, and the shaders square distances.
 const NOWHERE: f64 = 1e12;

@@ -15,13 +15,13 @@ pub(super) async fn with_error_scopes<T>(
     let out_of_memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     // Commands on a buffer that could not be created are refused, too.
     let refused = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let made = gpu.call(make);
+    let result = gpu.call(make);
     let (refused, out_of_memory) = (refused.pop(), out_of_memory.pop());
     let (refused, out_of_memory) = (refused.await, out_of_memory.await);
     if out_of_memory.is_some() {
         return Err(GpuError::OutOfMemory { what, count });
     }
-    let Some(error) = refused else { return made };
+    let Some(error) = refused else { return result };
     // A lost device refuses everything; polling it reports the loss.
     gpu.poll(wgpu::PollType::Poll)?;
     Err(gpu.failure(GpuError::Refused { what, message: error.to_string() }))

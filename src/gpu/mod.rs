@@ -41,12 +41,13 @@ pub(crate) use adapter::no_adapter;
 pub use adapter::{
     AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
 };
-pub use constants::{Constants, STEP_ANGLE, has_elastic_or_rigid_wall};
+pub use constants::{Constants, has_elastic_or_rigid_wall};
 pub use error::GpuError;
 pub use pool::Pool;
 pub use precision::Precision;
 pub use reading::LaneResult;
-pub use shader::{Variant, WORKGROUP};
+pub use shader::Variant;
+use shader::WORKGROUP;
 pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
 pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};

@@ -30,9 +30,9 @@ pub(super) fn catch_panic<T>(call: impl FnOnce() -> T) -> Result<T, String> {
         }));
     });
     let outer = IS_CAUGHT.replace(true);
-    let made = panic::catch_unwind(AssertUnwindSafe(call));
+    let result = panic::catch_unwind(AssertUnwindSafe(call));
     IS_CAUGHT.set(outer);
-    made.map_err(|payload| {
+    result.map_err(|payload| {
         let text = payload.downcast_ref::<String>().map(String::as_str);
         cause(text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or_default())
     })

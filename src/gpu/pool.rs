@@ -192,21 +192,21 @@ impl Pool {
         let make = async |slots| {
             with_error_scopes(gpu, "lanes", slots, || Slots::new(gpu, slots, self.settings.workgroup)).await
         };
-        let (slots, made) = match make(ample).await {
+        let (slots, buffers) = match make(ample).await {
             Err(GpuError::OutOfMemory { .. }) if needed < ample => (needed, make(needed).await?),
-            made => (ample, made?),
+            buffers => (ample, buffers?),
         };
         if let Some(old) = &self.buffers {
             gpu.call(|| {
                 let mut encoder = gpu.device.create_command_encoder(&Default::default());
-                for (from, to) in [(&old.motions, &made.motions), (&old.tallies, &made.tallies)] {
+                for (from, to) in [(&old.motions, &buffers.motions), (&old.tallies, &buffers.tallies)] {
                     encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
                 }
                 gpu.queue.submit([encoder.finish()]);
-                gpu.queue.write_buffer(&made.cells, 0, bytemuck::cast_slice(&self.cells));
+                gpu.queue.write_buffer(&buffers.cells, 0, bytemuck::cast_slice(&self.cells));
             })?;
         }
-        self.buffers = Some(made);
+        self.buffers = Some(buffers);
         self.free.extend(had as u32..slots as u32);
         self.lanes.resize(slots, (0, Lane { flow: 0, law: 0, start: [0.0; 4] }));
         self.cells.resize(slots, Cell::zeroed());

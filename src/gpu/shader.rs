@@ -35,7 +35,7 @@ pub struct Variant {
 }
 
 /// Default number of invocations per workgroup.
-pub const WORKGROUP: u32 = 64;
+pub(super) const WORKGROUP: u32 = 64;
 
 /// The shader without the declarations of the precision.
 const BODY: &str = concat!(

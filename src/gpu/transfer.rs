@@ -70,7 +70,7 @@ pub(super) async fn read<T>(
     buffer.map_async(wgpu::MapMode::Read, ..size, send);
     gpu.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })?;
     mapped.await.map_err(|error| lost(error.to_string()))?;
-    let taken = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
+    let value = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
     buffer.unmap();
-    Ok(taken)
+    Ok(value)
 }

@@ -87,7 +87,7 @@ pub struct Record {
 impl Record {
     /// Whether the cell had neither impacts nor meshing. Both must be in the record.
     pub fn is_contact_free(&self) -> bool {
-        let seen = valid::IMPACTS | valid::MESH;
-        self.valid & seen == seen && self.impacts_per_period == 0.0 && self.mesh_fraction == 0.0
+        let contacts = valid::IMPACTS | valid::MESH;
+        self.valid & contacts == contacts && self.impacts_per_period == 0.0 && self.mesh_fraction == 0.0
     }
 }

@@ -68,7 +68,7 @@ fn bar(pair: &GearPair, precision: Precision) -> f64 {
 #[test]
 fn chatter_agrees_with_the_reference() {
     let cells = cells();
-    let truth: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap()).collect();
+    let expected: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap()).collect();
     for precision in Precision::ALL {
         let mut gpu = open(precision);
         let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
@@ -81,7 +81,7 @@ fn chatter_agrees_with_the_reference() {
         for (i, pair) in cells.iter().enumerate() {
             let (e, omega, mesh_speed) = (pair.e, pair.omega, pair.mesh_speed);
             let at = format!("{precision:?}, e = {e}, omega = {omega}, mesh_speed = {mesh_speed}");
-            let (record, (end, impacts)) = (&records[i], truth[i]);
+            let (record, (end, impacts)) = (&records[i], expected[i]);
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             let counted = (record.impacts_per_period * f64::from(HORIZON)).round() as u64;
             assert_eq!(counted, impacts, "{at}: impacts");
@@ -122,9 +122,9 @@ fn chattering_cells_agree_with_the_reference() {
         .collect();
     let pairs: Vec<_> =
         cells.iter().map(|&(e, omega, mesh_speed)| GearPair { mesh_speed, ..paper(e, omega) }).collect();
-    let truth: Vec<_> =
+    let expected: Vec<_> =
         pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
-    let periodic = truth.iter().filter(|orbit| matches!(orbit.class, Class::Periodic { .. })).count();
+    let periodic = expected.iter().filter(|orbit| matches!(orbit.class, Class::Periodic { .. })).count();
     assert!(periodic >= 20 && periodic < cells.len(), "{periodic} cycles, and chaos");
     for precision in Precision::ALL {
         let exponent_bar = match precision {
@@ -133,7 +133,7 @@ fn chattering_cells_agree_with_the_reference() {
         };
         let records = run(&mut open(precision), &pairs, &LaneSettings::default());
         let mut collapsed = 0;
-        for ((record, orbit), cell) in records.iter().zip(&truth).zip(&cells) {
+        for ((record, orbit), cell) in records.iter().zip(&expected).zip(&cells) {
             let at = format!("{precision:?}, e, omega, mesh_speed = {cell:?}");
             assert_eq!(classify(record), orbit.class, "{at}");
             let apart = (record.lyapunov - orbit.lyapunov).abs();
@@ -167,12 +167,12 @@ fn hashes_of_long_patterns_agree() {
     let plane = [(114, 3), (94, 6), (109, 8), (45, 9), (111, 15), (72, 20), (101, 23), (77, 44), (52, 65)];
     let on = |(i, j): (u32, u32)| paper(0.6 + 0.2 * f64::from(i) / 119.0, 1.0 + 0.4 * f64::from(j) / 79.0);
     let pairs = plane.map(on).to_vec();
-    let truth: Vec<_> =
+    let expected: Vec<_> =
         pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
     for precision in Precision::ALL {
         let records = run(&mut open(precision), &pairs, &LaneSettings::default());
         let mut alike = 0;
-        for ((record, orbit), place) in records.iter().zip(&truth).zip(plane) {
+        for ((record, orbit), place) in records.iter().zip(&expected).zip(plane) {
             let pattern = orbit.word.pattern();
             assert!(pattern.len() > WORD_SYMBOLS && pattern.len() < orbit.word.len() / 3, "{place:?}");
             // In single precision a few motions end elsewhere.
@@ -220,7 +220,7 @@ fn errors_stay_below_the_stated_bound() {
             assert!(error < bound, "{at}: off by {error:.2e}, bound {bound:.2e}");
             beyond += u32::from(error > 10.0 * usual);
         }
-        assert!(beyond > 0, "{precision:?}: nothing but rounding was seen");
+        assert!(beyond > 0, "{precision:?}: all errors are rounding errors");
     }
 }
 
@@ -242,7 +242,7 @@ fn errors_fall_by_the_order_of_the_series() {
     errors_fall_by(5.0, [cut::<6, 16>, cut::<6, 4>]);
 }
 
-/// The same test with fewer terms.
+/// With fewer terms the order is lower.
 #[test]
 #[ignore = "compiles two shaders more; scripts/test.sh --all"]
 fn errors_fall_by_a_lower_order_of_the_series() {
@@ -252,12 +252,12 @@ fn errors_fall_by_a_lower_order_of_the_series() {
 /// Compares flights of up to 16 and up to 4 hundredths of a step.
 fn errors_fall_by(order: f64, forms: [fn(String) -> String; 2]) {
     let cells = [1.0, 1.2, 1.4, 1.6, 1.8].map(|omega| GearPair { mesh_speed: 1e-3, ..paper(0.5, omega) });
-    let truth: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap().0).collect();
+    let expected: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap().0).collect();
     let mut gpu = open(Precision::F64);
     let errors = forms.map(|form| {
         gpu.rewrite_shaders(form);
         let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
-        records.iter().zip(&truth).map(|(r, truth)| apart(r.strobe, *truth)).collect::<Vec<_>>()
+        records.iter().zip(&expected).map(|(r, expected)| apart(r.strobe, *expected)).collect::<Vec<_>>()
     });
     let slopes: Vec<f64> =
         errors[0].iter().zip(&errors[1]).map(|(long, short)| 0.5 * (long / short).log2()).collect();

@@ -55,17 +55,18 @@ fn sensitivity(pair: &GearPair, horizon: u32, precision: Precision) -> f64 {
 
 /// Compares cells after `horizon` periods. `measured`: largest errors, relative to the reference, in f32 and in f64.
 fn check(cells: &[(GearPair, State)], horizon: u32, measured: [f64; 2]) {
-    let truth: Vec<_> = cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
+    let expected: Vec<_> =
+        cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
     for precision in Precision::ALL {
         let records = run(&mut open(precision), cells, &LaneSettings::only(horizon));
         let mut worst = 0.0f64;
-        for ((record, truth), (pair, start)) in records.iter().zip(&truth).zip(cells) {
+        for ((record, expected), (pair, start)) in records.iter().zip(&expected).zip(cells) {
             let at = format!("{precision:?}, e = {}, omega = {} from {start:?}", pair.e, pair.omega);
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             assert_eq!(record.periods_run, horizon, "{at}");
-            let error = apart(record.strobe, *truth);
+            let error = apart(record.strobe, *expected);
             let bar = bar(measured, precision);
-            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {truth:?}", record.strobe);
+            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {expected:?}", record.strobe);
             worst = worst.max(error);
         }
         println!("{precision:?}: {} cells after {horizon} periods, worst {worst:.2e}", cells.len());
@@ -80,7 +81,7 @@ fn stable_cells_of_the_plane_agree() {
     let step = |i: u32, lo: f64, hi: f64| lo + (hi - lo) * f64::from(i) / f64::from(SIDE - 1);
     let all: Vec<_> =
         (0..SIDE * SIDE).map(|i| (pair(step(i % SIDE, 0.0, 1.0), step(i / SIDE, 1.0, 12.0)), REST)).collect();
-    let (cells, truth): (Vec<_>, Vec<State>) = all
+    let (cells, expected): (Vec<_>, Vec<State>) = all
         .into_par_iter()
         .filter_map(|cell| {
             let [at, next] = reference(&cell.0, cell.1, HORIZON);
@@ -98,9 +99,9 @@ fn stable_cells_of_the_plane_agree() {
         let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
         let mut errors: Vec<_> = records
             .iter()
-            .zip(&truth)
+            .zip(&expected)
             .zip(&cells)
-            .map(|((record, truth), (pair, _))| (apart(record.strobe, *truth), pair.e, pair.omega))
+            .map(|((record, expected), (pair, _))| (apart(record.strobe, *expected), pair.e, pair.omega))
             .collect();
         errors.sort_by(|a, b| a.0.total_cmp(&b.0));
         let at = |share: usize| errors[(errors.len() - 1) * share / 100];
@@ -165,7 +166,7 @@ fn closed_chatter_agrees_with_the_reference() {
     let rows = [0.05, 0.2, 0.4, 0.6, 0.75].map(|e| [0.3, 1.0, 1.7, 2.5, 5.6].map(|omega| endless(e, omega)));
     let cells: Vec<_> = rows.into_iter().flatten().map(|pair| (pair, REST)).collect();
     check(&cells, HORIZON, [1.4e-4, 8.6e-14]);
-    let truth: Vec<u32> = cells
+    let expected: Vec<u32> = cells
         .iter()
         .map(|(pair, start)| {
             let flow = flow_of(pair);
@@ -179,7 +180,7 @@ fn closed_chatter_agrees_with_the_reference() {
     assert!(meshing.iter().filter(|record| record.mesh_fraction > 0.0).count() > 10, "too little chatter");
     for precision in Precision::ALL {
         let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
-        for ((record, &impacts), (pair, _)) in records.iter().zip(&truth).zip(&cells) {
+        for ((record, &impacts), (pair, _)) in records.iter().zip(&expected).zip(&cells) {
             let counted = record.impacts_per_period * f64::from(HORIZON);
             let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
             assert!((counted - f64::from(impacts)).abs() < 0.5, "{at}: {counted} impacts, {impacts}");
@@ -196,13 +197,13 @@ fn exponents_through_closed_chatter_agree_with_the_reference() {
     for precision in Precision::ALL {
         let records = run(&mut open(precision), &cells, &LaneSettings::default());
         for (record, (pair, start)) in records.iter().zip(&cells) {
-            let truth = analyse(pair, *start, &Settings::default()).unwrap();
+            let expected = analyse(pair, *start, &Settings::default()).unwrap();
             let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
-            println!("{at}: {} {} {:?}", record.lyapunov, truth.lyapunov, truth.class);
-            assert_eq!(Class::Periodic { period: record.period }, truth.class, "{at}");
-            assert!((record.impacts_per_period - truth.impacts_per_period).abs() < 1e-9, "{at}");
-            assert_eq!(record.word().as_ref(), Some(&truth.word), "{at}");
-            let error = (record.lyapunov - truth.lyapunov).abs();
+            println!("{at}: {} {} {:?}", record.lyapunov, expected.lyapunov, expected.class);
+            assert_eq!(Class::Periodic { period: record.period }, expected.class, "{at}");
+            assert!((record.impacts_per_period - expected.impacts_per_period).abs() < 1e-9, "{at}");
+            assert_eq!(record.word().as_ref(), Some(&expected.word), "{at}");
+            let error = (record.lyapunov - expected.lyapunov).abs();
             assert!(error < bar([1.3e-7, 3.4e-13], precision), "{at}: {error:.2e}");
         }
     }
@@ -224,10 +225,10 @@ fn grazing_contacts_are_found_exactly() {
             let start = [amplitude, 0.0, 0.0, 0.0];
             // Where the amplitude exceeds the wall, the motion starts at rest.
             let start = if sign > 0.0 { [0.0; 4] } else { start };
-            let truth = reference(&grazing, start, 2)[0];
+            let expected = reference(&grazing, start, 2)[0];
             for precision in Precision::ALL {
                 let record = run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
-                let error = apart(record.strobe, truth);
+                let error = apart(record.strobe, expected);
                 assert!(
                     error < bar([1.7e-6, 2.7e-15], precision),
                     "{precision:?}, {hair} {sign}: {error:.2e}"

@@ -31,7 +31,7 @@ impl Numbers {
 
 /// Returns an oscillator with its law and a start. It has one or two displacements; one wall or two, each of any kind
 /// with a law of its own; loads; full mass matrices; gap rows of which either entry may be the larger.
-pub(super) fn drawn(seed: u64) -> (Oscillator, Law, State) {
+pub(super) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
     let mut draw = Numbers(seed);
     let degrees = draw.one_of(&[1, 2, 2]);
     let first = |m: [[f64; 2]; 2]| if degrees == 1 { [[m[0][0], 0.0], [0.0, 0.0]] } else { m };
@@ -77,7 +77,7 @@ pub(super) fn drawn(seed: u64) -> (Oscillator, Law, State) {
     };
     let omega = draw.between(0.6, 4.0);
     let oscillator = Oscillator { degrees, mass, gap, walls, contacts, omega, force, free, meshing };
-    oscillator.validate().expect("what is drawn is an oscillator");
+    oscillator.validate().expect("a valid oscillator");
     let mut start = [0; 4].map(|_| draw.between(-0.4, 0.4));
     if degrees == 1 {
         start[2..].fill(0.0);

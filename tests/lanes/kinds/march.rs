@@ -214,9 +214,9 @@ impl March {
     /// Applies an impulse along the gap that removes `share` of its rate.
     fn push(&mut self, share: f64) {
         let along = self.inverse_mass * self.gap;
-        let taken = along * (share * self.rate(&self.y) / self.gap.dot(&along));
-        self.y[2] -= taken[0];
-        self.y[3] -= taken[1];
+        let impulse = along * (share * self.rate(&self.y) / self.gap.dot(&along));
+        self.y[2] -= impulse[0];
+        self.y[3] -= impulse[1];
     }
 
     fn contact(&mut self, side: usize) {

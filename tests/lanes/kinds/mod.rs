@@ -5,7 +5,7 @@ mod march;
 
 use crate::common::apart;
 use crate::common::gpu::open;
-use draw::drawn;
+use draw::random_cell;
 use march::March;
 use nalgebra::Matrix4;
 use rattlemap::gpu::{GpuError, Lane, LaneSettings, Precision};
@@ -23,7 +23,7 @@ const SEEDS: u64 = 64;
 pub(super) type Cell = (Oscillator, Law, State);
 
 fn cells() -> Vec<Cell> {
-    (0..SEEDS).map(drawn).collect()
+    (0..SEEDS).map(random_cell).collect()
 }
 
 /// Returns the records of oscillators, each with its own law and start.
@@ -54,7 +54,7 @@ fn may_chatter((oscillator, law, _): &Cell) -> bool {
 fn motion_agrees_with_plain_steps() {
     const HORIZON: u32 = 20;
     let cells = cells();
-    let truth: Vec<_> = cells.par_iter().map(|cell| march(cell, cell.2, HORIZON)).collect();
+    let expected: Vec<_> = cells.par_iter().map(|cell| march(cell, cell.2, HORIZON)).collect();
     // Measured: medians 1.7e-13 and 2.0e-7; worst without chaos 1.1e-11 and 5.8e-6.
     for (precision, median_bar, bar, rounding) in
         [(Precision::F64, 1e-12, 1e-10, 1e-13), (Precision::F32, 1e-6, 3e-5, 1e-7)]
@@ -62,7 +62,7 @@ fn motion_agrees_with_plain_steps() {
         let records = run(precision, &cells, &LaneSettings::only(HORIZON)).unwrap();
         let mut errors = Vec::new();
         let (mut chaotic, mut impacts, mut rests) = (0, 0, 0);
-        for (seed, ((record, cell), (end, march))) in records.iter().zip(&cells).zip(&truth).enumerate() {
+        for (seed, ((record, cell), (end, march))) in records.iter().zip(&cells).zip(&expected).enumerate() {
             let at = format!("{precision:?}, seed {seed}, {cell:?}");
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             let error = apart(record.strobe, *end);
@@ -165,7 +165,7 @@ fn records_agree_with_the_reference() {
         shows_exponent: true,
     };
     let measured = |(oscillator, law, start): &Cell| measure(&Flow::new(oscillator), *law, *start, &budget);
-    let truth: Vec<_> =
+    let expected: Vec<_> =
         cells.par_iter().map(|cell| measured_record(&measured(cell), &Needs::EVERYTHING)).collect();
     // Measured: 2.3e-12 per unit time and 6.0e-6; time in contact 8e-14 and 6.3e-8.
     for (precision, exponent_bar, contact_bar) in
@@ -173,28 +173,28 @@ fn records_agree_with_the_reference() {
     {
         let records = run(precision, &cells, &LaneSettings::default()).unwrap();
         let (mut cycles, mut superstable, mut symbols) = (0, 0, 0);
-        for (seed, (record, truth)) in records.iter().zip(&truth).enumerate() {
+        for (seed, (record, expected)) in records.iter().zip(&expected).enumerate() {
             let at = format!("{precision:?}, seed {seed}, {:?}", cells[seed]);
-            assert_eq!(classify(record), classify(truth), "{at}");
-            assert_eq!(record.spelling(), truth.spelling(), "{at}");
-            assert_eq!(record.pattern(), truth.pattern(), "{at}");
-            if !matches!(classify(truth), Class::Periodic { .. }) {
+            assert_eq!(classify(record), classify(expected), "{at}");
+            assert_eq!(record.spelling(), expected.spelling(), "{at}");
+            assert_eq!(record.pattern(), expected.pattern(), "{at}");
+            if !matches!(classify(expected), Class::Periodic { .. }) {
                 continue;
             }
-            assert_eq!(record.impacts_per_period, truth.impacts_per_period, "{at}");
-            let contact = (record.mesh_fraction - truth.mesh_fraction).abs();
-            assert!(contact < contact_bar, "{at}: {} {}", record.mesh_fraction, truth.mesh_fraction);
-            let off = (record.lyapunov - truth.lyapunov).abs();
-            let is_superstable = truth.lyapunov == f64::NEG_INFINITY;
+            assert_eq!(record.impacts_per_period, expected.impacts_per_period, "{at}");
+            let contact = (record.mesh_fraction - expected.mesh_fraction).abs();
+            assert!(contact < contact_bar, "{at}: {} {}", record.mesh_fraction, expected.mesh_fraction);
+            let off = (record.lyapunov - expected.lyapunov).abs();
+            let is_superstable = expected.lyapunov == f64::NEG_INFINITY;
             assert!(
-                if is_superstable { record.lyapunov == truth.lyapunov } else { off < exponent_bar },
+                if is_superstable { record.lyapunov == expected.lyapunov } else { off < exponent_bar },
                 "{at}: {} {}",
                 record.lyapunov,
-                truth.lyapunov
+                expected.lyapunov
             );
             cycles += 1;
             superstable += u32::from(is_superstable);
-            symbols += truth.word_length;
+            symbols += expected.word_length;
         }
         assert!(cycles >= 60 && superstable >= 3 && symbols > 150, "{cycles} {superstable} {symbols}");
     }
