@@ -30,9 +30,9 @@ fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
     return sign_of(side) * first > 0.0;
 }
 
-// Returns the size up to which an acceleration of a gap at rest counts as zero. Its terms cancel to rounding, which
-// depends on the order of summation and on the domain. A gap that left its wall by one sign and was pressed back by
-// the other would repeat this for ever.
+// Returns the size up to which an acceleration of a gap at rest counts as zero. Where its terms cancel, its sign is
+// rounding, and depends on the order of summation and on the domain. If two domains disagreed, the gap would leave its
+// wall and be pressed back for ever.
 fn balance(row: array<Real, 6>, share: Real, q: array<Real, 4>) -> Real {
     return 4.0 * ULP * ((abs(row[0] * q[0]) + abs(row[2] * q[2])) + share * abs(row[3] * q[3])
         + (abs(row[4] * motion.phasor[0]) + abs(row[5])));
@@ -146,8 +146,8 @@ fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
     jump.event = true;
     jump.mode = MODE_FREE;
     motion.q[0] = walls[side];
-    // A gap that was at rest under a balanced load leaves at rest. Its computed rate is rounding. With it, free
-    // motion would follow the sign of an acceleration that is rounding, too, and be pressed back.
+    // A gap that was at rest under a balanced load leaves at rest. Its computed rate is rounding. With that
+    // rate, the next acceleration, which is rounding, too, could press it back.
     let leaving = max(-sign * motion.q[1], Real(0.0));
     motion.q[1] = select(-sign * leaving, Real(0.0), leaving <= here.substeps * balanced * tau);
     return jump;

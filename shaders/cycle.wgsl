@@ -104,9 +104,9 @@ fn spectral_growth() -> Real {
     return growth;
 }
 
-// Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. A lane goes on, while
-// it has periods left, if the cycle is unstable or if the lane is too far from it by the cycle's own multiplier:
-// chaos stays near unstable cycles, and near places where a pair of cycles has just vanished.
+// Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. If the cycle
+// is unstable, or if its multiplier shows that the lane is still too far from it, the lane goes on while it has periods
+// left: chaos stays near unstable cycles, and near places where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
     let is_last = tally.period >= settings.longest;
@@ -228,8 +228,8 @@ fn is_multiple() -> bool {
     return search.divisor > 0u && is_closed;
 }
 
-// Least ratio of the divisor's distance to the lane's distance from the cycle, in quarter octaves, at which the
-// divisor is another cycle.
+// Least ratio, in quarter octaves, of the distance between the cycle's points to the lane's distance from the cycle, at
+// which the divisor is certainly another cycle.
 const SEPARATION: u32 = 12u;
 
 // Whether the divisor was read for this multiple, is unstable, and is certainly another cycle: it may have been read
@@ -275,7 +275,7 @@ fn distance_to_cycle() -> f32 {
     return select(by_recurrence, max(by_recurrence, exp2(-f32(search.linear_distance) / PARTS_PER_OCTAVE)), EXPONENT);
 }
 
-// Returns that bound with the largest rounding error.
+// Returns a bound on that distance that includes the largest rounding error.
 fn blurred_distance_to_cycle() -> f32 {
     return max(distance_to_cycle(), limit_of(noise()));
 }
@@ -303,13 +303,13 @@ fn is_surely_symmetric() -> bool {
     return is_near_cycle() && exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) + 2.0 * distance_to_cycle() < MIRROR_DISTANCE;
 }
 
-// Whether the lane rests, and is not merely too slow to show its motion.
+// Whether the lane rests. A slow lane far from the cycle does not count.
 fn is_at_rest() -> bool {
     let is_there = !EXPONENT || exp2(-f32(search.linear_distance) / PARTS_PER_OCTAVE) < max(ON_CYCLE, limit_of(noise()));
     return search.return_distance >= AT_REST && is_there;
 }
 
-// Rounding errors of the motion by which a fixed point may be misplaced, before amplification.
+// Error of a computed fixed point in rounding errors of the motion, before amplification.
 const MISPLACED: Real = 8.0;
 
 // Whether a motion without events has its limit beyond the wall, by more than the rounding error of a period.

@@ -213,7 +213,7 @@ pub(crate) fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[Ad
         wanted = format!("called {name} {wanted}");
     }
     if let Some(number) = choice.number {
-        wanted = format!("of number {number} {wanted}");
+        wanted = format!("with number {number} {wanted}");
     }
     let list: Vec<String> = all
         .iter()

@@ -54,7 +54,7 @@ impl Trouble {
         Trouble(first)
     }
 
-    /// Stores a failure. Later ones follow from the first and say less.
+    /// Stores the first failure. Later ones only follow from it.
     pub(super) fn note(&self, message: String) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
     }

@@ -2,8 +2,8 @@
 //!
 //! [`Gpu::open`] opens an adapter for one precision. [`Gpu::run`] integrates lanes and returns one [`Record`] per
 //! lane. It runs as many lanes at a time as the adapter's limits allow, by short dispatches over state that stays on
-//! the device. In a [`Pool`], lanes can begin and end at any time. The engine uses no files and starts no
-//! threads.
+//! the device. In a [`Pool`], lanes can begin and end at any time. The engine uses no files and no
+//! threads of its own.
 //!
 //! Lanes are independent of [`rattlemap_dynamics::reference`]: they read the description of the model
 //! ([`rattlemap_dynamics::model`]) and nothing else. A lane moves from event to event on a fixed grid of steps with
@@ -60,7 +60,7 @@ use dispatch_policy::DispatchPolicy;
 use rattlemap_dynamics::model::{Law, Oscillator, State};
 use rattlemap_dynamics::orbit::Budget;
 
-/// Most events of a lane, so that their count does not overflow.
+/// Default limit of a lane's events, so that their count does not overflow.
 const MOST_EVENTS: u32 = 1 << 31;
 
 /// Whether lanes with this meshing speed follow chatter by short flights.
@@ -129,7 +129,8 @@ pub struct LaneSettings {
     pub passes_per_period: u32,
     /// Events per period above which a lane ends.
     pub events_per_period: u32,
-    /// Events in all above which a lane ends. Checked once per period, whose events must be fewer than 2^31.
+    /// Events in all periods above which a lane ends. Checked once per period: this limit and the events of one period
+    /// together must be below 2^32.
     pub most_events: u32,
 }
 
@@ -310,7 +311,7 @@ impl Gpu {
         self.run_on(&tables, lanes, settings).await
     }
 
-    /// Returns the reason for a lost device if there is one; errors that follow from the loss say less.
+    /// Returns the loss of the device in place of an error that follows from it.
     fn failure(&self, error: GpuError) -> GpuError {
         self.trouble.message().map_or(error, |message| GpuError::Lost { message })
     }

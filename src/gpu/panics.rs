@@ -51,7 +51,7 @@ impl<T> Deref for PanicFree<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        self.0.as_ref().expect("it is there until it is dropped")
+        self.0.as_ref().expect("the value exists until it is dropped")
     }
 }
 

@@ -1,4 +1,4 @@
-//! Progress of lanes, for measurements. The watcher keeps the clock.
+//! Progress of lanes, for measurements.
 
 /// A stage that lanes have reached.
 #[derive(Clone, Copy, Debug, PartialEq)]

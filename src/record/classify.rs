@@ -4,11 +4,12 @@
 //!
 //! - `failed` if the integration could not continue (`cap_events`, `cap_root`, `too_stiff`, `non_finite`);
 //! - `periodic` if the engine confirmed a period. Recurrence of strobe states is not enough: the orbit must be
-//! stable;
+//!   stable;
 //! - `chaotic` if there is no period, the exponent exceeds zero by [`CHAOS_ERRORS`] standard errors, and the motion
-//! did not stay near a cycle (status `slow`);
-//! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than `max_period` with an
-//! exponent below zero, on tori (quasi-periodic motion), and if a multiplier is 1, as for pairs without supports.
+//!   did not stay near a cycle (status `slow`);
+//! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than `max_period`, if the
+//!   exponent is clearly negative, on tori (quasi-periodic motion), and if a multiplier is 1, as for pairs without
+//!   supports.
 //!
 //! Two motions are wrongly called chaotic: transient chaos that outlasts the budget, and motion that grows without
 //! bound, as of undamped elastic pairs.
