@@ -10,9 +10,9 @@ fn is_endless(side: u32) -> bool {
 // negligible. The gap then rests on the wall, and meshing starts.
 //
 // `u` is the leaving speed, G the pressing acceleration, J its rate of change while the gap stays closed, and gamma
-// the damping of the gap. Up to third order the sequence lasts `T (1 - J T / (3 G) - gamma T / 6)` with `T = 2 u / (G
-// (1 - e))`. Meanwhile the other coordinate moves as with the gap closed. Tangent vectors follow these formulas up to
-// second order.
+// the damping of the gap. With `T = 2 u / (G (1 - e))` the sequence lasts `T (1 - J T / (3 G) - gamma T / 6)`, up to
+// third order. Meanwhile the other coordinate moves as with the gap closed. Tangent vectors follow these formulas up
+// to second order.
 fn close_chatter(side: u32, u: Real) {
     if !is_endless(side) {
         return;
@@ -101,9 +101,10 @@ const SHORT_FLIGHTS: u32 = 100u;
 //
 // Let n = SHORT_TERMS - 1 be the number of the gap's terms beyond its start, G the pressing acceleration, and B a
 // bound on the n-th derivative. The next derivative is at most 2 B, because a step turns the fastest mode by at most
-// a radian. The relative error of the speed at the end of a flight of length t is then at most `4 (B / G) t^(n-1) /
-// n! (1 + 2 / (n + 1))`. It is at most ULP where `B (t / SHORT)^(n-1) <= G`. Each flight is e times as long as the
-// one before, so that the error of a whole sequence is at most `1 / (1 - e^(n-1))` times that of its first flight.
+// a radian. At the end of a flight of length t, the relative error of the speed is then at most
+// `4 (B / G) t^(n-1) / n! (1 + 2 / (n + 1))`. It is at most ULP where `B (t / SHORT)^(n-1) <= G`. Each flight is e
+// times as long as the one before, so that the error of a whole sequence is at most `1 / (1 - e^(n-1))` times that of
+// its first flight.
 //
 // The careful step handles the impact with which meshing or the limit begins, and the motion after the load has
 // ceased to press.

@@ -171,8 +171,8 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 2.0 * dt;
             continue;
         }
-        // Between its ends a stretch may cross by an eighth of its bend. While the bend exceeds the remainder, a
-        // crossing is possible, however short the stretch.
+        // Within a stretch the distance may be an eighth of its bend less than at the ends. While the bend exceeds the
+        // remainder, a crossing is possible, however short the stretch.
         var is_shortest = dt <= SHORTEST;
         if is_shortest && dt > SHORTEST_STEP {
             let bend = dt * dt * vec2<Real>(

@@ -83,8 +83,8 @@ fn scan() -> u32 {
         let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + m[13]));
         let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + m[20]));
         let v1 = v + (((m[21] * z + m[22] * w) + (m[23] * x + m[24] * v)) + ((m[25] * c + m[26] * s) + m[27]));
-        // The phasor turns by three shears. Drivers reorder the usual form, `c + ((cos - 1) c - sin s)`, and `c +
-        // (cos - 1) c` loses what is below rounding, in the same direction at every step.
+        // The phasor turns by three shears. The usual form is `c + ((cos - 1) c - sin s)`. Drivers reorder it, and then
+        // `c + (cos - 1) c` loses digits below rounding, in the same direction at every step.
         let sheared = c - half * s;
         let s1 = s + sine * sheared;
         let c1 = sheared - half * s1;

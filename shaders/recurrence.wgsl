@@ -6,7 +6,7 @@ const SETTLED: f32 = 56.0;
 // Distance of the limit, 2^-4 of the motion, from which Newton's method may search it. `LONGEST_NEWTON_STEP` limits
 // the result.
 const REFINABLE: f32 = 16.0;
-// Least approach per period that is assumed before Newton's method: slower motion need not recur more closely.
+// Approach per period that `is_refinable` also assumes for slower motion, which need not recur more closely.
 const SLOWEST: f32 = 0.008;
 // Recurrences this close, 2^-12 of the motion, need not shrink; they must not grow.
 const SLOW: u32 = 48u;
@@ -191,8 +191,8 @@ fn judge_lag(found: u32) -> bool {
     }
     search.streak = select(1u, search.streak + 1u, found == tally.candidate);
     tally.candidate = found;
-    // Weak chaos contracts by chance, and the more often it is checked: after each failure, more windows must
-    // contract.
+    // Weak chaos contracts by chance, more often the more it is checked. After each failed reading, one more window
+    // must contract.
     let windows = STREAK + search.failed_readings + select(0u, 2u, grows(CHAOS_ERRORS));
     let has_contracted = search.streak >= windows;
     search.is_settled = select(0u, 1u, has_contracted && has_settled(found));

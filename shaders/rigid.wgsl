@@ -17,7 +17,7 @@ fn is_onset() -> bool {
     return tally.mode >= MODE_ONSET && !sticks();
 }
 
-// Returns the acceleration of a gap that rests on its wall, and the motion of x.
+// Returns the constants of the accelerations of x and of a gap that rests on its wall.
 fn stuck_pull(side: u32) -> Pull {
     let behind = meshing_pull(side);
     return Pull(flows[cell.flow_index].pressing[side], behind.x_row, behind.share, behind.angle);

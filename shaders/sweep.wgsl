@@ -61,7 +61,7 @@ fn store_lane() {
     }
 }
 
-// Load and store the state that strobes use: between strobes, its registers belong to the steps.
+// Loads the state that strobes use. Between strobes, the steps need its registers.
 fn load_strobe_state() {
     if !KEEP {
         measures = motions[lane].measures;

@@ -283,7 +283,7 @@ fn renormalise() -> Real {
     var u = tangent(0u);
     let size = largest(u);
     if !(size > 1e-30) {
-        // Superstable: the largest loss that is distinguished. Start with a new vector.
+        // Superstable: returns a large loss, and starts with a new vector.
         set_tangent(0u, initial_tangent());
         return -100.0;
     }
@@ -304,7 +304,7 @@ fn accumulate_growth() {
     count_growth(growth, 1u);
 }
 
-// Adds growth over a number of periods. A block that a cycle makes longer than the others counts like them.
+// Adds growth over a number of periods. A block that a cycle makes longer has the same weight as the others.
 fn count_growth(growth: Real, periods: u32) {
     motion.block_growth += growth;
     search.block_periods += periods;

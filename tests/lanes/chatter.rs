@@ -202,7 +202,7 @@ fn too_long(source: String) -> String {
 #[test]
 fn errors_stay_below_the_stated_bound() {
     let cells: Vec<_> = cells().into_iter().filter(|pair| pair.mesh_speed == 1e-3).collect();
-    // At this length the omitted terms are ULP; they grow with the number of terms, less two, as the power.
+    // At the length `short` the omitted terms are ULP. They grow with this power of the length.
     for (precision, short, power) in [(Precision::F32, 0.198, 6), (Precision::F64, 0.191, 11)] {
         let mut gpu = open(precision);
         let shipped = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));

@@ -45,7 +45,7 @@ fn the_exponent_does_not_depend_on_cycles_that_are_read() {
 
 /// A cycle of period 3 with a multiplier of -0.9985, at the end of long chaos that comes close to other cycles of
 /// period 3. Motion that approaches it from alternating sides recurs best after six periods. Lanes once reported
-/// period 6, because another cycle of period 3 is unstable.
+/// period 6: they had rejected period 3 after reading another cycle, which is unstable.
 #[test]
 fn a_cycle_that_is_approached_from_both_sides_is_not_doubled() {
     let cell = pair(0.948, 5.64);

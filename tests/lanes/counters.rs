@@ -2,8 +2,8 @@
 //!
 //! A snapshot that differs is a change in cost. If it is intended, accept it with `INSTA_UPDATE=always cargo test
 //! --test lanes counters` (or `cargo insta review`) and give the reason in the commit. Counts are means over 100
-//! forcing periods of settled cycles, to three significant digits. Other drivers and processors give the same counts;
-//! 2 % more work does not.
+//! forcing periods of settled cycles, to three significant digits. Other drivers and processors give the same counts,
+//! but 2 % more work shows.
 
 use std::fmt::Write;
 

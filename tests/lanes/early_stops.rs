@@ -152,9 +152,9 @@ fn random_cells(side: u32, count: usize) -> Vec<u32> {
     (0..count).map(|_| (numbers.next() % u64::from(side * side)) as u32).collect()
 }
 
-/// The reference of classes is a run of 2,000 + 512 periods. Early stops do a tenth of the work of 400 + 128 periods
-/// and may leave no more wrong classes; without exponents, a twelfth or less. Of these cells 11.4 % are chaotic, of
-/// the whole plane 9.6 %. Each bar allows 10 % more periods than a twelfth and a fifteenth (docs/decisions.md).
+/// Classes are compared with runs of 2,000 + 512 periods. Early stops give no more wrong classes than 400 + 128 periods
+/// for every cell, in about a tenth of the periods; without exponents, in a twelfth or less. Of these cells 11.4 % are
+/// chaotic, of the whole plane 9.6 %. The bars are earlier ratios of 12 and 15, divided by 1.1 (docs/decisions.md).
 #[test]
 fn a_tenth_of_the_work_is_as_right_as_brute_force() {
     check_savings(By::Reference, [10.9, 13.6]);
