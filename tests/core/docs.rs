@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Every Markdown file of the repository that is its own.
 fn texts() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = ["", "docs", "results", "benches", "benches/peers", "fuzz"];
+    let folders = ["", "docs", "docs/decisions", "results", "benches", "benches/peers", "fuzz"];
     let mut texts = Vec::new();
     for folder in folders.map(|folder| root.join(folder)) {
         for entry in fs::read_dir(folder).unwrap() {

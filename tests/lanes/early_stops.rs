@@ -160,8 +160,9 @@ fn random_cells(side: u32, count: usize) -> Vec<u32> {
 
 /// Against 2,000 + 512 periods: a tenth of the work leaves no more wrong classes than 400 + 128 periods for every cell; a
 /// twelfth, or on the reference a thirteenth, where no exponent is shown. Of these cells 11.4 % are chaotic, of the plane
-/// 9.6 %: there it is less. The reference did a twelfth and a fifteenth until it named cycles that the start never
-/// reaches; a tenth more periods was what their end might cost (docs/decisions.md), and the bars are those divided by 1.1.
+/// 9.6 %: there it is less. The limits are the first measured
+/// values (12 and 15 for the reference) divided by 1.1: a stricter rule for approaches to cycles may cost a tenth more
+/// periods (docs/decisions/dynamics.md).
 #[test]
 fn a_tenth_of_the_work_is_as_right_as_brute_force() {
     check_savings(By::Reference, [10.9, 13.6]);
