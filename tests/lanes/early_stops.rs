@@ -154,7 +154,7 @@ fn random_cells(side: u32, count: usize) -> Vec<u32> {
 
 /// Classes are compared with runs of 2,000 + 512 periods. Early stops give no more wrong classes than 400 + 128 periods
 /// for every cell, in about a tenth of the periods; without exponents, in a twelfth or less. Of these cells 11.4 % are
-/// chaotic, of the whole plane 9.6 %. The bars are earlier ratios of 12 and 15, divided by 1.1 (docs/decisions.md).
+/// chaotic, of the whole plane 9.6 %. The bars are earlier ratios of 12 and 15, divided by 1.1 (docs/decisions/dynamics.md).
 #[test]
 fn a_tenth_of_the_work_is_as_right_as_brute_force() {
     check_savings(By::Reference, [10.9, 13.6]);
