@@ -5,8 +5,11 @@
 //! | layer | what it is |
 //! | --- | --- |
 //! | [`cli`] | arguments and commands |
-//! | [`output`] | files: one per format |
+//! | [`job`] | what every front end needs to run a job |
+//! | [`store`] | results on disk: folders, manifests, record files, shards |
+//! | [`show`] | how results look: tables, figures, the report; no files |
 //! | [`mod@validate`] | how right is a finished map |
+//! | [`findings`] | what all records of a map show together |
 //! | [`map`] | many motions: scene, plan, schedule, engines |
 //! | [`model_file`] | models written down as files |
 //! | [`mod@text`] | what people write, with places for errors |
@@ -18,7 +21,7 @@
 //!
 //! ```
 //! use rattlemap::map::scene::{Quantity, Scene};
-//! use rattlemap::map::{self, Processor};
+//! use rattlemap::job::{self, Processor};
 //! use rattlemap::model::Stops;
 //!
 //! let model = Stops { r: 0.1, k: 1.0, ..Stops::with_restitution(0.8) };
@@ -27,7 +30,7 @@
 //!     .axis("omega", 0.5..=1.5, 6)
 //!     .quantities(&[Quantity::Class, Quantity::Impacts])
 //!     .build()?;
-//! let map = map::run(&scene, Processor::Cpu)?;
+//! let map = job::run(&scene, Processor::Cpu)?;
 //! for cell in map.cells() {
 //!     let (force, omega) = (cell.values[0], cell.values[1]);
 //!     println!("{force} {omega}: {:?}, {} impacts", cell.class, cell.record.impacts_per_period);
@@ -51,11 +54,18 @@ pub mod gpu;
 
 pub mod map;
 
+pub mod findings;
+
 #[cfg(feature = "gpu")]
 pub mod validate;
 
 #[cfg(feature = "figures")]
-pub mod output;
+pub mod show;
+
+#[cfg(feature = "figures")]
+pub mod store;
+
+pub mod job;
 
 #[cfg(feature = "cli")]
 pub mod cli;

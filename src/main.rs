@@ -4,10 +4,11 @@ use std::io::{Write, stderr};
 use std::process::ExitCode;
 
 use rattlemap::cli;
+use rattlemap::job::processor;
 
 fn main() -> ExitCode {
-    if !cli::is_fit() {
-        let _ = stderr().write_all(cli::MISFIT.as_bytes());
+    if !processor::is_fit() {
+        let _ = stderr().write_all(processor::MISFIT.as_bytes());
         return ExitCode::FAILURE;
     }
     if let Some((name, value)) = cli::missing_variable() {

@@ -10,19 +10,20 @@ mod stretched;
 use std::path::{Path, PathBuf};
 
 use rattlemap::gpu::Constants;
+use rattlemap::job;
+use rattlemap::job::run::{MapError, Processor};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene, SceneError};
 use rattlemap::map::schedule::Schedule;
 use rattlemap::map::shard::Shard;
-use rattlemap::map::{self, MapError, Processor};
 use rattlemap::model::GearPair;
-use rattlemap::output::map::{Made, Run};
-use rattlemap::output::merge::{MergeError, Parts};
-use rattlemap::output::shard::{Finished, Tally};
-use rattlemap::output::{
-    Folder, FolderError, Identity, OutputError, RECORDS, RecordFile, RecordFileError, shard,
-};
 use rattlemap::record::Record;
+use rattlemap::store::error::OutputError;
+use rattlemap::store::folder::{Folder, FolderError};
+use rattlemap::store::map::{Made, Run};
+use rattlemap::store::merge::{MergeError, Parts};
+use rattlemap::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
+use rattlemap::store::shard::{self, Finished, Tally};
 use rattlemap_dynamics::flow::Flow;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -97,7 +98,7 @@ fn scene(counts: [u32; 2], all: bool) -> Result<Scene, SceneError> {
 /// # Errors
 /// [`ScaleError`].
 pub fn write_shards(ask: Ask, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Taken>), ScaleError> {
-    let small = map::run(&scene([ask.small; 2], ask.all)?, Processor::Cpu)?;
+    let small = job::run(&scene([ask.small; 2], ask.all)?, Processor::Cpu)?;
     let scene = scene(ask.counts, ask.all)?;
     let stretched = Stretched::new(&small, ask.counts.map(|count| count as usize));
     let phase = Phase::begin("plan");

@@ -3,7 +3,7 @@
 use numpy::{Element, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rattlemap::output::Values;
+use rattlemap::show::table::cell_columns::Values;
 
 /// A vector as an array.
 pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyAny> {

@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rattlemap::map::scene::Scene as Read;
 use rattlemap::map::{bifurcation as diagram, plan};
-use rattlemap::output::bifurcation::Asked;
-use rattlemap::output::in_memory;
+use rattlemap::store::bifurcation::Asked;
+use rattlemap::store::in_memory;
 
 use crate::arrays::columns;
 use crate::problem::Problem;

@@ -5,18 +5,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use rattlemap::cli;
 use rattlemap::gpu::Precision;
+use rattlemap::job;
+use rattlemap::job::engine_choice::{self, Ask, Chosen};
+use rattlemap::job::kept::{self, Kept, KeptError, Work};
 use rattlemap::map::engine::{Engine, Loss};
-use rattlemap::map::engine_choice::{self, Ask, Chosen};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::Scene;
 use rattlemap::map::shard::Shard;
 use rattlemap::map::sweep;
-use rattlemap::output::kept::{self, Kept, KeptError, Work};
-use rattlemap::output::map::{Made, Run};
-use rattlemap::output::{Folder, FolderError};
 use rattlemap::record::Record;
+use rattlemap::store::folder::{Folder, FolderError};
+use rattlemap::store::map::{Made, Run};
 
 use crate::problem::Problem;
 use crate::waiting::{self, Watch};
@@ -107,7 +107,7 @@ impl Task {
     /// Refuses what does not fit this machine.
     pub(crate) fn check(&self) -> Result<(), Problem> {
         let out = self.out.as_ref().map(|out| &*out.path);
-        Ok(cli::fits(&self.scene, self.shard, self.ask.engine, out)?)
+        Ok(job::capacity::fits(&self.scene, self.shard, self.ask.engine, out)?)
     }
 
     /// Computes all cells and keeps them in the folder, if there is one. None if it was told to end before.

@@ -16,7 +16,7 @@ mod shard;
 mod waiting;
 
 use pyo3::prelude::*;
-use rattlemap::output::Identity;
+use rattlemap::store::record_file::Identity;
 
 #[pymodule]
 mod _native {

@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rattlemap::cli;
-use rattlemap::map::effect;
+use rattlemap::findings::effect;
+use rattlemap::job;
 use rattlemap::map::plan::Plan;
-use rattlemap::output::in_memory::Colors;
-use rattlemap::output::map::Run;
-use rattlemap::output::{self, Cells, Survey, in_memory};
+use rattlemap::show::cells::{Cells, Survey};
+use rattlemap::store::in_memory::Colors;
+use rattlemap::store::map::Run;
+use rattlemap::store::{self, in_memory};
 
 use crate::arrays::columns;
 use crate::engines::{Out, Task, ask};
@@ -79,13 +80,13 @@ fn compute(task: &Task, watch: &Watch) -> Result<Option<Made>, Problem> {
     let records = &integrated.work.records;
     let survey = Survey::of(&plan, records, refined);
     let cells = Cells::new(&task.scene, &plan, records).surveyed(&survey);
-    let (device, processor) = (integrated.engine.device(), cli::described_processor());
+    let (device, processor) = (integrated.engine.device(), job::processor::described());
     let run = Run {
         without_effect: effect::names(&plan, records, integrated.engine.precision()),
         ..integrated.run(task, &device, &processor)
     };
     let files = match &folder {
-        Some(folder) => output::map::write(folder, &cells, &run)?,
+        Some(folder) => store::map::write(folder, &cells, &run)?,
         None => Vec::new(),
     };
     Ok(Some(Made {

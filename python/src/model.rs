@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rattlemap::cli;
+use rattlemap::job;
 use rattlemap::map::scene::single_cell;
 use rattlemap::model::Model as _;
 use rattlemap::model_file::FileModel;
@@ -38,7 +38,7 @@ impl Model {
     /// The model that is built in under a name, or stands in a file.
     #[staticmethod]
     fn find(name: String) -> Result<Model, Problem> {
-        let model = cli::find_model(&name).map_err(Problem::model)?;
+        let model = job::model_choice::find(&name).map_err(Problem::model)?;
         Ok(Model { model, file: name })
     }
 

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rattlemap::cli;
+use rattlemap::job;
 use rattlemap::model::{Model as _, REST};
 use rattlemap::model_file::FileModel;
 use rattlemap::orbit::{self as analysis, Class, Settings};
-use rattlemap::output;
+use rattlemap::store;
 
 use crate::arrays::array;
 use crate::model::Model;
@@ -26,7 +26,7 @@ pub(crate) struct Orbit {
 impl Orbit {
     /// What `orbit --json` prints.
     fn json(&self) -> Result<String, Problem> {
-        Ok(output::orbit::json(&*self.model, &self.orbit, None)?)
+        Ok(store::orbit::json(&*self.model, &self.orbit, None)?)
     }
 
     /// Forcing periods that the events span.
@@ -52,11 +52,11 @@ impl Orbit {
             if orbit.class == Class::Failed {
                 return Ok(Some(Vec::new()));
             }
-            Ok(Some(output::orbit::moments(&*model, &orbit, samples_per_period)?))
+            Ok(Some(store::orbit::moments(&*model, &orbit, samples_per_period)?))
         })?;
         let columns = PyDict::new(py);
         let numbers =
-            |of: &dyn Fn(&output::orbit::Moment) -> f64| -> Vec<f64> { moments.iter().map(of).collect() };
+            |of: &dyn Fn(&store::orbit::Moment) -> f64| -> Vec<f64> { moments.iter().map(of).collect() };
         columns.set_item("t", array(py, numbers(&|moment| moment.t)))?;
         columns.set_item("phase", array(py, numbers(&|moment| moment.phase)))?;
         columns.set_item("z", array(py, numbers(&|moment| moment.gap[0])))?;
@@ -64,7 +64,7 @@ impl Orbit {
         for (i, name) in self.model.state_names().into_iter().enumerate() {
             columns.set_item(name, array(py, numbers(&|moment| moment.state[i])))?;
         }
-        let texts = |of: &dyn Fn(&output::orbit::Moment) -> &'static str| -> Vec<&'static str> {
+        let texts = |of: &dyn Fn(&store::orbit::Moment) -> &'static str| -> Vec<&'static str> {
             moments.iter().map(of).collect()
         };
         columns.set_item("domain", texts(&|moment| moment.domain))?;
@@ -90,7 +90,7 @@ pub(crate) fn orbit(
     let model = Arc::new(model.with(&sets)?);
     let mut state = REST;
     if let Some(start) = start {
-        cli::check_components(&*model, start.len()).map_err(Problem::from)?;
+        job::model_choice::check_components(&*model, start.len()).map_err(Problem::from)?;
         state[..start.len()].copy_from_slice(&start);
     }
     let settings = Settings {

@@ -4,15 +4,17 @@ use pyo3::PyErr;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
-use rattlemap::cli::Failure;
-use rattlemap::map::engine_choice::ChoiceError;
+use rattlemap::job::engine_choice::ChoiceError;
+use rattlemap::job::error::Failure;
+use rattlemap::job::kept::KeptError;
 use rattlemap::map::plan::NoMotion;
 use rattlemap::map::scene::SceneError;
 use rattlemap::map::sweep::SweepError;
 use rattlemap::model::ModelError;
-use rattlemap::output::kept::KeptError;
-use rattlemap::output::merge::MergeError;
-use rattlemap::output::{FolderError, OutputError, RecordFileError};
+use rattlemap::store::error::OutputError;
+use rattlemap::store::folder::FolderError;
+use rattlemap::store::merge::MergeError;
+use rattlemap::store::record_file::RecordFileError;
 
 /// An exception of the package that is to be raised, and its text.
 #[derive(Debug)]

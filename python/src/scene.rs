@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use rattlemap::cli;
+use rattlemap::job;
 use rattlemap::map::scene::{Along, FileBeside, FileText, Purpose, Scene as Read};
 use rattlemap::model::Model as _;
 use rattlemap::model_file::FileModel;
@@ -82,7 +82,7 @@ impl Scene {
         along: Option<(String, Vec<String>)>,
     ) -> Result<Scene, Problem> {
         let read_for = For::new(purpose, along)?;
-        let scene = cli::load_scene(&path, &sets, read_for.purpose, read_for.along.as_ref())?;
+        let scene = job::scene_file::load_along(&path, &sets, read_for.purpose, read_for.along.as_ref())?;
         Ok(Scene { scene: Arc::new(scene), sets, read_for })
     }
 

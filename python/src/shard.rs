@@ -6,12 +6,14 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rattlemap::cli;
-use rattlemap::map::engine_choice::{Ask, Who};
+use rattlemap::job;
+use rattlemap::job::engine_choice::{Ask, Who};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::shard::Shard;
-use rattlemap::output::merge::{MergeError, Parts, Progress};
-use rattlemap::output::shard::{self, Finished};
-use rattlemap::output::{self, Folder};
+use rattlemap::store;
+use rattlemap::store::folder::Folder;
+use rattlemap::store::merge::{MergeError, Parts, Progress};
+use rattlemap::store::shard::{self, Finished};
 use rayon::ThreadPoolBuilder;
 
 use crate::engines::{Out, Task, ask};
@@ -34,13 +36,13 @@ pub(crate) fn check_shards(
     force: bool,
 ) -> PyResult<()> {
     let (shard, _) = asked(1, count, engine, precision, adapter)?;
-    cli::fits_merged(&scene.scene, out.as_deref()).map_err(Problem::from)?;
+    job::capacity::fits_merged(&scene.scene, out.as_deref()).map_err(Problem::from)?;
     let plan = Plan::new(&scene.scene);
     shard.check(&plan).map_err(|error| Problem::scene(format!("--shard {error}")))?;
     if let Some(out) = out {
         // As when the shards are merged.
         let force = force || !Folder::holds_results(&out);
-        Folder::check(&out, force, output::map::names()).map_err(Problem::from)?;
+        Folder::check(&out, force, store::map::names()).map_err(Problem::from)?;
     }
     Ok(())
 }
@@ -104,7 +106,7 @@ fn compute(task: &Task, shard: Shard, watch: &Watch) -> Result<Option<Vec<String
     let Some(out) = &task.out else { return Ok(None) };
     let folder = out.open(watch)?;
     let Some(integrated) = task.integrate(&plan, Some(&folder), watch)? else { return Ok(None) };
-    let (device, processor) = (integrated.engine.device(), cli::described_processor());
+    let (device, processor) = (integrated.engine.device(), job::processor::described());
     let run = integrated.run(task, &device, &processor);
     let finished =
         Finished { shard, scene: &task.scene, plan: &plan, run: &run, tally: &integrated.work.tally };
@@ -130,7 +132,7 @@ pub(crate) fn merge<'py>(
 fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Option<Made>, Problem> {
     let parts = Parts::open(parts)?;
     parts.refuse(&out.path)?;
-    cli::fits_merged(parts.scene(), Some(&out.path))?;
+    job::capacity::fits_merged(parts.scene(), Some(&out.path))?;
     // A run that ended before it kept anything has left nothing else.
     let force = out.force || !Folder::holds_results(&out.path);
     let folder = Out { force, ..out }.open(watch)?;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use crate::cli::say;
 use crate::gpu::Precision;
-use crate::map::engine_choice::{Ask, Wanted, Who};
+use crate::job::engine_choice::{Ask, Wanted, Who};
 use crate::map::printable::is_printable;
 use crate::map::scene::{Along, Format};
 use crate::map::shard::Shard;

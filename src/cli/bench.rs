@@ -13,14 +13,15 @@ use crate::cli::bench::measure::{
 };
 use crate::gpu::{self, AdapterReport, Precision};
 use crate::map::scene::Scene;
-use crate::output::Folder;
+use crate::store::folder::Folder;
 use crate::validate::{DEFAULT_SAMPLES, Kind};
 use anyhow::anyhow;
 
 use crate::cli::arguments::{EngineChoice, Engines};
-use crate::cli::capacity;
-use crate::cli::error::Failure;
-use crate::cli::{processor, say};
+use crate::cli::say;
+use crate::job::capacity;
+use crate::job::error::Failure;
+use crate::job::processor;
 
 /// Side of the map on which operations are counted.
 const COUNTED_SIDE: u32 = 24;

@@ -7,13 +7,15 @@ use anyhow::anyhow;
 use rattlemap_dynamics::orbit::Class;
 
 use super::arguments::Bifurcation;
-use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress::Progress;
-use super::{say, scene_file};
-use crate::map::bifurcation::{Hysteresis, hysteresis};
+use crate::cli::say;
+use crate::findings::hysteresis::{self, Hysteresis};
+use crate::job::error::{Failure, fail_if};
+use crate::job::scene_file;
 use crate::map::{bifurcation, plan, scene};
-use crate::output::{self, Folder};
+use crate::store;
+use crate::store::folder::Folder;
 
 pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
     let (along, out) = (ask.along(), ask.out());
@@ -23,7 +25,7 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
     plan::check_line(&scene)?;
     let interrupt = Interrupt::listen(ask.quiet)?;
     let folder = Folder::open(&out, ask.force)?;
-    folder.refuse_links(output::bifurcation::names())?;
+    folder.refuse_links(store::bifurcation::names())?;
     let cells = scene.line();
     let count = bifurcation::column_count(cells.len(), scene.start());
     let progress = Progress::new(count, 0, "columns", ask.quiet);
@@ -43,9 +45,9 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
         );
         return Err(interrupt.failure(words));
     };
-    let asked = output::bifurcation::Asked { sets: &ask.set, along };
+    let asked = store::bifurcation::Asked { sets: &ask.set, along };
     let elapsed = clock.elapsed();
-    let files = output::bifurcation::write(&folder, &scene, asked, &columns, elapsed)?;
+    let files = store::bifurcation::write(&folder, &scene, asked, &columns, elapsed)?;
     let [periodic, chaotic, undecided, failed] =
         plan::count_classes(columns.iter().map(|column| column.class));
     let classes = format!(
@@ -53,7 +55,7 @@ pub(crate) fn run(ask: &Bifurcation) -> Result<(), Failure> {
         elapsed.as_secs_f64()
     );
     let name = &scene.axes()[0].parameter().name;
-    let differing = hysteresis(&columns).map(|found| format!("{}\n", told(&found, name)));
+    let differing = hysteresis::hysteresis(&columns).map(|found| format!("{}\n", told(&found, name)));
     let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
     progress.finish(&format!("{classes}\n{}{files}", differing.unwrap_or_default()));
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);

@@ -2,18 +2,21 @@
 
 use std::path::Path;
 
-use crate::output::Survey;
-use crate::output::inventory::{FileEntry, Finding};
-use crate::output::manifest::MANIFEST;
-use crate::output::map::{LIST, VALIDATION, repair};
-use crate::output::{self, Cells, Folder, RECORDS};
+use crate::show::cells::Cells;
+use crate::show::cells::Survey;
+use crate::store;
+use crate::store::folder::Folder;
+use crate::store::inventory::{FileEntry, Finding};
+use crate::store::manifest::MANIFEST;
+use crate::store::map::{LIST, VALIDATION, repair};
+use crate::store::record_file::RECORDS;
 use anyhow::{Context, anyhow};
 use serde_json::Value;
 
 use crate::cli::arguments::Check;
-use crate::cli::error::Failure;
-use crate::cli::finished_map::{self, Manifest, check_files, told};
 use crate::cli::say;
+use crate::job::error::Failure;
+use crate::job::finished_map::{self, Manifest, check_files, told};
 
 /// The command whose folders can be mended.
 const MAP: &str = "map";
@@ -79,7 +82,7 @@ fn mend(ask: &Check, folder: &Folder, command: &str, findings: &[Finding]) -> Re
             command.escape_debug()
         )));
     }
-    folder.refuse_links(output::map::names())?;
+    folder.refuse_links(store::map::names())?;
     let part = Manifest::read_part(dir)?;
     if let Some(shard) = part.shard() {
         return Err(Failure::Run(anyhow!(

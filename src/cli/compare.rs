@@ -6,17 +6,19 @@ use std::time::Instant;
 use anyhow::anyhow;
 
 use super::arguments::{Compare, FigureFormat};
-use super::error::Failure;
-use super::finished_map::{self, Manifest};
 use super::interrupt::Interrupt;
 use super::say;
-use crate::map::coexistence;
-use crate::map::compare::{Comparison, Kind, Side, Tally, compare};
+use crate::findings::coexistence;
+use crate::findings::compare::{Comparison, Kind, Side, Tally, compare};
+use crate::job::error::Failure;
+use crate::job::finished_map::{self, Manifest};
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
-use crate::output::compare::{Compared, MapSide};
-use crate::output::map::Made;
-use crate::output::{self, Cells, Folder, Survey};
+use crate::show::cells::{Cells, Survey};
+use crate::store;
+use crate::store::compare::{Compared, MapSide};
+use crate::store::folder::Folder;
+use crate::store::map::Made;
 
 /// Reads both, compares, writes.
 pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
@@ -35,7 +37,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
     let out = ask.out(&names);
     refuse_own_folder(&out, dirs)?;
     let folder = Folder::open(&out, ask.force)?;
-    folder.refuse_links(output::compare::names())?;
+    folder.refuse_links(store::compare::names())?;
     let plans = [finished[0].plan()?, finished[1].plan()?];
     interrupt.wait_for(Some("the maps are read"));
     let [(a, refined_a), (b, refined_b)] = [finished[0].records(&plans[0])?, finished[1].records(&plans[1])?];
@@ -74,13 +76,13 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
     if interrupt.is_raised() {
         return Err(stopped());
     }
-    let files = output::compare::write(&folder, &compared, &formats, clock.elapsed())?;
+    let files = store::compare::write(&folder, &compared, &formats, clock.elapsed())?;
     if !ask.quiet {
         let files = format!("{}: {}", say::path(folder.path()), files.join(", "));
         say::notes(format_args!("{}\n{files}", summary(&compared, scenes[0])));
     }
     if ask.json {
-        output::compare::print(folder.path(), &files, &compared)?;
+        store::compare::print(folder.path(), &files, &compared)?;
     }
     match comparison.differing() {
         differing if ask.fail && differing > 0 => Err(Failure::Run(anyhow!(

@@ -1,13 +1,15 @@
 //! `rattlemap devices`: what there is to compute on, and what a map would take.
 
 use crate::gpu::{self, AdapterChoice, AdapterReport};
-use crate::map::engine_choice::{self, Ask};
+use crate::job::engine_choice::{self, Ask};
 use crate::map::plan::Plan;
 use crate::map::scene::{Purpose, Scene};
-use crate::output::{OutputError, print};
+use crate::store::error::OutputError;
+use crate::store::stdout::print;
 
-use crate::cli::error::Failure;
-use crate::cli::{processor, say};
+use crate::cli::say;
+use crate::job::error::Failure;
+use crate::job::processor;
 
 /// What engines are tried on.
 const MAIN_MAP: &str = include_str!("../../scenes/e_omega.toml");

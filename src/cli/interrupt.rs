@@ -7,8 +7,8 @@ use anyhow::Context;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::low_level;
 
-use crate::cli::error::{Failure, SIGNALLED};
 use crate::cli::say;
+use crate::job::error::{Failure, SIGNALLED};
 
 /// How soon a signal is heard where the system does not tell of it.
 #[cfg(not(unix))]

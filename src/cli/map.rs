@@ -1,7 +1,6 @@
 //! `rattlemap map`: a scene into a folder, resumable at every batch.
 
 mod dry_run;
-mod forecast;
 mod resume_command;
 mod shard;
 mod stopped;
@@ -10,26 +9,29 @@ mod summary;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::map::effect;
+use crate::findings::effect;
+use crate::job::engine_choice::{self, Ask, Chosen};
+use crate::job::kept::{self, Kept, Work};
 use crate::map::engine::{Engine, Loss};
-use crate::map::engine_choice::{self, Ask, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::{Scene, Steps};
 use crate::map::sweep::{self, SweepError};
-use crate::output::kept::{self, Kept, Work};
-use crate::output::map::{LIST, Made, Run};
-use crate::output::{self, Cells, Folder, Survey};
 use crate::record::Record;
 use crate::record::classify::status;
+use crate::show::cells::{Cells, Survey};
+use crate::store;
+use crate::store::folder::Folder;
+use crate::store::map::{LIST, Made, Run};
 use anyhow::anyhow;
 use rattlemap_dynamics::orbit::{Class, Status};
 
 use crate::cli::arguments::Map;
-use crate::cli::capacity;
-use crate::cli::error::{Failure, fail_if};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
-use crate::cli::{processor, say, scene_file};
+use crate::cli::say;
+use crate::job::capacity;
+use crate::job::error::{Failure, fail_if};
+use crate::job::{processor, scene_file};
 pub use shard::open_engine;
 use summary::summary;
 
@@ -109,7 +111,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         ..Run::new(made, &ask.run.set, &processor).on(&engine)
     };
     let written = Instant::now();
-    let files = output::map::write(&folder, &cells, &run)?;
+    let files = store::map::write(&folder, &cells, &run)?;
     let writing = written.elapsed();
     let every = if plan.refine().is_some() { "every cell that was integrated" } else { "every cell" };
     let idle = run.without_effect.iter().map(|name| {
@@ -123,7 +125,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         files.join(", ")
     ));
     if ask.json {
-        output::map_json::print(folder.path(), &files, &cells, &run, writing)?;
+        store::map_json::print(folder.path(), &files, &cells, &run, writing)?;
     }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")

@@ -6,13 +6,15 @@ use std::sync::atomic::Ordering;
 use anyhow::anyhow;
 
 use super::arguments::Merge;
-use super::capacity;
-use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
 use super::progress;
 use super::say;
-use crate::output::merge::{MergeError, Merged, Parts, Progress};
-use crate::output::{self, Folder, RecordFileError};
+use crate::job::capacity;
+use crate::job::error::{Failure, fail_if};
+use crate::store;
+use crate::store::folder::Folder;
+use crate::store::merge::{MergeError, Merged, Parts, Progress};
+use crate::store::record_file::RecordFileError;
 
 /// Looks at all shards, gathers their records, writes the map.
 pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
@@ -22,7 +24,7 @@ pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
     capacity::fits_merged(parts.scene(), Some(&ask.out))?;
     // A run that ended before it kept anything has left nothing else.
     let folder = Folder::open(&ask.out, ask.force || !Folder::holds_results(&ask.out))?;
-    folder.refuse_links(output::map::names())?;
+    folder.refuse_links(store::map::names())?;
     let (shards, out) = (parts.count(), ask.out.display());
     let progress = progress::Progress::new(parts.scene().run_count().max(1) as usize, 0, "runs", ask.quiet);
     let go_on = |Progress { done, of }| {
@@ -42,8 +44,8 @@ pub(crate) fn run(ask: &Merge) -> Result<(), Failure> {
     }
     progress.finish(&told(&merged, shards, runs, folder.path()));
     if ask.json {
-        let text = serde_json::to_string_pretty(&merged.object).map_err(output::OutputError::from)?;
-        output::print(&text)?;
+        let text = serde_json::to_string_pretty(&merged.object).map_err(store::error::OutputError::from)?;
+        store::stdout::print(&text)?;
     }
     let [periodic, chaotic, undecided, failed] = merged.classes;
     let all_failed = failed > 0 && periodic + chaotic + undecided == 0;

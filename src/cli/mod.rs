@@ -1,26 +1,20 @@
 //! The commands, each a pipeline: ask, check, compute, write.
 
-mod arguments;
+pub(crate) mod arguments;
 pub mod bench;
 mod bifurcation;
-mod capacity;
 mod check;
 mod compare;
 mod completions;
 mod devices;
 mod environment;
-mod error;
-mod finished_map;
 mod interrupt;
 mod map;
 mod merge;
-mod model_choice;
 mod models;
 mod orbit;
-mod processor;
 mod progress;
-mod say;
-mod scene_file;
+pub(crate) mod say;
 mod validate;
 
 use std::ffi::OsString;
@@ -29,15 +23,10 @@ use std::process::ExitCode;
 use arguments::{Bench, Cli, Command, parsed_from};
 
 pub use arguments::parsed;
-pub use capacity::{fits, fits_merged};
 pub use environment::missing_variable;
-pub use error::{Failure, fail_if};
 pub use map::open_engine;
-pub use model_choice::{check_components, find as find_model};
-pub use processor::{MISFIT, cores, described as described_processor, is_fit, name as processor_name};
 pub use progress::Progress;
 pub use say::note;
-pub use scene_file::load_along as load_scene;
 
 /// Runs the command that the process was started with, and says how it ended.
 pub fn run() -> ExitCode {

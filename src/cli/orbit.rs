@@ -8,12 +8,14 @@ use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
 use super::arguments::{FigureFormat, Orbit};
-use super::error::{Failure, fail_if};
 use super::interrupt::Interrupt;
-use super::{model_choice, say};
+use crate::cli::say;
+use crate::job::error::{Failure, fail_if};
+use crate::job::model_choice;
 use crate::map::scene;
-use crate::output::orbit::{Asked, Instant as At};
-use crate::output::{self, Folder};
+use crate::store;
+use crate::store::folder::Folder;
+use crate::store::orbit::{Asked, Instant as At};
 
 pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     let model = model_choice::find(&ask.model)?;
@@ -26,7 +28,7 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     let interrupt = Interrupt::listen(true)?;
     let folder = ask.out.as_ref().map(|dir| Folder::open(dir, ask.force)).transpose()?;
     if let Some(folder) = &folder {
-        folder.refuse_links(output::orbit::names())?;
+        folder.refuse_links(store::orbit::names())?;
     }
     let clock = Instant::now();
     let (start, settings) = (ask.start(), ask.settings());
@@ -37,11 +39,10 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     let (shown, halt) = (orbit::SHOWN_PERIODS, interrupt.raised());
     let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(interrupted)?;
     let asked = Asked { start, settings, elapsed: clock.elapsed(), instant };
-    output::orbit::print(&*model, &orbit, &asked, ask.json)?;
+    store::orbit::print(&*model, &orbit, &asked, ask.json)?;
     let failed = orbit.class == Class::Failed;
     if let Some(folder) = folder {
-        let files =
-            output::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;
+        let files = store::orbit::write(&folder, &*model, &orbit, &asked, &FigureFormat::scene(&ask.format))?;
         say::notes(format_args!("{}: {}", say::path(folder.path()), files.join(", ")));
     }
     fail_if(failed, "the integration failed; `status` says why")

@@ -7,21 +7,23 @@ use std::time::Instant;
 
 use crate::gpu::{self, AdapterChoice, Gpu, Precision};
 use crate::map::plan::Plan;
-use crate::output::Survey;
-use crate::output::inventory::Finding;
-use crate::output::map::{MANIFEST, Made, write_validation};
-use crate::output::{self, Cells, Folder};
+use crate::show::cells::Cells;
+use crate::show::cells::Survey;
+use crate::store;
+use crate::store::folder::Folder;
+use crate::store::inventory::Finding;
+use crate::store::map::{MANIFEST, Made, write_validation};
 use crate::validate::{
     self, HORIZON, HalfMesh, Judge, Kind, Lanes, Sample, StratumResult, Subject, Validation,
 };
 use anyhow::{Context, anyhow};
 
 use crate::cli::arguments::Validate;
-use crate::cli::error::Failure;
-use crate::cli::finished_map::{self, Manifest};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::say;
+use crate::job::error::Failure;
+use crate::job::finished_map::{self, Manifest};
 
 /// Reads, replays, writes.
 pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
@@ -31,7 +33,7 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
     finished_map::require_folder(dir)?;
     // From here on: what is read must not be another map's by the time that something is written.
     let folder = Folder::open(dir, true)?;
-    folder.refuse_links(output::map::names())?;
+    folder.refuse_links(store::map::names())?;
     let manifest = Manifest::read(dir)?;
     let findings = finished_map::check_files(dir, &manifest.files, ask.quiet)?;
     let finished = manifest.scene(dir)?;

@@ -1,9 +1,5 @@
 //! Section points and the motion's class against one parameter, as in Fig. 5 of the paper.
 
-mod hysteresis;
-
-pub use hysteresis::{Hysteresis, hysteresis};
-
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::finite::not_finite;
+use crate::findings::attractors::{Basins, NONE};
 use crate::gpu::Precision;
-use crate::map::attractors::{Basins, NONE};
 use crate::record::classify::{classify, status};
 use crate::record::distance::{apart, is_within};
 use crate::record::{Record, Spelling, valid};

@@ -36,8 +36,8 @@ pub use rate::{Rate, TOLERATED};
 pub use sample::{Draw, Sample, Stratum, sample};
 pub use states::{HORIZON, Off, StateCheck};
 
+use crate::findings::attractors::Basins;
 use crate::gpu::Precision;
-use crate::map::attractors::Basins;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::{Record, valid};

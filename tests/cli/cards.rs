@@ -10,7 +10,7 @@ use std::process::{Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
-use rattlemap::output::{Identity, Order, RecordFile};
+use rattlemap::store::record_file::{Identity, Order, RecordFile};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use rattlemap::output::{Identity, Order, RecordFile, inventory};
 use rattlemap::record::Record;
+use rattlemap::store::inventory;
+use rattlemap::store::record_file::{Identity, Order, RecordFile};
 use tempfile::TempDir;
 
 use crate::common::{rattlemap, rows, says};

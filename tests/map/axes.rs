@@ -1,9 +1,10 @@
 //! Logarithmic and listed axes, derived parameters, lists of cells: every cell is the oscillator that they say.
 
-use rattlemap::map::effect::{ROUNDING, without_effect};
+use rattlemap::findings::effect::{ROUNDING, without_effect};
+use rattlemap::job;
+use rattlemap::job::run::Processor;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene, SceneBuilder};
-use rattlemap::map::{self, Processor};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, REST};
 use rattlemap_dynamics::orbit::{Class, Settings, analyse};
@@ -34,7 +35,7 @@ fn coupled() -> SceneBuilder {
 #[test]
 fn cells_of_unequal_steps_are_what_single_orbits_are() {
     let scene = coupled().build().unwrap();
-    let map = map::run(&scene, Processor::Cpu).unwrap();
+    let map = job::run(&scene, Processor::Cpu).unwrap();
     let mut decided = 0;
     for cell in map.cells() {
         let (k1, force) = (cell.values[0], cell.values[1]);
@@ -61,7 +62,7 @@ fn cells_of_unequal_steps_are_what_single_orbits_are() {
 /// What stands beside a cell changes nothing of it: the same cells, listed in another order, twice.
 #[test]
 fn cells_of_a_list_are_those_of_the_grid_to_the_bit() {
-    let grid = map::run(&coupled().build().unwrap(), Processor::Cpu).unwrap();
+    let grid = job::run(&coupled().build().unwrap(), Processor::Cpu).unwrap();
     let mut order: Vec<usize> = (0..30).map(|n| n * 7 % 30).collect();
     order.push(4);
     let values: Vec<[f64; 2]> = order
@@ -77,7 +78,7 @@ fn cells_of_a_list_are_those_of_the_grid_to_the_bit() {
         .cells(["F", "k1"], &values)
         .build()
         .unwrap();
-    let list = map::run(&scene, Processor::Cpu).unwrap();
+    let list = job::run(&scene, Processor::Cpu).unwrap();
     assert_eq!(list.counts(), [31, 1]);
     assert!(order.iter().enumerate().all(|(row, &id)| list.records()[row] == grid.records()[id]));
     assert!(list.cells().zip(&values).all(|(cell, values)| cell.values == values));
@@ -91,7 +92,7 @@ fn parameters_of_teeth_that_do_not_meet_have_no_effect() {
     let map_of = |e: f64, forces: std::ops::RangeInclusive<f64>| {
         let scene =
             built().parameter("e", e).log_axis("k", 100.0..=10000.0, 4).axis("F", forces, 5).build().unwrap();
-        let map = map::run(&scene, Processor::Cpu).unwrap();
+        let map = job::run(&scene, Processor::Cpu).unwrap();
         let named = without_effect(map.plan(), map.records(), ROUNDING[1]);
         named.iter().map(|parameter| parameter.name.to_string()).collect::<Vec<_>>()
     };

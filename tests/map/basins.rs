@@ -6,20 +6,21 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use crate::common::gpu;
+use rattlemap::findings::attractors::{self, Attractor, Basins, NONE};
 use rattlemap::gpu::Precision;
-use rattlemap::map::attractors::{self, Attractor, Basins, NONE};
+use rattlemap::job;
+use rattlemap::job::run::Processor;
 use rattlemap::map::engine::{Cpu, Engine};
 use rattlemap::map::plan::Plan;
 use rattlemap::map::random::Random;
 use rattlemap::map::scene::{Quantity, Refine, Scene, SceneBuilder, Start};
 use rattlemap::map::schedule::{Refined, Schedule};
-use rattlemap::map::{self, Processor};
 use rattlemap::record::{Record, valid};
 use rattlemap_dynamics::model::{GearPair, State, Stops};
 use rattlemap_dynamics::orbit::Class;
 
 fn basins(scene: &Scene) -> Basins {
-    let map = map::run(scene, Processor::Cpu).unwrap();
+    let map = job::run(scene, Processor::Cpu).unwrap();
     map.basins().expect("a map of basins")
 }
 
@@ -169,7 +170,7 @@ fn refined_scene() -> Scene {
 /// Every cell of that map, integrated.
 static WHOLE: LazyLock<Vec<Record>> = LazyLock::new(|| {
     let scene = gears(coexisting(), SIDE).build().unwrap();
-    map::run(&scene, Processor::Cpu).unwrap().records().to_vec()
+    job::run(&scene, Processor::Cpu).unwrap().records().to_vec()
 });
 
 /// The adaptive map of these cells where they come in the order that `next` says.
@@ -238,7 +239,7 @@ fn lanes_label_as_the_reference_does() {
     const SIDE: usize = 32;
     let scene = gears(coexisting(), SIDE as u32).build().unwrap();
     let plan = Plan::new(&scene);
-    let reference = map::run(&scene, Processor::Cpu).unwrap();
+    let reference = job::run(&scene, Processor::Cpu).unwrap();
     let truth = reference.basins().unwrap();
     for precision in Precision::ALL {
         let cells = plan.cells(0..plan.cell_count());
@@ -303,7 +304,7 @@ fn attractors_are_followed_along_a_parameter() {
 fn what_sweeps_no_start_has_no_basins() {
     let scene =
         Scene::builder(rattling()).axis("F", 0.5..=1.5, 3).axis("omega", 1.0..=3.0, 3).build().unwrap();
-    let map = map::run(&scene, Processor::Cpu).unwrap();
+    let map = job::run(&scene, Processor::Cpu).unwrap();
     assert!(map.basins().is_none());
     let plan = Plan::new(&scene);
     let mut engine = Engine::Cpu(Cpu::new(&plan));

@@ -1,7 +1,8 @@
 //! Maps of another model than the gear pair.
 
+use rattlemap::job;
+use rattlemap::job::run::Processor;
 use rattlemap::map::scene::{Quantity, Scene, Start};
-use rattlemap::map::{self, Processor};
 use rattlemap::record::valid;
 use rattlemap_dynamics::model::Stops;
 use rattlemap_dynamics::orbit::Class;
@@ -35,7 +36,7 @@ fn a_map_of_stops_has_the_impacts_of_the_closed_form() {
         .build()
         .unwrap();
     assert_eq!(scene.title(), "Oscillator between stops: half distance of the stops x excitation frequency");
-    let map = map::run(&scene, Processor::Cpu).unwrap();
+    let map = job::run(&scene, Processor::Cpu).unwrap();
     assert_eq!((map.counts(), map.cells().len()), ([4, 4], 16));
     for cell in map.cells() {
         let (b, omega) = (cell.values[0], cell.values[1]);

@@ -9,9 +9,9 @@ use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
 use rattlemap::map::scene::Format;
 use rattlemap::model_file::FileModel;
-use rattlemap::output::bifurcation_figure::{self, Shown};
-use rattlemap::output::orbit_figures;
-use rattlemap::output::plot_style::axes::Scale;
+use rattlemap::show::drawing::axes::Scale;
+use rattlemap::show::figure;
+use rattlemap::show::figure::bifurcation::Shown;
 use rattlemap_dynamics::model::{GearPair, Model, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, Event, EventKind, Orbit, Sample, Settings, Status};
 use rattlemap_dynamics::word::Word;
@@ -111,7 +111,7 @@ fn orbit_figures_show_motion_meshing_and_events() {
     let dir = tempfile::tempdir().unwrap();
     let (orbit, trace) = meshing_orbit();
     let files =
-        orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &[Format::Png]).unwrap();
+        figure::orbit::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &[Format::Png]).unwrap();
     let names: Vec<_> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect();
     assert_eq!(names, ["phase_plane.png", "time_history.png", "gap.png"]);
     for file in &files {
@@ -151,7 +151,7 @@ fn motion_without_contact_without_data_or_without_numbers_is_drawn() {
     ] {
         let orbit = Orbit { class, lyapunov: f64::NAN, ..orbit(vec![]) };
         let files =
-            orbit_figures::write(dir.path(), &GearPair::paper(0.5), &orbit, trace, &[Format::Png]).unwrap();
+            figure::orbit::write(dir.path(), &GearPair::paper(0.5), &orbit, trace, &[Format::Png]).unwrap();
         files.iter().for_each(|file| assert!(distinct_colors(&read(file)) > 10, "{}", file.display()));
     }
 }
@@ -164,7 +164,7 @@ fn drawn(name: &str, values: &[(&str, f64)]) -> [String; 3] {
     assert!(matches!(orbit.class, Class::Periodic { .. }), "{name} {values:?}: {:?}", orbit.class);
     let trace = orbit::trace(&model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, 100).unwrap();
     let dir = tempfile::tempdir().unwrap();
-    let files = orbit_figures::write(dir.path(), &model, &orbit, &trace, &[Format::Svg]).unwrap();
+    let files = figure::orbit::write(dir.path(), &model, &orbit, &trace, &[Format::Svg]).unwrap();
     let files: Vec<String> = files.iter().map(|file| fs::read_to_string(file).unwrap()).collect();
     assert!(files.iter().all(|svg| !svg.contains("NaN") && !svg.contains("inf")), "{name}");
     files.try_into().unwrap()
@@ -230,7 +230,7 @@ fn figures_in_svg_and_pdf_have_lines_and_text() {
         let dir = tempfile::tempdir().unwrap();
         let formats = [Format::Svg, Format::Pdf];
         let files =
-            orbit_figures::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &formats).unwrap();
+            figure::orbit::write(dir.path(), &GearPair::paper(0.06), &orbit, &trace, &formats).unwrap();
         files.iter().map(|file| fs::read(file).unwrap()).collect::<Vec<_>>()
     };
     let files = written();
@@ -261,7 +261,7 @@ fn titles_stay_text_in_svg() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.svg");
     let title = "a < b && \"c\" </text><script>\u{7}\u{2028}10\u{207b}\u{b2}";
-    bifurcation_figure::write(&path, [title, "second\nthird"], E, &pair(), &columns(9, 3)).unwrap();
+    figure::bifurcation::write(&path, [title, "second\nthird"], E, &pair(), &columns(9, 3)).unwrap();
     let svg = fs::read_to_string(path).unwrap();
     let expected = "a &lt; b &amp;&amp; \"c\" &lt;/text&gt;&lt;script&gt; \u{2028}10<tspan dy=";
     assert!(svg.contains(expected) && !svg.contains("<script"), "{svg:.600}");
@@ -276,7 +276,7 @@ fn titles_stay_text_in_svg() {
 fn characters_that_the_typeface_lacks_are_no_others_in_pdf() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("b.pdf");
-    bifurcation_figure::write(&path, ["\u{65e5}\u{672c}", "second"], E, &pair(), &columns(9, 3)).unwrap();
+    figure::bifurcation::write(&path, ["\u{65e5}\u{672c}", "second"], E, &pair(), &columns(9, 3)).unwrap();
     let map = String::from_utf8(stream(&fs::read(path).unwrap(), "/Type /CMap")).unwrap().to_uppercase();
     assert!(map.contains("<0073>") && !map.contains("<65E5>") && !map.contains("<672C>"), "{map}");
 }
@@ -322,7 +322,7 @@ fn lower_panel(picture: &RgbImage) -> RgbImage {
 fn bifurcation_figure_shows_both_walls() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("bifurcation.png");
-    bifurcation_figure::write(&path, ["Bifurcation", "from rest"], E, &pair(), &columns(1000, 200)).unwrap();
+    figure::bifurcation::write(&path, ["Bifurcation", "from rest"], E, &pair(), &columns(1000, 200)).unwrap();
     let picture = read(&path);
     assert_eq!(picture.dimensions(), (1600, 1750));
     assert!(ink(&picture) > 5000, "{}", ink(&picture));
@@ -338,7 +338,7 @@ fn the_panel_of_exponents_tells_chaos_from_cycles_and_has_a_band() {
     let drawn = |columns: &[Column]| {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("b.png");
-        bifurcation_figure::write(&path, [""; 2], E, &pair(), columns).unwrap();
+        figure::bifurcation::write(&path, [""; 2], E, &pair(), columns).unwrap();
         lower_panel(&read(&path))
     };
     let chaos = columns(40, 2);
@@ -375,7 +375,7 @@ fn two_passes_are_told_apart_by_colour_and_grey_where_they_agree() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("b.png");
         let both: Vec<Column> = pass(Direction::Up, 0.3).chain(pass(Direction::Down, lyapunov)).collect();
-        bifurcation_figure::write(&path, [""; 2], E, &pair(), &both).unwrap();
+        figure::bifurcation::write(&path, [""; 2], E, &pair(), &both).unwrap();
         read(&path)
     };
     let [apart, same] = [0.1, 0.3].map(drawn);
@@ -397,7 +397,7 @@ fn a_logarithmic_axis_has_its_decades() {
         .collect();
     let ticks = |scale| {
         let path = dir.path().join("b.svg");
-        bifurcation_figure::write(&path, [""; 2], ("k", scale), &pair(), &decades).unwrap();
+        figure::bifurcation::write(&path, [""; 2], ("k", scale), &pair(), &decades).unwrap();
         let svg = fs::read_to_string(path).unwrap();
         // A linear axis to 10,000 has a tick at 1000, too.
         ["10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
@@ -417,7 +417,7 @@ fn a_constant_has_short_labels_and_a_whole_axis_name() {
         };
         let mut columns = columns(9, 2);
         columns.iter_mut().for_each(|column| point(column, value));
-        bifurcation_figure::write(&path, [""; 2], E, &pair(), &columns).unwrap();
+        figure::bifurcation::write(&path, [""; 2], E, &pair(), &columns).unwrap();
         fs::read_to_string(&path).unwrap()
     };
     for (value, label) in [(0.2, "0.20"), (0.0, "0.0"), (3e-8, "3.0\u{b7}10"), (4e7, "4.0\u{b7}10")] {
@@ -445,7 +445,7 @@ fn bifurcation_figure_survives_poor_data() {
         ("wild", &long, wild),
     ] {
         let path = dir.path().join(format!("{name}.png"));
-        bifurcation_figure::write(&path, [title, ""], E, &pair(), &columns).unwrap();
+        figure::bifurcation::write(&path, [title, ""], E, &pair(), &columns).unwrap();
         assert_eq!(read(&path).width(), 1600);
     }
 }
@@ -453,10 +453,10 @@ fn bifurcation_figure_survives_poor_data() {
 #[test]
 fn a_file_that_cannot_be_written_is_named() {
     let dir = tempfile::tempdir().unwrap().path().join("absent");
-    let error = bifurcation_figure::write(&dir.join("b.png"), ["", ""], E, &pair(), &[]).unwrap_err();
+    let error = figure::bifurcation::write(&dir.join("b.png"), ["", ""], E, &pair(), &[]).unwrap_err();
     assert!(format!("{error:#}").contains("b.png"), "{error:#}");
     let (orbit, trace) = meshing_orbit();
     let error =
-        orbit_figures::write(&dir, &GearPair::paper(0.5), &orbit, &trace, &[Format::Png]).unwrap_err();
+        figure::orbit::write(&dir, &GearPair::paper(0.5), &orbit, &trace, &[Format::Png]).unwrap_err();
     assert!(format!("{error:#}").contains("phase_plane.png"), "{error:#}");
 }

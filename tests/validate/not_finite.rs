@@ -8,8 +8,8 @@ use assert_cmd::Command;
 use rattlemap::gpu::Precision;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Purpose, Scene};
-use rattlemap::output::{Identity, Order, RECORDS, RecordFile};
 use rattlemap::record::{Record, valid};
+use rattlemap::store::record_file::{Identity, Order, RECORDS, RecordFile};
 use rattlemap::validate::{Lanes, Subject, replay};
 
 const SCENE: &str = r#"[[axis]]

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Context;
-use rattlemap::cli::{Failure, note};
-use rattlemap::output::RECORDS;
+use rattlemap::cli::note;
+use rattlemap::job::error::Failure;
+use rattlemap::store::record_file::RECORDS;
 use rattlemap_bench::scale::{self, Ask, Size, Taken};
 use serde::Serialize;
 
@@ -24,7 +25,7 @@ pub(crate) fn run(ask: &Scale) -> Result<(), Failure> {
     };
     let dir = ask.run.out("scale");
     let cells: u64 = measured.counts.iter().map(|&count| u64::from(count)).product();
-    let outer = rattlemap::output::Folder::open(&dir, ask.run.force)?;
+    let outer = rattlemap::store::folder::Folder::open(&dir, ask.run.force)?;
     let (shards, mut taken) = scale::write_shards(measured, &dir).context("the shards")?;
     let (mut rounds, out) = (Vec::new(), dir.join("map"));
     let mut files = Vec::new();

@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use anyhow::{Context, anyhow};
 use rattlemap::gpu::AdapterChoice;
-use rattlemap::output::Folder;
+use rattlemap::store::folder::Folder;
 use rattlemap_bench::stress::{self, Lanes, Part, Size, Verdict, Watch, output};
 
 use crate::arguments::Stress;
-use rattlemap::cli::Failure;
 use rattlemap::cli::Progress;
 use rattlemap::cli::note;
+use rattlemap::job::error::Failure;
 
 /// Decides every random cell: whoever runs this meets the same ones.
 const SEED: u64 = 1;

@@ -1,7 +1,7 @@
 //! `work-precision`: cells, methods in turns, files, ratios.
 
 use anyhow::Context;
-use rattlemap::output::Folder;
+use rattlemap::store::folder::Folder;
 use rattlemap_bench::work_precision::cells::subjects;
 use rattlemap_bench::work_precision::measure::{Curve, Method, ONE_CORE, Thoroughness, measure};
 use rattlemap_bench::work_precision::output::{FILES, Run, write};
@@ -10,8 +10,8 @@ use rattlemap_bench::work_precision::ratio::sentences;
 
 use crate::arguments::WorkPrecision;
 use rattlemap::cli::Progress;
-use rattlemap::cli::{Failure, fail_if};
-use rattlemap::cli::{cores, processor_name};
+use rattlemap::job::error::{Failure, fail_if};
+use rattlemap::job::processor::{cores, name};
 
 /// Cells of every kind.
 const CELLS: usize = 5;
@@ -46,7 +46,7 @@ pub(crate) fn run(ask: &WorkPrecision) -> Result<(), Failure> {
     let left_out: Vec<&str> = methods.iter().filter(|m| !measured(m)).map(|m| m.name()).collect();
     let adapter = ours.iter().find(|point| point.device != ONE_CORE);
     let run = Run {
-        processor: &processor_name().unwrap_or_else(|| "processor".to_owned()),
+        processor: &name().unwrap_or_else(|| "processor".to_owned()),
         cores: cores(),
         adapter: adapter.map_or("no device", |point| &point.device),
         rounds: how.rounds,

@@ -1,6 +1,6 @@
 //! A small map, stretched.
 
-use rattlemap::map::Map;
+use rattlemap::job::run::Map;
 use rattlemap::record::Record;
 
 /// Numbers differ from those of the small map by this much of themselves: no more than the first digit is left.

@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use super::{EngineName, grazing, grid, long_runs, stiffness};
-use rattlemap::output::plot_style::axes::{Axis, Frame};
-use rattlemap::output::plot_style::legend::{Entry, Key, draw_head};
-use rattlemap::output::plot_style::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
-use rattlemap::output::{DrawError, FigureError};
+use rattlemap::show::drawing::axes::{Axis, Frame};
+use rattlemap::show::drawing::legend::{Entry, Key, draw_head};
+use rattlemap::show::drawing::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
+use rattlemap::show::error::{DrawError, FigureError};
 
 const SIZE: (u32, u32) = (1500, 1150);
 const LEFT: f64 = 160.0;

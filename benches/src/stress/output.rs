@@ -6,9 +6,11 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::{Report, Verdict, figures, fuzz};
-use rattlemap::output::inventory::{self, FileEntry};
-use rattlemap::output::manifest::{Head, MANIFEST};
-use rattlemap::output::{Folder, OutputError, WriteError};
+use rattlemap::show::error::WriteError;
+use rattlemap::store::error::OutputError;
+use rattlemap::store::folder::Folder;
+use rattlemap::store::inventory::{self, FileEntry};
+use rattlemap::store::manifest::{Head, MANIFEST};
 use rattlemap_dynamics::model::{GearPair, Model};
 
 /// All that a folder may hold: what an earlier run left goes before anything is written.

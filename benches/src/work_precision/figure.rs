@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::points::Point;
-use rattlemap::output::plot_style::axes::{Axis, Frame};
-use rattlemap::output::plot_style::labels::Labels;
-use rattlemap::output::plot_style::legend::{Entry, Key, draw_head};
-use rattlemap::output::plot_style::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
-use rattlemap::output::{DrawError, FigureError};
+use rattlemap::show::drawing::axes::{Axis, Frame};
+use rattlemap::show::drawing::labels::Labels;
+use rattlemap::show::drawing::legend::{Entry, Key, draw_head};
+use rattlemap::show::drawing::{Canvas, DARK, FAINT, Marker, RGBColor, Shape, save_figure};
+use rattlemap::show::error::{DrawError, FigureError};
 
 const SIZE: (u32, u32) = (1500, 1280);
 const LEFT: f64 = 160.0;

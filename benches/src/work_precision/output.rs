@@ -9,11 +9,13 @@ use super::cells::Subject;
 use super::figure::{self, Shown};
 use super::measure::Curve;
 use super::points::{self, Point};
-use rattlemap::output::inventory::{self, FileEntry};
-use rattlemap::output::manifest::{Head, MANIFEST};
-use rattlemap::output::parameters::Parameters;
-use rattlemap::output::{Folder, OutputError, WriteError};
 use rattlemap::record::distance::farther;
+use rattlemap::show::error::WriteError;
+use rattlemap::show::parameters::Parameters;
+use rattlemap::store::error::OutputError;
+use rattlemap::store::folder::Folder;
+use rattlemap::store::inventory::{self, FileEntry};
+use rattlemap::store::manifest::{Head, MANIFEST};
 use rattlemap_dynamics::model::State;
 
 const TABLE: &str = "work_precision.csv";

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use rattlemap::output::WriteError;
+use rattlemap::show::error::WriteError;
 use serde::{Deserialize, Serialize};
 
 /// A point of the work-precision diagram. Times are seconds of wall time per forcing period of

@@ -6,21 +6,24 @@ use std::time::Instant;
 use anyhow::anyhow;
 use serde_json::{Value, json};
 
-use super::forecast::Forecast;
 use super::{engine_of, shard};
 use crate::cli::arguments::Map;
-use crate::cli::capacity::{Free, bytes};
-use crate::cli::error::Failure;
-use crate::cli::{processor, say};
+use crate::cli::say;
+use crate::job::capacity::{Free, bytes};
+use crate::job::engine_choice::{self, Chosen};
+use crate::job::error::Failure;
+use crate::job::forecast::Forecast;
+use crate::job::kept;
+use crate::job::processor;
 use crate::map::engine::Engine;
-use crate::map::engine_choice::{self, Chosen};
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::map::schedule::Schedule;
 use crate::map::shard::Shard;
 use crate::map::size::Size;
-use crate::output::kept;
-use crate::output::{self, Folder, Identity, RECORDS, RecordFile, RecordFileError};
+use crate::store;
+use crate::store::folder::Folder;
+use crate::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
 
 /// What is foreseen.
 struct Foreseen<'a> {
@@ -72,11 +75,11 @@ pub(super) fn run(ask: &Map, scene: &Scene, plan: &Plan, free: Free) -> Result<(
         forecast,
     };
     let text = if ask.json {
-        serde_json::to_string_pretty(&foreseen.object(&out)).map_err(output::OutputError::from)?
+        serde_json::to_string_pretty(&foreseen.object(&out)).map_err(store::error::OutputError::from)?
     } else {
         foreseen.text(&out)
     };
-    Ok(output::print(&text)?)
+    Ok(store::stdout::print(&text)?)
 }
 
 /// Refuses a folder that a run would refuse, as far as that can be seen without making it.
@@ -84,7 +87,7 @@ fn check_folder(ask: &Map, out: &Path) -> Result<(), Failure> {
     if ask.resume && !out.join(RECORDS).is_file() && Folder::holds_results(out) {
         return Err(RecordFileError::NothingToResume { folder: out.to_owned() }.into());
     }
-    Ok(Folder::check(out, ask.run.force || ask.resume, output::map::names())?)
+    Ok(Folder::check(out, ask.run.force || ask.resume, store::map::names())?)
 }
 
 /// How many runs are kept of those that are asked for.

@@ -7,22 +7,23 @@ use anyhow::anyhow;
 
 use super::summary;
 use crate::cli::arguments::{EngineChoice, Map};
-use crate::cli::error::Failure;
-use crate::cli::finished_map::Manifest;
 use crate::cli::progress::Progress;
-use crate::cli::{processor, say};
+use crate::cli::say;
 use crate::gpu::Precision;
+use crate::job::error::Failure;
+use crate::job::finished_map::Manifest;
+use crate::job::kept::{Kept, Work, order};
+use crate::job::processor;
 use crate::map::engine::Engine;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::map::sweep;
-use crate::output::inventory::{self, Finding};
-use crate::output::kept::{Kept, Work, order};
-use crate::output::map::{Made, Run};
-use crate::output::shard::{self, Finished, Tally};
-use crate::output::{Identity, RECORDS, RecordFile};
 use crate::record::Record;
+use crate::store::inventory::{self, Finding};
+use crate::store::map::{Made, Run};
+use crate::store::record_file::{Identity, RECORDS, RecordFile};
+use crate::store::shard::{self, Finished, Tally};
 
 /// Refuses to leave the engine open: two machines could choose two, whose parts make no map.
 pub(super) fn require_engine(ask: &Map) -> Result<(), Failure> {

@@ -5,9 +5,10 @@ use anyhow::anyhow;
 use super::resume_command::{cpu_command, resume_command, same_command};
 use super::shard;
 use crate::cli::arguments::{EngineChoice, Map};
-use crate::cli::error::Failure;
+use crate::job::error::Failure;
 use crate::map::plan::Plan;
-use crate::output::{Folder, Identity, Order, RECORDS, RecordFile};
+use crate::store::folder::Folder;
+use crate::store::record_file::{Identity, Order, RECORDS, RecordFile};
 
 /// How many are kept, and the command that computes the others.
 pub(super) fn go_on(ask: &Map, plan: &Plan, done: usize) -> String {

@@ -4,12 +4,13 @@ use crate::cli::say::quoted;
 use crate::map::engine::CardReport;
 use crate::map::plan::count_classes;
 use crate::map::schedule::{Deviation, Errors, Refined};
-use crate::output::{self, Cells};
+use crate::show::cells::Cells;
+use crate::store;
 
 /// What was done, how fast, and what came out.
 pub(super) fn summary(
     cells: &Cells<'_>,
-    run: &output::map::Run<'_>,
+    run: &store::map::Run<'_>,
     lane_steps: Option<u64>,
     seconds: f64,
 ) -> String {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::label::Label;
-use crate::map::attractors::catalogue::{Catalogue, Found};
+use crate::map::catalogue::{Catalogue, Found};
 use crate::map::plan::Plan;
 use crate::record::Record;
 use rattlemap_dynamics::flow::Flow;

@@ -1,6 +1,6 @@
 //! Maps of basins: their files, and that a run which goes on gives the same bytes.
 
-use rattlemap::output::{Identity, Order, RecordFile};
+use rattlemap::store::record_file::{Identity, Order, RecordFile};
 
 use super::*;
 

@@ -1,7 +1,8 @@
 //! `rattlemap check`: what was damaged is named, and made anew where records allow.
 
-use rattlemap::output::{Identity, Order, RecordFile, inventory};
 use rattlemap::record::{Record, valid};
+use rattlemap::store::inventory;
+use rattlemap::store::record_file::{Identity, Order, RecordFile};
 
 use super::*;
 

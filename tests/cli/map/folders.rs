@@ -1,6 +1,6 @@
 //! Folders: one writer at a time, and no file through a symbolic link.
 
-use rattlemap::output::Folder;
+use rattlemap::store::folder::Folder;
 
 use super::*;
 

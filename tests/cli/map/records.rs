@@ -1,7 +1,7 @@
 //! `records.bin`: torn, damaged and foreign ones, and what is kept of them.
 
-use rattlemap::output::{Extent, Identity, Order, RecordFile};
 use rattlemap::record::Record;
+use rattlemap::store::record_file::{Extent, Identity, Order, RecordFile};
 
 use super::*;
 

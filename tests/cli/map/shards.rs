@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use rattlemap::output::merge::{MergeError, Parts};
-use rattlemap::output::{Folder, Identity, RecordFile, inventory};
+use rattlemap::store::folder::Folder;
+use rattlemap::store::inventory;
+use rattlemap::store::merge::{MergeError, Parts};
+use rattlemap::store::record_file::{Identity, RecordFile};
 
 use super::*;
 

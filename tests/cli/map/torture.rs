@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use rattlemap::map::random::Random;
-use rattlemap::output::{Damage, Identity, Order, RecordFile};
 use rattlemap::record::{Record, valid};
+use rattlemap::store::record_file::{Damage, Identity, Order, RecordFile};
 
 use super::*;
 

@@ -10,7 +10,8 @@ use paths::named;
 
 /// The library's layers, lowest first. A new folder in `src` is put in its place here. Below them all lie the
 /// modules of `rattlemap-dynamics`, a package of its own.
-const LAYERS: [&str; 8] = ["record", "gpu", "text", "model_file", "map", "validate", "output", "cli"];
+const LAYERS: [&str; 11] =
+    ["record", "gpu", "text", "model_file", "map", "findings", "validate", "show", "store", "job", "cli"];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -107,7 +108,7 @@ fn planted_arrows_are_found() {
         "use crate::{record::{Record, valid}, cli};",
         "fn f() { let plan = crate::map::plan::Plan::new(); }",
         "impl From<crate::validate::Report> for u8 {}",
-        "println!(\"{}\", crate::output::folder::NAME);",
+        "println!(\"{}\", crate::store::folder::NAME);",
         "use super::super::map::plan;",
         "mod tests { use super::super::super::map; }",
         "mod tests { fn f() {} mod deeper { use super::super::super::super::map; } }",

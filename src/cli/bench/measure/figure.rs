@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::{Engine, Point, Run, Series, Times};
 use crate::gpu::Precision;
-use crate::output::plot_style::axes::{Axis, Frame};
-use crate::output::plot_style::legend::{Entry, Key, draw_head};
-use crate::output::plot_style::{Align, Canvas, DARK, Marker, RGBColor, Rect, SMALL, Shape, save_figure};
-use crate::output::{DrawError, FigureError};
+use crate::show::drawing::axes::{Axis, Frame};
+use crate::show::drawing::legend::{Entry, Key, draw_head};
+use crate::show::drawing::{Align, Canvas, DARK, Marker, RGBColor, Rect, SMALL, Shape, save_figure};
+use crate::show::error::{DrawError, FigureError};
 
 const SIZE: (u32, u32) = (1700, 1150);
 const LEFT: f64 = 190.0;

@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::gpu::DeviceTimes;
-use crate::output::{OutputError, WriteError};
+use crate::show::error::WriteError;
+use crate::store::error::OutputError;
 use serde::Serialize;
 
 use super::check::Check;
 use super::{Point, Run, SCENE, Series, figure};
 use crate::cli::bench::statistics::Spread;
-use crate::output::Folder;
-use crate::output::inventory::{self, FileEntry};
-use crate::output::manifest::{Head, MANIFEST};
+use crate::store::folder::Folder;
+use crate::store::inventory::{self, FileEntry};
+use crate::store::manifest::{Head, MANIFEST};
 use crate::validate::Kind;
 use rattlemap_dynamics::orbit::Class;
 

@@ -11,9 +11,11 @@ use crate::gpu::{self, AdapterChoice, DeviceTimes, Precision, Stage};
 use crate::map::engine::{self, Cpu};
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
-use crate::output::{Cells, Folder, map};
 use crate::record::Record;
 use crate::record::classify::classify;
+use crate::show::cells::Cells;
+use crate::store::folder::Folder;
+use crate::store::map;
 use rattlemap_dynamics::orbit::Class;
 
 /// Most lanes handed over at a time.

@@ -1,0 +1,327 @@
+//! To which attractor does each start lead? The basins of a map whose axes sweep the start.
+//!
+//! All chaotic starts share one attractor: nothing in a record tells two chaotic attractors apart. Contact-free motion
+//! is one, however far it still is from it. Periodic starts are told apart by their cycles, which Newton's method finds
+//! on the reference (`catalogue`); symmetry-conjugate orbits are different attractors here. Undecided and failed starts
+//! belong to none.
+//!
+//! Attractors are numbered by share; equal shares by period, then by strobe state. What is found depends on the records
+//! alone: not on the order in which they came.
+//!
+//! Where one axis sweeps a parameter, every value of it has attractors of its own. An attractor goes on at the next value
+//! as the nearest cycle of the same period, if that lies within [`FOLLOWED`] of the motion's size; else it ends there, and
+//! what is left at the next value begins.
+
+use rayon::prelude::*;
+
+use crate::map::catalogue::{self, Catalogue, Found};
+use crate::map::cycle::{Seen, distance};
+use crate::map::engine::Flows;
+use crate::map::plan::Plan;
+use crate::record::classify::classify;
+use crate::record::distance::farther;
+use crate::record::{Record, Records};
+use rattlemap_dynamics::flow::Flow;
+use rattlemap_dynamics::model::{Law, State};
+use rattlemap_dynamics::orbit::{self, Class, Settings};
+use rattlemap_dynamics::word::Word;
+
+/// The label of a start that belongs to no basin.
+pub const NONE: u16 = u16::MAX;
+
+/// How far a cycle may move from one value of a parameter to the next and still be followed.
+pub const FOLLOWED: f64 = 0.25;
+
+/// What starts lead to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attractor {
+    /// Periodic or chaotic.
+    pub class: Class,
+    /// The least of its strobe states; none of chaos.
+    pub strobe: Option<State>,
+    /// The name of its cycle, where it was read.
+    pub word: Option<Word>,
+    /// The largest Lyapunov exponent: of chaos the mean over its cells.
+    pub exponent: Option<f64>,
+    /// Modulus of the largest Floquet multiplier of a cycle.
+    pub multiplier: Option<f64>,
+    /// Whether a cycle is its own mirror image.
+    pub symmetric: Option<bool>,
+    /// Cells of its basin.
+    pub cells: usize,
+    /// A cell of it: where a parameter is swept, strobe state, word, exponent, multiplier and symmetry are those there.
+    pub cell: usize,
+}
+
+/// A map of basins.
+#[derive(Clone, Debug)]
+pub struct Basins {
+    labels: Vec<u16>,
+    list: Vec<Attractor>,
+    /// By value of a swept parameter; one where there is none.
+    groups: Vec<Group>,
+    chaos: Option<u16>,
+    cut: Cut,
+}
+
+/// The cycles at one value of the parameter.
+#[derive(Clone, Debug)]
+struct Group {
+    catalogue: Catalogue,
+    labels: Vec<u16>,
+}
+
+/// How cells are grouped by the value of a swept parameter.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    counts: [usize; 2],
+    /// The axis of the parameter.
+    along: Option<usize>,
+}
+
+impl Cut {
+    fn of(plan: &Plan) -> Cut {
+        let along = plan.axes().iter().position(|axis| !axis.target().is_start());
+        Cut { counts: plan.counts(), along }
+    }
+
+    fn groups(&self) -> usize {
+        self.along.map_or(1, |axis| self.counts[axis])
+    }
+
+    fn group(&self, id: usize) -> usize {
+        self.along.map_or(0, |axis| [id % self.counts[0], id / self.counts[0]][axis])
+    }
+
+    /// Its cells, by id.
+    fn cells(&self, group: usize) -> Vec<usize> {
+        let [columns, rows] = self.counts;
+        match self.along {
+            None => (0..columns * rows).collect(),
+            Some(0) => (0..rows).map(|j| j * columns + group).collect(),
+            Some(_) => (group * columns..(group + 1) * columns).collect(),
+        }
+    }
+}
+
+/// Labels the cells of a map of basins; none of other maps. `filled_from` has for every cell the one whose record it
+/// was filled with, itself where it was integrated; empty where all were.
+///
+/// # Panics
+/// If there are not as many records as cells.
+pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32]) -> Option<Basins> {
+    if !plan.is_basin() {
+        return None;
+    }
+    assert_eq!(plan.cell_count(), records.count(), "one record per cell");
+    let cut = Cut::of(plan);
+    let is_own = |id: usize| filled_from.get(id).is_none_or(|&from| from as usize == id);
+    let flows = Flows::new(plan);
+    let groups: Vec<(Catalogue, Vec<(usize, Found)>)> = (0..cut.groups())
+        .into_par_iter()
+        .map(|group| {
+            let ids: Vec<usize> = cut.cells(group).into_iter().filter(|&id| is_own(id)).collect();
+            let cell = plan.cell(cut.cells(group)[0] as u32);
+            let learn = |flow: &Flow| catalogue::learn(flow, plan.law(cell.law), records, &ids);
+            let (catalogue, found) = flows.with(cell.flow, learn);
+            (catalogue, ids.into_iter().zip(found).collect())
+        })
+        .collect();
+    // One number for every cycle, the same where it is followed.
+    let numbers = follow(groups.iter().map(|(catalogue, _)| catalogue));
+    let cycles = numbers.iter().flatten().map(|&n| n + 1).max().unwrap_or(0);
+    let chaos = cycles;
+    let mut own = vec![None; records.count()];
+    for (group, (_, found)) in groups.iter().enumerate() {
+        for &(id, found) in found {
+            own[id] = match found {
+                Found::Cycle(nth) => Some(numbers[group][nth as usize]),
+                Found::Chaos => Some(chaos),
+                Found::Unresolved(_) | Found::Undecided | Found::Failed => None,
+            };
+        }
+    }
+    let of = |id: usize| filled_from.get(id).map_or(own[id], |&from| own[from as usize]);
+    let cells: Vec<Option<usize>> = (0..records.count()).map(of).collect();
+    let mut counts = vec![0usize; cycles + 1];
+    cells.iter().flatten().for_each(|&n| counts[n] += 1);
+    let catalogues: Vec<&Catalogue> = groups.iter().map(|(catalogue, _)| catalogue).collect();
+    let shown = Shown { plan, records, cut, flows: &flows, catalogues: &catalogues, numbers: &numbers };
+    let mut list: Vec<(usize, Attractor)> = (0..=cycles)
+        .into_par_iter()
+        .filter(|&n| counts[n] > 0)
+        .map(|n| (n, if n == chaos { shown.chaos(&own, n) } else { shown.cycle(&cells, n) }))
+        .collect();
+    list.iter_mut().for_each(|(n, attractor)| attractor.cells = counts[*n]);
+    list.sort_by(|(_, a), (_, b)| {
+        let period = |attractor: &Attractor| match attractor.class {
+            Class::Periodic { period } => period,
+            _ => u32::MAX,
+        };
+        let state = |attractor: &Attractor| attractor.strobe.unwrap_or_default();
+        let by_state = || lexicographic(&state(a), &state(b));
+        b.cells.cmp(&a.cells).then(period(a).cmp(&period(b))).then_with(by_state)
+    });
+    let mut label_of = vec![NONE; cycles + 1];
+    for (label, (n, _)) in (0..NONE).zip(&list) {
+        label_of[*n] = label;
+    }
+    list.truncate(usize::from(NONE));
+    let groups = groups.into_iter().zip(numbers).map(|((catalogue, _), numbers)| Group {
+        catalogue,
+        labels: numbers.into_iter().map(|n| label_of[n]).collect(),
+    });
+    Some(Basins {
+        labels: cells.iter().map(|n| n.map_or(NONE, |n| label_of[n])).collect(),
+        list: list.into_iter().map(|(_, attractor)| attractor).collect(),
+        groups: groups.collect(),
+        chaos: Some(label_of[chaos]).filter(|&label| label != NONE),
+        cut,
+    })
+}
+
+impl Basins {
+    /// The attractor of every cell, by id: its place in the list, or [`NONE`].
+    pub fn labels(&self) -> &[u16] {
+        &self.labels
+    }
+
+    /// The attractors, the one with the largest basin first.
+    pub fn attractors(&self) -> &[Attractor] {
+        &self.list
+    }
+
+    /// The label of the attractor that another record of the cell `id` shows. None if the record decides nothing, or
+    /// shows none of the map's attractors.
+    pub fn label(&self, id: usize, record: &Record) -> Option<u16> {
+        let group = &self.groups[self.cut.group(id)];
+        match classify(record) {
+            Class::Chaotic => self.chaos,
+            Class::Periodic { period } => {
+                let nth = group.catalogue.nearest(&record.strobe, period)?;
+                Some(group.labels[nth as usize]).filter(|&label| label != NONE)
+            }
+            Class::Undecided | Class::Failed => None,
+        }
+    }
+}
+
+/// Numbers for the cycles of each group, the same where one is followed from group to group.
+fn follow<'c>(catalogues: impl Iterator<Item = &'c Catalogue>) -> Vec<Vec<usize>> {
+    let mut numbers: Vec<Vec<usize>> = Vec::new();
+    let mut before: Option<&Catalogue> = None;
+    let mut next = 0;
+    for catalogue in catalogues {
+        let mut own = vec![None; catalogue.cycles().len()];
+        if let (Some(before), Some(theirs)) = (before, numbers.last()) {
+            let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+            for (i, a) in before.cycles().iter().enumerate() {
+                for (j, b) in catalogue.cycles().iter().enumerate() {
+                    let is_alike =
+                        a.seen.period == b.seen.period && a.seen.is_non_impacting == b.seen.is_non_impacting;
+                    let distance = if is_alike { between(&a.seen, &b.seen, b.units) } else { f64::INFINITY };
+                    if distance < FOLLOWED {
+                        pairs.push((distance, i, j));
+                    }
+                }
+            }
+            pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+            let mut is_taken = vec![false; theirs.len()];
+            for (_, i, j) in pairs {
+                if !is_taken[i] && own[j].is_none() {
+                    is_taken[i] = true;
+                    own[j] = Some(theirs[i]);
+                }
+            }
+        }
+        let fresh = |n: Option<usize>| {
+            n.unwrap_or_else(|| {
+                next += 1;
+                next - 1
+            })
+        };
+        numbers.push(own.into_iter().map(fresh).collect());
+        before = Some(catalogue);
+    }
+    numbers
+}
+
+/// How far two cycles of one period are apart, by the turn that brings them nearest.
+fn between(a: &Seen, b: &Seen, units: [f64; 2]) -> f64 {
+    let period = a.period as usize;
+    if a.points.len() < period || b.points.len() < period {
+        return f64::INFINITY;
+    }
+    let turned = |turn: usize| {
+        let apart = |k: usize| distance(units, &a.points[k], &b.points[(k + turn) % period]);
+        (0..period).map(apart).fold(0.0, farther)
+    };
+    (0..period).map(turned).fold(f64::INFINITY, f64::min)
+}
+
+fn lexicographic(a: &State, b: &State) -> std::cmp::Ordering {
+    let pairs = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
+    pairs.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+}
+
+/// What attractors are read from.
+struct Shown<'a, R: ?Sized> {
+    plan: &'a Plan,
+    records: &'a R,
+    cut: Cut,
+    flows: &'a Flows<'a>,
+    catalogues: &'a [&'a Catalogue],
+    numbers: &'a [Vec<usize>],
+}
+
+impl<R: Records + ?Sized> Shown<'_, R> {
+    /// A cycle by its number, read where its basin is largest.
+    fn cycle(&self, cells: &[Option<usize>], number: usize) -> Attractor {
+        let mut counts = vec![0usize; self.cut.groups()];
+        let of = || (0..cells.len()).filter(|&id| cells[id] == Some(number));
+        of().for_each(|id| counts[self.cut.group(id)] += 1);
+        let largest = counts.iter().copied().max().unwrap_or(0);
+        let group = counts.iter().position(|&count| count == largest).unwrap_or(0);
+        let cell = of().find(|&id| self.cut.group(id) == group).unwrap_or(0);
+        let nth = self.numbers[group].iter().position(|&n| n == number).unwrap_or(0);
+        let seen = &self.catalogues[group].cycles()[nth].seen;
+        let least = seen.points.iter().copied().min_by(lexicographic).unwrap_or(seen.last);
+        let of_cell = self.plan.cell(cell as u32);
+        let (law, settings) = (self.plan.law(of_cell.law), self.plan.budget().settings);
+        let orbit = self.flows.with(of_cell.flow, |flow| read(flow, law, least, seen.period, &settings));
+        Attractor {
+            class: Class::Periodic { period: seen.period },
+            strobe: Some(least),
+            exponent: orbit.as_ref().map(|orbit| orbit.lyapunov),
+            multiplier: orbit.as_ref().and_then(|orbit| {
+                let [re, im] = *orbit.floquet.as_ref()?.first()?;
+                Some(re.hypot(im))
+            }),
+            symmetric: orbit.as_ref().and_then(|orbit| orbit.symmetric),
+            word: orbit.map(|orbit| orbit.word),
+            cells: 0,
+            cell,
+        }
+    }
+
+    fn chaos(&self, own: &[Option<usize>], number: usize) -> Attractor {
+        let ids: Vec<usize> = (0..own.len()).filter(|&id| own[id] == Some(number)).collect();
+        let sum: f64 = ids.iter().map(|&id| self.records.record(id).lyapunov).sum();
+        Attractor {
+            class: Class::Chaotic,
+            strobe: None,
+            word: None,
+            exponent: Some(sum / ids.len() as f64).filter(|mean| mean.is_finite()),
+            multiplier: None,
+            symmetric: None,
+            cells: 0,
+            cell: ids.first().copied().unwrap_or(0),
+        }
+    }
+}
+
+/// The orbit through a state of a cycle, if it is read as what it is known to be.
+fn read(flow: &Flow, law: Law, state: State, period: u32, settings: &Settings) -> Option<orbit::Orbit> {
+    let orbit = orbit::analyse_flow(flow, law, state, settings, 0);
+    (orbit.class == Class::Periodic { period }).then_some(orbit)
+}

@@ -1,0 +1,98 @@
+//! Where do the two passes of a diagram disagree?
+
+use crate::findings::compare::{Kind, words_differ};
+use crate::map::bifurcation::{Column, Direction};
+
+/// Columns in which the motion depends on the way that the attractor was followed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hysteresis {
+    /// Values of the axis.
+    pub columns: usize,
+    /// Those at which class or period differ.
+    pub differing: usize,
+    /// Runs of neighbouring values at which they do: the first and the last value of each.
+    pub ranges: Vec<[f64; 2]>,
+    /// Values at which class and period are the same and the patterns alone differ, as where one way leads to motion
+    /// without contact and the other one to rattling. Those of an orbit and its mirror image are one.
+    pub by_pattern: usize,
+    /// Runs of neighbouring ones, as above.
+    pub pattern_ranges: Vec<[f64; 2]>,
+}
+
+/// Compares the two passes of a diagram by class and period; none if it shows one alone.
+pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
+    let pass = |direction| columns.iter().filter(move |column| column.direction == Some(direction));
+    let [up, down] = Direction::BOTH.map(pass);
+    let (mut differing, mut by_pattern) = (Runs::default(), Runs::default());
+    for (up, down) in up.zip(down) {
+        let differs = Kind::of(up.class, down.class).is_some();
+        differing.take(up.value, differs);
+        // Words count bounces before meshing, patterns do not.
+        let patterns = up.pattern().zip(down.pattern());
+        by_pattern.take(up.value, !differs && patterns.is_some_and(|(up, down)| words_differ(&up, &down)));
+    }
+    (differing.seen > 0).then_some(Hysteresis {
+        columns: differing.seen,
+        differing: differing.count,
+        ranges: differing.ranges,
+        by_pattern: by_pattern.count,
+        pattern_ranges: by_pattern.ranges,
+    })
+}
+
+/// Values at which something holds, as runs of neighbours.
+#[derive(Default)]
+struct Runs {
+    seen: usize,
+    count: usize,
+    ranges: Vec<[f64; 2]>,
+    /// Whether it held at the value before.
+    is_within: bool,
+}
+
+impl Runs {
+    fn take(&mut self, value: f64, holds: bool) {
+        match self.ranges.last_mut() {
+            Some(range) if holds && self.is_within => range[1] = value,
+            _ if holds => self.ranges.push([value; 2]),
+            _ => {}
+        }
+        self.seen += 1;
+        self.count += usize::from(holds);
+        self.is_within = holds;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::orbit::Class;
+    use rattlemap_dynamics::word::Word;
+
+    fn column(direction: Option<Direction>, value: f64, class: Class) -> Column {
+        Column { direction, ..Column::plain(value, class) }
+    }
+
+    #[test]
+    fn differing_neighbours_are_one_range() {
+        let [one, two] = [1, 2].map(|period| Class::Periodic { period });
+        let up = [one, one, two, Class::Chaotic, one, Class::Chaotic, Class::Undecided];
+        let down = [one, two, one, Class::Chaotic, one, one, Class::Undecided];
+        let pass = |direction, classes: [Class; 7]| {
+            let numbered = classes.into_iter().enumerate();
+            numbered.map(|(i, class)| column(Some(direction), i as f64, class)).collect::<Vec<_>>()
+        };
+        let mut both = [pass(Direction::Up, up), pass(Direction::Down, down)].concat();
+        let mut spell = |i: usize, word: &[u8]| both[i].word = Some(Word::cyclic(word));
+        // An impact on either side against meshing; an orbit against its mirror image; as many bounces less.
+        let cycles: [(usize, &[u8]); 4] = [(0, b"36"), (7, b"14"), (4, b"1355546"), (11, b"462213")];
+        for (i, word) in cycles {
+            spell(i, word);
+        }
+        let ranges = vec![[1.0, 2.0], [5.0, 5.0]];
+        let expected =
+            Hysteresis { columns: 7, differing: 3, ranges, by_pattern: 1, pattern_ranges: vec![[0.0, 0.0]] };
+        assert_eq!(hysteresis(&both), Some(expected));
+        assert_eq!(hysteresis(&[column(None, 0.0, one)]), None);
+    }
+}

@@ -1,0 +1,8 @@
+//! What the records of a map show together: attractors and their basins, coexistence, hysteresis, differences between
+//! two maps, and parameters without effect.
+
+pub mod attractors;
+pub mod coexistence;
+pub mod compare;
+pub mod effect;
+pub mod hysteresis;

@@ -1,0 +1,217 @@
+//! Pictures as PNG.
+
+use std::collections::HashMap;
+
+use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
+use tiny_skia::{
+    Color, FillRule, FilterQuality, IntSize, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap,
+    PixmapPaint, Rect as SkiaRect, Stroke, StrokeDash, Transform,
+};
+use ttf_parser::{GlyphId, OutlineBuilder};
+
+use crate::show::drawing::canvas::{Item, Shaped};
+use crate::show::drawing::typeface::{Glyph, beginning};
+use crate::show::drawing::{Bitmap, Canvas, DASH, PER_INCH, Point, RGBColor, Rect};
+use crate::show::error::DrawError;
+
+/// The bytes of the file.
+pub(crate) fn encoded(canvas: &Canvas<'_>) -> Result<Vec<u8>, DrawError> {
+    let (width, height) = (canvas.size.0 as u32, canvas.size.1 as u32);
+    let mut page = Pixmap::new(width, height).ok_or(DrawError::Size { width, height })?;
+    page.fill(Color::WHITE);
+    for item in canvas.items.borrow().iter() {
+        draw(&mut page, canvas, item);
+    }
+    let mut rgb = Vec::with_capacity(3 * page.pixels().len());
+    page.pixels().iter().for_each(|pixel| rgb.extend([pixel.red(), pixel.green(), pixel.blue()]));
+    drop(page);
+    bitmap(&Bitmap { size: [width as usize, height as usize], rgb, alpha: None, is_smooth: false })
+}
+
+/// The bytes of a file of these pixels alone: by their place in a palette where they have few colours.
+pub(crate) fn bitmap(bitmap: &Bitmap) -> Result<Vec<u8>, DrawError> {
+    let [width, height] = bitmap.size.map(|side| side as u32);
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, width, height);
+    encoder.set_depth(BitDepth::Eight);
+    let per_metre = (PER_INCH / 0.0254).round() as u32;
+    encoder.set_pixel_dims(Some(PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }));
+    let (color, data) = match (&bitmap.alpha, palette(&bitmap.rgb)) {
+        (Some(alpha), _) => {
+            let pixels = bitmap.rgb.chunks_exact(3).zip(alpha);
+            (ColorType::Rgba, pixels.flat_map(|(c, &a)| [c[0], c[1], c[2], a]).collect())
+        }
+        (None, Some((palette, indices))) => {
+            encoder.set_palette(palette);
+            (ColorType::Indexed, indices)
+        }
+        (None, None) => (ColorType::Rgb, bitmap.rgb.clone()),
+    };
+    encoder.set_color(color);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&data)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The colours, in the order in which they occur, and each pixel's place among them; none if they are more than 256.
+fn palette(rgb: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
+    let (mut places, mut palette) = (HashMap::new(), Vec::new());
+    let index = |pixel: &[u8]| {
+        let color = [pixel[0], pixel[1], pixel[2]];
+        let next = places.len();
+        let place = *places.entry(color).or_insert_with(|| {
+            palette.extend(color);
+            next
+        });
+        u8::try_from(place).ok()
+    };
+    let indices = rgb.chunks_exact(3).map(index).collect::<Option<Vec<u8>>>()?;
+    Some((palette, indices))
+}
+
+fn paint(RGBColor(r, g, b): RGBColor, opacity: f64) -> Paint<'static> {
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(r, g, b, (opacity * 255.0).round() as u8);
+    paint
+}
+
+fn draw(page: &mut Pixmap, canvas: &Canvas<'_>, item: &Item) {
+    let at_rest = Transform::identity();
+    // What has no extent has no path, and nothing to be seen.
+    match item {
+        Item::Area { shape, color, opacity } => {
+            if let Some(path) = outline(shape) {
+                page.fill_path(&path, &paint(*color, *opacity), FillRule::Winding, at_rest, None);
+            }
+        }
+        Item::Line { path, width, color, is_dashed } => {
+            let dash = is_dashed.then(|| StrokeDash::new(vec![DASH as f32; 2], 0.0)).flatten();
+            let stroke = Stroke {
+                width: *width as f32,
+                line_cap: LineCap::Round,
+                line_join: LineJoin::Round,
+                dash,
+                ..Stroke::default()
+            };
+            if let Some(path) = polyline(path, false) {
+                page.stroke_path(&path, &paint(*color, 1.0), &stroke, at_rest, None);
+            }
+        }
+        Item::Text { text, at, em, align, color } => {
+            let (glyphs, width) = canvas.typeface.set(text, *em);
+            let (origin, direction) = beginning(*at, width, *align);
+            let mut outlines =
+                Outlines { path: PathBuilder::new(), origin, direction, glyph: None, units: 1.0 };
+            outlines.units = f64::from(canvas.typeface.face().units_per_em());
+            for glyph in glyphs {
+                outlines.glyph = Some(glyph);
+                // A space has no outline.
+                let _ = canvas.typeface.face().outline_glyph(GlyphId(glyph.id), &mut outlines);
+            }
+            if let Some(path) = outlines.path.finish() {
+                page.fill_path(&path, &paint(*color, 1.0), FillRule::Winding, at_rest, None);
+            }
+        }
+        Item::Image { rect, bitmap } => {
+            let [columns, rows] = bitmap.size;
+            let (width, height) = (rect.right - rect.left, rect.bottom - rect.top);
+            let scale = (width / columns as f64, height / rows as f64);
+            let place = Transform::from_row(
+                scale.0 as f32,
+                0.0,
+                0.0,
+                scale.1 as f32,
+                rect.left as f32,
+                rect.top as f32,
+            );
+            let quality = if bitmap.is_smooth { FilterQuality::Bilinear } else { FilterQuality::Nearest };
+            let paint = PixmapPaint { quality, ..PixmapPaint::default() };
+            if let Some(pixels) = premultiplied(bitmap) {
+                page.draw_pixmap(0, 0, pixels.as_ref(), &paint, place, None);
+            }
+        }
+    }
+}
+
+fn premultiplied(bitmap: &Bitmap) -> Option<Pixmap> {
+    let [columns, rows] = bitmap.size.map(|side| u32::try_from(side).unwrap_or(0));
+    let over = |value: u8, alpha: u8| ((u32::from(value) * u32::from(alpha) + 127) / 255) as u8;
+    let pixels = bitmap.rgb.chunks_exact(3).enumerate();
+    let mut data = Vec::with_capacity(4 * bitmap.rgb.len() / 3);
+    pixels.for_each(|(i, c)| {
+        let alpha = bitmap.alpha.as_ref().map_or(0xff, |alpha| alpha[i]);
+        data.extend([over(c[0], alpha), over(c[1], alpha), over(c[2], alpha), alpha]);
+    });
+    Pixmap::from_vec(data, IntSize::from_wh(columns, rows)?)
+}
+
+fn outline(shape: &Shaped) -> Option<Path> {
+    match shape {
+        Shaped::Rect(Rect { left, top, right, bottom }) => {
+            let [left, top, right, bottom] = [left, top, right, bottom].map(|v| *v as f32);
+            Some(PathBuilder::from_rect(SkiaRect::from_ltrb(left, top, right, bottom)?))
+        }
+        Shaped::Circle { center, radius } => {
+            PathBuilder::from_circle(center.0 as f32, center.1 as f32, *radius as f32)
+        }
+        Shaped::Polygon(corners) => polyline(corners, true),
+    }
+}
+
+fn polyline(points: &[Point], is_closed: bool) -> Option<Path> {
+    let mut path = PathBuilder::new();
+    let (first, rest) = points.split_first()?;
+    path.move_to(first.0 as f32, first.1 as f32);
+    rest.iter().for_each(|point| path.line_to(point.0 as f32, point.1 as f32));
+    if is_closed {
+        path.close();
+    }
+    path.finish()
+}
+
+/// Takes outlines of glyphs to their places on the canvas.
+struct Outlines {
+    path: PathBuilder,
+    origin: Point,
+    /// In which the text runs; up is a quarter turn from it.
+    direction: Point,
+    glyph: Option<Glyph>,
+    units: f64,
+}
+
+impl Outlines {
+    fn place(&self, x: f32, y: f32) -> (f32, f32) {
+        let Some(glyph) = self.glyph else { return (x, y) };
+        let scale = glyph.em / self.units;
+        let (along, up) = (glyph.along + f64::from(x) * scale, glyph.raise + f64::from(y) * scale);
+        let (dx, dy) = self.direction;
+        ((self.origin.0 + along * dx + up * dy) as f32, (self.origin.1 + along * dy - up * dx) as f32)
+    }
+}
+
+impl OutlineBuilder for Outlines {
+    fn move_to(&mut self, x: f32, y: f32) {
+        let (x, y) = self.place(x, y);
+        self.path.move_to(x, y);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        let (x, y) = self.place(x, y);
+        self.path.line_to(x, y);
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let ((x1, y1), (x, y)) = (self.place(x1, y1), self.place(x, y));
+        self.path.quad_to(x1, y1, x, y);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        let ((x1, y1), (x2, y2), (x, y)) = (self.place(x1, y1), self.place(x2, y2), self.place(x, y));
+        self.path.cubic_to(x1, y1, x2, y2, x, y);
+    }
+
+    fn close(&mut self) {
+        self.path.close();
+    }
+}

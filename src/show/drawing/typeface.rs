@@ -1,0 +1,161 @@
+//! The typeface of figures: widths and outlines of its glyphs, and how raised digits are set.
+
+use std::sync::LazyLock;
+
+use epaint_default_fonts::UBUNTU_LIGHT;
+use ttf_parser::{Face, GlyphId};
+
+use crate::show::drawing::{Align, Point};
+
+/// The size and place of what is raised, over those of the line.
+const RAISED: (f64, f64) = (0.7, 0.36);
+
+/// A typeface and its measures.
+#[derive(Debug)]
+pub(crate) struct Typeface {
+    face: Face<'static>,
+    /// Units of the face to an em.
+    units: f64,
+}
+
+/// A glyph in its place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glyph {
+    pub(crate) id: u16,
+    /// The character that it shows.
+    pub(crate) sign: char,
+    /// From the line's beginning, in pixels.
+    pub(crate) along: f64,
+    /// Above the baseline.
+    pub(crate) raise: f64,
+    pub(crate) em: f64,
+}
+
+/// A stretch of text, on the line or raised.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Run {
+    pub(crate) text: String,
+    pub(crate) is_raised: bool,
+}
+
+impl Run {
+    /// Its size and how far it is raised, over the size of the line.
+    pub(crate) fn place(&self) -> (f64, f64) {
+        if self.is_raised { RAISED } else { (1.0, 0.0) }
+    }
+}
+
+/// Splits a text; what is raised has ordinary digits and minus.
+///
+/// The typeface has no raised minus, and raised digits of its own are higher than those of the line made smaller.
+pub(crate) fn runs(text: &str) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for sign in text.chars() {
+        let lowered = lowered(sign);
+        let (sign, is_raised) = (lowered.unwrap_or(sign), lowered.is_some());
+        match runs.last_mut() {
+            Some(run) if run.is_raised == is_raised => run.text.push(sign),
+            _ => runs.push(Run { text: sign.to_string(), is_raised }),
+        }
+    }
+    runs
+}
+
+fn lowered(sign: char) -> Option<char> {
+    match sign {
+        '\u{207b}' => Some('\u{2212}'),
+        '\u{b9}' => Some('1'),
+        '\u{b2}' => Some('2'),
+        '\u{b3}' => Some('3'),
+        '\u{2070}' | '\u{2074}'..='\u{2079}' => char::from_digit(sign as u32 - 0x2070, 10),
+        _ => None,
+    }
+}
+
+impl Typeface {
+    /// That of all figures.
+    pub(crate) fn of_figures() -> &'static Typeface {
+        static FACE: LazyLock<Typeface> = LazyLock::new(|| {
+            // Cannot fail: the bytes are compiled in and every test of a figure draws with them.
+            let face = Face::parse(UBUNTU_LIGHT, 0).expect("the typeface that is compiled in");
+            let units = f64::from(face.units_per_em());
+            Typeface { face, units }
+        });
+        &FACE
+    }
+
+    /// The file that it comes from.
+    pub(crate) fn bytes(&self) -> &'static [u8] {
+        UBUNTU_LIGHT
+    }
+
+    pub(crate) fn face(&self) -> &Face<'static> {
+        &self.face
+    }
+
+    /// The em of type whose lines are `size` high, from the lowest descender to the highest ascender.
+    pub(crate) fn em(&self, size: f64) -> f64 {
+        size * self.units / f64::from(self.face.ascender() - self.face.descender())
+    }
+
+    /// Of capitals and digits.
+    pub(crate) fn cap_height(&self, em: f64) -> f64 {
+        f64::from(self.face.capital_height().unwrap_or(0)) / self.units * em
+    }
+
+    /// How far a glyph moves on, in ems.
+    pub(crate) fn advance(&self, id: u16) -> f64 {
+        f64::from(self.face.glyph_hor_advance(GlyphId(id)).unwrap_or(0)) / self.units
+    }
+
+    /// The glyphs of a text and its width.
+    pub(crate) fn set(&self, text: &str, em: f64) -> (Vec<Glyph>, f64) {
+        let mut glyphs = Vec::with_capacity(text.len());
+        let mut along = 0.0;
+        for run in runs(text) {
+            let (scale, raise) = run.place();
+            for sign in run.text.chars() {
+                // Without one it is the face's box for what it does not know.
+                let id = self.face.glyph_index(sign).map_or(0, |id| id.0);
+                glyphs.push(Glyph { id, sign, along, raise: raise * em, em: scale * em });
+                along += self.advance(id) * scale * em;
+            }
+        }
+        (glyphs, along)
+    }
+}
+
+/// Where a text of some width begins on the canvas, and the direction in which it runs.
+pub(crate) fn beginning(at: Point, width: f64, align: Align) -> (Point, Point) {
+    match align {
+        Align::Left => (at, (1.0, 0.0)),
+        Align::Center => ((at.0 - width / 2.0, at.1), (1.0, 0.0)),
+        Align::Right => ((at.0 - width, at.1), (1.0, 0.0)),
+        Align::Upwards => ((at.0, at.1 + width / 2.0), (0.0, -1.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn raised_digits_are_ordinary_ones_made_smaller() {
+        let run = |text: &str, is_raised| Run { text: text.to_owned(), is_raised };
+        assert_eq!(
+            runs("2\u{b7}10\u{207b}\u{b9}\u{2076} s"),
+            [run("2\u{b7}10", false), run("\u{2212}16", true), run(" s", false)]
+        );
+        let face = Typeface::of_figures();
+        let [(_, raised), (_, plain)] = ["10\u{b3}", "103"].map(|text| face.set(text, 10.0));
+        assert!(raised < plain && raised > face.set("10", 10.0).1);
+    }
+
+    /// A figure must not show the box that stands for what a typeface does not know.
+    #[test]
+    fn the_typeface_has_every_sign_of_figures() {
+        let face = Typeface::of_figures();
+        let signs = "\u{3c9}\u{3bb}\u{2212}\u{b7}\u{d7}\u{b1}\u{2026}\u{2264}\u{2265}\u{2080}\u{2081}\u{2082}\u{2089}\u{207b}\u{2074}";
+        assert!(face.set(signs, 10.0).0.iter().all(|glyph| glyph.id != 0), "{:?}", face.set(signs, 10.0).0);
+    }
+}

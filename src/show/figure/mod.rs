@@ -1,0 +1,6 @@
+//! Figures of maps, diagrams, comparisons and orbits.
+
+pub mod bifurcation;
+pub mod compare;
+pub mod map;
+pub mod orbit;

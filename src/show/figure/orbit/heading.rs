@@ -1,0 +1,75 @@
+//! The words above an orbit's figures.
+
+use crate::show::caption;
+use crate::show::drawing::superscript;
+use crate::show::orbit_summary::has_mirror_images;
+use rattlemap_dynamics::model::Model;
+use rattlemap_dynamics::orbit::{Class, Orbit};
+
+/// Symbols of a word that a heading has room for.
+const WORD_SYMBOLS: usize = 32;
+
+/// The oscillator: what it is, and what tells it from the model's defaults.
+pub(crate) fn parameters(model: &dyn Model) -> String {
+    format!("{}: {}", model.title(), caption::parameters(model, |_| false))
+}
+
+/// Class, word and Lyapunov exponent of the orbit; its symmetry where motion has mirror images.
+pub(crate) fn character(model: &dyn Model, orbit: &Orbit) -> String {
+    let class = match (orbit.class, orbit.symmetric.filter(|_| has_mirror_images(model))) {
+        (Class::Periodic { period }, Some(true)) => format!("period {period}, symmetric"),
+        (Class::Periodic { period }, Some(false)) => format!("period {period}, not symmetric"),
+        (Class::Periodic { period }, None) => format!("period {period}"),
+        (Class::Chaotic, _) => "chaotic".to_owned(),
+        (Class::Undecided, _) => "undecided".to_owned(),
+        (Class::Failed, _) => "failed".to_owned(),
+    };
+    let mut parts = vec![class, flights(orbit)];
+    if orbit.lyapunov.is_finite() {
+        let error = orbit.lyapunov_error.map_or(String::new(), |error| format!(" \u{b1} {error:.4}"));
+        parts.push(format!("\u{3bb} = {:.4}{error}", orbit.lyapunov).replace('-', "\u{2212}"));
+    }
+    parts.join("  \u{b7}  ")
+}
+
+fn flights(orbit: &Orbit) -> String {
+    let word = shortened(&orbit.word.time_order());
+    match orbit.word.len() {
+        0 if orbit.strobe_meshing.is_some() => "always in contact".to_owned(),
+        0 => "no contact".to_owned(),
+        n if n > WORD_SYMBOLS => format!("word {word} ({n} flights)"),
+        _ => format!("word {word}"),
+    }
+}
+
+/// A long word with runs of a symbol as powers, cut where even that is too long.
+fn shortened(word: &str) -> String {
+    if word.len() <= WORD_SYMBOLS {
+        return word.to_owned();
+    }
+    let mut text = String::new();
+    for run in word.as_bytes().chunk_by(|a, b| a == b) {
+        let mut power = char::from(run[0]).to_string();
+        if run.len() > 1 {
+            power.extend(run.len().to_string().chars().map(superscript));
+        }
+        if text.chars().count() + power.chars().count() > WORD_SYMBOLS {
+            return text + "\u{2026}";
+        }
+        text += &power;
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_words_are_written_with_powers() {
+        assert_eq!(shortened("13554622"), "13554622");
+        assert_eq!(shortened(&format!("1{}36", "2".repeat(130))), "12\u{b9}\u{b3}\u{2070}36");
+        let long = shortened(&"36".repeat(40));
+        assert_eq!((long.chars().count(), long.ends_with('\u{2026}')), (33, true));
+    }
+}

@@ -1,0 +1,191 @@
+//! A trace and its events, merged into polylines whose corners are exact.
+
+use std::collections::BTreeSet;
+
+use rattlemap_dynamics::model::{Side, State};
+use rattlemap_dynamics::orbit::{Event, EventKind, Orbit, Sample};
+
+/// A stretch of motion between two events.
+pub(crate) struct Piece {
+    /// The wall the teeth mesh on, if they do.
+    pub(crate) meshing: Option<Side>,
+    /// Times in forcing periods and states, in order; at least one.
+    pub(crate) points: Vec<(f64, State)>,
+}
+
+impl Piece {
+    /// Start and end in forcing periods.
+    pub(crate) fn span(&self) -> (f64, f64) {
+        (self.points[0].0, self.points[self.points.len() - 1].0)
+    }
+}
+
+/// What there is to draw of an orbit.
+pub(crate) struct Motion {
+    pub(crate) pieces: Vec<Piece>,
+    /// The events on the trace: time in forcing periods, and the event.
+    pub(crate) events: Vec<(f64, Event)>,
+}
+
+impl Motion {
+    /// Merges trace and events; states that are not finite are left out.
+    pub(crate) fn new(orbit: &Orbit, trace: &[Sample]) -> Motion {
+        let period = if orbit.forcing_period > 0.0 { orbit.forcing_period } else { 1.0 };
+        let finite = |t: f64, state: &State| t.is_finite() && state.iter().all(|v| v.is_finite());
+        // A chaotic orbit's events may go on after the trace has stopped; those between its
+        // last sample and where the next would lie still belong to it.
+        let end = match trace {
+            [] => f64::INFINITY,
+            [only] => only.t,
+            [.., previous, last] => last.t + (last.t - previous.t),
+        };
+        let on_trace = |e: &&Event| e.t <= end && finite(e.t, &e.before) && finite(e.t, &e.after);
+        let events: Vec<(f64, Event)> =
+            orbit.events.iter().filter(on_trace).map(|e| (e.t / period, *e)).collect();
+        let mut pieces = Pieces::starting_in(trace.first().and_then(|s| s.meshing));
+        let mut next = events.iter().peekable();
+        for sample in trace.iter().filter(|s| finite(s.t, &s.state)) {
+            let t = sample.t / period;
+            while let Some((at, event)) = next.next_if(|(at, _)| *at <= t) {
+                pieces.cross(*at, event);
+            }
+            pieces.push(t, sample);
+        }
+        next.for_each(|(at, event)| pieces.cross(*at, event));
+        Motion { pieces: pieces.finished(), events }
+    }
+
+    /// Whether the teeth mesh anywhere.
+    pub(crate) fn meshes(&self) -> bool {
+        self.pieces.iter().any(|piece| piece.meshing.is_some())
+    }
+
+    /// The kinds of event that occur, in the order of a legend.
+    pub(crate) fn kinds(&self) -> Vec<EventKind> {
+        let all = [EventKind::Impact, EventKind::MeshStart, EventKind::MeshEnd];
+        all.into_iter().filter(|kind| self.events.iter().any(|(_, e)| e.kind == *kind)).collect()
+    }
+
+    /// The walls at which there are events or meshing.
+    pub(crate) fn walls(&self) -> BTreeSet<Side> {
+        let meshing = self.pieces.iter().filter_map(|piece| piece.meshing);
+        self.events.iter().map(|(_, e)| e.side).chain(meshing).collect()
+    }
+
+    /// Every state that is drawn, with its time in forcing periods.
+    pub(crate) fn points(&self) -> impl Iterator<Item = (f64, &State)> {
+        self.pieces.iter().flat_map(|piece| piece.points.iter().map(|(t, state)| (*t, state)))
+    }
+}
+
+/// The pieces under construction; the last one is open.
+struct Pieces(Vec<Piece>);
+
+impl Pieces {
+    fn starting_in(meshing: Option<Side>) -> Pieces {
+        Pieces(vec![Piece { meshing, points: Vec::new() }])
+    }
+
+    fn open(&mut self) -> &mut Piece {
+        self.0.last_mut().expect("there is always an open piece")
+    }
+
+    /// Ends a piece at an event and starts the next.
+    fn cross(&mut self, t: f64, event: &Event) {
+        self.open().points.push((t, event.before));
+        let meshing = (event.kind == EventKind::MeshStart).then_some(event.side);
+        self.0.push(Piece { meshing, points: vec![(t, event.after)] });
+    }
+
+    fn push(&mut self, t: f64, sample: &Sample) {
+        let piece = self.open();
+        // A sample on an event says nothing new, and may hold the state on either side of it.
+        if piece.points.last().is_some_and(|(last, _)| t <= *last) {
+            return;
+        }
+        piece.points.push((t, sample.state));
+        if piece.meshing != sample.meshing {
+            // No event told of it: the events span less than the trace.
+            self.0.push(Piece { meshing: sample.meshing, points: vec![(t, sample.state)] });
+        }
+    }
+
+    fn finished(mut self) -> Vec<Piece> {
+        self.0.retain(|piece| !piece.points.is_empty());
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::orbit::{Class, Status};
+    use rattlemap_dynamics::word::Word;
+
+    fn orbit(events: Vec<Event>) -> Orbit {
+        Orbit {
+            class: Class::Periodic { period: 1 },
+            status: Status::Ok,
+            lyapunov: -0.1,
+            lyapunov_error: None,
+            floquet: None,
+            symmetric: None,
+            word: Word::default(),
+            impacts_per_period: 0.0,
+            mesh_fraction: 0.0,
+            strobe: [0.0; 4],
+            strobe_meshing: None,
+            events,
+            cycle_periods: 1,
+            forcing_period: 2.0,
+            periods_run: 0,
+        }
+    }
+
+    fn event(kind: EventKind, t: f64) -> Event {
+        let (before, after) = ([0.5, 1.0, 0.0, 0.0], [0.5, 0.2, 0.0, 0.8]);
+        Event { kind, side: Side::Right, t, t_mod_period: t % 2.0, before, after }
+    }
+
+    fn sample(t: f64, meshing: Option<Side>) -> Sample {
+        Sample { t, state: [t, 0.0, 0.0, 0.0], meshing }
+    }
+
+    #[test]
+    fn pieces_end_in_the_exact_states_of_events() {
+        let meshing = Some(Side::Right);
+        let events = vec![
+            event(EventKind::Impact, 0.5),
+            event(EventKind::MeshStart, 1.0),
+            event(EventKind::MeshEnd, 1.6),
+        ];
+        let trace = [
+            sample(0.0, None),
+            sample(0.8, None),
+            sample(1.0, None),
+            sample(1.5, meshing),
+            sample(2.0, None),
+        ];
+        let motion = Motion::new(&orbit(events), &trace);
+        let modes: Vec<_> = motion.pieces.iter().map(|p| p.meshing).collect();
+        assert_eq!(modes, [None, None, meshing, None]);
+        assert_eq!(motion.pieces[0].points.last().unwrap().1, [0.5, 1.0, 0.0, 0.0]);
+        assert_eq!(motion.pieces[1].points[0], (0.25, [0.5, 0.2, 0.0, 0.8]));
+        // The sample on the start of meshing was left out.
+        assert_eq!(motion.pieces[2].points.len(), 3);
+        assert_eq!(motion.pieces[3].span(), (0.8, 1.0));
+    }
+
+    #[test]
+    fn gaps_in_the_data_are_survived() {
+        assert!(Motion::new(&orbit(vec![]), &[]).pieces.is_empty());
+        let late =
+            Motion::new(&orbit(vec![event(EventKind::Impact, 9.0)]), &[sample(0.0, None), sample(1.0, None)]);
+        assert!(late.events.is_empty());
+        let unannounced = [sample(0.0, None), sample(1.0, Some(Side::Left)), sample(2.0, None)];
+        assert_eq!(Motion::new(&orbit(vec![]), &unannounced).pieces.len(), 3);
+        let mut broken = sample(1.0, None);
+        broken.state[2] = f64::NAN;
+        assert_eq!(Motion::new(&orbit(vec![]), &[sample(0.0, None), broken]).points().count(), 1);
+    }
+}

@@ -1,0 +1,76 @@
+//! Which symbol of the word belongs to which flight, and where it is written.
+
+use rattlemap_dynamics::model::Side;
+use rattlemap_dynamics::orbit::{Event, EventKind};
+
+/// Events of figures that have room for symbols.
+const MOST: usize = 40;
+
+/// The middle of every flight between two events, in forcing periods, and its symbol.
+///
+/// `cycle` is the length of a cycle that begins at 0 and comes round; the flight across its end is named in the longer
+/// of its two parts. None where the motion is no cycle: what lies before the first event and after the last has no name.
+pub(crate) fn symbols(events: &[(f64, Event)], cycle: Option<f64>) -> Vec<(f64, char)> {
+    if events.len() > MOST {
+        return Vec::new();
+    }
+    let inner = events.windows(2).map(|pair| (0.5 * (pair[0].0 + pair[1].0), symbol(&pair[0].1, &pair[1].1)));
+    let mut symbols: Vec<(f64, char)> = inner.collect();
+    // A single event is both.
+    if let (Some(end), Some((first, to)), Some((last, from))) = (cycle, events.first(), events.last()) {
+        let middle = if end - last >= *first { 0.5 * (last + end) } else { 0.5 * first };
+        symbols.push((middle, symbol(from, to)));
+    }
+    symbols
+}
+
+/// The symbol of the flight between two events (18)-(23).
+fn symbol(from: &Event, to: &Event) -> char {
+    match (from.kind == EventKind::MeshStart, from.side, to.side) {
+        (true, Side::Right, _) => '1',
+        (true, Side::Left, _) => '4',
+        (false, Side::Right, Side::Right) => '2',
+        (false, Side::Left, Side::Left) => '5',
+        (false, Side::Right, Side::Left) => '3',
+        (false, Side::Left, Side::Right) => '6',
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rattlemap_dynamics::model::{GearPair, REST};
+    use rattlemap_dynamics::orbit::{self, Orbit, Settings};
+    use rattlemap_dynamics::word::Word;
+
+    fn orbit(e: f64) -> Orbit {
+        orbit::analyse(&GearPair::paper(e), REST, &Settings::default()).unwrap()
+    }
+
+    fn named(orbit: &Orbit, cycle: Option<f64>) -> Vec<(f64, char)> {
+        let events: Vec<_> = orbit.events.iter().map(|e| (e.t / orbit.forcing_period, *e)).collect();
+        symbols(&events, cycle)
+    }
+
+    #[test]
+    fn symbols_of_a_cycle_are_its_word() {
+        for (e, length) in [(0.06, 8), (0.0997, 4), (0.605, 2)] {
+            let orbit = orbit(e);
+            let named = named(&orbit, Some(f64::from(orbit.cycle_periods)));
+            assert_eq!(named.len(), length);
+            let letters: Vec<u8> = named.iter().map(|&(_, symbol)| symbol as u8).collect();
+            assert_eq!(Word::cyclic(&letters), orbit.word, "e = {e}");
+            assert!(named.iter().all(|(t, _)| (0.0..=1.0).contains(t)), "{named:?}");
+        }
+    }
+
+    #[test]
+    fn open_ends_have_no_name() {
+        assert_eq!(named(&orbit(0.06), None).len(), 7);
+        assert!(symbols(&[], Some(1.0)).is_empty());
+        let orbit = orbit(0.605);
+        let alone = [(0.25, orbit.events[0])];
+        let symbol = if orbit.events[0].side == Side::Right { '2' } else { '5' };
+        assert_eq!(symbols(&alone, Some(1.0)), [(0.625, symbol)]);
+    }
+}

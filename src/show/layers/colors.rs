@@ -1,0 +1,167 @@
+//! Colours: one per period, greys for chaos, ramps for numbers.
+
+/// Red, green and blue.
+pub(crate) type Color = [u8; 3];
+
+const fn hex(rgb: u32) -> Color {
+    [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]
+}
+
+/// Period 1 without any contact, its own mirror image, and one of a pair of mirror images.
+pub(crate) const NO_CONTACT: Color = hex(0xf7f6f3);
+pub(crate) const SYMMETRIC: Color = hex(0xc9e5fc);
+pub(crate) const UNSYMMETRIC: Color = hex(0x8bb3f5);
+/// Period 1 that is too slow an approach to tell.
+pub(crate) const SYMMETRY_UNKNOWN: Color = hex(0x546f90);
+
+/// Colours of things in a row, the first the most common: periods from 2 on, words. Searched for (annealing, then greedily)
+/// so that those near each other in a legend differ for people who see no red or no green, too, which a test measures.
+#[rustfmt::skip]
+const DISTINCT: [Color; 63] = [
+    hex(0xe6a700), hex(0x059d76), hex(0xe26a38), hex(0xf2ea30), hex(0x01569d), hex(0xba7db8), hex(0x8d5d31), hex(0x6fdcae),
+    hex(0x2f0692), hex(0xd3e98f), hex(0xf15a76), hex(0x9e2854), hex(0x58c7c8), hex(0x176caa), hex(0x50190f), hex(0xe8aa70),
+    hex(0x3b114d), hex(0x165470), hex(0x64b1a0), hex(0x1f908d), hex(0x7e2733), hex(0x975e57), hex(0x600f3c), hex(0x9e1073),
+    hex(0x28bf90), hex(0xbd6014), hex(0x92f2b2), hex(0x138968), hex(0x53a29f), hex(0xd94667), hex(0x8e453e), hex(0x84285a),
+    hex(0x77d1ba), hex(0xf3814f), hex(0xe4ce4b), hex(0xaa6c43), hex(0x86d1f4), hex(0x7a163c), hex(0xa36782), hex(0x13db92),
+    hex(0xf4f470), hex(0x197eab), hex(0x581971), hex(0x993516), hex(0x77b7d1), hex(0x459c85), hex(0x65112a), hex(0x76ab53),
+    hex(0x1292a0), hex(0x36349d), hex(0x7bc8bf), hex(0x8d4e69), hex(0x408715), hex(0xc5a178), hex(0xf7549a), hex(0x7f3c2a),
+    hex(0x7ba8d7), hex(0x751455), hex(0xe48422), hex(0xa18757), hex(0xaa468c), hex(0x77bca1), hex(0xcd8bb9),
+];
+
+/// The least and the largest exponent of chaos.
+const CHAOS: [Color; 2] = [hex(0x9a9a9a), hex(0x050505)];
+/// Meant to catch the eye: they are exceptions.
+pub(crate) const UNDECIDED: Color = hex(0xce44fa);
+pub(crate) const FAILED: Color = hex(0x8d130f);
+/// Cells without a value of a continuous layer.
+pub(crate) const NO_VALUE: Color = hex(0x8f8f8f);
+
+/// Viridis in nine steps.
+const SEQUENTIAL: [Color; 9] = [
+    hex(0x440154),
+    hex(0x472d7b),
+    hex(0x3b528b),
+    hex(0x2c728e),
+    hex(0x21918c),
+    hex(0x28ae80),
+    hex(0x5ec962),
+    hex(0xaddc30),
+    hex(0xfde725),
+];
+
+/// ColorBrewer's RdBu, blue below zero.
+const DIVERGING: [Color; 11] = [
+    hex(0x053061),
+    hex(0x2166ac),
+    hex(0x4393c3),
+    hex(0x92c5de),
+    hex(0xd1e5f0),
+    hex(0xf7f7f7),
+    hex(0xfddbc7),
+    hex(0xf4a582),
+    hex(0xd6604d),
+    hex(0xb2182b),
+    hex(0x67001f),
+];
+
+/// The colour of a period of 2 or more.
+pub(crate) fn period(period: u32) -> Color {
+    distinct(period as usize - 1)
+}
+
+/// A colour for the `n`th of many things, counted from 1. Beyond those that were searched for: hues a golden angle
+/// apart, in three lightnesses.
+pub(crate) fn distinct(n: usize) -> Color {
+    if let Some(color) = n.checked_sub(1).and_then(|place| DISTINCT.get(place)) {
+        return *color;
+    }
+    let hue = (n as f64 * 0.618_033_988_75).fract() * 6.0;
+    let lightness = [0.42, 0.62, 0.78][n % 3];
+    let chroma = 0.6 * (1.0 - (2.0f64 * lightness - 1.0).abs());
+    [0.0, 4.0, 2.0].map(|shift| {
+        let distance = ((hue + shift) % 6.0 - 3.0f64).abs() - 1.0;
+        let value = lightness + chroma * (distance.clamp(0.0, 1.0) - 0.5);
+        (value * 255.0).round() as u8
+    })
+}
+
+/// The colour of a share, 0 to 1, of what is counted from zero. The root leaves more colours
+/// to small numbers, which are the most.
+pub(crate) fn sequential(share: f64) -> Color {
+    between(&SEQUENTIAL, share.max(0.0).sqrt())
+}
+
+/// The colour of a number from -1 to 1; zero is white. Positive ones are spread by the root,
+/// for most exponents of chaos are far below the largest.
+pub(crate) fn diverging(value: f64) -> Color {
+    let spread = if value > 0.0 { value.sqrt() } else { value };
+    between(&DIVERGING, 0.5 * (spread + 1.0))
+}
+
+/// The grey of chaos with a share, 0 to 1, of the largest exponent.
+pub(crate) fn chaos(share: f64) -> Color {
+    between(&CHAOS, share.max(0.0).sqrt())
+}
+
+/// The colour at a share, 0 to 1, of the way along a chain of anchors.
+fn between(anchors: &[Color], share: f64) -> Color {
+    let place = share.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
+    let first = (place as usize).min(anchors.len() - 2);
+    let share = place - first as f64;
+    let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
+    let ([a, b, c], [d, e, f]) = (anchors[first], anchors[first + 1]);
+    [mix(a, d), mix(b, e), mix(c, f)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::show::color_difference;
+
+    #[test]
+    fn periods_have_colours_of_their_own() {
+        let mut colors: Vec<Color> = (2..=64).map(period).collect();
+        colors.extend([NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN, UNDECIDED, FAILED]);
+        let count = colors.len();
+        colors.sort_unstable();
+        colors.dedup();
+        assert_eq!(colors.len(), count);
+    }
+
+    /// For all eyes, those without receptors for long (protanopes) or medium (deuteranopes) wavelengths included.
+    #[test]
+    fn neighbours_in_a_legend_can_be_told_apart() {
+        let least = |pairs: Vec<(Color, Color)>| {
+            pairs.into_iter().map(|(a, b)| (color_difference::least_difference(a, b), a, b)).for_each(
+                |(difference, a, b)| {
+                    assert!(difference >= 10.0, "{a:02x?} {b:02x?}: {difference}");
+                },
+            );
+        };
+        let kinds = [NO_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
+        let legend: Vec<Color> = kinds.into_iter().chain((2..=64).map(period)).collect();
+        // What is not on a map is not in its legend. Periods up to 12 may stand beside any other, of longer ones those
+        // that are four apart.
+        let usual = kinds.len() + 11;
+        let near = |i: usize, j: usize| i < j && (j < usual || j - i <= 4);
+        let all = |near: &dyn Fn(usize, usize) -> bool| {
+            let pairs = (0..legend.len()).flat_map(|i| (0..legend.len()).map(move |j| (i, j)));
+            pairs.filter(|(i, j)| near(*i, *j)).map(|(i, j)| (legend[i], legend[j])).collect::<Vec<_>>()
+        };
+        least(all(&near));
+        let greys = (0..=20).map(|step| chaos(f64::from(step) / 20.0));
+        least(legend.iter().copied().chain(greys).chain([FAILED]).map(|color| (color, UNDECIDED)).collect());
+        let exceptions =
+            legend[..usual].iter().copied().chain((0..=20).map(|step| chaos(f64::from(step) / 20.0)));
+        least(exceptions.map(|color| (color, FAILED)).collect());
+        // Chaos in legends has the middle of its scale; it follows the periods, at most seventeen of them.
+        least(legend[..kinds.len() + 17].iter().map(|color| (*color, chaos(0.5))).collect());
+    }
+
+    #[test]
+    fn ramps_begin_and_end_with_their_anchors() {
+        assert_eq!([0.0, 1.0].map(chaos), CHAOS);
+        assert_eq!([-1.0, 0.0, 1.0].map(diverging), [DIVERGING[0], DIVERGING[5], DIVERGING[10]]);
+        assert_eq!([0.0, 0.25, 2.0].map(sequential), [SEQUENTIAL[0], SEQUENTIAL[4], SEQUENTIAL[8]]);
+    }
+}

@@ -1,0 +1,62 @@
+//! The command that replays one cell of a map.
+
+use crate::map::scene::{Scene, Start};
+use crate::model_file::{DEFAULT, FileModel};
+use crate::show::cells::Cells;
+use crate::store::map::MODEL;
+use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::orbit::Settings;
+
+/// What follows the `--set` of swept and derived parameters: others that differ from `orbit`'s own
+/// defaults, the start, and how long to integrate.
+pub(crate) fn arguments(scene: &Scene) -> String {
+    let mut words = Vec::new();
+    let base = scene.base();
+    if let Some(model) = base.downcast_ref::<FileModel>().and_then(model) {
+        words.push(format!(" --model {model}"));
+    }
+    for (name, value) in scene.fixed() {
+        let parameter = base.parameters().iter().find(|parameter| parameter.name == name);
+        if parameter.is_some_and(|parameter| parameter.default != Some(value)) {
+            words.push(format!(" --set {name}={value:?}"));
+        }
+    }
+    if let Start::State(state) = scene.start() {
+        words.push(start(base, state));
+    }
+    let (settings, default) = (scene.orbit_settings(), Settings::default());
+    if settings.transient_periods != default.transient_periods {
+        words.push(format!(" --transient {}", settings.transient_periods));
+    }
+    if settings.observed_periods != default.observed_periods {
+        words.push(format!(" --periods {}", settings.observed_periods));
+    }
+    words.concat()
+}
+
+/// How `orbit` finds a model that is not its own default: by name, or by the copy in the map's folder.
+fn model(file: &FileModel) -> Option<&str> {
+    match (file.is_built_in(), file.name()) {
+        (true, DEFAULT) => None,
+        (true, name) => Some(name),
+        (false, _) => Some(MODEL),
+    }
+}
+
+fn start(model: &dyn Model, state: State) -> String {
+    let shown = state[..model.state_names().len()].iter().map(|x| format!("{x:?}"));
+    format!(" --start {}", shown.collect::<Vec<_>>().join(","))
+}
+
+/// The whole command for the run `id`.
+pub(crate) fn command(cells: &Cells<'_>, id: usize) -> String {
+    let scene = cells.scene();
+    let targets = scene.points().targets();
+    let swept = targets.zip(scene.swept().map(|parameter| &*parameter.name).zip(cells.values(id)));
+    let swept = swept.filter(|(target, _)| !target.is_start()).map(|(_, named)| named);
+    let sets = swept.chain(cells.derived(id)).map(|(name, value)| format!(" --set {name}={value:?}"));
+    let sets: String = sets.collect();
+    // A later argument wins over the scene's own.
+    let own = if cells.has_own_start(id) { start(scene.base(), cells.start(id)) } else { String::new() };
+    format!("rattlemap orbit{sets}{}{own}", arguments(scene))
+}

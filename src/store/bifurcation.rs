@@ -1,0 +1,115 @@
+//! The folder of a bifurcation diagram: tables, figure and manifest.
+
+use std::fs::File;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+use crate::map::bifurcation::{Column, fixed};
+use crate::map::scene::{self, Along, Format, Scene};
+use crate::show::drawing::axes::Scale;
+use crate::show::figure;
+use crate::show::figure::bifurcation::Shown;
+use crate::show::symbols::{axis_label, symbol};
+use crate::show::table::{bifurcation_columns_csv, bifurcation_csv, bifurcation_strobe_csv};
+use crate::show::{caption, names};
+use crate::store::bifurcation_manifest::Manifest;
+use crate::store::error::OutputError;
+use crate::store::folder::Folder;
+use crate::store::inventory;
+use crate::store::manifest::MANIFEST;
+
+const CSV: &str = "bifurcation.csv";
+const COLUMNS_CSV: &str = "bifurcation_columns.csv";
+/// Of models whose walls fix a displacement.
+const STROBE_CSV: &str = "bifurcation_strobe.csv";
+/// The figure, by format.
+static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("bifurcation"));
+
+/// Every file that a bifurcation diagram may write.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    [MANIFEST, CSV, COLUMNS_CSV, STROBE_CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+}
+
+/// How a diagram was asked for, beside its scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    /// The `--set` arguments.
+    pub sets: &'a [String],
+    /// The line of a scene of several axes.
+    pub along: Option<&'a Along>,
+}
+
+/// Writes the files that the scene asks for, and the manifest last: a folder that has one
+/// is complete. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(
+    folder: &Folder,
+    scene: &Scene,
+    asked: Asked<'_>,
+    columns: &[Column],
+    elapsed: Duration,
+) -> Result<Vec<&'static str>, OutputError> {
+    let clock = Instant::now();
+    // Files of an earlier run must not stand beside a manifest that does not know them.
+    folder.remove(&names().collect::<Vec<_>>())?;
+    let parameter = scene.axes()[0].parameter();
+    let wanted = &scene.outputs().files;
+    let mut files = Vec::new();
+    let (names, fixed) = (scene.base().state_names(), fixed(&scene.line()));
+    if wanted.contains(&Format::Csv) {
+        folder.replace(CSV, |path| {
+            bifurcation_csv::write(File::create(path)?, &parameter.name, &names, columns)
+        })?;
+        folder.replace(COLUMNS_CSV, |path| {
+            bifurcation_columns_csv::write(File::create(path)?, &parameter.name, columns)
+        })?;
+        files.extend([CSV, COLUMNS_CSV]);
+        if fixed.is_some() {
+            folder.replace(STROBE_CSV, |path| {
+                bifurcation_strobe_csv::write(path, &parameter.name, &names, columns)
+            })?;
+            files.push(STROBE_CSV);
+        }
+    }
+    let shown = Shown::of(scene.base(), fixed);
+    for (_, name) in FIGURES.iter().filter(|(format, _)| wanted.contains(format)) {
+        let label = axis_label(parameter);
+        let subtitle =
+            format!("{}{}; {}", line(asked.along), scene.start().in_words(), caption::of_scene(scene));
+        let scale = match scene.axes()[0].scale() {
+            scene::Scale::Log => Scale::Logarithmic,
+            scene::Scale::Linear => Scale::Linear,
+            scene::Scale::Values => Scale::Listed,
+        };
+        folder.replace(name, |path| {
+            Ok(figure::bifurcation::write(
+                path,
+                [scene.title(), &subtitle],
+                (&label, scale),
+                &shown,
+                columns,
+            )?)
+        })?;
+        files.push(name);
+    }
+    let listed = inventory::entries(folder, &files)?;
+    let times = [elapsed, clock.elapsed()];
+    inventory::write_manifest(folder, &Manifest::new(scene, asked, columns, times, &listed))?;
+    files.push(MANIFEST);
+    Ok(files)
+}
+
+/// Of a line of a plane, which one it is: the scene's title is that of a map.
+fn line(along: Option<&Along>) -> String {
+    let Some(Along { parameter, at }) = along.filter(|along| !along.at.is_empty()) else {
+        return String::new();
+    };
+    let at: Vec<String> = at
+        .iter()
+        .filter_map(|at| at.split_once('='))
+        .map(|(name, value)| format!("{} = {}", symbol(name.trim()), value.trim()))
+        .collect();
+    format!("along {} at {}, ", symbol(parameter), at.join(", "))
+}

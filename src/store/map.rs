@@ -1,0 +1,279 @@
+//! The folder of a map: tables, figures, report and manifest.
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+use serde_json::Value;
+
+use crate::map::scene::{Format, List, Scene};
+use crate::model_file::FileModel;
+use crate::show::cells::Cells;
+use crate::show::error::WriteError;
+use crate::show::figure;
+use crate::show::layers::Layer;
+use crate::show::table::words_csv::Rows;
+use crate::show::table::{attractors_csv, cells_csv, cells_npy};
+use crate::show::words::{self, Spelled};
+use crate::show::{layers, names, report};
+use crate::store::error::OutputError;
+use crate::store::folder::Folder;
+use crate::store::folder::PARTIAL;
+use crate::store::record_file::RECORDS;
+use crate::store::unfinished::UNFINISHED;
+use crate::store::validation_json::ValidationObject;
+use crate::store::{inventory, map_manifest, unfinished};
+use crate::validate::Validation;
+
+pub use crate::store::manifest::MANIFEST;
+pub use crate::store::map_manifest::{Made, Merged, Run};
+
+const CSV: &str = "cells.csv";
+const NPY: &str = "cells.npy";
+const WORDS: &str = "words.csv";
+const HTML: &str = "report.html";
+const ATTRACTORS: &str = "attractors.csv";
+/// The cells of a map that has a list in the place of axes: a copy, lest the folder depend on a file elsewhere.
+pub const LIST: &str = "list.csv";
+/// The model of a map whose model is a file of somebody's own: a copy, likewise.
+pub const MODEL: &str = "model.toml";
+/// What a validation found.
+pub const VALIDATION: &str = "validation.json";
+
+/// The layers of which there are figures, in every format of figures.
+const LAYERS: [&str; 8] =
+    ["map", layers::CLASS, "lyapunov", "impacts", "mesh", "pattern", "word", "attractors"];
+
+/// Cells of a map at most whose figures are drawn side by side.
+const SIDE_BY_SIDE: usize = 1 << 22;
+
+/// Every file that a map may have beside its records, but for its list, which is not made of them.
+static ALL: LazyLock<Vec<String>> = LazyLock::new(|| {
+    let tables = [MANIFEST, CSV, NPY, WORDS, ATTRACTORS, HTML, VALIDATION].map(str::to_owned);
+    let figures = LAYERS.into_iter().flat_map(|layer| names::figures(layer).map(|(_, name)| name));
+    tables.into_iter().chain(figures).collect()
+});
+
+/// Every file that a map may write, records included.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ALL.iter().map(String::as_str).chain([LIST, MODEL, RECORDS, UNFINISHED])
+}
+
+/// Removes what an earlier run left, but for its records: files must not stand beside a
+/// manifest that does not know them. A list and a model go if a manifest has them; any other may be the user's own.
+///
+/// # Errors
+/// If a file cannot be removed.
+pub fn clear(folder: &Folder) -> Result<(), OutputError> {
+    for copy in [LIST, MODEL].into_iter().filter(|copy| inventory::lists(folder, copy)) {
+        folder.remove(&[copy])?;
+    }
+    clear_made(folder)
+}
+
+/// The same without the list.
+fn clear_made(folder: &Folder) -> Result<(), OutputError> {
+    folder.remove(&ALL)?;
+    let names = ALL.iter().map(String::as_str).chain([LIST, MODEL]);
+    folder.remove(&names.map(|name| format!("{PARTIAL}{name}")).collect::<Vec<_>>())
+}
+
+/// Clears the folder for a run that has its records there, and writes the list of its cells, if it has one: an
+/// interrupted run can be gone on with without the scene's own table, which may be this very file.
+///
+/// # Errors
+/// If a file cannot be removed or written.
+pub fn begin(folder: &Folder, scene: &Scene) -> Result<(), OutputError> {
+    match scene.list() {
+        // First, lest there be a moment without either.
+        Some(list) => {
+            write_list(folder, list)?;
+            clear_made(folder)
+        }
+        None => clear(folder),
+    }
+}
+
+fn write_list(folder: &Folder, list: &List) -> Result<(), OutputError> {
+    folder.replace(LIST, |path| Ok(fs::write(path, list.to_csv())?))
+}
+
+/// Writes the files that the scene asks for, and the manifest last: a folder that has one is
+/// complete. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(folder: &Folder, cells: &Cells<'_>, run: &Run<'_>) -> Result<Vec<String>, OutputError> {
+    let clock = Instant::now();
+    clear(folder)?;
+    let mut files = write_files(folder, cells, None, &|_| true)?;
+    let has_records = folder.path().join(RECORDS).is_file();
+    let listed: Vec<&str> = files.iter().map(String::as_str).chain(has_records.then_some(RECORDS)).collect();
+    let listed = inventory::entries(folder, &listed)?;
+    inventory::write_manifest(folder, &map_manifest::map(cells, run, clock.elapsed(), &listed))?;
+    files.push(MANIFEST.to_owned());
+    unfinished::clear(folder)?;
+    Ok(files)
+}
+
+/// Writes `validation.json` and, where the map has a report, the report again with a section
+/// on it; then the manifest that lists them. `again` is the device that ran the sample's lanes again, if one did,
+/// `elapsed` how long the validation took. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_validation(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    made: &Made<'_>,
+    again: Option<&str>,
+    validation: &Validation,
+    elapsed: Duration,
+) -> Result<Vec<&'static str>, OutputError> {
+    let object = serde_json::to_value(ValidationObject::new(cells, made, again, validation))?;
+    folder.write_json(VALIDATION, &object)?;
+    let mut files = vec![VALIDATION];
+    if folder.path().join(HTML).is_file() {
+        write_files(folder, cells, Some(&object), &|name| name == HTML)?;
+        files.push(HTML);
+    }
+    inventory::update(folder, &files, ("validate", elapsed.as_secs_f64()))?;
+    Ok(files)
+}
+
+/// Writes those of the files `lost` anew that are made of records alone, then the manifest that lists them. The report
+/// gets its section on the validation where `has_validation` says that this is good. Returns the files' names.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn repair(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    lost: &[&str],
+    has_validation: bool,
+) -> Result<Vec<String>, OutputError> {
+    let clock = Instant::now();
+    let path = folder.path().join(VALIDATION);
+    let read = || {
+        let text = fs::read_to_string(&path);
+        text.map_err(|reason| OutputError::Write { path: path.clone(), reason: reason.into() })
+    };
+    let validation: Option<Value> = if has_validation { Some(serde_json::from_str(&read()?)?) } else { None };
+    let files = write_files(folder, cells, validation.as_ref(), &|name| lost.contains(&name))?;
+    if !files.is_empty() {
+        let names: Vec<&str> = files.iter().map(String::as_str).collect();
+        inventory::update(folder, &names, ("repair", clock.elapsed().as_secs_f64()))?;
+    }
+    Ok(files)
+}
+
+/// Whether a name is wanted.
+pub(crate) type Wanted<'w> = &'w (dyn Fn(&str) -> bool + Sync);
+
+/// Writes the files that the scene asks for, as far as they are wanted.
+fn write_files(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    validation: Option<&Value>,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    let spelled = words::read(cells);
+    // Side by side, for each of them has parts that one core must do alone.
+    let (tables, pictures) = rayon::join(
+        || write_tables(folder, cells, &spelled, wanted),
+        || write_pictures(folder, cells, &spelled, validation, wanted),
+    );
+    let mut files = tables?;
+    files.extend(pictures?);
+    files.extend(write_copies(folder, cells.scene(), wanted)?);
+    Ok(files)
+}
+
+/// Writes the list and the model of a scene that has them, as far as they are wanted.
+pub(crate) fn write_copies(
+    folder: &Folder,
+    scene: &Scene,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    let mut files = Vec::new();
+    if let Some(list) = scene.list().filter(|_| wanted(LIST)) {
+        write_list(folder, list)?;
+        files.push(LIST.to_owned());
+    }
+    let own = scene.base().downcast_ref().filter(|model: &&FileModel| !model.is_built_in());
+    if let Some(model) = own.filter(|_| wanted(MODEL)) {
+        folder.replace(MODEL, |path| Ok(fs::write(path, &model.definition().text)?))?;
+        files.push(MODEL.to_owned());
+    }
+    Ok(files)
+}
+
+fn write_tables(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    spelled: &Spelled,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    type Write<'w> = &'w (dyn Fn(&Path) -> Result<(), WriteError> + Sync);
+    let write_if = |is_asked: bool, name: &str, write: Write<'_>| {
+        if is_asked && wanted(name) {
+            folder.replace(name, write).map(|()| Some(name.to_owned()))
+        } else {
+            Ok(None)
+        }
+    };
+    let asks = |format| cells.scene().outputs().files.contains(&format);
+    let rows = Rows::new(spelled);
+    let has_words = spelled.words.is_some() || spelled.patterns.is_some();
+    let (csv, npy) = rayon::join(
+        || write_if(asks(Format::Csv), CSV, &|path| cells_csv::write(path, cells)),
+        || write_if(asks(Format::Npy), NPY, &|path| cells_npy::write(path, cells, &rows)),
+    );
+    let words = write_if(asks(Format::Npy) && has_words, WORDS, &|path| rows.write(path));
+    let attractors = match cells.basins() {
+        Some(basins) => write_if(asks(Format::Csv), ATTRACTORS, &|path| {
+            attractors_csv::write(File::create(path)?, cells, basins)
+        })?,
+        None => None,
+    };
+    Ok([csv?, npy?, words?, attractors].into_iter().flatten().collect())
+}
+
+fn write_pictures(
+    folder: &Folder,
+    cells: &Cells<'_>,
+    spelled: &Spelled,
+    validation: Option<&Value>,
+    wanted: Wanted<'_>,
+) -> Result<Vec<String>, OutputError> {
+    let asks = |format| cells.scene().outputs().files.contains(&format);
+    let mut files = Vec::new();
+    let wants_page = asks(Format::Html) && wanted(HTML);
+    let formats: Vec<Format> = Format::FIGURES.into_iter().filter(|&format| asks(format)).collect();
+    let names = |layer| formats.iter().map(move |&format| names::figure(layer, format));
+    let wants_figures = LAYERS.iter().any(|layer| names(*layer).any(|name| wanted(&name)));
+    if !wants_page && !wants_figures {
+        return Ok(files);
+    }
+    let layers = layers::of(cells, spelled);
+    if wants_figures {
+        let named = layers.iter().flat_map(|layer| names(layer.name).map(move |name| (layer, name)));
+        let named: Vec<_> = named.filter(|(_, name)| wanted(name)).collect();
+        let draw = |(layer, name): &(&Layer, String)| {
+            folder.replace(name, |path| Ok(figure::map::write(path, cells, layer)?))
+        };
+        // Each holds its pixels, twice.
+        match cells.counts().iter().product::<usize>() > SIDE_BY_SIDE {
+            true => named.iter().try_for_each(draw)?,
+            false => named.par_iter().try_for_each(draw)?,
+        }
+        files.extend(named.into_iter().map(|(_, name)| name));
+    }
+    if wants_page {
+        folder.replace(HTML, |path| report::write(path, cells, &layers, spelled, validation))?;
+        files.push(HTML.to_owned());
+    }
+    Ok(files)
+}

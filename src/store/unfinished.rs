@@ -1,0 +1,62 @@
+//! `unfinished.json`: the time spent so far on a map that has no manifest yet.
+
+use std::fs;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::store::error::OutputError;
+use crate::store::folder::Folder;
+use crate::store::manifest::MANIFEST;
+
+/// Its name.
+pub(crate) const UNFINISHED: &str = "unfinished.json";
+const ELAPSED: &str = "elapsed_seconds";
+
+/// How long earlier runs in this folder integrated, all together, finished or not; nothing where they do not say.
+pub fn elapsed(folder: &Folder) -> Duration {
+    let read = |name: &str| {
+        let text = fs::read_to_string(folder.path().join(name)).ok()?;
+        let seconds = serde_json::from_str::<Value>(&text).ok()?[ELAPSED].as_f64()?;
+        Duration::try_from_secs_f64(seconds).ok()
+    };
+    // Both are there if a run ended between them.
+    [MANIFEST, UNFINISHED].into_iter().filter_map(read).max().unwrap_or_default()
+}
+
+/// Keeps that time until there is a manifest.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn keep_elapsed(folder: &Folder, elapsed: Duration) -> Result<(), OutputError> {
+    folder.write_json(UNFINISHED, &json!({ ELAPSED: elapsed.as_secs_f64() }))
+}
+
+/// Removes the file, if it is there.
+///
+/// # Errors
+/// If it cannot be removed.
+pub fn clear(folder: &Folder) -> Result<(), OutputError> {
+    folder.remove(&[UNFINISHED])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_time_that_anything_tells_counts() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = Folder::open(root.path(), false).unwrap();
+        assert_eq!(elapsed(&folder), Duration::ZERO);
+        fs::write(root.path().join(MANIFEST), "{\"elapsed_seconds\": 2.5}").unwrap();
+        assert_eq!(elapsed(&folder), Duration::from_millis(2500));
+        keep_elapsed(&folder, Duration::from_secs(3)).unwrap();
+        assert_eq!(elapsed(&folder), Duration::from_secs(3));
+        clear(&folder).unwrap();
+        for text in ["{\"elapsed_seconds\": -1}", "{}", "torn"] {
+            fs::write(root.path().join(MANIFEST), text).unwrap();
+            assert_eq!(elapsed(&folder), Duration::ZERO, "{text}");
+        }
+    }
+}
