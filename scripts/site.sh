@@ -50,6 +50,11 @@ def notebook(path: Path) -> str:
 
 
 summary = Path("site/SUMMARY.md").read_text(encoding="utf-8")
+# Pages for developers follow at the end, under their own headings.
+developers = [Path("CONTRIBUTING.md"), Path("docs/decisions/README.md"), *sorted(Path("docs/decisions").glob("[a-z]*.md"))]
+for page in filter(Path.exists, developers):
+    heading = page.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ")
+    summary += f"{'  ' if page.parent.name and page.name != 'README.md' else ''}- [{heading}]({page.as_posix()})\n"
 pages = [Path(target) for target, _ in LINK.findall(summary)]
 (book / "docs").mkdir()
 # A notebook becomes a page of its own.
@@ -64,7 +69,7 @@ for page in pages:
             copy(relative(linked))
     (book / page).parent.mkdir(parents=True, exist_ok=True)
     (book / page).write_text(text, encoding="utf-8")
-shutil.copy("site/SUMMARY.md", book / "SUMMARY.md")
+(book / "SUMMARY.md").write_text(summary, encoding="utf-8")
 PYTHON
 
 "$mdbook" build "$book"
