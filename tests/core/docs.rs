@@ -30,14 +30,14 @@ fn links(text: &str) -> Vec<&str> {
 
 /// Returns the anchor of a heading: lower case, spaces as hyphens, without punctuation.
 fn anchor(heading: &str) -> String {
-    let kept = heading.trim_start_matches('#').trim().chars();
-    let kept = kept.filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
-    kept.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
+    let characters = heading.trim_start_matches('#').trim().chars();
+    let characters = characters.filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    characters.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
 }
 
 #[test]
 fn links_have_targets() {
-    let mut seen = 0;
+    let mut checked = 0;
     for path in texts() {
         let text = fs::read_to_string(&path).unwrap();
         for link in links(&text).into_iter().filter(|link| !link.starts_with("https://")) {
@@ -49,10 +49,10 @@ fn links_have_targets() {
                 let has = there.lines().any(|line| line.starts_with('#') && anchor(line) == fragment);
                 assert!(has, "{}: no heading for {link}", path.display());
             }
-            seen += 1;
+            checked += 1;
         }
     }
-    assert!(seen > 50, "{seen} links");
+    assert!(checked > 50, "{checked} links");
 }
 
 #[test]
