@@ -9,13 +9,13 @@
 //! alone: not on the order in which they came.
 //!
 //! Where one axis sweeps a parameter, every value of it has attractors of its own. An attractor goes on at the next value
-//! as the nearest cycle of the same period, if that lies within [`FOLLOWED`] of the motion's size; else it ends there, and
+//! as the nearest cycle of the same period, if that lies within [`CONTINUATION`] of the motion's size; else it ends there, and
 //! what is left at the next value begins.
 
 use rayon::prelude::*;
 
-use crate::map::catalogue::{self, Catalogue, Found};
-use crate::map::cycle::{Seen, distance};
+use crate::map::catalogue::{self, Catalogue, Outcome};
+use crate::map::cycle::{StrobeCycle, distance};
 use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
@@ -30,7 +30,7 @@ use rattlemap_dynamics::word::Word;
 pub const NONE: u16 = u16::MAX;
 
 /// How far a cycle may move from one value of a parameter to the next and still be followed.
-pub const FOLLOWED: f64 = 0.25;
+pub const CONTINUATION: f64 = 0.25;
 
 /// What starts lead to.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +61,7 @@ pub struct Basins {
     /// By value of a swept parameter; one where there is none.
     groups: Vec<Group>,
     chaos: Option<u16>,
-    cut: Cut,
+    grouping: Grouping,
 }
 
 /// The cycles at one value of the parameter.
@@ -73,16 +73,16 @@ struct Group {
 
 /// How cells are grouped by the value of a swept parameter.
 #[derive(Clone, Copy, Debug)]
-struct Cut {
+struct Grouping {
     counts: [usize; 2],
     /// The axis of the parameter.
     along: Option<usize>,
 }
 
-impl Cut {
-    fn of(plan: &Plan) -> Cut {
+impl Grouping {
+    fn of(plan: &Plan) -> Grouping {
         let along = plan.axes().iter().position(|axis| !axis.target().is_start());
-        Cut { counts: plan.counts(), along }
+        Grouping { counts: plan.counts(), along }
     }
 
     fn groups(&self) -> usize {
@@ -114,14 +114,14 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
         return None;
     }
     assert_eq!(plan.cell_count(), records.count(), "one record per cell");
-    let cut = Cut::of(plan);
+    let grouping = Grouping::of(plan);
     let is_own = |id: usize| filled_from.get(id).is_none_or(|&from| from as usize == id);
     let flows = Flows::new(plan);
-    let groups: Vec<(Catalogue, Vec<(usize, Found)>)> = (0..cut.groups())
+    let groups: Vec<(Catalogue, Vec<(usize, Outcome)>)> = (0..grouping.groups())
         .into_par_iter()
         .map(|group| {
-            let ids: Vec<usize> = cut.cells(group).into_iter().filter(|&id| is_own(id)).collect();
-            let cell = plan.cell(cut.cells(group)[0] as u32);
+            let ids: Vec<usize> = grouping.cells(group).into_iter().filter(|&id| is_own(id)).collect();
+            let cell = plan.cell(grouping.cells(group)[0] as u32);
             let learn = |flow: &Flow| catalogue::learn(flow, plan.law(cell.law), records, &ids);
             let (catalogue, found) = flows.with(cell.flow, learn);
             (catalogue, ids.into_iter().zip(found).collect())
@@ -135,9 +135,9 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
     for (group, (_, found)) in groups.iter().enumerate() {
         for &(id, found) in found {
             own[id] = match found {
-                Found::Cycle(nth) => Some(numbers[group][nth as usize]),
-                Found::Chaos => Some(chaos),
-                Found::Unresolved(_) | Found::Undecided | Found::Failed => None,
+                Outcome::Cycle(nth) => Some(numbers[group][nth as usize]),
+                Outcome::Chaos => Some(chaos),
+                Outcome::Unresolved(_) | Outcome::Undecided | Outcome::Failed => None,
             };
         }
     }
@@ -146,11 +146,12 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
     let mut counts = vec![0usize; cycles + 1];
     cells.iter().flatten().for_each(|&n| counts[n] += 1);
     let catalogues: Vec<&Catalogue> = groups.iter().map(|(catalogue, _)| catalogue).collect();
-    let shown = Shown { plan, records, cut, flows: &flows, catalogues: &catalogues, numbers: &numbers };
+    let sources =
+        Sources { plan, records, grouping, flows: &flows, catalogues: &catalogues, numbers: &numbers };
     let mut list: Vec<(usize, Attractor)> = (0..=cycles)
         .into_par_iter()
         .filter(|&n| counts[n] > 0)
-        .map(|n| (n, if n == chaos { shown.chaos(&own, n) } else { shown.cycle(&cells, n) }))
+        .map(|n| (n, if n == chaos { sources.chaos(&own, n) } else { sources.cycle(&cells, n) }))
         .collect();
     list.iter_mut().for_each(|(n, attractor)| attractor.cells = counts[*n]);
     list.sort_by(|(_, a), (_, b)| {
@@ -176,7 +177,7 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
         list: list.into_iter().map(|(_, attractor)| attractor).collect(),
         groups: groups.collect(),
         chaos: Some(label_of[chaos]).filter(|&label| label != NONE),
-        cut,
+        grouping,
     })
 }
 
@@ -194,7 +195,7 @@ impl Basins {
     /// The label of the attractor that another record of the cell `id` shows. None if the record decides nothing, or
     /// shows none of the map's attractors.
     pub fn label(&self, id: usize, record: &Record) -> Option<u16> {
-        let group = &self.groups[self.cut.group(id)];
+        let group = &self.groups[self.grouping.group(id)];
         match classify(record) {
             Class::Chaotic => self.chaos,
             Class::Periodic { period } => {
@@ -217,10 +218,11 @@ fn follow<'c>(catalogues: impl Iterator<Item = &'c Catalogue>) -> Vec<Vec<usize>
             let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
             for (i, a) in before.cycles().iter().enumerate() {
                 for (j, b) in catalogue.cycles().iter().enumerate() {
-                    let is_alike =
-                        a.seen.period == b.seen.period && a.seen.is_non_impacting == b.seen.is_non_impacting;
-                    let distance = if is_alike { between(&a.seen, &b.seen, b.units) } else { f64::INFINITY };
-                    if distance < FOLLOWED {
+                    let is_alike = a.cycle.period == b.cycle.period
+                        && a.cycle.is_non_impacting == b.cycle.is_non_impacting;
+                    let distance =
+                        if is_alike { between(&a.cycle, &b.cycle, b.units) } else { f64::INFINITY };
+                    if distance < CONTINUATION {
                         pairs.push((distance, i, j));
                     }
                 }
@@ -247,7 +249,7 @@ fn follow<'c>(catalogues: impl Iterator<Item = &'c Catalogue>) -> Vec<Vec<usize>
 }
 
 /// How far two cycles of one period are apart, by the turn that brings them nearest.
-fn between(a: &Seen, b: &Seen, units: [f64; 2]) -> f64 {
+fn between(a: &StrobeCycle, b: &StrobeCycle, units: [f64; 2]) -> f64 {
     let period = a.period as usize;
     if a.points.len() < period || b.points.len() < period {
         return f64::INFINITY;
@@ -265,32 +267,32 @@ fn lexicographic(a: &State, b: &State) -> std::cmp::Ordering {
 }
 
 /// What attractors are read from.
-struct Shown<'a, R: ?Sized> {
+struct Sources<'a, R: ?Sized> {
     plan: &'a Plan,
     records: &'a R,
-    cut: Cut,
+    grouping: Grouping,
     flows: &'a Flows<'a>,
     catalogues: &'a [&'a Catalogue],
     numbers: &'a [Vec<usize>],
 }
 
-impl<R: Records + ?Sized> Shown<'_, R> {
+impl<R: Records + ?Sized> Sources<'_, R> {
     /// A cycle by its number, read where its basin is largest.
     fn cycle(&self, cells: &[Option<usize>], number: usize) -> Attractor {
-        let mut counts = vec![0usize; self.cut.groups()];
+        let mut counts = vec![0usize; self.grouping.groups()];
         let of = || (0..cells.len()).filter(|&id| cells[id] == Some(number));
-        of().for_each(|id| counts[self.cut.group(id)] += 1);
+        of().for_each(|id| counts[self.grouping.group(id)] += 1);
         let largest = counts.iter().copied().max().unwrap_or(0);
         let group = counts.iter().position(|&count| count == largest).unwrap_or(0);
-        let cell = of().find(|&id| self.cut.group(id) == group).unwrap_or(0);
+        let cell = of().find(|&id| self.grouping.group(id) == group).unwrap_or(0);
         let nth = self.numbers[group].iter().position(|&n| n == number).unwrap_or(0);
-        let seen = &self.catalogues[group].cycles()[nth].seen;
-        let least = seen.points.iter().copied().min_by(lexicographic).unwrap_or(seen.last);
+        let cycle = &self.catalogues[group].cycles()[nth].cycle;
+        let least = cycle.points.iter().copied().min_by(lexicographic).unwrap_or(cycle.last);
         let of_cell = self.plan.cell(cell as u32);
         let (law, settings) = (self.plan.law(of_cell.law), self.plan.budget().settings);
-        let orbit = self.flows.with(of_cell.flow, |flow| read(flow, law, least, seen.period, &settings));
+        let orbit = self.flows.with(of_cell.flow, |flow| read(flow, law, least, cycle.period, &settings));
         Attractor {
-            class: Class::Periodic { period: seen.period },
+            class: Class::Periodic { period: cycle.period },
             strobe: Some(least),
             exponent: orbit.as_ref().map(|orbit| orbit.lyapunov),
             multiplier: orbit.as_ref().and_then(|orbit| {

@@ -2,7 +2,7 @@
 //!
 //! Runs that end in chaos count as one attractor together: nothing in a record tells two chaotic
 //! attractors apart. Runs that end on a cycle are compared on the reference: two cycles are the
-//! same if the last strobe state of one lies on the other, within [`SAME`] of the motion's size,
+//! same if the last strobe state of one lies on the other, within [`CYCLE_TOLERANCE`] of the motion's size,
 //! and one period divides the other (at a flip, noise makes a multiple of a period). Newton's method
 //! shows where the cycle is that a run was still on its way to. Symmetry-conjugate
 //! orbits count as one: where a symmetric cycle has split they always coexist, and that says nothing.
@@ -14,7 +14,7 @@
 
 use rayon::prelude::*;
 
-use crate::map::cycle::Seen;
+use crate::map::cycle::StrobeCycle;
 use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
@@ -23,7 +23,7 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
 use rattlemap_dynamics::orbit::Class;
 
-pub use crate::map::cycle::SAME;
+pub use crate::map::cycle::CYCLE_TOLERANCE;
 
 /// Attractors found per cell, by id; none if every cell has one start.
 ///
@@ -39,7 +39,7 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     let count = |id: usize| {
         let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
-        let mut found = Found::new(plan.law(cell.law));
+        let mut found = CellAttractors::new(plan.law(cell.law));
         flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
         found.count()
     };
@@ -47,15 +47,15 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
 }
 
 /// The attractors of one cell.
-struct Found {
+struct CellAttractors {
     law: Law,
     chaos: bool,
-    cycles: Vec<Seen>,
+    cycles: Vec<StrobeCycle>,
 }
 
-impl Found {
-    fn new(law: Law) -> Found {
-        Found { law, chaos: false, cycles: Vec::new() }
+impl CellAttractors {
+    fn new(law: Law) -> CellAttractors {
+        CellAttractors { law, chaos: false, cycles: Vec::new() }
     }
 
     fn count(&self) -> u8 {
@@ -69,8 +69,8 @@ impl Found {
                 if self.cycles.iter().any(|cycle| cycle.passes(flow, &record.strobe, period)) {
                     return;
                 }
-                let other = Seen::from(flow, self.law, record.strobe, period);
-                let is_known = |cycle: &Seen| {
+                let other = StrobeCycle::from(flow, self.law, record.strobe, period);
+                let is_known = |cycle: &StrobeCycle| {
                     cycle.is_non_impacting && other.is_non_impacting
                         || cycle.passes(flow, &other.last, period)
                 };

@@ -8,14 +8,14 @@ use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// States this close, relative to the motion's size, lie on the same cycle. Engines confirm a
 /// period from as far away where the approach is slow.
-pub const SAME: f64 = 3e-2;
+pub const CYCLE_TOLERANCE: f64 = 3e-2;
 
 /// And a cycle this close to a run's last state is the run's own: engines measure by the whole motion.
-const ITS_OWN: f64 = 2.0 * SAME;
+const REFINEMENT_TOLERANCE: f64 = 2.0 * CYCLE_TOLERANCE;
 
 /// A cycle.
 #[derive(Clone, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct StrobeCycle {
     pub(crate) period: u32,
     /// Its strobe states: the first, and one after every period.
     pub(crate) points: Vec<State>,
@@ -28,29 +28,31 @@ pub(crate) struct Seen {
     pub(crate) mirrors: bool,
 }
 
-impl Seen {
+impl StrobeCycle {
     /// The cycle that a run was on its way to, by Newton's method; the motion from its last state if that finds none.
-    pub(crate) fn from(flow: &Flow, law: Law, strobe: State, period: u32) -> Seen {
-        Seen::refined(flow, law, strobe, period).unwrap_or_else(|| Seen::through(flow, law, strobe, period))
+    pub(crate) fn from(flow: &Flow, law: Law, strobe: State, period: u32) -> StrobeCycle {
+        StrobeCycle::refined(flow, law, strobe, period)
+            .unwrap_or_else(|| StrobeCycle::through(flow, law, strobe, period))
     }
 
     /// The stable cycle close by, if Newton's method finds one.
-    pub(crate) fn refined(flow: &Flow, law: Law, strobe: State, period: u32) -> Option<Seen> {
+    pub(crate) fn refined(flow: &Flow, law: Law, strobe: State, period: u32) -> Option<StrobeCycle> {
         let cycle = refine(&Trajectory::new(flow, law, strobe), StrobeMap::Periods(period))?;
-        let is_its_own = Seen::at(strobe, period).distance(flow, &cycle.state, &strobe) < ITS_OWN;
-        (cycle.is_stable() && is_its_own).then(|| Seen::through(flow, law, cycle.state, period))
+        let is_its_own =
+            StrobeCycle::at(strobe, period).distance(flow, &cycle.state, &strobe) < REFINEMENT_TOLERANCE;
+        (cycle.is_stable() && is_its_own).then(|| StrobeCycle::through(flow, law, cycle.state, period))
     }
 
     /// The motion from a state, for so many periods.
-    pub(crate) fn through(flow: &Flow, law: Law, state: State, period: u32) -> Seen {
-        let mut seen = Seen { mirrors: flow.mirror_symmetric(&law), ..Seen::at(state, period) };
+    pub(crate) fn through(flow: &Flow, law: Law, state: State, period: u32) -> StrobeCycle {
+        let mut seen = StrobeCycle { mirrors: flow.mirror_symmetric(&law), ..StrobeCycle::at(state, period) };
         // A motion that stops here is known by the state that it had.
         let _: Result<(), Stop> = seen.run(flow, law);
         seen
     }
 
-    fn at(state: State, period: u32) -> Seen {
-        Seen {
+    fn at(state: State, period: u32) -> StrobeCycle {
+        StrobeCycle {
             period,
             points: vec![state],
             halves: Vec::new(),
@@ -83,7 +85,7 @@ impl Seen {
 
     /// Whether it, or its symmetry-conjugate orbit, comes through a state of a cycle of `period`.
     pub(crate) fn passes(&self, flow: &Flow, state: &State, period: u32) -> bool {
-        let is_close = |point: State| self.distance(flow, &point, state) < SAME;
+        let is_close = |point: State| self.distance(flow, &point, state) < CYCLE_TOLERANCE;
         self.is_related(period)
             && (self.points.iter().copied().any(is_close) || self.mirrored().any(is_close))
     }
@@ -121,7 +123,7 @@ mod tests {
     #[test]
     fn a_state_that_is_no_number_lies_on_no_cycle() {
         let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
-        let seen = |point: State| Seen::at(point, 1);
+        let seen = |point: State| StrobeCycle::at(point, 1);
         let state = [0.1, 0.2, -0.1, 0.3];
         assert!(seen(state).passes(&flow, &state, 1));
         for i in 0..4 {

@@ -5,6 +5,7 @@
 pub use crate::text::{expression, printable};
 
 pub mod random;
+pub(crate) mod statistics;
 
 pub mod scene;
 

@@ -32,7 +32,7 @@ use start::Starts;
 
 /// Most flows that engines keep for all batches: below 1 GB but for motion that needs thousands of steps per forcing
 /// period.
-const KEPT_FLOWS: usize = 8_192;
+const MOST_STORED_FLOWS: usize = 8_192;
 
 /// What a run of a cell is made of: indices of its flow and its law in the plan, and its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -329,8 +329,8 @@ impl Plan {
     }
 
     /// Whether several runs share a flow, and all flows can be kept.
-    pub fn keeps_flows(&self) -> bool {
-        keeps_flows(self.flow_count() as u64, self.run_count() as u64)
+    pub fn stores_flows(&self) -> bool {
+        stores_flows(self.flow_count() as u64, self.run_count() as u64)
     }
 
     /// How many distinct laws there are.
@@ -361,8 +361,8 @@ impl Plan {
 }
 
 /// Whether several runs share a flow, and all flows can be kept.
-pub(crate) fn keeps_flows(flows: u64, runs: u64) -> bool {
-    flows < runs && flows <= KEPT_FLOWS as u64
+pub(crate) fn stores_flows(flows: u64, runs: u64) -> bool {
+    flows < runs && flows <= MOST_STORED_FLOWS as u64
 }
 
 fn needs(quantities: &[Quantity]) -> Needs {

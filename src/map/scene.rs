@@ -11,6 +11,7 @@ mod builder;
 mod derived;
 mod identity;
 mod keys;
+mod limits;
 mod list;
 mod models;
 mod overrides;
@@ -21,22 +22,23 @@ mod start;
 #[cfg(test)]
 mod tests;
 
-pub use crate::text::error::{Place, Problem, SceneError};
+pub use crate::text::error::{Fault, Place, Problem, SceneError};
 pub use along::Along;
-pub use axis::{Axis, MAX_COUNT, Scale, Target};
+pub use axis::{Axis, Scale, Target};
 pub use builder::SceneBuilder;
 pub(crate) use derived::Rule;
 pub use keys::{KEYS, Key, KeyDefault, Takes};
-pub use list::{Beside as FileBeside, FileText, FindFile, List};
+pub use limits::MAX_COUNT;
+pub use list::{CompanionFile, FileText, FindFile, List};
 pub(crate) use points::Points;
-pub use settings::{AUDIT, Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
+pub use settings::{Continuous, DEFAULT_AUDIT, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 
 use crate::text::document::{self, Node};
 use crate::text::error;
 use crate::text::section::{self, Section};
 use derived::Derived;
-use parameters::Beside;
+use parameters::ParameterSources;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, Parameter, ParameterError};
 use rattlemap_dynamics::orbit;
@@ -78,7 +80,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads a scene from its text, which must do without files beside it.
+    /// Reads a scene from its text, which must do without files sources it.
     ///
     /// `name` is what messages call the text, usually the file's path as the user gave it;
     /// `sets` are `NAME=VALUE` arguments, later ones winning over earlier ones and all of
@@ -88,7 +90,7 @@ impl Scene {
     /// [`SceneError`] for the first thing that is wrong.
     pub fn parse(text: &str, name: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
         let find: FindFile<'_> = &|_, _| Err("names a file, and no files are read here".to_owned());
-        Scene::parse_beside(text, name, sets, purpose, find)
+        Scene::parse_with_files(text, name, sets, purpose, find)
     }
 
     /// The same where a list of cells, or the model, may stand in a file of its own, which `find` reads: nothing here
@@ -96,7 +98,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError`] for the first thing that is wrong, in the text or in such a file.
-    pub fn parse_beside(
+    pub fn parse_with_files(
         text: &str,
         name: &str,
         sets: &[String],
@@ -126,7 +128,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::parse_along`].
-    pub fn parse_written(
+    pub fn parse_generated(
         text: &str,
         sets: &[String],
         purpose: Purpose,
@@ -184,8 +186,8 @@ impl Scene {
             axes.iter().any(|axis| axis.target() == target) || list.as_ref().is_some_and(is_column)
         };
         let derived = derived::read(&root, model, is_swept)?;
-        let beside = Beside { axes: &axes, list: list.as_ref(), derived: &derived };
-        let base = parameters::read(&root, model, beside)?;
+        let sources = ParameterSources { axes: &axes, list: list.as_ref(), derived: &derived };
+        let base = parameters::read(&root, model, sources)?;
         let title = root.get("title").map(|title| settings::read_title(&title)).transpose()?;
         let is_list = list.is_some();
         let points = Points::new(base, axes, list, derived);
@@ -375,8 +377,8 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
         overrides::apply(&mut document, set)?;
     }
     let root = Section::open(&document, "", &["parameters"])?;
-    let beside = Beside { axes: &[], list: None, derived: &Derived::default() };
-    let cell = parameters::read(&root, model, beside)?;
+    let sources = ParameterSources { axes: &[], list: None, derived: &Derived::default() };
+    let cell = parameters::read(&root, model, sources)?;
     Flow::validate(&*cell).map_err(|error| {
         // Defaults are fine: it is what was set that has to change.
         let error = root.no_motion("", &error);

@@ -12,7 +12,7 @@
 //! starts from the last states of the row before. Several starts per cell are
 //! further runs over all cells, one start after the other: what runs side by side starts alike.
 //!
-//! What is asked for follows from the records that have come, not from their order. So nobody waits for the
+//! What is asked for follows from the records that have done, not from their order. So nobody waits for the
 //! slowest cell but what depends on it, and a run that was interrupted goes on by replaying its records.
 
 mod adaptive;
@@ -44,24 +44,24 @@ pub struct Schedule {
     /// Places of it that were handed out, and how many had been before the last time.
     begun: usize,
     begun_before: usize,
-    /// How many records have come.
-    come: usize,
+    /// How many records have done.
+    done: usize,
     /// By run.
-    states: Vec<State>,
+    states: Vec<RunState>,
     /// Where the last row begins.
     row: usize,
-    rule: Rule,
+    strategy: Strategy,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum State {
-    Unasked,
-    Asked,
-    Come,
+enum RunState {
+    Unrequested,
+    Requested,
+    Done,
 }
 
-/// What asks for cells.
-enum Rule {
+/// What requests for cells.
+enum Strategy {
     /// All are asked for from the beginning.
     Whole,
     /// Rows that follow each other.
@@ -102,22 +102,23 @@ impl Schedule {
     pub fn of(plan: &Plan, shard: Option<Shard>) -> Schedule {
         assert!(shard.is_none() || plan.refine().is_none(), "an adaptive map is not dealt out");
         let mut sequence = Vec::new();
-        let rule = match plan.refine() {
-            Some(refine) => Rule::Adaptive(Box::new(Adaptive::new(plan, refine, &mut sequence))),
+        let strategy = match plan.refine() {
+            Some(refine) => Strategy::Adaptive(Box::new(Adaptive::new(plan, refine, &mut sequence))),
             None if plan.policy().follows() => {
                 let follow = Follow::new(plan, shard);
                 sequence = follow.row();
-                Rule::Follow(follow)
+                Strategy::Follow(follow)
             }
             None => {
                 let all = || (0..plan.run_count()).map(|place| plan.run_at(place)).collect();
                 sequence = shard.map_or_else(all, |shard| shard.runs(plan));
-                Rule::Whole
+                Strategy::Whole
             }
         };
-        let states = vec![State::Unasked; plan.run_count()];
-        let mut schedule = Schedule { sequence, begun: 0, begun_before: 0, come: 0, states, row: 0, rule };
-        schedule.note_asked(0);
+        let states = vec![RunState::Unrequested; plan.run_count()];
+        let mut schedule =
+            Schedule { sequence, begun: 0, begun_before: 0, done: 0, states, row: 0, strategy };
+        schedule.note_requested(0);
         schedule
     }
 
@@ -132,7 +133,7 @@ impl Schedule {
         let mut cells = Vec::new();
         self.begun_before = self.begun;
         while cells.len() < count && self.begun < self.sequence.len() {
-            if self.states[self.sequence[self.begun] as usize] == State::Asked {
+            if self.states[self.sequence[self.begun] as usize] == RunState::Requested {
                 cells.push(self.cell(plan, self.begun));
             }
             self.begun += 1;
@@ -141,84 +142,84 @@ impl Schedule {
     }
 
     /// Takes back what [`Schedule::next`] handed out last, which could not be begun.
-    pub fn take_back(&mut self) {
+    pub fn return_last(&mut self) {
         self.begun = self.begun_before;
     }
 
     /// Whether a cell is asked for and has no record yet.
-    pub fn waits_for(&self, id: u32) -> bool {
-        self.states.get(id as usize) == Some(&State::Asked)
+    pub fn is_waiting_for(&self, id: u32) -> bool {
+        self.states.get(id as usize) == Some(&RunState::Requested)
     }
 
     /// Whether records may be taken up in any order: no cell depends on another.
     pub fn takes_any_order(&self) -> bool {
-        matches!(self.rule, Rule::Whole)
+        matches!(self.strategy, Strategy::Whole)
     }
 
     /// Looks at records that are taken up next: all at once is faster, and the same.
-    pub fn foresee(&mut self, records: &[(u32, Record)]) {
-        if let Rule::Adaptive(adaptive) = &mut self.rule {
-            adaptive.foresee(records);
+    pub fn prepare(&mut self, records: &[(u32, Record)]) {
+        if let Strategy::Adaptive(adaptive) = &mut self.strategy {
+            adaptive.prepare(records);
         }
     }
 
     /// Whether it reads the records of other cells: else there need be none when one is taken up.
     pub fn reads_records(&self) -> bool {
-        !matches!(self.rule, Rule::Whole)
+        !matches!(self.strategy, Strategy::Whole)
     }
 
     /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included, if it reads
     /// them.
     pub fn take(&mut self, id: u32, records: &[Record]) {
-        self.states[id as usize] = State::Come;
-        self.come += 1;
+        self.states[id as usize] = RunState::Done;
+        self.done += 1;
         let end = self.sequence.len();
-        if let Rule::Adaptive(adaptive) = &mut self.rule {
+        if let Strategy::Adaptive(adaptive) = &mut self.strategy {
             adaptive.take(id, &records[id as usize], &mut self.sequence);
         }
-        if self.come == self.sequence.len() {
-            match &mut self.rule {
-                Rule::Whole => {}
-                Rule::Follow(follow) => {
+        if self.done == self.sequence.len() {
+            match &mut self.strategy {
+                Strategy::Whole => {}
+                Strategy::Follow(follow) => {
                     self.sequence.extend(follow.next(records));
                     self.row = end;
                 }
-                Rule::Adaptive(adaptive) => adaptive.settle(records, &mut self.sequence),
+                Strategy::Adaptive(adaptive) => adaptive.settle(records, &mut self.sequence),
             }
         }
-        self.note_asked(end);
+        self.note_requested(end);
     }
 
-    fn note_asked(&mut self, from: usize) {
+    fn note_requested(&mut self, from: usize) {
         for &id in &self.sequence[from..] {
-            self.states[id as usize] = State::Asked;
+            self.states[id as usize] = RunState::Requested;
         }
     }
 
     /// Whether every cell that is asked for has its record.
     pub fn is_finished(&self) -> bool {
-        self.come == self.sequence.len()
+        self.done == self.sequence.len()
     }
 
     /// Runs that there will be, as far as is known by now.
     pub fn expected(&self) -> usize {
-        match &self.rule {
-            Rule::Follow(follow) => follow.cell_count(),
-            Rule::Whole | Rule::Adaptive(_) => self.sequence.len(),
+        match &self.strategy {
+            Strategy::Follow(follow) => follow.cell_count(),
+            Strategy::Whole | Strategy::Adaptive(_) => self.sequence.len(),
         }
     }
 
     fn cell(&self, plan: &Plan, place: usize) -> Cell {
         let cell = plan.cell(self.sequence[place]);
-        match &self.rule {
-            Rule::Follow(follow) => Cell { start: follow.start(place - self.row), ..cell },
-            Rule::Whole | Rule::Adaptive(_) => cell,
+        match &self.strategy {
+            Strategy::Follow(follow) => Cell { start: follow.start(place - self.row), ..cell },
+            Strategy::Whole | Strategy::Adaptive(_) => cell,
         }
     }
 
     /// Fills what was not integrated and says how it went; none where every cell was.
     pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
-        let Rule::Adaptive(adaptive) = &self.rule else { return None };
+        let Strategy::Adaptive(adaptive) = &self.strategy else { return None };
         let (filled, filled_from) = adaptive.fill(records);
         Some(Refined {
             integrated: self.sequence.len(),

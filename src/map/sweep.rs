@@ -1,4 +1,4 @@
-//! The run of a map. Cells go to an engine as soon as the schedule asks for them; records are kept as they come.
+//! The run of a map. Cells go to an engine as soon as the schedule requests for them; records are kept as they come.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -32,8 +32,8 @@ pub enum SweepError {
     Keep(Box<dyn Error + Send + Sync>),
 }
 
-/// Runs the cells that a schedule asks for, puts their records into `records` (by
-/// run; empty where neither the schedule reads them nor anybody else) and hands them to `keep` about once a second, with the number of runs that are foreseen by
+/// Runs the cells that a schedule requests for, puts their records into `records` (by
+/// run; empty where neither the schedule reads them nor anybody else) and hands them to `keep` about once a second, with the number of runs that are prepared by
 /// now. It ends before, and soon, once `halt` is raised. True if the map is finished.
 ///
 /// So many cells are under way that some end in about a second; records do not depend on it. If there are too many
@@ -49,7 +49,7 @@ pub async fn run(
     halt: &Arc<AtomicBool>,
     mut keep: impl FnMut(&[(u32, Record)], usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
-    engine.heed(halt);
+    engine.stop_on(halt);
     let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH * engine.card_count() };
     let mut under_way = 0;
     let (mut unkept, mut last_kept, mut last_ended) = (Vec::new(), Instant::now(), Instant::now());
@@ -59,7 +59,7 @@ pub async fn run(
         let clock = if engine.card_count() > 1 { last_ended } else { Instant::now() };
         let ended = match engine.begin(&next).await {
             Err(EngineError::OutOfMemory { .. }) if pace.halve(under_way + next.len()) => {
-                schedule.take_back();
+                schedule.return_last();
                 continue;
             }
             Err(error) => Err(error),
@@ -76,7 +76,7 @@ pub async fn run(
             Ok(ended) => {
                 pace.adapt(under_way, ended.len(), last_ended - clock);
                 under_way -= ended.len();
-                schedule.foresee(ended);
+                schedule.prepare(ended);
                 for &(id, record) in ended {
                     put(records, id, record);
                     schedule.take(id, records);
@@ -101,9 +101,9 @@ pub async fn run(
 /// Takes up records of an interrupted run, in the order in which they were kept. False if the schedule does not
 /// wait for one of them.
 pub fn replay(schedule: &mut Schedule, records: &mut [Record], kept: &[(u32, Record)]) -> bool {
-    schedule.foresee(kept);
+    schedule.prepare(kept);
     kept.iter().all(|&(id, record)| {
-        let is_waited_for = schedule.waits_for(id);
+        let is_waited_for = schedule.is_waiting_for(id);
         if is_waited_for {
             put(records, id, record);
             schedule.take(id, records);

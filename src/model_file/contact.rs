@@ -8,7 +8,7 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Its keys.
-const KEYS: [&str; 7] = ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping"];
+const CONTACT_KEYS: [&str; 7] = ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping"];
 
 /// A wall.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub struct Wall {
     /// What happens there.
     pub law: WallLaw,
     /// What lies behind it; none where it does not yield.
-    pub behind: Option<Behind>,
+    pub spring: Option<WallSpring>,
 }
 
 /// What happens at a wall.
@@ -37,7 +37,7 @@ pub enum WallLaw {
 
 /// A spring and a damper along the gap row.
 #[derive(Clone, Debug)]
-pub struct Behind {
+pub struct WallSpring {
     /// Stiffness.
     pub stiffness: Expression,
     /// Damping.
@@ -45,7 +45,7 @@ pub struct Behind {
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum LawKind {
     Impact,
     Elastic,
 }
@@ -53,7 +53,7 @@ enum Kind {
 impl Wall {
     /// What it is to the oscillator.
     pub fn contact(&self) -> Contact {
-        match (&self.law, &self.behind) {
+        match (&self.law, &self.spring) {
             (WallLaw::Elastic, _) => Contact::Elastic,
             (WallLaw::Impact { .. }, Some(_)) => Contact::Impact,
             (WallLaw::Impact { .. }, None) => Contact::Rigid,
@@ -62,8 +62,8 @@ impl Wall {
 
     /// Entries that the oscillator depends on.
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
-        let behind = self.behind.iter().flat_map(|behind| [&behind.stiffness, &behind.damping]);
-        behind.chain([&self.at])
+        let spring = self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping]);
+        spring.chain([&self.at])
     }
 
     /// Entries that the law depends on.
@@ -82,15 +82,15 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Option<Wall>
     let two = "one or two tables, [[contact]]: a model has at most two walls, one on each side";
     let items = field.list(two)?;
     if !(1..=2).contains(&items.len()) {
-        return Err(field.counted(items.len(), "tables", two));
+        return Err(field.wrong_count(items.len(), "tables", two));
     }
     let mut walls = [None, None];
     for item in &items {
         let (side, field, wall) = read_one(item, names)?;
         if walls[side.index()].is_some() {
-            return Err(field.conflict(
-                "there is a wall on this side already; a model has one on each side at most".to_owned(),
-            ));
+            return Err(
+                field.conflict("there is a wall on this side already; a model has one on each side at most")
+            );
         }
         walls[side.index()] = Some(wall);
     }
@@ -98,7 +98,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Option<Wall>
 }
 
 fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, Wall), SceneError> {
-    let section = Section::open(item.node, &item.path, &KEYS)?;
+    let section = Section::open(item.node, &item.path, &CONTACT_KEYS)?;
     let side = section.require("side", "write side = \"right\" (z <= at) or side = \"left\" (z >= at)")?;
     let which = side.choice(&[("right", Side::Right), ("left", Side::Left)])?;
     let at = section.require("at", "write where the wall is, such as at = \"b\"")?;
@@ -107,18 +107,17 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
     let entry = |name: &str| section.get(name).map(|field| names.entry(&field)).transpose();
     let zero = || Expression::number(0.0);
     let (stiffness, damping) = (entry("stiffness")?, entry("damping")?);
-    let law = match law.choice(&[("impact", Kind::Impact), ("elastic", Kind::Elastic)])? {
-        Kind::Impact => {
+    let law = match law.choice(&[("impact", LawKind::Impact), ("elastic", LawKind::Elastic)])? {
+        LawKind::Impact => {
             let restitution = section.require("restitution", "an impact needs one: w+ = -restitution w-")?;
             let restitution = names.entry(&restitution)?;
             WallLaw::Impact { restitution, mesh_speed: entry("mesh_speed")?.unwrap_or_else(zero) }
         }
-        Kind::Elastic => {
+        LawKind::Elastic => {
             for name in ["restitution", "mesh_speed"] {
                 if let Some(field) = section.get(name) {
                     return Err(field.conflict(
-                        "it belongs to law = \"impact\" alone: elastic contact has no jump; drop it, or change the law"
-                            .to_owned(),
+                        "it belongs to law = \"impact\" alone: elastic contact has no jump; drop it, or change the law",
                     ));
                 }
             }
@@ -126,7 +125,9 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
             WallLaw::Elastic
         }
     };
-    let behind = (stiffness.is_some() || damping.is_some())
-        .then(|| Behind { stiffness: stiffness.unwrap_or_else(zero), damping: damping.unwrap_or_else(zero) });
-    Ok((which, side, Wall { at, law, behind }))
+    let spring = (stiffness.is_some() || damping.is_some()).then(|| WallSpring {
+        stiffness: stiffness.unwrap_or_else(zero),
+        damping: damping.unwrap_or_else(zero),
+    });
+    Ok((which, side, Wall { at, law, spring }))
 }

@@ -14,11 +14,11 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// What stands outside of any table, and the tables.
-const TOP_LEVEL: [&str; 8] =
+const MODEL_KEYS: [&str; 8] =
     ["name", "title", "summary", "source", "notes", "parameters", "motion", "contact"];
 
 /// Characters of the name: it stands in scenes and in names of files.
-const LONGEST_NAME: usize = 40;
+const LONGEST_MODEL_NAME: usize = 40;
 
 /// Characters of title, summary and source: each has one line.
 const LONGEST_LINE: usize = 200;
@@ -61,7 +61,7 @@ impl PartialEq for Definition {
 /// Reads a model's file and looks at its motion at the defaults.
 pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let document = document::read(text, file)?;
-    let root = Section::open(&document, "", &TOP_LEVEL)?;
+    let root = Section::open(&document, "", &MODEL_KEYS)?;
     let name = root.require("name", "name the model, such as name = \"my-model\"")?;
     let name = read_name(&name)?;
     let line = |key| root.get(key).map(|field| field.line(LONGEST_LINE)).transpose();
@@ -106,18 +106,17 @@ fn read_name(field: &Field<'_>) -> Result<String, SceneError> {
     let name = field.text()?;
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let is_name = name.chars().all(is_word) && name.starts_with(|c: char| c.is_ascii_alphanumeric());
-    match is_name && name.len() <= LONGEST_NAME {
+    match is_name && name.len() <= LONGEST_MODEL_NAME {
         true => Ok(name.to_owned()),
-        false => {
-            Err(field
-                .out_of_range(&format!("1 to {LONGEST_NAME} letters, digits and hyphens, such as my-model")))
-        }
+        false => Err(field.out_of_range(&format!(
+            "1 to {LONGEST_MODEL_NAME} letters, digits and hyphens, such as my-model"
+        ))),
     }
 }
 
 /// The error for a model without motion at its defaults, at the field that has to change.
 fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) -> SceneError {
-    let (table, key) = blamed(error);
+    let (table, key) = blame(error);
     let wall = |of: &Field<'_>, has: &dyn Fn(&str) -> bool| match (&of.node.value, table) {
         (Value::Table(fields), Table::Wall(side)) => {
             let is_there = |side: Side| match fields.get("side").map(|node| &node.value) {
@@ -147,7 +146,7 @@ enum Table {
 }
 
 /// Where the number comes from that an error names.
-fn blamed(error: &ModelError) -> (Table, &str) {
+fn blame(error: &ModelError) -> (Table, &str) {
     let ModelError::Oscillator(error) = error else { return (Table::Motion, "") };
     let quantity = match error {
         OscillatorError::OutOfRange { quantity, .. }
@@ -222,9 +221,9 @@ impl Definition {
             let i = side.index();
             oscillator.walls[i] = at;
             oscillator.contacts[i] = wall.contact();
-            if let Some(behind) = &wall.behind {
+            if let Some(spring) = &wall.spring {
                 oscillator.meshing[i] =
-                    with_spring(free, gap, at, of(&behind.stiffness), of(&behind.damping));
+                    with_spring(free, gap, at, of(&spring.stiffness), of(&spring.damping));
             }
         }
         Ok(oscillator)

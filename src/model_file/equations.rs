@@ -17,10 +17,10 @@ pub(super) fn lines(definition: &Definition) -> Vec<String> {
     for side in Side::BOTH {
         let Some(wall) = definition.wall(side) else { continue };
         let name = name(side);
-        match (wall.contact(), &wall.behind) {
-            (Contact::Impact | Contact::Elastic, Some(behind)) => {
-                let spring = product(&behind.stiffness, &format!("({})", minus("z", &wall.at)));
-                let force = sum([spring, product(&behind.damping, "w")]);
+        match (wall.contact(), &wall.spring) {
+            (Contact::Impact | Contact::Elastic, Some(spring)) => {
+                let elastic = product(&spring.stiffness, &format!("({})", minus("z", &wall.at)));
+                let force = sum([elastic, product(&spring.damping, "w")]);
                 lines.push(format!("behind the {name} wall, with N = {force}"));
                 lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
             }

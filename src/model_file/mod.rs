@@ -19,7 +19,7 @@ use std::sync::Arc;
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter};
 
 pub use builtin::{BUILT_IN, DEFAULT};
-pub use contact::{Behind, Wall, WallLaw};
+pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
 #[cfg(feature = "cli")]
 pub(crate) use equations::factor;

@@ -8,7 +8,7 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Its keys.
-const KEYS: [&str; 10] = [
+const MOTION_KEYS: [&str; 10] = [
     "coordinates",
     "velocities",
     "bodies",
@@ -74,7 +74,8 @@ impl Motion {
 /// Reads `[motion]`.
 pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, SceneError> {
     root.require("motion", "write [motion] with coordinates, mass, frequency and gap")?;
-    let section = root.section_among("motion", &KEYS, &format!("{}; {LIMITS}", KEYS.join(", ")))?;
+    let section =
+        root.section_among("motion", &MOTION_KEYS, &format!("{}; {LIMITS}", MOTION_KEYS.join(", ")))?;
     let field = section.require("coordinates", "name one or two, such as coordinates = [\"x\"]")?;
     let two = "one or two names: a model has at most two degrees of freedom";
     let coordinates = read_names(&field, two)?;

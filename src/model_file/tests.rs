@@ -4,7 +4,7 @@ use rattlemap_dynamics::model::{Contact, Domain, Model, Range, Shapes, Side};
 
 use super::*;
 
-const GOOD: &str = r#"name = "stop"
+const ONE_DEGREE: &str = r#"name = "stop"
 title = "One stop"
 source = "a book"
 
@@ -33,7 +33,7 @@ law = "impact"
 restitution = "e"
 "#;
 
-const TWO: &str = r#"name = "two"
+const TWO_DEGREES: &str = r#"name = "two"
 
 [parameters]
 m = 2.0
@@ -79,7 +79,7 @@ fn refusal_of(text: &str, old: &str, new: &str) -> String {
 
 #[test]
 fn a_file_says_all_that_a_model_is() {
-    let model = read(GOOD);
+    let model = read(ONE_DEGREE);
     assert_eq!((model.name(), model.title(), model.source()), ("stop", "One stop", Some("a book")));
     assert_eq!((model.state_names(), model.bodies()), (vec!["x", "v"], vec!["x"]));
     let names: Vec<&str> = model.parameters().iter().map(|p| &*p.name).collect();
@@ -111,7 +111,7 @@ fn a_file_says_all_that_a_model_is() {
 
 #[test]
 fn two_degrees_of_freedom_and_walls_of_different_laws() {
-    let model = read(TWO);
+    let model = read(TWO_DEGREES);
     assert_eq!((model.title(), model.source()), ("two", None));
     assert_eq!((model.state_names(), model.bodies()), (vec!["a", "va", "b", "vb"], vec!["rotor", "stator"]));
     let oscillator = model.oscillator().unwrap();
@@ -271,7 +271,7 @@ fn what_does_not_fit_is_refused_by_name_with_the_limit() {
         ("[motion]", "[movement]", "unknown field `movement = { ... }`; valid names: name, title"),
         ("mass = [[\"1\"]]\n", "", "m.toml:13:2: `motion.mass` is missing"),
     ] {
-        let message = refusal_of(GOOD, old, new);
+        let message = refusal_of(ONE_DEGREE, old, new);
         assert!(message.contains(expected), "{new}: expected {expected:?} in: {message}");
     }
     for (old, new, expected) in [
@@ -298,11 +298,12 @@ fn what_does_not_fit_is_refused_by_name_with_the_limit() {
         ("[\"va\", \"vb\"]", "[\"va\", \"a\"]", "`a` names something else already"),
         ("\"10*k\"", "\"10*k*log(0)\"", "m.toml:23:13: `contact.0.stiffness = \"10*k*log(0)\"` does not fit"),
     ] {
-        let message = refusal_of(TWO, old, new);
+        let message = refusal_of(TWO_DEGREES, old, new);
         assert!(message.contains(expected), "{new}: expected {expected:?} in: {message}");
     }
-    let none =
-        FileModel::parse(&GOOD[..GOOD.find("[[contact]]").unwrap()], "m.toml").unwrap_err().to_string();
+    let none = FileModel::parse(&ONE_DEGREE[..ONE_DEGREE.find("[[contact]]").unwrap()], "m.toml")
+        .unwrap_err()
+        .to_string();
     assert!(none.contains("`contact` is missing; write [[contact]]"), "{none}");
 }
 
@@ -340,7 +341,7 @@ fn equations_are_written_as_the_field_writes_them() {
         ]
     );
     assert_eq!(
-        read(GOOD).equations(),
+        read(ONE_DEGREE).equations(),
         [
             "gap   z = x",
             "rate  w = v",
@@ -350,7 +351,7 @@ fn equations_are_written_as_the_field_writes_them() {
         ]
     );
     assert_eq!(
-        read(TWO).equations()[3..8],
+        read(TWO_DEGREES).equations()[3..8],
         [
             "    m a'' + 0.5 b'' + c a' - c b' + k a - k b = 0",
             "    0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b = 0",

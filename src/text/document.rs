@@ -10,7 +10,7 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Place, Problem, SHOWN, SceneError};
+use super::error::{LONGEST_EXCERPT, Place, Problem, SceneError};
 
 /// The fields of a table by name.
 pub(crate) type Table = BTreeMap<String, Node>;
@@ -195,10 +195,10 @@ fn begun(bytes: &[u8]) -> usize {
     bytes.iter().filter(|&&byte| byte & 0xc0 != 0x80).count()
 }
 
-/// One line of at most [`SHOWN`] characters; no more of the text is looked at.
+/// One line of at most [`LONGEST_EXCERPT`] characters; no more of the text is looked at.
 pub(crate) fn shorten(text: &str) -> String {
     let mut line = String::new();
-    let mut left = SHOWN;
+    let mut left = LONGEST_EXCERPT;
     for word in text.split_whitespace() {
         let space = if line.is_empty() { "" } else { " " };
         for c in space.chars().chain(word.chars()) {

@@ -52,7 +52,7 @@ impl Place {
 }
 
 /// Characters of a name or a value that a message shows.
-pub(crate) const SHOWN: usize = 60;
+pub(crate) const LONGEST_EXCERPT: usize = 60;
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -76,118 +76,111 @@ pub struct SceneError {
     pub problem: Problem,
 }
 
-/// What can be wrong with a scene. Fields are full paths as `--set` takes them.
+/// What can be wrong with a scene or a model. Fields are named by their full path, as `--set` takes it.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Problem {
-    /// The file could not be read.
+    /// The file cannot be read.
     #[error("cannot read the scene ({reason}); give the path of a TOML file such as scenes/smoke.toml")]
     Unreadable {
-        /// The operating system's words.
+        /// The operating system's message.
         reason: String,
     },
     /// The text is not TOML.
     #[error("not valid TOML: {message}; the line reads `{line}`")]
     Syntax {
-        /// The parser's words.
+        /// The parser's message.
         message: String,
-        /// The offending line.
+        /// The line with the error.
         line: String,
     },
-    /// A `--set` argument without a name, a value, or the equals sign between them.
+    /// A `--set` argument lacks a name, a value, or the equals sign between them.
     #[error("expected NAME=VALUE, such as e=0.6 or integration.max_period=32")]
     NotAnAssignment,
-    /// A field that scenes do not have.
-    #[error("unknown field `{field} = {value}`; {remedy}")]
-    UnknownField {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// The nearest known name, and all of them.
-        remedy: String,
-    },
-    /// A value that must be one of a list of names and is not.
-    #[error("`{field} = {value}` is not known; {remedy}")]
-    UnknownName {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// The nearest known name, and all of them.
-        remedy: String,
-    },
-    /// A name within a value that is not known.
-    #[error("`{field} = {value}` has an unknown name, {remedy}")]
-    UnknownWithin {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// The name, the nearest known one, and all of them.
-        remedy: String,
-    },
-    /// Text, or a file that a field names, that cannot be read as what it should be.
-    #[error("`{field} = {value}` {reason}")]
-    UnreadableValue {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// Why not, and what to write.
-        reason: String,
-    },
-    /// A table of cells that is none.
+    /// A table of cells is empty or malformed.
     #[error("{message}")]
     Table {
-        /// What is wrong there.
+        /// The fault and its remedy.
         message: String,
     },
-    /// A value of the wrong type.
-    #[error("`{field} = {value}` has the wrong type: it must be {expected}")]
-    WrongType {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// What it must be.
-        expected: String,
-    },
-    /// A value outside its range.
-    #[error("`{field} = {value}` is out of range: it must be {requirement}")]
-    OutOfRange {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// What it must be.
-        requirement: String,
-    },
-    /// A required field that is not there.
+    /// A required field is missing.
     #[error("`{field}` is missing; {remedy}")]
     Missing {
-        /// The field.
+        /// Path of the field.
         field: String,
         /// What to write.
         remedy: String,
     },
-    /// Parameters that are fine one by one, and together make no oscillator.
+    /// Each parameter is in its range, but together they do not make an oscillator.
     #[error("{}{reason}; change the parameters", if .cell.is_empty() { String::new() } else { format!("at {cell}: ") })]
     NoMotion {
-        /// The axes' values there; empty where there are no axes.
+        /// Values of the swept parameters; empty without axes.
         cell: String,
         /// Why there is no motion.
         reason: Box<ModelError>,
     },
-    /// A value that is fine by itself but not beside another.
-    #[error("`{field} = {value}` does not fit: {remedy}")]
-    Conflict {
-        /// The field.
+    /// A field has a value that cannot be used.
+    #[error("{}`{field} = {value}`{}{detail}", .fault.before(), .fault.after())]
+    Value {
+        /// Kind of the fault.
+        fault: Fault,
+        /// Path of the field.
         field: String,
-        /// Its value as written.
+        /// The value as written, shortened.
         value: String,
-        /// The other value, and which one to change.
-        remedy: String,
+        /// The requirement that is not met, or the remedy.
+        detail: String,
     },
+}
+
+impl Problem {
+    /// Builds [`Problem::Value`].
+    pub(crate) fn value(
+        fault: Fault,
+        field: impl Into<String>,
+        value: impl Into<String>,
+        detail: impl Into<String>,
+    ) -> Problem {
+        Problem::Value { fault, field: field.into(), value: value.into(), detail: detail.into() }
+    }
+}
+
+/// Kinds of values that cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Scenes have no field of this name.
+    UnknownField,
+    /// The value must be one of a list of names, and is not.
+    UnknownName,
+    /// An expression contains an unknown name.
+    UnknownWithin,
+    /// An expression, or the file that the field names, cannot be read.
+    Unreadable,
+    /// The value has the wrong type.
+    WrongType,
+    /// The value is outside its range.
+    OutOfRange,
+    /// The value contradicts another field.
+    Conflict,
+}
+
+impl Fault {
+    /// Returns the text in front of the field.
+    fn before(self) -> &'static str {
+        if self == Fault::UnknownField { "unknown field " } else { "" }
+    }
+
+    /// Returns the text between the value and the detail.
+    fn after(self) -> &'static str {
+        match self {
+            Fault::UnknownField => "; ",
+            Fault::UnknownName => " is not known; ",
+            Fault::UnknownWithin => " has an unknown name, ",
+            Fault::Unreadable => " ",
+            Fault::WrongType => " has the wrong type: it must be ",
+            Fault::OutOfRange => " is out of range: it must be ",
+            Fault::Conflict => " does not fit: ",
+        }
+    }
 }
 
 /// The sentence for an unknown name: the nearest known one, if any is near, and `all` of them, listed.

@@ -13,16 +13,16 @@ use grammar::Tree;
 pub const LONGEST: usize = 500;
 
 /// Characters that a message shows of what cannot be read.
-const SHOWN: usize = 20;
+const LONGEST_REST: usize = 20;
 
 /// What expressions are made of, for messages.
 pub const TAKES: &str = "numbers, parameters, pi, + - * / ^, parentheses, and sqrt exp log sin cos tan abs (of one), min max (of two)";
 
-type One = fn(f64) -> f64;
-type Two = fn(f64, f64) -> f64;
+type Unary = fn(f64) -> f64;
+type Binary = fn(f64, f64) -> f64;
 
 /// Functions of one argument.
-const ONE: [(&str, One); 7] = [
+const UNARY: [(&str, Unary); 7] = [
     ("sqrt", libm::sqrt),
     ("exp", libm::exp),
     ("log", libm::log),
@@ -33,7 +33,7 @@ const ONE: [(&str, One); 7] = [
 ];
 
 /// Functions of two arguments.
-const TWO: [(&str, Two); 2] = [("min", smaller), ("max", larger)];
+const BINARY: [(&str, Binary); 2] = [("min", smaller), ("max", larger)];
 
 /// Why a text is no expression.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -65,7 +65,7 @@ pub enum ExpressionError {
 }
 
 fn place(rest: &str) -> String {
-    let shown: String = rest.chars().take(SHOWN).collect();
+    let shown: String = rest.chars().take(LONGEST_REST).collect();
     let more = if shown.len() < rest.len() { "..." } else { "" };
     if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{shown}{more}` on") }
 }
@@ -85,8 +85,8 @@ enum Term {
     /// A name by its place.
     Name(usize),
     Negative(Box<Term>),
-    One(One, Box<Term>),
-    Two(Two, Box<[Term; 2]>),
+    Unary(Unary, Box<Term>),
+    Binary(Binary, Box<[Term; 2]>),
 }
 
 impl Expression {
@@ -146,8 +146,8 @@ impl Term {
             Term::Number(number) => *number,
             Term::Name(place) => value(*place),
             Term::Negative(of) => -of.evaluate(value),
-            Term::One(function, of) => function(of.evaluate(value)),
-            Term::Two(function, of) => function(of[0].evaluate(value), of[1].evaluate(value)),
+            Term::Unary(function, of) => function(of.evaluate(value)),
+            Term::Binary(function, of) => function(of[0].evaluate(value), of[1].evaluate(value)),
         }
     }
 }
@@ -169,7 +169,7 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
         Tree::Binary(sign, of) => {
             let [a, b] = *of;
             let of = [resolved(a, names, uses)?, resolved(b, names, uses)?];
-            Term::Two(operator(sign), Box::new(of))
+            Term::Binary(operator(sign), Box::new(of))
         }
         Tree::Call(name, arguments) => {
             let given = arguments.len();
@@ -177,12 +177,12 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
             for argument in arguments {
                 terms.push(resolved(argument, names, uses)?);
             }
-            let one = ONE.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
-            let two = TWO.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
+            let one = UNARY.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
+            let two = BINARY.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
             match (one, two, <[Term; 2]>::try_from(terms)) {
-                (_, Some(function), Ok(both)) => Term::Two(function, Box::new(both)),
+                (_, Some(function), Ok(both)) => Term::Binary(function, Box::new(both)),
                 (Some(function), _, Err(mut terms)) if given == 1 => {
-                    Term::One(function, Box::new(terms.remove(0)))
+                    Term::Unary(function, Box::new(terms.remove(0)))
                 }
                 _ => return Err(call(name, given)),
             }
@@ -196,8 +196,8 @@ pub fn is_reserved(name: &str) -> bool {
 }
 
 fn arity(name: &str) -> Option<usize> {
-    let one = ONE.iter().any(|(known, _)| *known == name);
-    let two = TWO.iter().any(|(known, _)| *known == name);
+    let one = UNARY.iter().any(|(known, _)| *known == name);
+    let two = BINARY.iter().any(|(known, _)| *known == name);
     if one { Some(1) } else { two.then_some(2) }
 }
 
@@ -210,7 +210,7 @@ fn call(name: &str, given: usize) -> ExpressionError {
     ExpressionError::Call { name }
 }
 
-fn operator(sign: char) -> Two {
+fn operator(sign: char) -> Binary {
     match sign {
         '+' => |a, b| a + b,
         '-' => |a, b| a - b,

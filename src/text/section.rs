@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::document::{Node, Table, Value, shorten};
-use super::error::{Place, Problem, SceneError, suggest};
+use super::error::{Fault, Place, Problem, SceneError, suggest};
 use super::expression::{Expression, ExpressionError};
 use rattlemap_dynamics::model::ModelError;
 
@@ -34,11 +34,8 @@ impl<'a> Section<'a> {
             1 => format!("{}; 1 more field beside it is unknown", suggest(name, known, all)),
             more => format!("{}; {more} more fields beside it are unknown", suggest(name, known, all)),
         };
-        let problem = Problem::UnknownField {
-            field: section.path_of(&shorten(name)),
-            value: node.shown.clone(),
-            remedy,
-        };
+        let (field, value) = (section.path_of(&shorten(name)), node.shown.clone());
+        let problem = Problem::value(Fault::UnknownField, field, value, remedy);
         Err(SceneError { place: node.name_place.clone(), problem })
     }
 
@@ -212,7 +209,10 @@ impl<'a> Field<'a> {
             _ => return Err(self.wrong_type(&format!("an expression in quotes, such as {example}"))),
         };
         Expression::parse(&text, names).map_err(|error| match &error {
-            ExpressionError::Unknown { name } => self.unknown_in(name, names, all),
+            ExpressionError::Unknown { name } => {
+                let remedy = format!("`{}`: {}", shorten(name), suggest(name, names, all));
+                self.refuse(Fault::UnknownWithin, remedy)
+            }
             _ => self.unreadable(&error.to_string()),
         })
     }
@@ -233,7 +233,7 @@ impl<'a> Field<'a> {
         };
         match choices.iter().find(|(known, _)| known == name) {
             Some(&(_, choice)) => Ok(choice),
-            None => Err(self.unknown_name(name, &names)),
+            None => Err(self.unknown_name(name, &names, &names.join(", "))),
         }
     }
 
@@ -260,57 +260,43 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// Builds the error for a value of the wrong type.
     pub(crate) fn wrong_type(&self, expected: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::WrongType { field, value, expected: expected.to_owned() })
+        self.refuse(Fault::WrongType, expected.to_owned())
     }
 
+    /// Builds the error for a value outside its range.
     pub(crate) fn out_of_range(&self, requirement: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::OutOfRange { field, value, requirement: requirement.to_owned() })
+        self.refuse(Fault::OutOfRange, requirement.to_owned())
     }
 
-    /// The error for a list of so many `things`.
-    pub(crate) fn counted(&self, count: usize, things: &str, requirement: &str) -> SceneError {
-        let (field, value) = (self.path.clone(), format!("{count} {things}"));
-        self.error(Problem::OutOfRange { field, value, requirement: requirement.to_owned() })
+    /// Builds the error for a list with `count` elements, such as `tables`, where another number is required.
+    pub(crate) fn wrong_count(&self, count: usize, things: &str, requirement: &str) -> SceneError {
+        self.error(Problem::value(Fault::OutOfRange, &self.path, format!("{count} {things}"), requirement))
     }
 
-    pub(crate) fn conflict(&self, remedy: String) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::Conflict { field, value, remedy })
+    /// Builds the error for a value that contradicts another field.
+    pub(crate) fn conflict(&self, remedy: impl Into<String>) -> SceneError {
+        self.refuse(Fault::Conflict, remedy.into())
     }
 
-    pub(crate) fn unknown_name(&self, name: &str, known: &[&str]) -> SceneError {
-        self.unknown_among(name, known, &known.join(", "))
+    /// Builds the error for a value that is none of the `known` names; `list` is shown as the list of them.
+    pub(crate) fn unknown_name(&self, name: &str, known: &[&str], list: &str) -> SceneError {
+        self.refuse(Fault::UnknownName, suggest(name, known, list))
     }
 
-    /// The same where `all` says what the known names mean.
-    pub(crate) fn unknown_among(&self, name: &str, known: &[&str], all: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::UnknownName { field, value, remedy: suggest(name, known, all) })
-    }
-
-    /// The error for a cell in which the field's value leaves no motion.
+    /// Builds the error for a cell in which this field's value leaves no motion.
     pub(crate) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
         self.error(Problem::NoMotion { cell: cell.to_owned(), reason: Box::new(reason.clone()) })
     }
 
-    /// The error for text that cannot be read as what it should be; `reason` says why, and how to mend it.
+    /// Builds the error for text that cannot be read; `reason` says why and names the remedy.
     pub(crate) fn unreadable(&self, reason: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::UnreadableValue { field, value, reason: reason.to_owned() })
+        self.refuse(Fault::Unreadable, reason.to_owned())
     }
 
-    /// The error for a name within text that is none of the known ones.
-    pub(crate) fn unknown_in(&self, name: &str, known: &[&str], all: &str) -> SceneError {
-        let (field, value) = self.named();
-        let remedy = format!("`{}`: {}", shorten(name), suggest(name, known, all));
-        self.error(Problem::UnknownWithin { field, value, remedy })
-    }
-
-    fn named(&self) -> (String, String) {
-        (self.path.clone(), self.node.shown.clone())
+    fn refuse(&self, fault: Fault, detail: String) -> SceneError {
+        self.error(Problem::value(fault, &self.path, &self.node.shown, detail))
     }
 
     fn error(&self, problem: Problem) -> SceneError {

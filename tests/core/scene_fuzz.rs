@@ -176,13 +176,13 @@ fn any_table_is_refused_with_a_remedy_or_valid() {
         .prop_map(|(header, rows)| format!("{header}\n{}", rows.join("\n")));
     torture(&table, |table| {
         let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: table.clone() });
-        match Scene::parse_beside(scene, "scene.toml", &[], Purpose::Map, &find) {
+        match Scene::parse_with_files(scene, "scene.toml", &[], Purpose::Map, &find) {
             Ok(scene) => {
                 let list = scene.list().unwrap();
                 prop_assert!(!list.is_empty() && scene.cell_count() == list.len() as u64);
                 let again = list.to_csv();
                 let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: again.clone() });
-                let again = Scene::parse_beside(scene.text(), "s", &[], Purpose::Map, &find).unwrap();
+                let again = Scene::parse_with_files(scene.text(), "s", &[], Purpose::Map, &find).unwrap();
                 prop_assert_eq!(again.identity(), scene.identity());
             }
             Err(error) => {
@@ -244,7 +244,7 @@ const LIST: (&str, &str) = ("points.csv", "omega,k\n5.6,900\n7,1e4\n");
 
 fn parse(text: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
     let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: LIST.1.to_owned() });
-    Scene::parse_beside(text, "scene.toml", sets, purpose, &find)
+    Scene::parse_with_files(text, "scene.toml", sets, purpose, &find)
 }
 
 fn check(text: &str, sets: &[String]) -> Result<(), TestCaseError> {

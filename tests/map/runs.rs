@@ -242,7 +242,7 @@ fn slow_cells_hold_up_nobody() {
         let is_slow = |id: u32| id % 7 == 3;
         let fake = Fake::slow(|cell| if cell.id % 7 == 3 { 100 } else { 1 + cell.id % 2 }, disc);
         let (mut late, same_records, same_refined) = run(fake);
-        // A coarse cell that is slow comes after what its neighbours ask for.
+        // A coarse cell that is slow comes after what its neighbours request for.
         let first_slow = late.iter().position(|&id| is_slow(id)).unwrap();
         assert!(refined.is_none() || first_slow > 36, "{first_slow}");
         assert_eq!(refined, same_refined);

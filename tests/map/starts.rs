@@ -365,8 +365,8 @@ fn files_say_how_cells_started_and_resume_to_the_same_bytes() {
             "every cell from rest, attractors counted with 2 random states more",
         ),
     ] {
-        let ask = [&["map", "s.toml", "--quiet", "--force", "--out", "whole"], engine, sets].concat();
-        run(at, &ask).success();
+        let request = [&["map", "s.toml", "--quiet", "--force", "--out", "whole"], engine, sets].concat();
+        run(at, &request).success();
         let whole = at.join("whole");
         let (expected, records) = (bytes(&whole, &files), fs::read(whole.join("records.bin")).unwrap());
         assert!(String::from_utf8_lossy(&expected[6]).contains(said), "{said}");
@@ -377,8 +377,8 @@ fn files_say_how_cells_started_and_resume_to_the_same_bytes() {
             let cut = at.join("cut");
             fs::create_dir_all(&cut).unwrap();
             fs::write(cut.join("records.bin"), &records[..length]).unwrap();
-            let ask = [&["map", "s.toml", "--quiet", "--resume", "--out", "cut"], engine, sets].concat();
-            run(at, &ask).success();
+            let request = [&["map", "s.toml", "--quiet", "--resume", "--out", "cut"], engine, sets].concat();
+            run(at, &request).success();
             assert!(bytes(&cut, &files) == expected, "{sets:?}: cut to {length} bytes");
         }
         run(at, &["validate", "whole", "--quiet", "--samples", "40"]).success();

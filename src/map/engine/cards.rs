@@ -13,13 +13,13 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::{CardReport, Engine, EngineError, Loss};
+use super::{CardReport, Device, Engine, EngineError, Loss};
 use crate::gpu::AdapterId;
 use crate::map::plan::Cell;
 use crate::record::Record;
 
 /// Records that have come wait no longer than this for others while there is a queue.
-const PATIENCE: Duration = Duration::from_secs(1);
+const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
 /// Without a queue cells may be wanted that wait for these records: then they wait for those of other cards as long as
 /// this, and this share of the time that the first of them took.
@@ -30,13 +30,13 @@ const GRACE_SHARE: f64 = 0.25;
 const TICK: Duration = Duration::from_millis(50);
 
 /// Cards that are told to stop are waited for no longer than this.
-const STOPPED_AFTER: Duration = Duration::from_secs(2);
+const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Share of its part that a card takes up at once, where that is more than enough to keep it busy.
 const AT_ONCE: f64 = 0.75;
 
 /// How much an earlier rate counts beside the last one.
-const MEMORY: f64 = 0.5;
+const RATE_MEMORY: f64 = 0.5;
 
 /// Equal cards that compute one plan together.
 pub struct Cards {
@@ -57,8 +57,8 @@ pub struct Cards {
 type Listener = Box<dyn Fn(&Loss) + Send>;
 
 struct Shared {
-    state: Mutex<State>,
-    /// There are cells to take up, or no more will come.
+    state: Mutex<PoolState>,
+    /// There are cells to accept up, or no more will come.
     work: Condvar,
     /// There are records, or a card is gone.
     news: Condvar,
@@ -66,7 +66,7 @@ struct Shared {
     stop: Arc<AtomicBool>,
 }
 
-struct State {
+struct PoolState {
     queue: VecDeque<Cell>,
     ended: Vec<(u32, Record)>,
     cards: Vec<Card>,
@@ -107,7 +107,7 @@ impl Cards {
             is_at_work: false,
             lost: None,
         });
-        let state = State {
+        let state = PoolState {
             queue: VecDeque::new(),
             ended: Vec::new(),
             cards: cards.collect(),
@@ -135,46 +135,6 @@ impl Cards {
 
     pub(super) fn count(&self) -> usize {
         self.threads.len()
-    }
-
-    pub(super) fn name(&self) -> &'static str {
-        self.name
-    }
-
-    pub(super) fn precision(&self) -> &'static str {
-        self.precision
-    }
-
-    pub(super) fn device(&self) -> String {
-        self.device.clone()
-    }
-
-    /// Of all cards.
-    pub(super) fn device_bytes(&self) -> Option<u64> {
-        self.device_bytes
-    }
-
-    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
-        self.steps_per_period
-    }
-
-    pub(super) fn least_batch(&self) -> usize {
-        let state = self.shared.lock();
-        state.at_hand().map(|card| card.least).fold(0, usize::saturating_add).max(1)
-    }
-
-    pub(super) fn lane_steps(&self) -> Option<u64> {
-        self.shared.lock().cards.iter().map(|card| card.steps).sum()
-    }
-
-    /// Cells that the cards have room for, those in the queue left out.
-    pub(super) fn room(&self) -> usize {
-        let state = self.shared.lock();
-        state.at_hand().map(|card| card.most).fold(0, usize::saturating_add).saturating_sub(state.left())
-    }
-
-    pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
-        self.halt = Arc::clone(halt);
     }
 
     pub(super) fn listen(&mut self, listener: Listener) {
@@ -214,7 +174,7 @@ impl Cards {
             let is_over = if is_halted {
                 let halted_at = *halted_at.get_or_insert_with(Instant::now);
                 let is_idle = state.cards.iter().all(|card| !card.is_at_work);
-                is_idle || halted_at.elapsed() >= STOPPED_AFTER
+                is_idle || halted_at.elapsed() >= STOP_TIMEOUT
             } else {
                 let left = state.left();
                 if !state.ended.is_empty() {
@@ -222,7 +182,7 @@ impl Cards {
                 }
                 let is_patient = |first: Duration| match state.queue.is_empty() {
                     true => clock.elapsed() < first.mul_f64(1.0 + GRACE_SHARE) + GRACE,
-                    false => clock.elapsed() < PATIENCE,
+                    false => clock.elapsed() < LONGEST_WAIT,
                 };
                 left == 0
                     || state.last_loss().is_some()
@@ -256,6 +216,46 @@ impl Cards {
     }
 }
 
+impl Device for Cards {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn precision(&self) -> &'static str {
+        self.precision
+    }
+
+    fn device(&self) -> String {
+        self.device.clone()
+    }
+
+    fn device_bytes(&self) -> Option<u64> {
+        self.device_bytes
+    }
+
+    fn steps_per_period(&self) -> Option<[u32; 2]> {
+        self.steps_per_period
+    }
+
+    fn least_batch(&self) -> usize {
+        let state = self.shared.lock();
+        state.working().map(|card| card.least).fold(0, usize::saturating_add).max(1)
+    }
+
+    fn lane_steps(&self) -> Option<u64> {
+        self.shared.lock().cards.iter().map(|card| card.steps).sum()
+    }
+
+    fn room(&self) -> usize {
+        let state = self.shared.lock();
+        state.working().map(|card| card.most).fold(0, usize::saturating_add).saturating_sub(state.left())
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.halt = Arc::clone(halt);
+    }
+}
+
 impl Drop for Cards {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
@@ -270,7 +270,7 @@ impl Drop for Cards {
 
 impl Shared {
     /// What the lock guards is sound between any two of its changes.
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, PoolState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -298,7 +298,7 @@ impl Shared {
     }
 
     /// Takes what a card has computed, in so many seconds.
-    fn take(&self, nth: usize, ended: Vec<(u32, Record)>, seconds: f64, steps: Option<u64>) {
+    fn accept(&self, nth: usize, ended: Vec<(u32, Record)>, seconds: f64, steps: Option<u64>) {
         let mut state = self.lock();
         let card = &mut state.cards[nth];
         let under_way = card.under_way.len();
@@ -308,10 +308,11 @@ impl Shared {
         card.cells += ended.len();
         card.steps = steps;
         card.is_at_work = false;
-        // Fewer cells take as long; the last few, which are waited for, say nothing.
+        // Fewer cells accept as long; the last few, which are waited for, say nothing.
         if under_way >= card.least && 4 * ended.len() >= under_way {
             let now = ended.len() as f64 / seconds.max(1e-6);
-            card.rate = Some(card.rate.map_or(now, |before| MEMORY * before + (1.0 - MEMORY) * now));
+            card.rate =
+                Some(card.rate.map_or(now, |before| RATE_MEMORY * before + (1.0 - RATE_MEMORY) * now));
         }
         state.ended.extend(ended);
         drop(state);
@@ -319,7 +320,7 @@ impl Shared {
     }
 
     /// Puts cells back for which a card has no memory. False if it has none for a single one.
-    fn take_back(&self, nth: usize, cells: &[Cell]) -> bool {
+    fn put_back(&self, nth: usize, cells: &[Cell]) -> bool {
         let mut state = self.lock();
         let card = &mut state.cards[nth];
         let tried = card.under_way.len();
@@ -351,9 +352,9 @@ impl Shared {
     }
 }
 
-impl State {
+impl PoolState {
     /// Cards that are not lost.
-    fn at_hand(&self) -> impl Iterator<Item = &Card> {
+    fn working(&self) -> impl Iterator<Item = &Card> {
         self.cards.iter().filter(|card| card.lost.is_none())
     }
 
@@ -364,7 +365,7 @@ impl State {
 
     /// Why the last card was lost; none while one is left.
     fn last_loss(&self) -> Option<EngineError> {
-        if self.at_hand().next().is_some() {
+        if self.working().next().is_some() {
             return None;
         }
         self.cards.iter().rev().find_map(|card| card.lost.clone())
@@ -373,11 +374,11 @@ impl State {
     /// Cells that a card takes up now.
     fn share(&self, nth: usize) -> usize {
         let card = &self.cards[nth];
-        let rates = || self.at_hand().filter_map(|card| card.rate);
+        let rates = || self.working().filter_map(|card| card.rate);
         // A card whose rate is not known yet is taken to be like the others.
         let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
         let rate = |card: &Card| card.rate.unwrap_or(if mean > 0.0 { mean } else { 1.0 });
-        let weight = rate(card) / self.at_hand().map(rate).sum::<f64>();
+        let weight = rate(card) / self.working().map(rate).sum::<f64>();
         let part = (self.left() as f64 * weight).ceil() as usize;
         let at_once = ((part as f64 * AT_ONCE).ceil() as usize).max(card.least.min(part));
         at_once.min(card.most).saturating_sub(card.under_way.len()).min(self.queue.len())
@@ -403,13 +404,13 @@ impl Drop for Leaving<'_> {
 /// The thread of a card: takes up cells and hands over records until no more cells will come, or it is lost.
 fn work(nth: usize, mut engine: Engine<'static>, shared: &Shared) {
     let leaving = Leaving { nth, shared, device: engine.device() };
-    engine.heed(&shared.stop);
+    engine.stop_on(&shared.stop);
     let mut cells = Vec::new();
     while shared.next(nth, &mut cells) {
         let clock = Instant::now();
         match pollster::block_on(engine.begin(&cells)) {
             Ok(()) => {}
-            Err(EngineError::OutOfMemory { .. }) if shared.take_back(nth, &cells) => {
+            Err(EngineError::OutOfMemory { .. }) if shared.put_back(nth, &cells) => {
                 cells.clear();
                 continue;
             }
@@ -418,7 +419,7 @@ fn work(nth: usize, mut engine: Engine<'static>, shared: &Shared) {
         cells.clear();
         let half = shared.lock().cards[nth].under_way.len() / 2;
         match pollster::block_on(engine.advance(half)) {
-            Ok(ended) => shared.take(nth, ended, clock.elapsed().as_secs_f64(), engine.lane_steps()),
+            Ok(ended) => shared.accept(nth, ended, clock.elapsed().as_secs_f64(), engine.lane_steps()),
             Err(error) => return shared.lose(nth, error),
         }
     }
@@ -509,7 +510,7 @@ mod tests {
         all_of(seen, 600);
         let counts: Vec<usize> = cards.reports().iter().map(|card| card.cells).collect();
         assert!(counts[1] < 200 && counts[1] > 30, "{counts:?}");
-        // Half of all cells would take the slow one three times as long as both need together.
+        // Half of all cells would accept the slow one three times as long as both need together.
         let each = 1e-6 * MICROSECONDS.load(Ordering::Relaxed) as f64 / counts[1] as f64;
         assert!(took < 0.6 * 300.0 * each, "{took} s, {each} s per cell");
     }
@@ -574,7 +575,7 @@ mod tests {
     fn a_raised_flag_stops_them_and_a_lowered_one_lets_them_go_on() {
         let mut cards = cards(vec![Fake::slow(|cell| cell.id, slow), Fake::slow(|cell| cell.id, slow)]);
         let halt = Arc::new(AtomicBool::new(false));
-        cards.heed(&halt);
+        cards.stop_on(&halt);
         let cells = cells(200);
         cards.begin(&cells).unwrap();
         halt.store(true, Ordering::Relaxed);
@@ -616,7 +617,7 @@ mod tests {
         };
         let shares = |cards: Vec<Card>, queued: u32| {
             let count = cards.len();
-            let state = State {
+            let state = PoolState {
                 queue: cells(queued).into(),
                 ended: Vec::new(),
                 cards,

@@ -7,6 +7,7 @@ use std::time::Duration;
 use rayon::prelude::*;
 use web_time::Instant;
 
+use super::Device;
 use super::flows::Flows;
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
@@ -14,7 +15,7 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::orbit::{Measured, measure_until};
 
 /// Cells that have ended wait no longer than this for others to begin.
-const PATIENCE: Duration = Duration::from_secs(2);
+const BATCH_TIME: Duration = Duration::from_secs(2);
 
 /// The event-driven reference.
 pub struct Cpu<'p> {
@@ -22,17 +23,13 @@ pub struct Cpu<'p> {
     flows: Flows<'p>,
     under_way: Vec<Cell>,
     /// Raised by whoever wants no more cells.
-    pub(super) halt: Arc<AtomicBool>,
+    halt: Arc<AtomicBool>,
 }
 
 impl<'p> Cpu<'p> {
     /// An engine for the cells of a plan.
     pub fn new(plan: &'p Plan) -> Cpu<'p> {
         Cpu { plan, flows: Flows::new(plan), under_way: Vec::new(), halt: Arc::default() }
-    }
-
-    pub(super) fn least_batch(&self) -> usize {
-        64 * rayon::current_num_threads()
     }
 
     pub(super) fn begin(&mut self, cells: &[Cell]) {
@@ -48,7 +45,7 @@ impl<'p> Cpu<'p> {
             .with_max_len(1)
             .enumerate()
             .map(|(i, cell)| {
-                let record = (i == 0 || clock.elapsed() < PATIENCE).then(|| self.cell(cell))??;
+                let record = (i == 0 || clock.elapsed() < BATCH_TIME).then(|| self.cell(cell))??;
                 Some((cell.id, record))
             })
             .collect();
@@ -62,6 +59,24 @@ impl<'p> Cpu<'p> {
         let (law, budget) = (self.plan.law(cell.law), self.plan.budget());
         let of = |flow: &Flow| measure_until(flow, law, cell.start, budget, &self.halt);
         self.flows.with(cell.flow, of).map(|measured| record(&measured, self.plan.needs()))
+    }
+}
+
+impl Device for Cpu<'_> {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn device(&self) -> String {
+        "event-driven reference".to_owned()
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.halt = Arc::clone(halt);
+    }
+
+    fn least_batch(&self) -> usize {
+        64 * rayon::current_num_threads()
     }
 }
 

@@ -1,6 +1,9 @@
 //! An engine without physics.
 
-use super::EngineError;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::{Device, EngineError};
 use crate::map::plan::Cell;
 use crate::record::Record;
 
@@ -63,4 +66,20 @@ impl Fake {
         let ended: Vec<_> = self.under_way.extract_if(.., |&mut (left, _)| left == 0).collect();
         Ok(ended.iter().map(|(_, cell)| (cell.id, (self.rule)(cell))).collect())
     }
+}
+
+impl Device for Fake {
+    fn name(&self) -> &'static str {
+        "fake"
+    }
+
+    fn device(&self) -> String {
+        "fake".to_owned()
+    }
+
+    fn least_batch(&self) -> usize {
+        16
+    }
+
+    fn stop_on(&mut self, _: &Arc<AtomicBool>) {}
 }

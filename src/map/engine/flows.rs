@@ -14,7 +14,7 @@ pub(crate) struct Flows<'p> {
 
 impl<'p> Flows<'p> {
     pub(crate) fn new(plan: &'p Plan) -> Flows<'p> {
-        let kept = if plan.keeps_flows() { plan.flow_count() } else { 0 };
+        let kept = if plan.stores_flows() { plan.flow_count() } else { 0 };
         Flows { plan, kept: (0..kept).map(|_| OnceLock::new()).collect() }
     }
 

@@ -7,14 +7,14 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::EngineError;
+use super::{Device, EngineError};
 use crate::gpu::{self, AdapterId, Constants, Ended, GpuError, Lane, LaneSettings, Pool, Tables};
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::map::scene::Steps;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::Contact;
 
-/// First batches: enough to keep a hardware device busy, or a software one for a second.
+/// First batches: enough to drop_unrequested a hardware device busy, or a software one for a second.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
 const LEAST_IN_SOFTWARE: usize = 256;
 
@@ -23,7 +23,7 @@ const FLOWS_IN_SOFTWARE: usize = 8_192;
 
 /// Lanes on one device, in one precision.
 pub struct Gpu<'p> {
-    plan: Held<'p>,
+    plan: PlanRef<'p>,
     device: gpu::Gpu,
     settings: LaneSettings,
     /// All flows and laws; none where there are too many of them to be kept.
@@ -38,18 +38,18 @@ pub struct Gpu<'p> {
 }
 
 /// A plan, of somebody else's or one that several hold.
-enum Held<'p> {
+enum PlanRef<'p> {
     Borrowed(&'p Plan),
     Shared(Arc<Plan>),
 }
 
-impl Deref for Held<'_> {
+impl Deref for PlanRef<'_> {
     type Target = Plan;
 
     fn deref(&self) -> &Plan {
         match self {
-            Held::Borrowed(plan) => plan,
-            Held::Shared(plan) => plan,
+            PlanRef::Borrowed(plan) => plan,
+            PlanRef::Shared(plan) => plan,
         }
     }
 }
@@ -60,7 +60,7 @@ impl Gpu<'static> {
     /// # Errors
     /// As [`Gpu::new`].
     pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
-        Gpu::open(Held::Shared(plan), device).await
+        Gpu::open(PlanRef::Shared(plan), device).await
     }
 }
 
@@ -70,10 +70,10 @@ impl<'p> Gpu<'p> {
     /// # Errors
     /// [`EngineError`] if the device takes no constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        Gpu::open(Held::Borrowed(plan), device).await
+        Gpu::open(PlanRef::Borrowed(plan), device).await
     }
 
-    async fn open(plan: Held<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+    async fn open(plan: PlanRef<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let settings = lane_settings(&plan);
         let mut engine = Gpu {
             plan,
@@ -89,7 +89,7 @@ impl<'p> Gpu<'p> {
             engine.most_waiting = FLOWS_IN_SOFTWARE;
         }
         let plan = &engine.plan;
-        if plan.keeps_flows() {
+        if plan.stores_flows() {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
             engine.tables = match engine.load(&flows, &laws).await {
@@ -100,7 +100,7 @@ impl<'p> Gpu<'p> {
         }
         // Compiled now, not while somebody waits for cells.
         let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
-        engine.pool = engine.plan.keeps_flows().then_some(pool);
+        engine.pool = engine.plan.stores_flows().then_some(pool);
         Ok(engine)
     }
 
@@ -113,48 +113,8 @@ impl<'p> Gpu<'p> {
         self.device.id()
     }
 
-    pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
-        self.device.heed(halt);
-    }
-
-    pub(super) fn precision(&self) -> &'static str {
-        self.device.precision().name()
-    }
-
-    pub(super) fn device(&self) -> String {
-        gpu::describe(self.device.adapter())
-    }
-
-    pub(super) fn least_batch(&self) -> usize {
-        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
-    }
-
-    /// Bytes of the device's memory that the plan takes at most, constants left out that are not kept.
-    pub(super) fn device_bytes(&self) -> u64 {
-        let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
-        self.device.bytes_of_lanes(self.plan.run_count()) + constants
-    }
-
     fn is_hardware(&self) -> bool {
         gpu::is_hardware(self.device.adapter())
-    }
-
-    /// Free steps of all lanes so far.
-    pub(super) fn steps(&self) -> u64 {
-        self.steps
-    }
-
-    /// The least and the most free steps per forcing period, over all flows that lanes can carry.
-    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
-        let (plan, asked) = (&*self.plan, self.settings.steps_per_period);
-        let steps = |flow| Constants::steps(&plan.oscillator(flow), asked);
-        let all = (0..plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
-        all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])
-    }
-
-    /// Cells that may be begun now.
-    pub(super) fn room(&self) -> usize {
-        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
     }
 
     pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
@@ -186,7 +146,7 @@ impl<'p> Gpu<'p> {
             _ => self.run_waiting().await,
         };
         let mut ended = ended.map_err(|error| self.error(error, self.waiting.len()))?;
-        ended.iter_mut().for_each(|(_, record)| keep(record, self.plan.needs()));
+        ended.iter_mut().for_each(|(_, record)| drop_unrequested(record, self.plan.needs()));
         Ok(ended)
     }
 
@@ -239,6 +199,48 @@ impl<'p> Gpu<'p> {
             GpuError::Lost { message } => EngineError::Lost { device, reason: message },
             other => EngineError::Refused { device, reason: other.to_string() },
         }
+    }
+}
+
+impl Device for Gpu<'_> {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.device.heed(halt);
+    }
+
+    fn precision(&self) -> &'static str {
+        self.device.precision().name()
+    }
+
+    fn device(&self) -> String {
+        gpu::describe(self.device.adapter())
+    }
+
+    fn least_batch(&self) -> usize {
+        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+    }
+
+    fn device_bytes(&self) -> Option<u64> {
+        let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
+        Some(self.device.bytes_of_lanes(self.plan.run_count()) + constants)
+    }
+
+    fn lane_steps(&self) -> Option<u64> {
+        Some(self.steps)
+    }
+
+    fn steps_per_period(&self) -> Option<[u32; 2]> {
+        let (plan, asked) = (&*self.plan, self.settings.steps_per_period);
+        let steps = |flow| Constants::steps(&plan.oscillator(flow), asked);
+        let all = (0..plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
+        all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])
+    }
+
+    fn room(&self) -> usize {
+        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
     }
 }
 
@@ -323,7 +325,7 @@ fn branches(plan: &Plan) -> [bool; 2] {
 }
 
 /// Leaves what somebody asked for.
-pub(crate) fn keep(record: &mut Record, needs: &Needs) {
+pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
     let mut drop = |asked: bool, bits: u32, clear: fn(&mut Record)| {
         if !asked {
             record.valid &= !bits;
@@ -369,9 +371,9 @@ mod tests {
             ..Record::default()
         };
         let whole = record;
-        keep(&mut record, &Needs::EVERYTHING);
+        drop_unrequested(&mut record, &Needs::EVERYTHING);
         assert_eq!(record, whole);
-        keep(
+        drop_unrequested(
             &mut record,
             &Needs {
                 exponent: false,

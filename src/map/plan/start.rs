@@ -8,7 +8,7 @@ use rattlemap_dynamics::model::{Oscillator, REST, State};
 
 /// Displacements are drawn within this many scales of length of the middle, velocities within as
 /// many times what that is as a velocity: the attractors of the paper's plane lie inside.
-const REACH: f64 = 4.0;
+const START_RANGE: f64 = 4.0;
 
 /// The starts of every cell, in units of the cell's own.
 #[derive(Clone, Debug)]
@@ -55,8 +55,8 @@ impl Starts {
             both => both,
         };
         let (middle, half) = (0.5 * (right + left), 0.5 * (right - left));
-        let (z, x2) = (middle + half * gap, REACH * length * x2);
-        let speed = REACH * length * oscillator.omega;
+        let (z, x2) = (middle + half * gap, START_RANGE * length * x2);
+        let speed = START_RANGE * length * oscillator.omega;
         let [g1, g2] = oscillator.gap;
         [(z - g2 * x2) / g1, speed * v1, x2, speed * v2]
     }

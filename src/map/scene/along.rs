@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::axis::{self, Axis};
 use super::document::{Node, Table, Value, read_argument};
-use super::error::{Place, Problem, SceneError};
+use super::error::{Fault, Place, Problem, SceneError};
 use super::section::Section;
 use super::settings::Format;
 use super::{Purpose, TOP_LEVEL};
@@ -62,14 +62,11 @@ pub(super) fn take(document: &mut Node, model: &dyn Model, along: Option<&Along>
 fn unnamed(place: &Place, axes: &[Axis]) -> SceneError {
     let names: Vec<&str> = axes.iter().map(|axis| &*axis.parameter().name).collect();
     let at: String = names[1..].iter().map(|name| format!(" --at {name}=VALUE")).collect();
-    let problem = Problem::Conflict {
-        field: "axis".to_owned(),
-        value: format!("{} tables", axes.len()),
-        remedy: format!(
-            "`bifurcation` needs 1 axis; take one line of the plane with --along {}{at}, or remove [[axis]] tables",
-            names[0]
-        ),
-    };
+    let remedy = format!(
+        "`bifurcation` needs 1 axis; take one line of the plane with --along {}{at}, or remove [[axis]] tables",
+        names[0]
+    );
+    let problem = Problem::value(Fault::Conflict, "axis", format!("{} tables", axes.len()), remedy);
     SceneError { place: place.clone(), problem }
 }
 
@@ -80,11 +77,8 @@ fn held<'a>(axes: &'a [Axis], along: &Along) -> Result<Vec<(&'a Axis, Node)>, Sc
     let place = |option, argument: &str| Place::Option { option, argument: argument.into() };
     let along_place = || place("--along", &along.parameter);
     if !axes.iter().any(|axis| *axis.parameter().name == *along.parameter) {
-        let problem = Problem::Conflict {
-            field: "along".to_owned(),
-            value: along.parameter.clone(),
-            remedy: format!("the scene does not sweep it; its axes: {names}"),
-        };
+        let remedy = format!("the scene does not sweep it; its axes: {names}");
+        let problem = Problem::value(Fault::Conflict, "along", &along.parameter, remedy);
         return Err(SceneError { place: along_place(), problem });
     }
     let mut held: Vec<(&Axis, Node)> = Vec::new();
@@ -95,20 +89,18 @@ fn held<'a>(axes: &'a [Axis], along: &Along) -> Result<Vec<(&'a Axis, Node)>, Sc
         else {
             return Err(fail(Problem::NotAnAssignment));
         };
-        let conflict = |remedy: String| {
-            fail(Problem::Conflict { field: name.to_owned(), value: value.to_owned(), remedy })
-        };
+        let conflict = |remedy: &str| fail(Problem::value(Fault::Conflict, name, value, remedy));
         if name == along.parameter {
-            return Err(conflict("--along sweeps it; --at is for the other axis".to_owned()));
+            return Err(conflict("--along sweeps it; --at is for the other axis"));
         }
         let Some(axis) = axes.iter().find(|axis| *axis.parameter().name == *name) else {
-            return Err(conflict(format!(
+            return Err(conflict(&format!(
                 "the scene does not sweep it, so there is no axis to hold; its axes: {names}; set a parameter with \
                  --set {name}={value}"
             )));
         };
         if held.iter().any(|(other, _)| other.target() == axis.target()) {
-            return Err(conflict("--at names it twice; drop one of the two".to_owned()));
+            return Err(conflict("--at names it twice; remove one of the two"));
         }
         let argument: Arc<str> = argument.as_str().into();
         let node = read_argument(value, &argument).placed(place("--at", &argument));
@@ -154,11 +146,12 @@ fn hold(root: &mut Table, name: &str, value: Node, is_argument: bool) -> Result<
     match table.insert(name.to_owned(), value) {
         Some(other) if !is_argument || !is_from_text(&other) => Err(SceneError {
             place: other.place,
-            problem: Problem::Conflict {
-                field: format!("parameters.{name}"),
-                value: other.shown,
-                remedy: format!("--at gives `{name}` its value; drop one of the two"),
-            },
+            problem: Problem::value(
+                Fault::Conflict,
+                format!("parameters.{name}"),
+                other.shown,
+                format!("--at gives `{name}` its value; remove one of the two"),
+            ),
         }),
         _ => Ok(()),
     }

@@ -5,11 +5,9 @@ use std::sync::Arc;
 use super::document::{Node, Value};
 use super::error::SceneError;
 use super::keys;
+use super::limits::MAX_COUNT;
 use super::section::{Field, Section};
 use rattlemap_dynamics::model::{Model, Parameter, Range, Shapes, State};
-
-/// The most values that one axis may have.
-pub const MAX_COUNT: u32 = 1_000_000;
 
 const EXAMPLE: &str = "write [[axis]] with parameter, min, max and count, or with parameter and values";
 
@@ -219,11 +217,11 @@ fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axi
     let (target, parameter) = if is_start {
         let names = model.state_names();
         let place = names.iter().position(|known| *known == name);
-        let place = place.ok_or_else(|| field.unknown_among(name, &names, &names.join(", ")))?;
+        let place = place.ok_or_else(|| field.unknown_name(name, &names, &names.join(", ")))?;
         (Target::Start(place), component(model, place))
     } else {
         let index =
-            model.index(name).map_err(|_| field.unknown_among(name, &names(model), &meanings(model)))?;
+            model.index(name).map_err(|_| field.unknown_name(name, &names(model), &meanings(model)))?;
         (Target::Parameter(index), model.parameters()[index].clone())
     };
     if let Some(i) = before.iter().position(|axis| axis.target == target) {

@@ -233,22 +233,19 @@ impl SceneBuilder {
     }
 
     fn start_table(&self) -> String {
-        let policy = match self.start {
-            Start::Rest => "\"rest\"".to_owned(),
-            Start::Up => "\"up\"".to_owned(),
-            Start::Down => "\"down\"".to_owned(),
-            Start::Both => "\"both\"".to_owned(),
-            Start::State(state) => {
-                // Components that the model has not are written only where somebody gave them, and then refused.
-                let count = self.model.state_names().len();
-                let is_its_own = state[count..].iter().all(|&x| x == 0.0);
-                let told = if is_its_own { &state[..count] } else { &state[..] };
-                let numbers: Vec<String> = told.iter().map(|&x| number(x)).collect();
-                format!("\"state\"\nstate = [{}]", numbers.join(", "))
-            }
-        };
-        let draw = self.draw.map(|Draw { count, seed }| format!("\ncount = {count}\nseed = {seed}"));
-        format!("\n[start]\npolicy = {policy}{}", draw.unwrap_or_default())
+        let mut table = format!("\n[start]\npolicy = \"{}\"", self.start.policy());
+        if let Start::State(state) = self.start {
+            // A nonzero component beyond those of the model is written, so that reading the scene refuses it.
+            let count = self.model.state_names().len();
+            let has_more = state[count..].iter().any(|&x| x != 0.0);
+            let written = if has_more { &state[..] } else { &state[..count] };
+            let numbers: Vec<String> = written.iter().map(|&x| number(x)).collect();
+            table += &format!("\nstate = [{}]", numbers.join(", "));
+        }
+        if let Some(Draw { count, seed }) = self.draw {
+            table += &format!("\ncount = {count}\nseed = {seed}");
+        }
+        table
     }
 }
 

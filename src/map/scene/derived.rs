@@ -76,7 +76,7 @@ pub(super) fn read(
     for (name, field) in section.fields() {
         let Some(index) = names.iter().position(|known| *known == name) else { continue };
         if is_swept(index) {
-            return Err(field.conflict("it is swept, too; drop it here, or sweep another parameter".into()));
+            return Err(field.conflict("it is swept, too; drop it here, or sweep another parameter"));
         }
         // An argument wins over the text, but for a value that the text derives: it would be lost unseen.
         if let Some(value) = parameters.get(name)

@@ -5,7 +5,7 @@ use crate::model_file::FileModel;
 use rattlemap_dynamics::model::Model;
 
 /// Values that are told one by one.
-const SHOWN_VALUES: usize = 32;
+const MOST_LISTED_VALUES: usize = 32;
 
 impl Scene {
     /// Names and values of all that records depend on, in a fixed order: axes, parameters,
@@ -62,11 +62,8 @@ impl Scene {
         tell("integration.undecided_periods".into(), integration.undecided_periods.to_string());
         tell("integration.max_period".into(), integration.max_period.to_string());
         let start = match self.start() {
-            Start::Rest => "rest".to_owned(),
             Start::State(state) => format!("state {state:?}"),
-            Start::Up => "up".to_owned(),
-            Start::Down => "down".to_owned(),
-            Start::Both => "both".to_owned(),
+            start => start.policy().to_owned(),
         };
         tell("start".into(), start);
         if let Some(draw) = self.draw() {
@@ -89,7 +86,7 @@ impl Scene {
 
 /// The values of an axis, or what stands for them where they are many.
 fn values(axis: &Axis) -> String {
-    if axis.count() > SHOWN_VALUES {
+    if axis.count() > MOST_LISTED_VALUES {
         return format!("{} with the hash {}", axis.count(), list::hash(&[], axis.values()));
     }
     axis.values().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(" ")

@@ -1,8 +1,6 @@
 //! Every key of a scene, once: the parser knows these names, and `docs/scenes.md` is made from them.
 
-use super::axis::MAX_COUNT;
-use super::settings::{LONGEST_TITLE, MAX_PERIODS};
-use super::start::MAX_STARTS;
+use super::limits::{LONGEST_TITLE, MAX_COUNT, MAX_PERIODS, MAX_STARTS};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 
 /// One key.

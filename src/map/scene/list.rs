@@ -7,9 +7,9 @@ use sha2::{Digest, Sha256};
 use super::Purpose;
 use super::axis::{Target, component, meanings, names};
 use super::document::shorten;
-use super::error::{Place, Problem, SceneError, suggest};
+use super::error::{Fault, Place, Problem, SceneError, suggest};
 use super::keys;
-use super::section::{Field, Section};
+use super::section::Section;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 
 /// A file beside a scene, as whoever reads the scene has found it.
@@ -23,7 +23,7 @@ pub struct FileText {
 
 /// What a scene names a file for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Beside {
+pub enum CompanionFile {
     /// A table of cells.
     Cells,
     /// A model.
@@ -31,13 +31,13 @@ pub enum Beside {
 }
 
 /// Finds a file beside a scene, by its name in the scene; the error says why it cannot be read.
-pub type FindFile<'f> = &'f dyn Fn(Beside, &str) -> Result<FileText, String>;
+pub type FindFile<'f> = &'f dyn Fn(CompanionFile, &str) -> Result<FileText, String>;
 
 /// A list of cells: parameters or components of the start, and a value of each per cell.
 #[derive(Clone, Debug)]
 pub struct List {
     file: String,
-    columns: Vec<Column>,
+    columns: Vec<ListColumn>,
     /// Row by row.
     values: Vec<f64>,
     hash: String,
@@ -45,7 +45,7 @@ pub struct List {
 
 /// What one column of a list sets.
 #[derive(Clone, Debug)]
-struct Column {
+struct ListColumn {
     parameter: Parameter,
     target: Target,
 }
@@ -125,14 +125,14 @@ pub(super) fn read(
     let section = root.section("cells", &keys::names("cells"))?;
     let Some(cells) = root.get("cells") else { return Ok(None) };
     if purpose == Purpose::Bifurcation {
-        return Err(cells.conflict("`bifurcation` takes an axis; a list of cells is for `map`".into()));
+        return Err(cells.conflict("`bifurcation` needs an axis; a list of cells is for `map`"));
     }
     if let Some(axis) = root.get("axis") {
-        return Err(axis.conflict("[cells] says which cells there are; drop [[axis]] or [cells]".into()));
+        return Err(axis.conflict("[cells] lists the cells instead of axes; remove [[axis]] or [cells]"));
     }
     let field = section.require("file", "name a table, such as file = \"points.csv\"")?;
     let file = field.text()?.to_owned();
-    let found = find(Beside::Cells, &file).map_err(|reason| field.unreadable(&reason))?;
+    let found = find(CompanionFile::Cells, &file).map_err(|reason| field.unreadable(&reason))?;
     let (columns, values) = table(&found, model)?;
     let names: Vec<&str> = columns.iter().map(|column| &*column.parameter.name).collect();
     let hash = hash(&names, values.iter().copied());
@@ -151,7 +151,7 @@ pub(super) fn hash(names: &[&str], values: impl Iterator<Item = f64>) -> String 
 }
 
 /// Columns and values of a table.
-fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<Column>, Vec<f64>), SceneError> {
+fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<ListColumn>, Vec<f64>), SceneError> {
     // Spreadsheets begin a file with a mark of its byte order.
     let text = file.text.strip_prefix('\u{feff}').unwrap_or(&file.text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
@@ -174,16 +174,11 @@ fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<Column>, Vec<f64>), 
         for (i, (column, text)) in columns.iter().zip(&record).enumerate() {
             let (field, value) = (column.parameter.name.to_string(), shorten(text));
             let at = |problem| wrong(file, line, i + 1, problem);
-            let number: f64 = text.parse().map_err(|_| {
-                at(Problem::WrongType {
-                    field: field.clone(),
-                    value: value.clone(),
-                    expected: "a number".into(),
-                })
-            })?;
+            let number: f64 =
+                text.parse().map_err(|_| at(Problem::value(Fault::WrongType, &field, &value, "a number")))?;
             if !column.parameter.range.contains(number) {
-                let requirement = column.parameter.range.requirement().into_owned();
-                return Err(at(Problem::OutOfRange { field, value, requirement }));
+                let requirement = column.parameter.range.requirement();
+                return Err(at(Problem::value(Fault::OutOfRange, field, value, requirement)));
             }
             values.push(number);
         }
@@ -199,8 +194,8 @@ fn columns(
     file: &FileText,
     header: &csv::StringRecord,
     model: &dyn Model,
-) -> Result<Vec<Column>, SceneError> {
-    let mut columns: Vec<Column> = Vec::new();
+) -> Result<Vec<ListColumn>, SceneError> {
+    let mut columns: Vec<ListColumn> = Vec::new();
     for (i, name) in header.iter().enumerate() {
         let (field, value) = (format!("column {}", i + 1), shorten(name));
         let at = |problem| wrong(file, 1, i + 1, problem);
@@ -212,14 +207,14 @@ fn columns(
                 (Err(_), None) => {
                     let all = format!("{}; or of the start {}", meanings(model), components.join(", "));
                     let remedy = suggest(name, &[names(model), components].concat(), &all);
-                    return Err(at(Problem::UnknownName { field, value, remedy }));
+                    return Err(at(Problem::value(Fault::UnknownName, field, value, remedy)));
                 }
             };
         if columns.iter().any(|before| before.target == target) {
-            let remedy = "another column sets it already; drop either".to_owned();
-            return Err(at(Problem::Conflict { field, value, remedy }));
+            let remedy = "another column sets it; remove one of the two";
+            return Err(at(Problem::value(Fault::Conflict, field, value, remedy)));
         }
-        columns.push(Column { parameter, target });
+        columns.push(ListColumn { parameter, target });
     }
     match columns.is_empty() {
         false => Ok(columns),
@@ -243,15 +238,11 @@ fn wrong(file: &FileText, line: u64, column: usize, problem: Problem) -> SceneEr
 
 /// Refuses what does not go with a list.
 pub(super) fn check(root: &Section<'_>, follows: bool) -> Result<(), SceneError> {
-    let conflict = |field: Field<'_>, remedy: &str| Err(field.conflict(remedy.to_owned()));
     if let Some(refine) = root.get("refine") {
-        return conflict(refine, "cells of a list have no neighbours to be filled from; drop [refine]");
+        return Err(refine.conflict("cells of a list have no neighbours to be filled from; remove [refine]"));
     }
     let policy = root.section("start", &keys::names("start"))?.get("policy");
-    match policy.filter(|_| follows) {
-        Some(policy) => {
-            conflict(policy, "cells of a list have no neighbours to start from; use \"rest\" or \"state\"")
-        }
-        None => Ok(()),
-    }
+    policy.filter(|_| follows).map_or(Ok(()), |policy| {
+        Err(policy.conflict("cells of a list have no neighbours to start from; use \"rest\" or \"state\""))
+    })
 }

@@ -1,6 +1,6 @@
 //! `model`: which model a scene is about.
 
-use super::list::{Beside, FindFile};
+use super::list::{CompanionFile, FindFile};
 pub(super) use crate::model_file::DEFAULT;
 use crate::model_file::{BUILT_IN, FileModel};
 use crate::text::error::SceneError;
@@ -20,13 +20,13 @@ pub(super) fn read(root: &Section<'_>, find: FindFile<'_>) -> Result<FileModel, 
     match (FileModel::built_in(name), field) {
         (Some(model), _) => Ok(model),
         (None, Some(field)) if name.ends_with(FILE) => {
-            let found = find(Beside::Model, name).map_err(|reason| field.unreadable(&reason))?;
+            let found = find(CompanionFile::Model, name).map_err(|reason| field.unreadable(&reason))?;
             FileModel::parse(&found.text, &found.name)
         }
         (None, Some(field)) => {
             let names: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
             let all = format!("{}, or the path of a model's file, such as my-model{FILE}", names.join(", "));
-            Err(field.unknown_among(name, &names, &all))
+            Err(field.unknown_name(name, &names, &all))
         }
         // It is built in, as a test knows.
         (None, None) => Err(root.missing("model", "name one")),

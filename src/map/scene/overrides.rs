@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::TOP_LEVEL;
 use super::document::{Node, Table, Value, read_argument, shorten};
-use super::error::{Place, Problem, SceneError};
+use super::error::{Fault, Place, Problem, SceneError};
 
 /// Names in a path: more than any setting has, and few enough to go down by recursion.
 const DEEPEST: usize = 8;
@@ -30,7 +30,7 @@ pub(super) fn apply(document: &mut Node, argument: &str) -> Result<(), SceneErro
     let node = read_argument(value, &argument);
     let unknown = |remedy| {
         let (field, value) = (shorten(&path.join(".")), node.shown.clone());
-        fail(Problem::UnknownField { field, value, remedy })
+        fail(Problem::value(Fault::UnknownField, field, value, remedy))
     };
     if path.len() > DEEPEST {
         return Err(unknown("no setting lies as deep; the deepest are such as axis.0.count".to_owned()));

@@ -4,15 +4,10 @@ use super::Purpose;
 use super::document::Value;
 use super::error::SceneError;
 use super::keys;
+use super::limits::{LONGEST_TITLE, MAX_PERIODS};
 use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 use rattlemap_dynamics::orbit;
-
-/// The most forcing periods that one field may ask for.
-pub(super) const MAX_PERIODS: u32 = 1_000_000_000;
-
-/// Characters of a title: figures have one line for it.
-pub(super) const LONGEST_TITLE: usize = 200;
 
 /// How fine the lanes' time grid is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +70,7 @@ pub struct Refine {
     /// Fraction of the filled cells that may be wrong, as the audit measures it.
     pub max_error: f64,
     /// Filled cells that one audit integrates at first, up to sixteen times as many where the result may be
-    /// chance; none for [`AUDIT`], or a quarter of the filled ones if that is less.
+    /// chance; none for [`DEFAULT_AUDIT`], or a quarter of the filled ones if that is less.
     pub audit: Option<u32>,
     /// Whether a change of the word alone is a border, where the scene asks for words; of the pattern alone, where it
     /// asks for patterns. At low frequencies words change from one cell to the next but few, while class, period and
@@ -86,7 +81,7 @@ pub struct Refine {
 }
 
 /// Filled cells that one audit integrates unless told otherwise: enough to see an error of 0.3 %.
-pub const AUDIT: u32 = 2000;
+pub const DEFAULT_AUDIT: u32 = 2000;
 
 impl Default for Refine {
     fn default() -> Self {
@@ -107,7 +102,7 @@ impl Refine {
     pub fn audited(&self, filled: usize) -> usize {
         match self.audit {
             Some(cells) => filled.min(cells as usize),
-            None => filled.div_ceil(4).min(AUDIT as usize),
+            None => filled.div_ceil(4).min(DEFAULT_AUDIT as usize),
         }
     }
 }
@@ -269,7 +264,7 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
         return Ok(None);
     }
     if let (Purpose::Bifurcation, Some(field)) = (purpose, root.get("refine")) {
-        return Err(field.conflict("`bifurcation` integrates every column; drop [refine]".into()));
+        return Err(field.conflict("`bifurcation` integrates every column; drop [refine]"));
     }
     let default = Refine::default();
     let max_error = match section.get("max_error") {

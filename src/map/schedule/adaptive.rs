@@ -7,7 +7,7 @@
 mod auditing;
 
 use super::audit::Audit;
-use super::basins::Basins;
+use super::basins::BasinLabels;
 use super::fill::Filling;
 use super::label::Label;
 use super::tiling::{Tile, Tiling};
@@ -31,19 +31,19 @@ const LEVELS: u32 = u16::BITS;
 pub(super) struct Adaptive {
     counts: [usize; 2],
     refine: Refine,
-    /// What makes borders: what the scene asks for, words only where they are to.
+    /// What makes borders: what the scene requests for, words only where they are to.
     needs: Needs,
     /// What makes borders in a map of basins.
-    basins: Option<Basins>,
+    basins: Option<BasinLabels>,
     /// By cell id; unknown where nothing was integrated.
     labels: Vec<Label>,
     /// By cell id.
-    is_asked: Vec<bool>,
+    is_requested: Vec<bool>,
     /// Cells that were not asked for.
-    unasked: usize,
+    unrequested: usize,
     tiling: Tiling,
     /// What is known of each block.
-    sights: Vec<Sight>,
+    blocks: Vec<BlockState>,
     /// Levels of blocks with differing corners that a cell belongs to, a bit for each.
     touched: Vec<u16>,
     /// Blocks that are to be halved.
@@ -63,7 +63,7 @@ pub(super) struct Adaptive {
 
 /// What is known of a block.
 #[derive(Clone, Copy, Default)]
-struct Sight {
+struct BlockState {
     /// Of the first cell that was known.
     label: Label,
     /// Of the first corner that was known.
@@ -86,8 +86,8 @@ enum Stage {
 }
 
 impl Adaptive {
-    /// Nothing is known; `asks` gets the cells of the coarse grid, neighbours one after the other.
-    pub(super) fn new(plan: &Plan, refine: Refine, asks: &mut Vec<u32>) -> Adaptive {
+    /// Nothing is known; `requests` gets the cells of the coarse grid, neighbours one after the other.
+    pub(super) fn new(plan: &Plan, refine: Refine, requests: &mut Vec<u32>) -> Adaptive {
         let counts = plan.counts();
         let tiling = Tiling::new(counts, refine.minimum_grid as usize);
         let cells = plan.cell_count();
@@ -100,11 +100,11 @@ impl Adaptive {
             refine,
             narrow: if needs.symmetric { NARROWEST } else { NARROW },
             needs,
-            basins: Basins::of(plan),
+            basins: BasinLabels::of(plan),
             labels: vec![Label::default(); cells],
-            is_asked: vec![false; cells],
-            unasked: cells,
-            sights: vec![Sight::default(); tiling.tiles().len()],
+            is_requested: vec![false; cells],
+            unrequested: cells,
+            blocks: vec![BlockState::default(); tiling.tiles().len()],
             tiling,
             touched: vec![0; cells],
             pending: Vec::new(),
@@ -116,9 +116,9 @@ impl Adaptive {
             stage: Stage::Halving,
         };
         for tile in adaptive.tiling.tiles() {
-            adaptive.ask_corners(tile, asks);
+            adaptive.request_corners(tile, requests);
         }
-        asks.sort_by_cached_key(|&id| crate::map::plan::morton_key(adaptive.at(id)));
+        requests.sort_by_cached_key(|&id| crate::map::plan::morton_key(adaptive.at(id)));
         adaptive
     }
 
@@ -136,14 +136,14 @@ impl Adaptive {
     }
 
     /// Looks at records that are taken up next.
-    pub(super) fn foresee(&mut self, records: &[(u32, Record)]) {
+    pub(super) fn prepare(&mut self, records: &[(u32, Record)]) {
         if let Some(basins) = &mut self.basins {
-            basins.foresee(records);
+            basins.prepare(records);
         }
     }
 
-    /// Takes up the record of a cell that was asked for; `asks` gets the cells that are needed for that.
-    pub(super) fn take(&mut self, id: u32, record: &Record, asks: &mut Vec<u32>) {
+    /// Takes up the record of a cell that was asked for; `requests` gets the cells that are needed for that.
+    pub(super) fn take(&mut self, id: u32, record: &Record, requests: &mut Vec<u32>) {
         let label = match &mut self.basins {
             Some(basins) => basins.label(id, record),
             None => Label::of(record, &self.needs),
@@ -151,18 +151,18 @@ impl Adaptive {
         self.labels[id as usize] = label;
         if self.stage != Stage::Auditing {
             self.show(self.at(id), label);
-            self.halve(asks);
+            self.halve(requests);
         }
     }
 
     /// Goes on once every cell that was asked for has been taken up: audits once, and again after every audit
-    /// that is failed. `asks` gets the next cells, none if the map is finished.
-    pub(super) fn settle(&mut self, records: &[Record], asks: &mut Vec<u32>) {
-        let before = asks.len();
-        while asks.len() == before && self.stage != Stage::Done {
+    /// that is failed. `requests` gets the next cells, none if the map is finished.
+    pub(super) fn settle(&mut self, records: &[Record], requests: &mut Vec<u32>) {
+        let before = requests.len();
+        while requests.len() == before && self.stage != Stage::Done {
             match self.stage {
-                Stage::Halving => self.begin_audit(asks),
-                Stage::Auditing => self.judge_audit(records, asks),
+                Stage::Halving => self.begin_audit(requests),
+                Stage::Auditing => self.judge_audit(records, requests),
                 Stage::Mending | Stage::Done => self.stage = Stage::Done,
             }
         }
@@ -180,7 +180,7 @@ impl Adaptive {
     }
 
     fn show_to(&mut self, tile: Tile, label: Label) {
-        let sight = &mut self.sights[tile];
+        let sight = &mut self.blocks[tile];
         if !sight.label.is_known() {
             sight.label = label;
         } else if sight.label != label {
@@ -189,7 +189,7 @@ impl Adaptive {
     }
 
     fn show_corner(&mut self, tile: Tile, label: Label) {
-        let sight = &mut self.sights[tile];
+        let sight = &mut self.blocks[tile];
         if sight.kind == 0 {
             sight.kind = label.kind;
         } else if sight.kind != label.kind && !sight.has_border {
@@ -223,17 +223,17 @@ impl Adaptive {
     }
 
     /// Halves what is to be halved, and what that shows.
-    fn halve(&mut self, asks: &mut Vec<u32>) {
+    fn halve(&mut self, requests: &mut Vec<u32>) {
         while let Some(tile) = self.pending.pop() {
             if !self.may_halve(tile) {
                 continue;
             }
-            let is_free = self.sights[tile].is_free;
+            let is_free = self.blocks[tile].is_free;
             let parts = self.tiling.halve(tile);
             self.deepest = self.deepest.max(self.tiling.level(parts.start));
             for part in parts {
-                self.sights.push(Sight { is_free, ..Sight::default() });
-                self.ask_corners(part, asks);
+                self.blocks.push(BlockState { is_free, ..BlockState::default() });
+                self.request_corners(part, requests);
                 let block = self.tiling.block(part);
                 for at in block.cells() {
                     let label = self.label(at);
@@ -254,24 +254,24 @@ impl Adaptive {
     fn may_halve(&self, tile: Tile) -> bool {
         let is_allowed = || {
             let level = self.tiling.level(tile);
-            self.sights[tile].is_free || self.refine.rounds.is_none_or(|most| level < most)
+            self.blocks[tile].is_free || self.refine.rounds.is_none_or(|most| level < most)
         };
         self.tiling.is_leaf(tile) && self.tiling.block(tile).has_inside() && is_allowed()
     }
 
-    fn ask_corners(&mut self, tile: Tile, asks: &mut Vec<u32>) {
+    fn request_corners(&mut self, tile: Tile, requests: &mut Vec<u32>) {
         for at in self.tiling.block(tile).corners() {
             let id = self.id(at);
-            self.ask(id, asks);
+            self.request(id, requests);
         }
     }
 
     /// Asks for a cell, once; whether it was the first time.
-    fn ask(&mut self, id: usize, asks: &mut Vec<u32>) -> bool {
-        let is_new = !std::mem::replace(&mut self.is_asked[id], true);
+    fn request(&mut self, id: usize, requests: &mut Vec<u32>) -> bool {
+        let is_new = !std::mem::replace(&mut self.is_requested[id], true);
         if is_new {
-            self.unasked -= 1;
-            asks.push(id as u32);
+            self.unrequested -= 1;
+            requests.push(id as u32);
         }
         is_new
     }
@@ -313,7 +313,7 @@ impl Adaptive {
             let filling = Filling::new(&block, corners.each_ref());
             for at in block.cells().filter(|&at| self.tiling.owner(at) == tile) {
                 let id = self.id(at);
-                if !self.is_asked[id] {
+                if !self.is_requested[id] {
                     records[id] = filling.record(at);
                     if let Some(from) = from.get_mut(id) {
                         *from = self.id(block.corners()[block.nearest(at)]) as u32;

@@ -1,6 +1,7 @@
 //! The audit of filled cells: how many of them are wrong, and by how much?
 
 use super::errors::Errors;
+use crate::map::statistics::{TWO_SIDED_95, TWO_SIDED_99, score_interval};
 
 /// What an audit measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,13 +24,6 @@ pub struct Audit {
     /// By how much exponents, impacts and mesh fractions had been filled wrongly.
     pub errors: Errors,
 }
-
-/// The 97.5 % point of the normal distribution.
-pub(super) const TWO_SIDED_95: f64 = 1.959964;
-
-/// Its 99.5 % point: to refine a map costs half as much again, and an audit that goes on is asked
-/// several times.
-const TWO_SIDED_99: f64 = 2.575829;
 
 /// An audit that finds too many wrong cells, but no more than chance may put into its sample, goes on to
 /// this many times the sample: of maps with 0.26 % wrong one in forty is refined for bad luck where
@@ -60,29 +54,9 @@ impl Audit {
     }
 }
 
-/// Wilson's interval of the share that `hits` of `sampled` tell; `z` is its point of the normal distribution.
-pub(super) fn score_interval(hits: usize, sampled: usize, z: f64) -> [f64; 2] {
-    let n = sampled.max(1) as f64;
-    let rate = hits as f64 / n;
-    let centre = rate + z * z / (2.0 * n);
-    let half = z * (rate * (1.0 - rate) / n + z * z / (4.0 * n * n)).sqrt();
-    let scale = 1.0 + z * z / n;
-    [((centre - half) / scale).max(0.0), ((centre + half) / scale).min(1.0)]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn intervals_are_those_of_the_textbook() {
-        let audit = |wrong, sampled| Audit { filled: 10_000, sampled, wrong, ..Audit::default() };
-        // R: binom::binom.confint(10, 1000, methods = "wilson")
-        let [low, high] = audit(10, 1000).interval();
-        assert!((low - 0.005_441).abs() < 1e-5 && (high - 0.018_309).abs() < 1e-5, "{low} {high}");
-        let [low, high] = audit(0, 2000).interval();
-        assert!(low < 1e-12 && (high - 0.001_917).abs() < 1e-5, "{high}");
-    }
 
     #[test]
     fn an_audit_goes_on_while_chance_may_have_its_hand_in_it() {

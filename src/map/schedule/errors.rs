@@ -1,6 +1,7 @@
 //! How far what is filled is from what integration shows.
 
 use crate::map::plan::Needs;
+use crate::map::statistics::{TWO_SIDED_95, score_interval};
 use crate::record::distance::apart;
 use crate::record::{Record, valid};
 
@@ -8,7 +9,7 @@ use crate::record::{Record, valid};
 const HALF_AN_IMPACT: f64 = 0.5;
 
 /// Counts per period that differ by one are a rounding away from it.
-const ROUNDING: f64 = 1e-9;
+const COUNT_ROUNDING: f64 = 1e-9;
 
 /// Errors of the continuous quantities of audited cells; none where the scene does not ask for a quantity, or
 /// leaves it empty in filled cells.
@@ -80,7 +81,7 @@ impl Deviation {
             median: rank(0.5),
             p95: rank(0.95),
             worst: rank(1.0),
-            off_by_one: differences.iter().filter(|&&difference| difference >= 1.0 - ROUNDING).count(),
+            off_by_one: differences.iter().filter(|&&difference| difference >= 1.0 - COUNT_ROUNDING).count(),
         }
     }
 
@@ -91,7 +92,7 @@ impl Deviation {
 
     /// Its 95 % interval, as [`Audit::interval`](super::Audit::interval).
     pub fn off_by_one_interval(&self) -> [f64; 2] {
-        super::audit::score_interval(self.off_by_one, self.compared, super::audit::TWO_SIDED_95)
+        score_interval(self.off_by_one, self.compared, TWO_SIDED_95)
     }
 }
 

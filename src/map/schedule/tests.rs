@@ -51,11 +51,14 @@ fn run_in(
             let [i, j] = plan.indices(id);
             assert_eq!(records[id as usize].periods_run, 0, "cell {id} was asked for twice");
             records[id as usize] = shown(picture(i, j));
-            assert!(schedule.waits_for(id));
+            assert!(schedule.is_waiting_for(id));
             schedule.take(id, &records);
         }
     }
-    assert!(waiting.is_empty() && schedule.next(plan, 1).is_empty(), "cells were begun that nobody asks for");
+    assert!(
+        waiting.is_empty() && schedule.next(plan, 1).is_empty(),
+        "cells were begun that nobody requests for"
+    );
     let refined = schedule.finish(&mut records).unwrap();
     assert_eq!(refined.integrated + refined.filled, plan.cell_count());
     assert!(records.iter().all(|r| (r.periods_run == 0) == (r.valid & valid::FILLED != 0)));
@@ -110,12 +113,12 @@ fn the_audit_of_a_small_map_leaves_most_of_it_filled() {
     let [audit] = refined.audits[..] else { panic!("{refined:?}") };
     assert_eq!((audit.filled, audit.sampled), (1600 - 36, 391), "{refined:?}");
     assert_eq!(refined.filled, 1600 - 36 - 391);
-    // Who asks for so many cells gets them.
+    // Who requests for so many cells gets them.
     let (_, refined) = run(&plan([40, 40], "minimum_grid = 8\naudit = 2000"), |_, _| 4);
     assert_eq!((refined.audits[0].sampled, refined.filled), (1564, 0), "{refined:?}");
     // On a large map the cells that it takes to see 0.3 %.
     let (_, refined) = run(&plan([200, 200], "minimum_grid = 8"), |_, _| 4);
-    assert_eq!(refined.audits[0].sampled, crate::map::scene::AUDIT as usize);
+    assert_eq!(refined.audits[0].sampled, crate::map::scene::DEFAULT_AUDIT as usize);
 }
 
 /// Islands smaller than a block that the coarse grid misses altogether.
@@ -155,7 +158,7 @@ fn a_failed_audit_has_borders_followed_more_closely_first() {
     assert!(first.rate() > 0.002 && second.rate() <= 0.002, "{refined:?}");
     assert_eq!(
         first.sampled,
-        crate::map::scene::AUDIT as usize,
+        crate::map::scene::DEFAULT_AUDIT as usize,
         "mended before more is audited: {refined:?}"
     );
     // As with symmetries from the beginning, but for what the audits integrate.
@@ -179,15 +182,18 @@ fn an_audit_that_may_be_chance_goes_on() {
         };
         let (_, refined) = run(&plan, strewn);
         let first = refined.audits[0];
-        let is_prolonged = first.sampled > crate::map::scene::AUDIT as usize;
+        let is_prolonged = first.sampled > crate::map::scene::DEFAULT_AUDIT as usize;
         prolonged += u32::from(is_prolonged);
         passed += u32::from(is_prolonged && refined.audits.len() == 1);
-        assert!(first.sampled <= 16 * crate::map::scene::AUDIT as usize && first.rate() > 0.0, "{refined:?}");
+        assert!(
+            first.sampled <= 16 * crate::map::scene::DEFAULT_AUDIT as usize && first.rate() > 0.0,
+            "{refined:?}"
+        );
     }
     assert!((2..20).contains(&prolonged) && 2 * passed >= prolonged, "{passed} of {prolonged}");
     // What is no chance is mended at once.
     let (_, refined) = run(&plan, |i, j| if (2..7).contains(&(i % 16)) && j % 16 > 8 { 5 } else { 1 });
-    assert_eq!(refined.audits[0].sampled, crate::map::scene::AUDIT as usize, "{refined:?}");
+    assert_eq!(refined.audits[0].sampled, crate::map::scene::DEFAULT_AUDIT as usize, "{refined:?}");
 }
 
 /// A plain region does not pay for what is wrong elsewhere.

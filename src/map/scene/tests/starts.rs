@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::map::plan::Plan;
-use crate::map::scene::{FileBeside, FileText};
+use crate::map::scene::{CompanionFile, FileText};
 use rattlemap_dynamics::model::Stops;
 
 const PLANE: &str = "[parameters]\ne = 0.5\n\n[[axis]]\nstart = 'v1'\nmin = -2\nmax = 2\ncount = 5\n\n\
@@ -99,10 +99,10 @@ fn a_list_may_have_columns_of_the_start() {
     let text = "[parameters]\nF = 40.0\nomega = 4.0\n\n[cells]\nfile = 'p.csv'\n";
     let read = |table: &str, sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-        let find = |_: FileBeside, _: &str| {
+        let find = |_: CompanionFile, _: &str| {
             Ok::<_, String>(FileText { name: "p.csv".to_owned(), text: table.to_owned() })
         };
-        Scene::parse_beside(text, "s.toml", &sets, Purpose::Map, &find)
+        Scene::parse_with_files(text, "s.toml", &sets, Purpose::Map, &find)
     };
     let scene = read("v2,e\n1,0.5\n-2,0.5\n3,0.25\n", &[]).unwrap();
     let plan = Plan::new(&scene);

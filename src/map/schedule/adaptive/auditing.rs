@@ -20,9 +20,9 @@ struct Verdict {
 }
 
 impl Adaptive {
-    pub(super) fn begin_audit(&mut self, asks: &mut Vec<u32>) {
-        let filled = self.unasked;
-        let sampled = self.sample(self.refine.audited(filled), asks);
+    pub(super) fn begin_audit(&mut self, requests: &mut Vec<u32>) {
+        let filled = self.unrequested;
+        let sampled = self.sample(self.refine.audited(filled), requests);
         self.stage = if sampled == 0 { Stage::Done } else { Stage::Auditing };
         if sampled > 0 {
             self.audits.push(Audit { filled, sampled, ..Audit::default() });
@@ -30,14 +30,14 @@ impl Adaptive {
     }
 
     /// Asks for so many of the cells that nothing is known of, at random.
-    fn sample(&mut self, count: usize, asks: &mut Vec<u32>) -> usize {
-        let count = count.min(self.unasked);
-        let from = asks.len();
-        while asks.len() < from + count {
+    fn sample(&mut self, count: usize, requests: &mut Vec<u32>) -> usize {
+        let count = count.min(self.unrequested);
+        let from = requests.len();
+        while requests.len() < from + count {
             let id = self.random.below(self.labels.len());
-            self.ask(id, asks);
+            self.request(id, requests);
         }
-        self.audited.extend(&asks[from..]);
+        self.audited.extend(&requests[from..]);
         self.samples += usize::from(count > 0);
         count
     }
@@ -47,17 +47,17 @@ impl Adaptive {
     /// that are filled with what is wrong most often: mostly chaos with its
     /// windows, which the plain regions around need not pay for. If that may be chance, more cells are
     /// audited before. Where blocks have been halved as often as they may there is nothing left to do.
-    pub(super) fn judge_audit(&mut self, records: &[Record], asks: &mut Vec<u32>) {
+    pub(super) fn judge_audit(&mut self, records: &[Record], requests: &mut Vec<u32>) {
         let Verdict { wrong, bad } = self.count_wrong(records);
         let audit = *self.audits.last().unwrap_or(&Audit::default());
         let is_over = audit.rate() > self.refine.max_error;
         let closer = if is_over { self.follow_closely() } else { Vec::new() };
-        let is_bad = |tile: Tile| bad.contains(&self.sights[tile].kind);
+        let is_bad = |tile: Tile| bad.contains(&self.blocks[tile].kind);
         let worst: Vec<Tile> = self.tiles_to_halve(is_bad).collect();
         if is_over && closer.is_empty() && !worst.is_empty() {
             let more = audit.more(self.refine.audited(audit.filled), self.refine.max_error);
             if more > 0 {
-                self.sample(more, asks);
+                self.sample(more, requests);
                 return;
             }
         }
@@ -65,13 +65,13 @@ impl Adaptive {
         self.stage = if self.pending.is_empty() { Stage::Mending } else { Stage::Halving };
         for id in wrong {
             let tile = self.tiling.owner(self.at(id));
-            self.sights[tile].is_free = true;
+            self.blocks[tile].is_free = true;
             self.pending.push(tile);
         }
         for id in std::mem::take(&mut self.audited) {
             self.show(self.at(id), self.labels[id as usize]);
         }
-        self.halve(asks);
+        self.halve(requests);
     }
 
     /// Compares what was filled into the audited cells with their records.
