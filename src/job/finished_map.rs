@@ -170,7 +170,7 @@ impl Manifest {
             })?;
             Ok(FileText { name: path.display().to_string(), text })
         };
-        let scene = Scene::parse_with_files(&self.scene, &name, &self.set, Purpose::Map, &find)?;
+        let scene = Scene::parse_with_files(&self.scene, &name, &self.set, Purpose::Map, None, &find)?;
         capacity::check_finished(&scene)?;
         Ok(FinishedMap { manifest: self, dir: dir.to_owned(), scene })
     }

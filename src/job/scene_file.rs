@@ -65,7 +65,7 @@ fn load_from(
             None => find(&beside, MOST),
         }
     };
-    Scene::parse_along(&text, &name, sets, purpose, along, &find)
+    Scene::parse_with_files(&text, &name, sets, purpose, along, &find)
 }
 
 /// Reads the file of a model; the error is the end of a sentence that names it.

@@ -255,8 +255,8 @@ mod tests {
     fn rows_of_a_list_take_room_beside_their_records() {
         let text = "e,omega\n".to_owned() + &"0.5,5.6\n".repeat(100);
         let find = |_, _: &str| Ok(FileText { name: "l.csv".to_owned(), text: text.clone() });
-        let list =
-            Scene::parse_with_files("[cells]\nfile = 'l.csv'\n", "s", &[], Purpose::Map, &find).unwrap();
+        let list = Scene::parse_with_files("[cells]\nfile = 'l.csv'\n", "s", &[], Purpose::Map, None, &find)
+            .unwrap();
         let [list, grid] = [list, scene("omega", 1.0, 12.0, [10, 10])].map(|scene| Size::of(&scene).memory);
         assert_eq!(list - grid, 100 * LIST_ROW);
     }

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use rattlemap::map::printable::line;
-use rattlemap::map::scene::{Axis, FileText, Place, Problem, Purpose, Scene, SceneError, Steps};
+use rattlemap::map::scene::{Axis, Fault, FileText, Place, Problem, Purpose, Scene, SceneError, Steps};
 use rattlemap_dynamics::model::{GearPair, Parameter};
 
 const SCENES: [&str; 5] = [
@@ -176,13 +176,14 @@ fn any_table_is_refused_with_a_remedy_or_valid() {
         .prop_map(|(header, rows)| format!("{header}\n{}", rows.join("\n")));
     torture(&table, |table| {
         let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: table.clone() });
-        match Scene::parse_with_files(scene, "scene.toml", &[], Purpose::Map, &find) {
+        match Scene::parse_with_files(scene, "scene.toml", &[], Purpose::Map, None, &find) {
             Ok(scene) => {
                 let list = scene.list().unwrap();
                 prop_assert!(!list.is_empty() && scene.cell_count() == list.len() as u64);
                 let again = list.to_csv();
                 let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: again.clone() });
-                let again = Scene::parse_with_files(scene.text(), "s", &[], Purpose::Map, &find).unwrap();
+                let again =
+                    Scene::parse_with_files(scene.text(), "s", &[], Purpose::Map, None, &find).unwrap();
                 prop_assert_eq!(again.identity(), scene.identity());
             }
             Err(error) => {
@@ -224,15 +225,10 @@ fn check_refusal(error: &SceneError, text: &str, sets: &[String]) -> Result<(), 
         Problem::Syntax { message, .. } => message,
         Problem::NoMotion { reason, .. } => &reason.to_string(),
         Problem::NotAnAssignment => return Ok(()),
-        Problem::UnreadableValue { reason, .. } => &line(reason).into_owned(),
+        Problem::Value { fault: Fault::Unreadable, detail, .. } => &line(detail).into_owned(),
+        Problem::Value { detail, .. } => detail,
         Problem::Table { message } => message,
-        Problem::UnknownWithin { remedy, .. }
-        | Problem::UnknownField { remedy, .. }
-        | Problem::UnknownName { remedy, .. }
-        | Problem::Missing { remedy, .. }
-        | Problem::Conflict { remedy, .. } => remedy,
-        Problem::WrongType { expected, .. } => expected,
-        Problem::OutOfRange { requirement, .. } => requirement,
+        Problem::Missing { remedy, .. } => remedy,
         Problem::Unreadable { .. } => return Err(TestCaseError::fail(format!("no file was read: {said}"))),
     };
     prop_assert!(remedy.len() > 3 && said.contains(remedy.as_str()), "no remedy: {said:?}");
@@ -244,7 +240,7 @@ const LIST: (&str, &str) = ("points.csv", "omega,k\n5.6,900\n7,1e4\n");
 
 fn parse(text: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
     let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: LIST.1.to_owned() });
-    Scene::parse_with_files(text, "scene.toml", sets, purpose, &find)
+    Scene::parse_with_files(text, "scene.toml", sets, purpose, None, &find)
 }
 
 fn check(text: &str, sets: &[String]) -> Result<(), TestCaseError> {
@@ -306,8 +302,10 @@ fn mutants_reach_both_sides() {
         match parse(&mutated(scene, &mutations), &sets, Purpose::Map) {
             Ok(_) => accepted += 1,
             Err(error) => {
-                let kind = format!("{:?}", error.problem);
-                kinds.insert(kind.split([' ', '{']).next().unwrap_or_default().to_owned());
+                kinds.insert(match &error.problem {
+                    Problem::Value { fault, .. } => format!("{fault:?}"),
+                    problem => format!("{problem:?}").split([' ', '{']).next().unwrap_or_default().to_owned(),
+                });
             }
         }
     }

@@ -1,5 +1,4 @@
-//! A scene built in Rust. It is written down as TOML and read like any other: one set of rules,
-//! one set of errors, and a text for manifests.
+//! A scene built in Rust. It is written as TOML and then read like a file, so the same checks, errors and manifests apply.
 
 use std::fmt::Write;
 use std::ops::RangeInclusive;
@@ -11,21 +10,7 @@ use super::settings::{Continuous, Format, Integration, Quantity, Refine, Steps};
 use super::{Draw, Purpose, Scene, SceneError, Start};
 use rattlemap_dynamics::model::Model;
 
-/// What is asked, step by step; [`SceneBuilder::build`] looks at all of it. What is not said is as
-/// in a scene file that does not say it.
-///
-/// ```
-/// use rattlemap::map::scene::Scene;
-/// use rattlemap::model::GearPair;
-///
-/// let pair = GearPair { k: 800.0, ..GearPair::paper(0.5) };
-/// let scene = Scene::builder(pair).axis("e", 0.0..=1.0, 64).axis("omega", 1.0..=12.0, 64);
-/// assert_eq!(scene.build()?.cell_count(), 4096);
-/// let wrong = Scene::builder(pair).axis("e", 0.0..=1.5, 64).axis("omega", 1.0..=12.0, 64);
-/// let error = wrong.build().unwrap_err().to_string();
-/// assert_eq!(error, "scene: `axis.0.max = 1.5` is out of range: it must be between 0 and 1, as `e` is");
-/// # Ok::<(), rattlemap::map::scene::SceneError>(())
-/// ```
+/// Builds a scene step by step; [`SceneBuilder::build`] checks it. Anything that is not set has the default of scene files.
 #[derive(Clone, Debug)]
 #[must_use]
 pub struct SceneBuilder {
@@ -33,9 +18,9 @@ pub struct SceneBuilder {
     title: Option<String>,
     parameters: Vec<(String, f64)>,
     derived: Vec<(String, String)>,
-    /// What each sweeps, its name, and the other lines of its table.
+    /// For each axis the key `parameter` or `start`, the name of the swept quantity, and the other lines of the table.
     axes: Vec<(&'static str, String, String)>,
-    /// A table.
+    /// A list of cells as CSV.
     cells: Option<String>,
     integration: Option<Integration>,
     start: Start,
@@ -46,7 +31,7 @@ pub struct SceneBuilder {
 }
 
 impl SceneBuilder {
-    /// Cells have the model's values, but for those of the axes.
+    /// Begins a scene whose cells have the model's values, except for swept parameters.
     pub(super) fn new(model: Box<dyn Model>) -> SceneBuilder {
         SceneBuilder {
             model,
@@ -64,7 +49,7 @@ impl SceneBuilder {
         }
     }
 
-    /// The heading of figures and reports.
+    /// Sets the heading of figures and reports.
     pub fn title(mut self, title: &str) -> SceneBuilder {
         self.title = Some(title.to_owned());
         self
@@ -76,25 +61,25 @@ impl SceneBuilder {
         self
     }
 
-    /// Has a parameter follow others: `derived("k2", "0.5*k1")`.
+    /// Derives a parameter from others: `derived("k2", "0.5*k1")`.
     pub fn derived(mut self, name: &str, expression: &str) -> SceneBuilder {
-        // A later expression wins over an earlier one.
+        // A later expression replaces an earlier one.
         self.derived.retain(|(derived, _)| derived != name);
         self.derived.push((name.to_owned(), expression.to_owned()));
         self
     }
 
-    /// Sweeps a parameter over `count` values, both ends included. The first axis is along columns.
+    /// Sweeps a parameter over `count` values with equal differences, both ends included. The first axis runs along columns.
     pub fn axis(self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
         self.swept(parameter, range_lines(&range, count))
     }
 
-    /// The same by equal ratios.
+    /// Sweeps a parameter over `count` values with equal ratios, both ends included.
     pub fn log_axis(self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
         self.swept(parameter, range_lines(&range, count) + "\nscale = \"log\"")
     }
 
-    /// Sweeps a parameter over these values, which increase.
+    /// Sweeps a parameter over increasing values.
     pub fn values_axis(self, parameter: &str, values: &[f64]) -> SceneBuilder {
         let values: Vec<String> = values.iter().map(|&value| number(value)).collect();
         self.swept(parameter, format!("values = [{}]", values.join(", ")))
@@ -105,13 +90,13 @@ impl SceneBuilder {
         self
     }
 
-    /// Sweeps a component of the start, by its name among the model's state names: the map then shows basins.
+    /// Sweeps a component of the start, given by one of the model's state names. The map then shows basins.
     pub fn start_axis(mut self, component: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
         self.axes.push(("start", component.to_owned(), range_lines(&range, count)));
         self
     }
 
-    /// Lists cells in the place of axes: values of these parameters or components of the start, row by row.
+    /// Lists the cells instead of axes. Each row has the values of these parameters or components of the start.
     pub fn cells<const N: usize>(mut self, parameters: [&str; N], rows: &[[f64; N]]) -> SceneBuilder {
         let row = |row: &[f64; N]| row.map(number).join(",");
         let rows = rows.iter().map(row);
@@ -120,19 +105,19 @@ impl SceneBuilder {
         self
     }
 
-    /// How long each cell is integrated, and what for.
+    /// Sets how long each cell is integrated.
     pub fn integration(mut self, integration: Integration) -> SceneBuilder {
         self.integration = Some(integration);
         self
     }
 
-    /// Where cells start: at rest unless told.
+    /// Sets the states in which cells start; at rest by default.
     pub fn start(mut self, start: Start) -> SceneBuilder {
         self.start = start;
         self
     }
 
-    /// Several starts per cell, which are drawn beside the first.
+    /// Adds random starts to each cell.
     pub fn draw(mut self, draw: Draw) -> SceneBuilder {
         self.draw = Some(draw);
         self
@@ -144,30 +129,30 @@ impl SceneBuilder {
         self
     }
 
-    /// What is computed: class and Lyapunov exponent unless told.
+    /// Sets the quantities that are computed; class and Lyapunov exponent by default.
     pub fn quantities(mut self, quantities: &[Quantity]) -> SceneBuilder {
         self.quantities = Some(quantities.to_vec());
         self
     }
 
-    /// What is written, if anything is: all kinds of file unless told.
+    /// Sets the kinds of files that are written.
     pub fn files(mut self, files: &[Format]) -> SceneBuilder {
         self.files = Some(files.to_vec());
         self
     }
 
-    /// The scene of a map over two axes.
+    /// Builds the scene of a map.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong.
+    /// [`SceneError`] for the first error.
     pub fn build(self) -> Result<Scene, SceneError> {
         self.build_for(Purpose::Map)
     }
 
-    /// A scene for this purpose.
+    /// Builds a scene for this purpose.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong.
+    /// [`SceneError`] for the first error.
     pub fn build_for(self, purpose: Purpose) -> Result<Scene, SceneError> {
         let text = self.text();
         let document = document::read(&text, "scene")?.placed(Place::Builder);
@@ -176,7 +161,7 @@ impl SceneBuilder {
         Scene::read(text, &document, &*self.model, purpose, &find)
     }
 
-    /// The scene in TOML.
+    /// Writes the scene as TOML.
     fn text(&self) -> String {
         let mut text = String::new();
         let mut line = |line: String| {
@@ -189,17 +174,17 @@ impl SceneBuilder {
         let mut parameters = self.parameters.clone();
         for (index, parameter) in self.model.parameters().iter().enumerate() {
             let (name, value) = (&*parameter.name, self.model.value(index));
-            let is_told = parameters.iter().any(|(told, _)| told == name)
+            let is_set = parameters.iter().any(|(set, _)| set == name)
                 || self.axes.iter().any(|(what, set, _)| *what == "parameter" && set == name)
                 || self.derived.iter().any(|(set, _)| set == name)
                 || self.cells.as_ref().is_some_and(|table| {
                     table.lines().next().is_some_and(|names| names.split(',').any(|column| column == name))
                 });
-            if !is_told && parameter.default != Some(value) {
+            if !is_set && parameter.default != Some(value) {
                 parameters.push((name.to_owned(), value));
             }
         }
-        // A later value wins over an earlier one.
+        // A later value replaces an earlier one.
         for (i, (name, value)) in parameters.iter().enumerate() {
             if !parameters[i + 1..].iter().any(|(later, _)| later == name) {
                 line(format!("{} = {}", quoted(name), number(*value)));
@@ -289,7 +274,7 @@ fn refine_table(refine: &Refine) -> String {
     )
 }
 
-/// A TOML string, or a key that any name fits.
+/// Quotes a TOML string or key.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from('"');
     for c in text.chars() {
@@ -306,7 +291,7 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-/// The shortest decimal that reads back as the same number, as TOML writes it.
+/// Writes a number in TOML as the shortest decimal that reads back as the same number.
 fn number(x: f64) -> String {
     if x.is_nan() { "nan".to_owned() } else { format!("{x:?}") }
 }

@@ -1,42 +1,42 @@
-//! Every key of a scene, once: the parser knows these names, and `docs/scenes.md` is made from them.
+//! The table of all keys of a scene. The parser accepts these names, and `docs/scenes.md` is generated from them.
 
 use super::limits::{LONGEST_TITLE, MAX_COUNT, MAX_PERIODS, MAX_STARTS};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 
-/// One key.
+/// One key of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
-    /// The table that it stands in; empty for those before any table.
+    /// Name of the table that contains the key; empty for keys outside of any table.
     pub table: &'static str,
-    /// Its name.
+    /// Name of the key.
     pub name: &'static str,
-    /// What holds where it is not written, as TOML.
+    /// Value that applies if the key is not written.
     pub default: KeyDefault,
-    /// What it takes.
+    /// Values that are allowed.
     pub takes: Takes,
-    /// One phrase.
+    /// Meaning of the key in one phrase.
     pub meaning: &'static str,
 }
 
-/// What holds where a key is not written.
+/// The value that applies if a key is not written.
 #[derive(Clone, Copy, Debug)]
 pub enum KeyDefault {
-    /// This value.
+    /// A value, as TOML.
     Value(&'static str),
-    /// What the words say.
+    /// A description in words.
     Words(&'static str),
-    /// Nothing: it must be written where it applies.
+    /// None: the key is required where it applies.
     None,
 }
 
-/// The values that a key takes.
+/// The values that a key allows.
 #[derive(Clone, Copy, Debug)]
 pub enum Takes {
-    /// A whole number between these, ends included.
+    /// A whole number between these bounds, which are included.
     Whole(u32, u32),
-    /// The same, or "auto".
+    /// "auto", or a whole number between these bounds, which are included.
     WholeOrAuto(u32, u32),
-    /// A number between 0 and 1, ends excluded.
+    /// A number greater than 0 and less than 1.
     Fraction,
     /// true or false.
     Flag,
@@ -44,9 +44,9 @@ pub enum Takes {
     OneOf(&'static [&'static str]),
     /// A list of some of these names.
     List(&'static [&'static str]),
-    /// Text of at most so many characters.
+    /// Text with at most this number of characters.
     Text(usize),
-    /// What the words say; it depends on the model.
+    /// Values that depend on the model, described in words.
     Words(&'static str),
 }
 
@@ -64,7 +64,7 @@ const fn key(
 
 const END: Takes = Takes::Words("the parameter's range; of a start any finite number");
 
-/// Every key, in the order in which messages list them; `[parameters]` has those of the model.
+/// All keys, in the order in which messages list them. `[parameters]` has the names of the model's parameters as keys.
 #[rustfmt::skip]
 pub const KEYS: &[Key] = &[
     key("", "title", Words("from the axes"), Takes::Text(LONGEST_TITLE), "heading of figures and of the report"),
@@ -97,13 +97,13 @@ pub const KEYS: &[Key] = &[
     key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "what is written; png, svg and pdf are figures; `bifurcation` knows them and csv, a list of cells csv and npy"),
 ];
 
-/// The names in one table.
+/// Returns the names of the keys in one table.
 pub(super) fn names(table: &str) -> Vec<&'static str> {
     KEYS.iter().filter(|key| key.table == table).map(|key| key.name).collect()
 }
 
 impl Takes {
-    /// In words.
+    /// Describes the allowed values.
     pub fn in_words(self) -> String {
         match self {
             Takes::Whole(least, most) => format!("{least} to {most}"),
@@ -119,7 +119,7 @@ impl Takes {
 }
 
 impl KeyDefault {
-    /// In words; a dash where there is none.
+    /// Describes the default; a dash if there is none.
     pub fn in_words(self) -> &'static str {
         match self {
             Value(words) | Words(words) => words,

@@ -1,4 +1,4 @@
-//! `[cells]`: a table of cells in the place of axes.
+//! `[cells]`: a table of cells instead of axes.
 
 use std::fmt::Write;
 
@@ -12,16 +12,16 @@ use super::keys;
 use super::section::Section;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 
-/// A file beside a scene, as whoever reads the scene has found it.
+/// A file that a scene names, as the caller has read it.
 #[derive(Clone, Debug)]
 pub struct FileText {
-    /// What messages call it.
+    /// Name of the file in messages.
     pub name: String,
-    /// What it holds.
+    /// Contents of the file.
     pub text: String,
 }
 
-/// What a scene names a file for.
+/// Purposes for which a scene names a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CompanionFile {
     /// A table of cells.
@@ -30,20 +30,20 @@ pub enum CompanionFile {
     Model,
 }
 
-/// Finds a file beside a scene, by its name in the scene; the error says why it cannot be read.
+/// Reads a file that a scene names. The error says why it cannot be read.
 pub type FindFile<'f> = &'f dyn Fn(CompanionFile, &str) -> Result<FileText, String>;
 
-/// A list of cells: parameters or components of the start, and a value of each per cell.
+/// A list of cells: columns set parameters or components of the start, rows are cells.
 #[derive(Clone, Debug)]
 pub struct List {
     file: String,
     columns: Vec<ListColumn>,
-    /// Row by row.
+    /// All rows, one after the other.
     values: Vec<f64>,
     hash: String,
 }
 
-/// What one column of a list sets.
+/// The quantity that one column sets.
 #[derive(Clone, Debug)]
 struct ListColumn {
     parameter: Parameter,
@@ -51,27 +51,27 @@ struct ListColumn {
 }
 
 impl List {
-    /// The file's name in the scene.
+    /// Returns the file's name in the scene.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// The parameters, or components of the start, of its columns, in their order.
+    /// Returns the parameters or components of the start that the columns set.
     pub fn parameters(&self) -> impl ExactSizeIterator<Item = &Parameter> {
         self.columns.iter().map(|column| &column.parameter)
     }
 
-    /// How many cells there are, at least one.
+    /// Returns the number of cells, at least 1.
     pub fn len(&self) -> usize {
         self.values.len() / self.columns.len()
     }
 
-    /// No list is.
+    /// Whether the list has no cells; always false.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// The values of a cell, in the order of the columns.
+    /// Returns the values of a cell, one per column.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -80,12 +80,12 @@ impl List {
         &self.values[cell * columns..(cell + 1) * columns]
     }
 
-    /// A hash of names and values, SHA-256: lists of the same hash are the same cells.
+    /// Returns the SHA-256 hash of the columns' names and the values.
     pub fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// The list as a table that reads back as the same: names, then numbers as shortest decimals.
+    /// Writes the list as CSV that reads back as an equal list: names, then numbers as shortest decimals.
     pub fn to_csv(&self) -> String {
         let names: Vec<&str> = self.parameters().map(|parameter| &*parameter.name).collect();
         let mut text = names.join(",") + "\n";
@@ -99,23 +99,23 @@ impl List {
         text
     }
 
-    /// What the columns set.
+    /// Returns the quantities that the columns set.
     pub(crate) fn targets(&self) -> impl ExactSizeIterator<Item = Target> {
         self.columns.iter().map(|column| column.target)
     }
 
-    /// Gives a model the values of a cell.
+    /// Sets the parameters of a cell in `model`.
     pub(crate) fn set(&self, model: &mut dyn Model, cell: usize) {
         self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.set(model, value));
     }
 
-    /// Gives a start the values of a cell.
+    /// Sets the components of a cell in `start`.
     pub(crate) fn begin(&self, start: &mut State, cell: usize) {
         self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.begin(start, value));
     }
 }
 
-/// Reads `[cells]` and the file that it names; none where the scene has no such table.
+/// Reads `[cells]` and the file that it names; returns none if the scene has no such table.
 pub(super) fn read(
     root: &Section<'_>,
     model: &dyn Model,
@@ -139,7 +139,7 @@ pub(super) fn read(
     Ok(Some(List { file, columns, values, hash }))
 }
 
-/// SHA-256 of names and of the bits of numbers.
+/// Computes the SHA-256 hash of names and of the bits of numbers.
 pub(super) fn hash(names: &[&str], values: impl Iterator<Item = f64>) -> String {
     let mut hasher = Sha256::new();
     for name in names {
@@ -150,9 +150,9 @@ pub(super) fn hash(names: &[&str], values: impl Iterator<Item = f64>) -> String 
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Columns and values of a table.
+/// Reads the columns and values of a table.
 fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<ListColumn>, Vec<f64>), SceneError> {
-    // Spreadsheets begin a file with a mark of its byte order.
+    // Spreadsheets write a byte-order mark at the beginning.
     let text = file.text.strip_prefix('\u{feff}').unwrap_or(&file.text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let damaged = |error: csv::Error| {
@@ -184,7 +184,7 @@ fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<ListColumn>, Vec<f64
         }
     }
     if values.is_empty() {
-        let message = "it lists no cells; write a line of numbers for each".to_owned();
+        let message = "it has no cells; write a line of numbers for each cell".to_owned();
         return Err(wrong(file, 1, 1, Problem::Table { message }));
     }
     Ok((columns, values))
@@ -205,7 +205,8 @@ fn columns(
                 (Ok(index), _) => (Target::Parameter(index), model.parameters()[index].clone()),
                 (Err(_), Some(place)) => (Target::Start(place), component(model, place)),
                 (Err(_), None) => {
-                    let all = format!("{}; or of the start {}", meanings(model), components.join(", "));
+                    let all =
+                        format!("{}; components of the start: {}", meanings(model), components.join(", "));
                     let remedy = suggest(name, &[names(model), components].concat(), &all);
                     return Err(at(Problem::value(Fault::UnknownName, field, value, remedy)));
                 }
@@ -220,7 +221,7 @@ fn columns(
         false => Ok(columns),
         true => {
             let message =
-                "it is empty; write a line with names of parameters, and a line of numbers for each cell";
+                "it is empty; write a line with parameter names, then a line of numbers for each cell";
             Err(wrong(file, 1, 1, Problem::Table { message: message.to_owned() }))
         }
     }
@@ -230,13 +231,13 @@ fn fields(count: u64) -> String {
     if count == 1 { "1 field".to_owned() } else { format!("{count} fields") }
 }
 
-/// An error in a table: its columns count fields, not characters.
+/// Builds an error at a place in a table. `column` counts fields, not characters.
 fn wrong(file: &FileText, line: u64, column: usize, problem: Problem) -> SceneError {
     let place = Place::Text { file: file.name.as_str().into(), line: line as usize, column };
     SceneError { place, problem }
 }
 
-/// Refuses what does not go with a list.
+/// Refuses settings that need neighbouring cells.
 pub(super) fn check(root: &Section<'_>, follows: bool) -> Result<(), SceneError> {
     if let Some(refine) = root.get("refine") {
         return Err(refine.conflict("cells of a list have no neighbours to be filled from; remove [refine]"));

@@ -73,7 +73,7 @@ impl Manifest {
             })?;
             Ok(FileText { name: path.display().to_string(), text })
         };
-        Ok(Scene::parse_with_files(&self.scene, &name, &self.set, Purpose::Map, &find)?)
+        Ok(Scene::parse_with_files(&self.scene, &name, &self.set, Purpose::Map, None, &find)?)
     }
 
     /// The command that makes a shard, if it names a folder in that one.

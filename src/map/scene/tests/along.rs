@@ -20,7 +20,7 @@ fn along(text: &str, sets: &[&str], parameter: &str, at: &[&str]) -> Result<Scen
     let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
     let along = Along { parameter: parameter.to_owned(), at: at.iter().map(ToString::to_string).collect() };
     let find: FindFile<'_> = &|_, file| Err(format!("{file} is not here"));
-    Scene::parse_along(text, "s.toml", &sets, Purpose::Bifurcation, Some(&along), find)
+    Scene::parse_with_files(text, "s.toml", &sets, Purpose::Bifurcation, Some(&along), find)
 }
 
 #[test]

@@ -13,7 +13,7 @@ fn read(scene: &str, table: &str, sets: &[&str]) -> Result<Scene, SceneError> {
         assert_eq!(file, "points.csv");
         Ok(FileText { name: "dir/points.csv".to_owned(), text: table.to_owned() })
     };
-    Scene::parse_with_files(scene, "s.toml", &sets, Purpose::Map, &find)
+    Scene::parse_with_files(scene, "s.toml", &sets, Purpose::Map, None, &find)
 }
 
 fn refused(scene: &str, table: &str, sets: &[&str]) -> String {

@@ -90,7 +90,7 @@ fn what_does_not_go_with_starts_is_said() {
     let along = Along { parameter: "e".to_owned(), at: vec!["v1=1".to_owned()] };
     let plane = format!("{line}[[axis]]\nparameter = 'e'\nmin = 0\nmax = 1\ncount = 2\n");
     let find: FindFile<'_> = &|_, _| unreachable!();
-    let read = Scene::parse_along(&plane, "s.toml", &[], Purpose::Bifurcation, Some(&along), find);
+    let read = Scene::parse_with_files(&plane, "s.toml", &[], Purpose::Bifurcation, Some(&along), find);
     assert_says(&read.unwrap_err().to_string(), &["`axis.0.start = 'v1'`", "starts are for `map`"]);
 }
 
@@ -102,7 +102,7 @@ fn a_list_may_have_columns_of_the_start() {
         let find = |_: CompanionFile, _: &str| {
             Ok::<_, String>(FileText { name: "p.csv".to_owned(), text: table.to_owned() })
         };
-        Scene::parse_with_files(text, "s.toml", &sets, Purpose::Map, &find)
+        Scene::parse_with_files(text, "s.toml", &sets, Purpose::Map, None, &find)
     };
     let scene = read("v2,e\n1,0.5\n-2,0.5\n3,0.25\n", &[]).unwrap();
     let plan = Plan::new(&scene);
