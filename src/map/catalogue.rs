@@ -1,8 +1,8 @@
-//! The cycles of one oscillator, as records show them one after the other.
+//! The catalogue of cycles of one oscillator, built from records.
 //!
-//! A record that lies within [`SETTLED_TOLERANCE`] of a known cycle is on it. From any other Newton's method finds the cycle that it was
-//! on its way to; cycles as near to each other as that are one. So what is told the same does not depend on which
-//! record came first.
+//! A record within [`SETTLED_TOLERANCE`] of a known cycle belongs to it. From any other record, Newton's method finds the
+//! cycle that the motion approaches; two cycles within the same tolerance are one. So the result does not depend on the
+//! order of the records.
 
 use rayon::prelude::*;
 
@@ -13,54 +13,55 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, NonImpacting, State};
 use rattlemap_dynamics::orbit::Class;
 
-/// States this close, relative to the motion's size, lie on one cycle without a question: lanes in single precision
-/// are nearer to theirs where they have settled.
+/// Relative distance within which a state belongs to a cycle without further search. Settled lanes in single precision are
+/// closer to their cycle.
 const SETTLED_TOLERANCE: f64 = 1e-4;
 
-/// A refined cycle that comes back to itself within this is one of fewer periods.
+/// Relative distance within which a cycle counts as closed after fewer periods.
 const CLOSING_TOLERANCE: f64 = 1e-6;
 
-/// Records that are compared with the same catalogue, at first: few, since what they show has to be found.
+/// Number of records that are first compared with one state of the catalogue. It is small because the first records
+/// contain new cycles.
 const FIRST_CHUNK: usize = 16;
-/// And at most.
+/// Largest number of records that are compared with one state of the catalogue.
 const LARGEST_CHUNK: usize = 1 << 16;
 
-/// What a record shows.
+/// Motion that a record shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// The cycle at this place of the catalogue.
+    /// The cycle with this index in the catalogue.
     Cycle(u32),
-    /// A cycle of so many periods that Newton's method does not find.
+    /// A cycle of this period that Newton's method does not find.
     Unresolved(u32),
     Chaos,
     Undecided,
     Failed,
 }
 
-/// A cycle, and what distances to it are relative to.
+/// A cycle with its units of displacement and velocity.
 #[derive(Clone, Debug)]
 pub(crate) struct ScaledCycle {
     pub(crate) cycle: StrobeCycle,
     pub(crate) units: [f64; 2],
 }
 
-/// The cycles that are known.
+/// Known cycles of one oscillator.
 #[derive(Clone, Debug)]
 pub(crate) struct Catalogue {
     contact_free: Option<NonImpacting>,
     cycles: Vec<ScaledCycle>,
-    /// Strobe states with the cycle that each is on, by the first displacement.
+    /// Strobe states with the index of their cycle, sorted by the first displacement.
     points: Vec<(State, u32)>,
     /// The largest unit of displacement.
     largest_unit: f64,
-    /// The contact-free one.
+    /// Index of the contact-free cycle.
     free: Option<u32>,
 }
 
 impl Catalogue {
-    /// None yet of an oscillator.
+    /// Begins an empty catalogue for an oscillator.
     pub(crate) fn of(flow: &Flow) -> Catalogue {
-        // Beside a degree of freedom at rest it is one of many motions.
+        // If a degree of freedom is at rest, there are many contact-free motions.
         let contact_free = flow.non_impacting().filter(|free| free.resting().is_none()).cloned();
         Catalogue { contact_free, cycles: Vec::new(), points: Vec::new(), largest_unit: 0.0, free: None }
     }
@@ -69,7 +70,7 @@ impl Catalogue {
         &self.cycles
     }
 
-    /// What so many records show, one after the other, by their place; they may show cycles that were not known.
+    /// Identifies the motions of `count` records and adds new cycles to the catalogue. `record` returns a record by index.
     pub(crate) fn learn(
         &mut self,
         flow: &Flow,
@@ -98,7 +99,7 @@ impl Catalogue {
         all
     }
 
-    /// What a record shows as far as it is known; else its period.
+    /// Identifies the motion of a record from known cycles; the error is the period of an unknown cycle.
     fn identify(&self, record: &Record) -> Result<Outcome, u32> {
         match classify(record) {
             Class::Failed => Ok(Outcome::Failed),
@@ -114,7 +115,7 @@ impl Catalogue {
         }
     }
 
-    /// The cycle that comes nearest to a state, if it comes within `bar` of it.
+    /// Returns the cycle nearest to a state, if its relative distance is below `bar`.
     fn within(&self, bar: f64, state: &State, period: u32) -> Option<u32> {
         let largest_unit = bar * self.largest_unit;
         let from = self.points.partition_point(|(point, _)| point[0] < state[0] - largest_unit);
@@ -126,14 +127,14 @@ impl Catalogue {
         nearest.map(|(_, nth)| nth)
     }
 
-    /// The cycle that a state of a slow approach belongs to.
+    /// Returns the cycle nearest to a state of a slow approach, within [`CYCLE_TOLERANCE`].
     pub(crate) fn nearest(&self, state: &State, period: u32) -> Option<u32> {
         self.free
             .filter(|_| self.is_contact_free(state))
             .or_else(|| self.within(CYCLE_TOLERANCE, state, period))
     }
 
-    /// The cycle that a record was on its way to, in as few periods as it closes in.
+    /// Returns the cycle that a record approaches, with its smallest period.
     fn refined(&self, flow: &Flow, law: Law, record: &Record, period: u32) -> Option<StrobeCycle> {
         if self.is_contact_free(&record.strobe) {
             let steady = self.contact_free.as_ref()?.steady();
@@ -154,12 +155,12 @@ impl Catalogue {
         Some(StrobeCycle { period: turn, points: short(cycle.points), halves: short(cycle.halves), ..cycle })
     }
 
-    /// Whether a state certainly leads to contact-free motion.
+    /// Whether a state is certain to lead to contact-free motion.
     fn is_contact_free(&self, state: &State) -> bool {
         self.contact_free.as_ref().is_some_and(|free| free.is_certain(*state))
     }
 
-    /// The place of a cycle, which may be known.
+    /// Returns the index of a cycle, after adding it if it is new.
     fn add(&mut self, flow: &Flow, cycle: StrobeCycle) -> u32 {
         if let Some(known) = self.place(flow, &cycle) {
             return known;
@@ -179,7 +180,7 @@ impl Catalogue {
         if let Some(free) = self.free.filter(|_| cycle.is_non_impacting) {
             return Some(free);
         }
-        // One that has an event at phase 0 has two states there.
+        // A cycle with an event at phase 0 has two states there, so states half a period later are compared, too.
         let halves = || {
             let units = cycle.units(flow);
             let half = cycle.halves.first()?;
@@ -193,7 +194,7 @@ impl Catalogue {
     }
 }
 
-/// What every one of these records shows, and the cycles that they are on.
+/// Identifies the motions of the records `ids`, and returns the catalogue of their cycles.
 pub(crate) fn learn(
     flow: &Flow,
     law: Law,
@@ -202,7 +203,7 @@ pub(crate) fn learn(
 ) -> (Catalogue, Vec<Outcome>) {
     let mut catalogue = Catalogue::of(flow);
     let mut all = catalogue.learn(flow, law, ids.len(), |nth| records.record(ids[nth]));
-    // What is left takes the nearest cycle, or is one of its own.
+    // Records without a cycle get the nearest one, or add their own motion as a cycle.
     for (found, &id) in all.iter_mut().zip(ids) {
         if let Outcome::Unresolved(period) = *found {
             let state = records.record(id).strobe;

@@ -1,4 +1,4 @@
-//! Labels of starts in a map of basins, while it is made: what their attractors are.
+//! Labels of starts in an adaptive map of basins: their attractors.
 
 use std::collections::HashMap;
 
@@ -9,21 +9,22 @@ use crate::record::Record;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
 
-/// Kinds below are those of starts without a cycle; those above of cycles without a place.
+/// Smallest kind of a start that leads to a cycle of the catalogue.
 const FIRST_CYCLE: u32 = 4;
+/// Smallest kind of a start that leads to a cycle that is not in the catalogue.
 const FIRST_UNRESOLVED: u32 = 1 << 24;
 
-/// The attractors that are known, all of one oscillator: an adaptive map of basins sweeps starts alone.
+/// Known attractors. They belong to one oscillator, because an adaptive map of basins sweeps only starts.
 pub(super) struct BasinLabels {
     flow: Box<Flow>,
     law: Law,
     catalogue: Catalogue,
-    /// Labels of records that have not been taken up yet.
+    /// Labels of records that have not been accepted yet.
     prepared: HashMap<u32, Label>,
 }
 
 impl BasinLabels {
-    /// None where the map is of something else.
+    /// Begins the labels of a map of basins; none for other maps.
     pub(super) fn of(plan: &Plan) -> Option<BasinLabels> {
         plan.is_basin().then(|| {
             let cell = plan.cell(0);
@@ -33,7 +34,7 @@ impl BasinLabels {
         })
     }
 
-    /// Labels of records that are taken up next: side by side, for some of them take Newton's method.
+    /// Labels records that are accepted next, in parallel, because some need Newton's method.
     pub(super) fn prepare(&mut self, records: &[(u32, Record)]) {
         let found = self.catalogue.learn(&self.flow, self.law, records.len(), |nth| records[nth].1);
         let ids = records.iter().map(|(id, _)| *id);
