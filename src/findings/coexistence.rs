@@ -1,16 +1,14 @@
-//! On how many attractors do the starts of a cell end?
+//! Coexistence: the number of attractors that the starts of a cell reach.
 //!
-//! Runs that end in chaos count as one attractor together: nothing in a record tells two chaotic
-//! attractors apart. Runs that end on a cycle are compared on the reference: two cycles are the
-//! same if the last strobe state of one lies on the other, within [`CYCLE_TOLERANCE`] of the motion's size,
-//! and one period divides the other (at a flip, noise makes a multiple of a period). Newton's method
-//! shows where the cycle is that a run was still on its way to. Symmetry-conjugate
-//! orbits count as one: where a symmetric cycle has split they always coexist, and that says nothing.
-//! Contact-free motion is one attractor however far it still is from it. Runs that are undecided
-//! or failed count for nothing.
+//! Two periodic runs have one attractor if the last strobe state of one is on the cycle of the other, within a relative
+//! distance of [`CYCLE_TOLERANCE`](crate::map::cycle::CYCLE_TOLERANCE), and if one period divides the other. Near a period
+//! doubling, rounding can turn a period into a multiple. Newton's method finds the cycle that an unsettled run approaches.
+//! Symmetry-conjugate orbits count as one attractor, because they always coexist after a symmetric cycle has split.
+//! Contact-free motion is one attractor, even if a run has not reached it yet. All chaotic runs share one attractor, because
+//! records do not distinguish chaotic attractors. Undecided and failed runs are ignored.
 //!
-//! So the number is a lower bound, with one exception: a chaotic transient that outlives the
-//! budget is called chaos, and counts beside the cycle that it ends on.
+//! The number is a lower bound, with one exception: a chaotic transient longer than the budget counts as chaos, in addition
+//! to the cycle that it reaches later.
 
 use rayon::prelude::*;
 
@@ -23,12 +21,10 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
 use rattlemap_dynamics::orbit::Class;
 
-pub use crate::map::cycle::CYCLE_TOLERANCE;
-
-/// Attractors found per cell, by id; none if every cell has one start.
+/// Counts the attractors of each cell, by id; returns none if every cell has one start.
 ///
 /// # Panics
-/// If there are not as many records as runs.
+/// If the number of records is not that of the runs.
 pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<u8>> {
     assert_eq!(plan.run_count(), records.count(), "one record per run");
     if plan.start_count() == 1 {
@@ -46,7 +42,7 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     Some((0..cells).into_par_iter().map(count).collect())
 }
 
-/// The attractors of one cell.
+/// Attractors of one cell.
 struct CellAttractors {
     law: Law,
     chaos: bool,

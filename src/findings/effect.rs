@@ -1,23 +1,23 @@
-//! Which swept parameters changed nothing? Pure.
+//! Swept parameters without effect, such as the stiffness behind a wall that no motion reaches. Pure.
 //!
-//! A stiffness behind a wall that no motion reaches, say. What is compared is what tables show: class, period,
-//! exponent, impacts, meshing, symmetry, word and pattern, as far as they were measured.
+//! All quantities of tables are compared, as far as they were computed: class, period, exponent, impacts, meshing,
+//! symmetry, word and pattern.
 
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::{Record, Records, valid};
 use rattlemap_dynamics::model::Parameter;
 
-/// Relative differences that rounding makes of a number, in an engine of single precision and of double.
+/// Relative tolerance for rounding errors of engines in single and in double precision.
 pub const ROUNDING: [f64; 2] = [1e-3, 1e-6];
 
-/// Parameters of the axes along which every cell that was integrated is as the others, within `rounding`.
+/// Returns the swept parameters along whose axis all integrated cells are equal within the relative tolerance `rounding`.
 ///
-/// Cells that were filled say nothing. None is named where cells start from their neighbours, since then more than
-/// the parameter changes along an axis, nor in a list, which has no lines along one parameter.
+/// Filled cells are ignored. The result is empty if cells start from their neighbours, because then more than the parameter
+/// changes along an axis, and for a list, which has no axes.
 ///
 /// # Panics
-/// If there are not as many records as runs.
+/// If the number of records is not that of the runs.
 pub fn without_effect<'p>(
     plan: &'p Plan,
     records: &(impl Records + ?Sized),
@@ -46,15 +46,15 @@ pub fn without_effect<'p>(
         }
         compared > 0
     };
-    // A start may change nothing and is no parameter.
+    // Components of the start are not parameters.
     let axes = plan.axes().iter().enumerate().filter(|(_, axis)| !axis.target().is_start());
     axes.filter(|&(i, _)| changes_nothing(i)).map(|(_, axis)| axis.parameter()).collect()
 }
 
-/// Their names, within the rounding of records of this precision: `f64`, else single.
+/// Returns the names of the parameters without effect, with the tolerance of `precision`: `f64`, else single.
 ///
 /// # Panics
-/// As [`without_effect`].
+/// As for [`without_effect`].
 pub fn names(plan: &Plan, records: &(impl Records + ?Sized), precision: &str) -> Vec<String> {
     let rounding = ROUNDING[usize::from(precision == "f64")];
     let found = without_effect(plan, records, rounding);
@@ -104,10 +104,10 @@ mod tests {
         assert_eq!(named(&plan, &by(|_, j| record(1 + j as u32, -1.0))), ["e"]);
         assert_eq!(named(&plan, &by(|_, _| record(1, -1.0))), ["e", "k"]);
         assert!(named(&plan, &by(|i, j| record(1, -(((1 + i) * (1 + j)) as f64)))).is_empty());
-        // Rounding is no effect.
+        // Differences within the tolerance are ignored.
         let rounded = by(|i, j| record(1, -1.0 - i as f64 - 1e-8 * j as f64));
         assert_eq!(named(&plan, &rounded), ["k"]);
-        // One cell suffices, whatever of it differs.
+        // A difference of any quantity in one cell is an effect.
         for change in [
             |record: &mut Record| record.period = 2,
             |record: &mut Record| record.lyapunov *= 1.001,
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_filled_or_follows_says_nothing() {
+    fn filled_cells_and_cells_that_follow_are_ignored() {
         let same = vec![record(1, -1.0); 6];
         let filled = Record { valid: valid::FILLED | record(1, -1.0).valid, ..record(1, -1.0) };
         assert!(named(&plan("[refine]\n"), &[filled; 6]).is_empty());

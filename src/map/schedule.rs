@@ -37,7 +37,7 @@ use crate::map::plan::{Cell, Plan};
 use crate::map::shard::Shard;
 use crate::record::Record;
 
-/// The order of work on a map: which cells are asked for, and which of them have their records.
+/// The order of work on a map: the requested cells, and which of them have their records.
 pub struct Schedule {
     /// Cells in the order of their requests.
     sequence: Vec<u32>,

@@ -1,4 +1,4 @@
-//! Lanes on a graphics device as an engine.
+//! Lanes on a graphics device, as an engine.
 
 use std::collections::HashMap;
 use std::ops::Deref;
@@ -14,11 +14,12 @@ use crate::map::scene::Steps;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::Contact;
 
-/// First batches: enough to drop_unrequested a hardware device busy, or a software one for a second.
+/// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
+/// Smallest batch on a software device: about a second of work.
 const LEAST_IN_SOFTWARE: usize = 256;
 
-/// Cells with a flow of their own that a software device is given at a time: some seconds of work.
+/// Largest number of cells with distinct flows per batch on a software device: some seconds of work.
 const FLOWS_IN_SOFTWARE: usize = 8_192;
 
 /// Lanes on one device, in one precision.
@@ -26,18 +27,19 @@ pub struct Gpu<'p> {
     plan: PlanRef<'p>,
     device: gpu::Gpu,
     settings: LaneSettings,
-    /// All flows and laws; none where there are too many of them to be kept.
+    /// All flows and laws; none if they are too many to be stored.
     tables: Option<Tables>,
-    /// Free steps taken so far.
+    /// Number of free steps so far.
     steps: u64,
-    /// Cells under way, where there are tables.
+    /// Cells under way, if all tables are stored.
     pool: Option<Pool>,
-    /// And where there are none; so many of them are run at a time.
+    /// Cells under way, if tables are loaded for each batch.
     waiting: Vec<Cell>,
+    /// Largest number of cells of such a batch.
     most_waiting: usize,
 }
 
-/// A plan, of somebody else's or one that several hold.
+/// A borrowed or shared plan.
 enum PlanRef<'p> {
     Borrowed(&'p Plan),
     Shared(Arc<Plan>),
@@ -55,20 +57,20 @@ impl Deref for PlanRef<'_> {
 }
 
 impl Gpu<'static> {
-    /// [`Gpu::new`] for a thread of its own.
+    /// Builds an engine that can move to another thread.
     ///
     /// # Errors
-    /// As [`Gpu::new`].
+    /// As for [`Gpu::new`].
     pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
         Gpu::open(PlanRef::Shared(plan), device).await
     }
 }
 
 impl<'p> Gpu<'p> {
-    /// An engine for the cells of a plan on an open device.
+    /// Builds an engine for the cells of a plan on an open device.
     ///
     /// # Errors
-    /// [`EngineError`] if the device takes no constants.
+    /// [`EngineError`] if the device cannot store the constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         Gpu::open(PlanRef::Borrowed(plan), device).await
     }
@@ -93,18 +95,18 @@ impl<'p> Gpu<'p> {
             let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
             let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
             engine.tables = match engine.load(&flows, &laws).await {
-                // Batches that need fewer of them may fit.
+                // The tables of single batches may fit.
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
                 other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
             };
         }
-        // Compiled now, not while somebody waits for cells.
+        // The shader is compiled now, so that the first batch does not wait for it.
         let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
         engine.pool = engine.plan.stores_flows().then_some(pool);
         Ok(engine)
     }
 
-    /// The device, for another plan.
+    /// Returns the device for another plan.
     pub fn into_device(self) -> gpu::Gpu {
         self.device
     }
@@ -132,8 +134,8 @@ impl<'p> Gpu<'p> {
             (Some(tables), Some(pool)) => match self.device.advance(pool, tables, until).await {
                 Ok(ended) => {
                     let constants = tables.constants();
-                    let told = |ended: &Ended| (ended.number(), ended.record(constants));
-                    let records: Vec<_> = ended.par_iter().map(told).collect();
+                    let read = |ended: &Ended| (ended.number(), ended.record(constants));
+                    let records: Vec<_> = ended.par_iter().map(read).collect();
                     let steps = |id: u32| tables.steps_per_period(self.plan.cell(id).flow);
                     self.steps += steps_of(records.iter().map(|(id, record)| (record, steps(*id))));
                     Ok(records)
@@ -150,8 +152,7 @@ impl<'p> Gpu<'p> {
         Ok(ended)
     }
 
-    /// Some of the cells whose flows are too many to be kept all together, fewer where there is no memory for as
-    /// many.
+    /// Computes some of the waiting cells with tables of their own; fewer if they do not fit into the memory.
     async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
         while !self.waiting.is_empty() {
             let bytes = |cell: &Cell| {
@@ -233,8 +234,8 @@ impl Device for Gpu<'_> {
     }
 
     fn steps_per_period(&self) -> Option<[u32; 2]> {
-        let (plan, asked) = (&*self.plan, self.settings.steps_per_period);
-        let steps = |flow| Constants::steps(&plan.oscillator(flow), asked);
+        let (plan, requested) = (&*self.plan, self.settings.steps_per_period);
+        let steps = |flow| Constants::steps(&plan.oscillator(flow), requested);
         let all = (0..plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
         all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])
     }
@@ -244,13 +245,12 @@ impl Device for Gpu<'_> {
     }
 }
 
-/// Free steps of lanes, by their records and by those of a period.
+/// Returns the number of free steps of lanes, given their records and steps per period.
 fn steps_of<'r>(lanes: impl Iterator<Item = (&'r Record, u32)>) -> u64 {
     lanes.map(|(record, steps)| u64::from(record.periods_run) * u64::from(steps)).sum()
 }
 
-/// How many things of these sizes are taken at a time: one at least, `most` at most, and between these as many as fit
-/// [`gpu::MOST_BYTES`].
+/// Returns how many tables of these sizes fit into [`gpu::MOST_BYTES`], between 1 and `most`.
 fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
     let total = bytes.take(most).scan(0, |total, bytes| {
         *total += bytes;
@@ -259,7 +259,7 @@ fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
     total.take_while(|&total| total <= gpu::MOST_BYTES).count().max(1)
 }
 
-/// The flows and laws of these cells alone, and their lanes with indices among them.
+/// Returns the flows and laws of some cells, and their lanes with indices into these lists.
 fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
     let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
     let lanes = cells.iter().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
@@ -270,7 +270,7 @@ fn lane(cell: &Cell, flow: u32, law: u32) -> Lane {
     Lane { flow, law, start: cell.start }
 }
 
-/// Things in the order in which they were first met.
+/// Numbers things in the order of their first occurrence.
 #[derive(Default)]
 struct Numbering {
     list: Vec<u32>,
@@ -286,7 +286,7 @@ impl Numbering {
     }
 }
 
-/// How lanes of a plan are run.
+/// Returns the settings of a plan's lanes.
 pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
     let budget = plan.budget();
     let default = LaneSettings::within(budget);
@@ -307,7 +307,7 @@ pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
     }
 }
 
-/// Whether any cell of the plan may follow chatter by short flights, and whether any has a wall that is elastic or rigid.
+/// Whether any cell may need short flights for chatter, and whether any cell has an elastic or rigid wall.
 fn branches(plan: &Plan) -> [bool; 2] {
     let laws = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed);
     let least =
@@ -324,20 +324,22 @@ fn branches(plan: &Plan) -> [bool; 2] {
     flows.reduce(|| [false; 2], |a, b| [a[0] || b[0], a[1] || b[1]])
 }
 
-/// Leaves what somebody asked for.
+/// Clears the fields of a record that the scene did not request.
 pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
-    let mut drop = |asked: bool, bits: u32, clear: fn(&mut Record)| {
-        if !asked {
+    let mut clear_unless = |is_requested: bool, bits: u32, clear: fn(&mut Record)| {
+        if !is_requested {
             record.valid &= !bits;
             clear(record);
         }
     };
-    drop(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
-    drop(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
-    drop(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
-    drop(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
-    drop(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
-    drop(needs.pattern, valid::PATTERN, |r| (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0));
+    clear_unless(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
+    clear_unless(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
+    clear_unless(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
+    clear_unless(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
+    clear_unless(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
+    clear_unless(needs.pattern, valid::PATTERN, |r| {
+        (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
+    });
 }
 
 #[cfg(test)]
@@ -345,7 +347,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_taken_at_a_time_fits_the_memory() {
+    fn batches_fit_the_memory() {
         let third = gpu::MOST_BYTES / 3;
         assert_eq!(fitting([third; 10].into_iter(), 8), 3);
         assert_eq!(fitting([1; 10].into_iter(), 8), 8);
@@ -354,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_asked_for_is_not_in_the_record() {
+    fn quantities_that_are_not_requested_are_cleared() {
         let mut record = Record {
             lyapunov: 1.0,
             lyapunov_error: 1.0,
