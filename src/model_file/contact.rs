@@ -1,4 +1,4 @@
-//! `[[contact]]`: the walls, one or two, and what they do.
+//! `[[contact]]`: the walls and their contact laws.
 
 use rattlemap_dynamics::model::{Contact, Side};
 
@@ -7,31 +7,31 @@ use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
-/// Its keys.
+/// Keys of `[[contact]]`.
 const CONTACT_KEYS: [&str; 7] = ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping"];
 
 /// A wall.
 #[derive(Clone, Debug)]
 pub struct Wall {
-    /// Where it is, on the scale of the gap.
+    /// Position, as a value of the gap.
     pub at: Expression,
-    /// What happens there.
+    /// Contact law.
     pub law: WallLaw,
-    /// What lies behind it; none where it does not yield.
+    /// Spring and damper behind the wall; none for a rigid wall.
     pub spring: Option<WallSpring>,
 }
 
-/// What happens at a wall.
+/// The law of contact with a wall.
 #[derive(Clone, Debug)]
 pub enum WallLaw {
     /// An impact.
     Impact {
         /// Coefficient of restitution.
         restitution: Expression,
-        /// Leaving speed at or below which a pressed contact lasts.
+        /// Largest leaving speed at which contact is sustained.
         mesh_speed: Expression,
     },
-    /// The motion goes on behind the wall.
+    /// The motion continues behind the wall without a jump.
     Elastic,
 }
 
@@ -51,7 +51,7 @@ enum LawKind {
 }
 
 impl Wall {
-    /// What it is to the oscillator.
+    /// Returns the kind of contact.
     pub fn contact(&self) -> Contact {
         match (&self.law, &self.spring) {
             (WallLaw::Elastic, _) => Contact::Elastic,
@@ -60,13 +60,13 @@ impl Wall {
         }
     }
 
-    /// Entries that the oscillator depends on.
+    /// Returns the entries on which the oscillator depends.
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
         let spring = self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping]);
         spring.chain([&self.at])
     }
 
-    /// Entries that the law depends on.
+    /// Returns the entries on which the contact law depends.
     pub(super) fn shaping_law(&self) -> impl Iterator<Item = &Expression> {
         let both = match &self.law {
             WallLaw::Impact { restitution, mesh_speed } => Some([restitution, mesh_speed]),
@@ -76,7 +76,7 @@ impl Wall {
     }
 }
 
-/// Reads the walls: right, left.
+/// Reads the right and the left wall.
 pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Option<Wall>; 2], SceneError> {
     let field = root.require("contact", "write [[contact]] with side, at and law; a model has one or two")?;
     let two = "one or two tables, [[contact]]: a model has at most two walls, one on each side";
@@ -89,7 +89,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Option<Wall>
         let (side, field, wall) = read_one(item, names)?;
         if walls[side.index()].is_some() {
             return Err(
-                field.conflict("there is a wall on this side already; a model has one on each side at most")
+                field.conflict("there is already a wall on this side; a model has at most one on each side")
             );
         }
         walls[side.index()] = Some(wall);
@@ -117,7 +117,7 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
             for name in ["restitution", "mesh_speed"] {
                 if let Some(field) = section.get(name) {
                     return Err(field.conflict(
-                        "it belongs to law = \"impact\" alone: elastic contact has no jump; drop it, or change the law",
+                        "it needs law = \"impact\", because elastic contact has no jump; remove it, or change the law",
                     ));
                 }
             }

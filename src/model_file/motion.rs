@@ -7,7 +7,7 @@ use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
-/// Its keys.
+/// Keys of `[motion]`.
 const MOTION_KEYS: [&str; 10] = [
     "coordinates",
     "velocities",
@@ -21,10 +21,10 @@ const MOTION_KEYS: [&str; 10] = [
     "gap",
 ];
 
-/// What no key can ask for.
+/// Limits of all models, for messages.
 const LIMITS: &str = "a model has one or two coordinates, one harmonic force and one gap row";
 
-/// Characters of the name of what moves.
+/// Largest number of characters of a body's name.
 const LONGEST_BODY: usize = 40;
 
 /// Free motion and its gap.
@@ -34,7 +34,7 @@ pub struct Motion {
     pub coordinates: Vec<String>,
     /// Names of their rates.
     pub velocities: Vec<String>,
-    /// What moves, one for each coordinate.
+    /// Names of the moving bodies, one for each coordinate.
     pub bodies: Vec<String>,
     /// Mass matrix, row by row.
     pub mass: Vec<Vec<Expression>>,
@@ -48,22 +48,22 @@ pub struct Motion {
     pub load: Vec<Expression>,
     /// Excitation frequency.
     pub frequency: Expression,
-    /// The gap is `gap . x`.
+    /// Gap row: the gap is `gap . x`.
     pub gap: Vec<Expression>,
 }
 
 impl Motion {
-    /// Degrees of freedom.
+    /// Returns the number of degrees of freedom.
     pub fn degrees(&self) -> usize {
         self.coordinates.len()
     }
 
-    /// Names of the state's components.
+    /// Returns the names of the state's components.
     pub fn state_names(&self) -> impl Iterator<Item = &str> {
         self.coordinates.iter().zip(&self.velocities).flat_map(|(x, v)| [x.as_str(), v.as_str()])
     }
 
-    /// Every entry.
+    /// Returns all entries.
     pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
         let matrices = [&self.mass, &self.damping, &self.stiffness].into_iter().flatten().flatten();
         let vectors = [&self.force, &self.load, &self.gap].into_iter().flatten();
@@ -99,7 +99,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
     for (i, name) in all.iter().enumerate() {
         if names.0.contains(&name.as_str()) || all[..i].contains(name) {
             return Err(field.conflict(format!(
-                "`{name}` names something else already, a parameter, a coordinate or a velocity; rename either"
+                "`{name}` is already the name of a parameter, a coordinate or a velocity; rename one of them"
             )));
         }
     }
@@ -114,8 +114,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         None => coordinates.clone(),
     };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
-    let gap =
-        section.require("gap", "write the row that makes the gap, such as gap = [\"1\"]: z = gap . x")?;
+    let gap = section.require("gap", "write the gap row, such as gap = [\"1\"]: z = gap . x")?;
     Ok(Motion {
         mass: names.matrix(&mass, count)?,
         damping: names.matrix_or_zeros(&section, "damping", count)?,

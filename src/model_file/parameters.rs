@@ -1,4 +1,4 @@
-//! `[parameters]`: the table of a model.
+//! `[parameters]`: the parameters of a model.
 
 use std::borrow::Cow;
 
@@ -12,13 +12,13 @@ use crate::text::section::{Field, Section};
 /// Keys of a parameter's own table.
 const PARAMETER_KEYS: [&str; 6] = ["default", "min", "max", "open", "meaning", "required"];
 
-/// Characters of a name: tables and figures have columns for it.
+/// Largest number of characters of a parameter's name, which occurs in tables and figures.
 const LONGEST_PARAMETER_NAME: usize = 32;
 
-/// Characters of a meaning: it stands beside an axis.
+/// Largest number of characters of a meaning, which labels an axis.
 const LONGEST_MEANING: usize = 120;
 
-/// Columns that tables have beside those of parameters and states, and what stands beside states in that of an orbit.
+/// Names of columns of tables, which cannot be names of parameters.
 pub(super) const COLUMNS: [&str; 26] = [
     "i",
     "j",
@@ -48,19 +48,19 @@ pub(super) const COLUMNS: [&str; 26] = [
     "moment",
 ];
 
-/// A parameter as the file has it: what it shapes is found out from where it is used.
+/// A parameter as written in the file. Its use in the model is found later.
 pub(super) struct ParameterEntry {
     pub(super) name: String,
     meaning: String,
     pub(super) default: f64,
-    /// Whether a scene must say it.
+    /// Whether a scene must set the parameter.
     is_required: bool,
     range: Range,
 }
 
 impl ParameterEntry {
-    /// The line of the model's table.
-    pub(super) fn shaping(self, shapes: Shapes) -> Parameter {
+    /// Converts the entry to a parameter that affects `shapes`.
+    pub(super) fn into_parameter(self, shapes: Shapes) -> Parameter {
         Parameter {
             name: Cow::Owned(self.name),
             meaning: Cow::Owned(self.meaning),
@@ -71,7 +71,7 @@ impl ParameterEntry {
     }
 }
 
-/// Reads `[parameters]`, in the order in which it is written.
+/// Reads `[parameters]` in the order of the text.
 pub(super) fn read(root: &Section<'_>) -> Result<Vec<ParameterEntry>, SceneError> {
     let Some(field) = root.get("parameters") else { return Ok(Vec::new()) };
     let Value::Table(table) = &field.node.value else {
@@ -99,7 +99,9 @@ fn read_one(name: &str, field: &Field<'_>) -> Result<ParameterEntry, SceneError>
     let open = section.get("open");
     let is_open = flag("open")?;
     if let (Some(field), None) = (open, section.get("min")) {
-        return Err(field.conflict("it leaves out `min` itself, and there is none"));
+        return Err(
+            field.conflict("it excludes the value `min`, but `min` is missing; add min or remove open")
+        );
     }
     let end = |name, none| match section.get(name) {
         None => Ok(none),
@@ -124,7 +126,7 @@ fn read_one(name: &str, field: &Field<'_>) -> Result<ParameterEntry, SceneError>
     Ok(ParameterEntry { name: name.to_owned(), meaning, default, is_required: flag("required")?, range })
 }
 
-/// Refuses what cannot be a name: of a parameter, a coordinate, a velocity.
+/// Checks a name of a parameter, a coordinate or a velocity.
 pub(super) fn check_name(name: &str, field: &Field<'_>) -> Result<(), SceneError> {
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let is_name = name.chars().all(is_word) && name.starts_with(|c: char| c.is_ascii_alphabetic());
@@ -139,11 +141,11 @@ pub(super) fn check_name(name: &str, field: &Field<'_>) -> Result<(), SceneError
             "pi" => "is a number",
             _ => "is a function",
         };
-        return Err(field.conflict(format!("`{name}` {meaning} and can be no name; choose another")));
+        return Err(field.conflict(format!("`{name}` {meaning} and cannot be used; choose another name")));
     }
     if COLUMNS.contains(&name) {
         return Err(
-            field.conflict(format!("`{name}` is a column of tables and can be no name; choose another"))
+            field.conflict(format!("`{name}` is a column of tables and cannot be used; choose another name"))
         );
     }
     Ok(())

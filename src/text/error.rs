@@ -1,4 +1,4 @@
-//! Why a scene or a model is refused, with the place, the value and the remedy.
+//! Errors in scenes and models, with place, value and remedy.
 
 use std::fmt;
 use std::sync::Arc;
@@ -8,10 +8,10 @@ use super::printable;
 use rattlemap_dynamics::model::ModelError;
 use thiserror::Error;
 
-/// Where the text that has to change stands.
+/// Place of the text that must be changed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
-    /// A spot in a scene file; line and column count from 1, columns in characters.
+    /// A place in a file. Lines and columns count from 1, columns in characters.
     Text {
         /// The file as it was named by the caller.
         file: Arc<str>,
@@ -20,29 +20,29 @@ pub enum Place {
         /// Column, from 1.
         column: usize,
     },
-    /// A `--set` argument, which wins over the file.
+    /// A `--set` argument.
     Set {
-        /// `NAME=VALUE` as it was given.
+        /// `NAME=VALUE` as given.
         argument: Arc<str>,
     },
     /// Another argument: `--along` or `--at`.
     Option {
-        /// The option's name, dashes included.
+        /// Name of the option, including dashes.
         option: &'static str,
-        /// What was given with it.
+        /// Argument of the option.
         argument: Arc<str>,
     },
-    /// A file that could not be read at all.
+    /// A file that cannot be read.
     File {
         /// The file as it was named by the caller.
         file: Arc<str>,
     },
-    /// A scene that was built without a file.
+    /// A scene without a file.
     Builder,
 }
 
 impl Place {
-    /// Where it stands in its text; none where it is in none.
+    /// Returns line and column; none for a place outside of a file.
     pub(crate) fn line_and_column(&self) -> Option<(usize, usize)> {
         match self {
             Place::Text { line, column, .. } => Some((*line, *column)),
@@ -51,7 +51,7 @@ impl Place {
     }
 }
 
-/// Characters of a name or a value that a message shows.
+/// Largest number of characters of a name or a value in a message.
 pub(crate) const LONGEST_EXCERPT: usize = 60;
 
 impl fmt::Display for Place {
@@ -66,13 +66,13 @@ impl fmt::Display for Place {
     }
 }
 
-/// A scene, or a model beside it, that cannot be run; its text is one line that says how to mend it, fit for a terminal.
+/// An error in a scene or a model. Its message is one line, safe for a terminal.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("{}", printable::line(&format!("{place}: {problem}")))]
 pub struct SceneError {
-    /// Where it stands.
+    /// Place of the error.
     pub place: Place,
-    /// What is wrong there.
+    /// The error.
     pub problem: Problem,
 }
 
@@ -183,18 +183,18 @@ impl Fault {
     }
 }
 
-/// The sentence for an unknown name: the nearest known one, if any is near, and `all` of them, listed.
+/// Returns the remedy for an unknown name: the most similar known one, if there is one, and `all`, the list of known names.
 pub(crate) fn suggest(name: &str, known: &[&str], all: &str) -> String {
     let length = name.chars().count();
-    // One slip per three letters; a name that is all slips resembles nothing.
+    // One typing error per three letters, but fewer errors than letters.
     let most = (length / 3).max(1).min(length.saturating_sub(1));
-    // As many as lengths differ by, at least: a name of a million letters is compared with nothing.
+    // Names of very different length are not compared, which would take long for a name of a million letters.
     let may_be_near = |candidate: &&&str| candidate.chars().count().abs_diff(length) <= most;
-    let slips =
+    let typos =
         |candidate: &str| strsim::damerau_levenshtein(&candidate.to_lowercase(), &name.to_lowercase());
-    let candidates = known.iter().filter(may_be_near).map(|candidate| (slips(candidate), candidate));
-    match candidates.min_by_key(|(slips, _)| *slips) {
-        Some((slips, nearest)) if slips <= most => {
+    let candidates = known.iter().filter(may_be_near).map(|candidate| (typos(candidate), candidate));
+    match candidates.min_by_key(|(typos, _)| *typos) {
+        Some((typos, nearest)) if typos <= most => {
             format!("did you mean `{nearest}`? valid names: {all}")
         }
         _ => format!("valid names: {all}"),
