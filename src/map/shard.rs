@@ -89,7 +89,7 @@ pub enum ShardError {
     /// An adaptive map cannot be split.
     #[error(
         "{shard}: an adaptive map needs the records of all cells to decide which cells to integrate; \
-         drop [refine] from the scene, or make the map on one machine"
+         remove [refine] from the scene, or compute the map on one machine"
     )]
     Adaptive {
         /// The requested shard.

@@ -319,18 +319,21 @@ fn starts_that_make_no_sense_are_refused() {
         Scene::parse(SCENE, "s.toml", &sets, purpose).unwrap_err().to_string()
     };
     for (sets, part) in [
-        (&["refine.max_error=0.01"][..], "filled cells have no motion for their neighbours to start from"),
+        (
+            &["refine.max_error=0.01"][..],
+            "filled cells have no last state for their neighbours to start from",
+        ),
         (&["start.count=4"], "cells that follow their neighbours have one start each"),
         (
             &["start.policy=rest", "start.count=4", "refine.max_error=0.01"],
-            "where the map is filled, attractors are not counted",
+            "attractors are not counted in filled cells",
         ),
         (
             &["start.policy=rest", "start.count=0"],
             "`start.count = 0` is out of range: it must be a whole number",
         ),
         (&["start.policy=rest", "start.count=256"], "from 1 to 255"),
-        (&["start.policy=rest", "start.seed=3"], "it draws nothing without start.count above 1"),
+        (&["start.policy=rest", "start.seed=3"], "a seed needs start.count above 1"),
         (&["start.policy=upp"], "did you mean `up`?"),
     ] {
         let message = refused(sets, Purpose::Map);

@@ -48,8 +48,8 @@ fn the_other_axis_stays_at_exactly_the_value_given() {
 fn what_does_not_fit_the_axes_is_refused() {
     for (parameter, at, parts) in [
         ("F", &[][..], &["--along F: ", "the scene does not sweep it; its axes: e, omega"][..]),
-        ("e", &[], &["--along e: ", "`--at omega=VALUE` is missing", "at which omega the line lies"]),
-        ("e", &["k=800"], &["--at k=800: ", "no axis to hold; its axes: e, omega", "--set k=800"]),
+        ("e", &[], &["--along e: ", "`--at omega=VALUE` is missing", "give the value of omega on the line"]),
+        ("e", &["k=800"], &["--at k=800: ", "no axis to fix; its axes: e, omega", "--set k=800"]),
         ("e", &["e=0.5"], &["--at e=0.5: ", "--along sweeps it"]),
         ("e", &["omega=5", "omega=6"], &["--at omega=6: ", "names it twice"]),
         ("e", &["omega"], &["--at omega: ", "expected NAME=VALUE"]),
@@ -92,9 +92,9 @@ fn what_only_maps_have_is_left_out_unless_an_argument_asks_for_it() {
     let none = of_a_map.replace("'npy', 'png', 'html'", "'html'");
     assert_eq!(along(&none, &[], "e", &["omega=5"]).unwrap().outputs().files, [Format::Csv, Format::Png]);
     for (set, part) in [
-        ("outputs.files=[\"html\"]", "drop \"html\""),
+        ("outputs.files=[\"html\"]", "remove \"html\""),
         ("start.count=4", "follows one motion per column"),
-        ("refine.max_error=0.1", "drop [refine]"),
+        ("refine.max_error=0.1", "remove [refine]"),
     ] {
         assert_says(&along(&of_a_map, &[set], "e", &["omega=5"]).unwrap_err().to_string(), &[part]);
     }

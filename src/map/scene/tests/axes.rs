@@ -49,7 +49,7 @@ fn what_a_logarithmic_axis_cannot_be_is_said() {
         [&LOG[..3], &["axis.0.max=100.00000000000003", "axis.0.count=50", "axis.0.scale=log"]].concat();
     assert_says(
         &refused(&close),
-        &["`axis.0.count = 50` is out of range: it must be so small that no two values"],
+        &["`axis.0.count = 50` is out of range: it must be so small that neighbouring values"],
     );
     // A linear one likewise: there is one number between the ends.
     let ends = ["axis.0.min=0.5", "axis.0.max=0.5000000000000002"];
@@ -81,30 +81,25 @@ fn values_are_taken_as_they_are() {
 
 #[test]
 fn values_that_are_none_are_named() {
-    let cases = [
-        ("[0.1]", "`axis.0.values = [0.1]` is out of range: it must be a list of 2 to 1000000 numbers"),
-        ("0.1", "`axis.0.values = 0.1` has the wrong type: it must be a list of 2"),
-        (
-            "[0.1, 0.3, 0.2]",
-            "s.toml:9:21: `axis.0.values.2 = 0.2` is out of range: it must be greater than the value before it, 0.3",
-        ),
-        (
-            "[0.1, 0.1]",
-            "`axis.0.values.1 = 0.1` is out of range: it must be greater than the value before it, 0.1",
-        ),
-        ("[0.1, 1.5]", "`axis.0.values.1 = 1.5` is out of range: it must be between 0 and 1, as `e` is"),
-        ("[nan, 0.5]", "`axis.0.values.0 = nan` is out of range"),
-        ("[0.1, \"x\"]", "`axis.0.values.1 = \"x\"` has the wrong type: it must be a number"),
-    ];
-    for (values, expected) in cases {
+    for [values, expected] in test_cases(
+        r#"
+[0.1] | `axis.0.values = [0.1]` is out of range: it must be a list of 2 to 1000000 numbers
+0.1 | `axis.0.values = 0.1` has the wrong type: it must be a list of 2
+[0.1, 0.3, 0.2] | s.toml:9:21: `axis.0.values.2 = 0.2` is out of range: it must be greater than the value before it, 0.3
+[0.1, 0.1] | `axis.0.values.1 = 0.1` is out of range: it must be greater than the value before it, 0.1
+[0.1, 1.5] | `axis.0.values.1 = 1.5` is out of range: it must be between 0 and 1, as `e` is
+[nan, 0.5] | `axis.0.values.0 = nan` is out of range
+[0.1, "x"] | `axis.0.values.1 = "x"` has the wrong type: it must be a number
+"#,
+    ) {
         let range = "min = 0.1\nmax = 1\ncount = 4\n";
-        assert_says(&refusal(range, &format!("values = {values}\n")), &[expected, "s.toml:9:"]);
+        assert_says(&refusal(range, &format!("values = {values}\n")), &[&expected, "s.toml:9:"]);
     }
     assert_says(
         &refusal("count = 4", "values = [0.1, 0.2]"),
         &[
             "s.toml:11:10: `axis.0.values = [0.1, 0.2]` does not fit",
-            "`axis.0.min` is given, too; drop either",
+            "`axis.0.min` is given, too; remove one of the two",
         ],
     );
     let message = parse(GOOD, &["axis.0.values=[0.1,0.2]", "axis.0.scale=log"]).unwrap_err().to_string();

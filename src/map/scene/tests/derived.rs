@@ -69,29 +69,21 @@ fn what_is_derived_from_an_axis_has_flows_of_its_own() {
 
 #[test]
 fn what_cannot_be_derived_is_said() {
-    let cases = [
-        ("K2 = \"k1\"", "s.toml:4:1: unknown field `derived.K2 = \"k1\"`; did you mean `k2`?"),
-        (
-            "k2 = \"0.5*K1\"",
-            "s.toml:4:6: `derived.k2 = \"0.5*K1\"` has an unknown name, `K1`: did you mean `k1`?",
-        ),
-        (
-            "k2 = \"0.5 k1\"",
-            "`derived.k2 = \"0.5 k1\"` cannot be read from `k1` on; an expression has numbers",
-        ),
-        ("k2 = \"0.5*\"", "`derived.k2 = \"0.5*\"` cannot be read to its end"),
-        ("k2 = \"sqrt(k1, 2)\"", "`sqrt` takes one argument"),
-        ("k2 = true", "`derived.k2 = true` has the wrong type: it must be an expression in quotes"),
-        ("F = \"k1\"", "s.toml:4:5: `derived.F = \"k1\"` does not fit: it is swept, too"),
-        ("e = \"0.5\"", "s.toml:2:5: `parameters.e = 0.5` does not fit: `derived.e` derives it; drop either"),
-        ("k2 = \"r2\"\nr2 = \"2*m2\"\nm2 = \"k2\"", "does not fit: it follows itself: k2 <- r2 <- m2 <- k2"),
-        (
-            "k2 = \"m2\"\nm2 = \"m2 + k1\"",
-            "`derived.m2 = \"m2 + k1\"` does not fit: it follows itself: m2 <- m2",
-        ),
-    ];
-    for (derived, expected) in cases {
-        assert_says(&refused(derived, &[]), &[expected]);
+    for [derived, expected] in test_cases(
+        r#"
+K2 = "k1" | s.toml:4:1: unknown field `derived.K2 = "k1"`; did you mean `k2`?
+k2 = "0.5*K1" | s.toml:4:6: `derived.k2 = "0.5*K1"` has an unknown name, `K1`: did you mean `k1`?
+k2 = "0.5 k1" | `derived.k2 = "0.5 k1"` cannot be read from `k1` on; an expression has numbers
+k2 = "0.5*" | `derived.k2 = "0.5*"` cannot be read to its end
+k2 = "sqrt(k1, 2)" | `sqrt` takes one argument
+k2 = true | `derived.k2 = true` has the wrong type: it must be an expression in quotes
+F = "k1" | s.toml:4:5: `derived.F = "k1"` does not fit: it is also swept
+e = "0.5" | s.toml:2:5: `parameters.e = 0.5` does not fit: `derived.e` derives it; remove one of the two
+k2 = "r2"\nr2 = "2*m2"\nm2 = "k2" | does not fit: it depends on itself: k2 <- r2 <- m2 <- k2
+k2 = "m2"\nm2 = "m2 + k1" | `derived.m2 = "m2 + k1"` does not fit: it depends on itself: m2 <- m2
+"#,
+    ) {
+        assert_says(&refused(&derived, &[]), &[&expected]);
     }
     let long = format!("k2 = \"{}\"", "1+".repeat(300));
     assert_says(&refused(&long, &[]), &["it has 600 characters, and may have 500"]);

@@ -3,10 +3,6 @@
 use super::*;
 use crate::model_file::FileModel;
 
-fn set_refusal(set: &str) -> String {
-    parse(GOOD, &[set]).expect_err(set).to_string()
-}
-
 #[test]
 fn sets_win_over_the_text() {
     let sets =
@@ -21,36 +17,25 @@ fn sets_win_over_the_text() {
 
 #[test]
 fn bad_sets_name_themselves_instead_of_a_line() {
-    let cases = [
-        ("axis.0.count=1", "--set axis.0.count=1: `axis.0.count = 1` is out of range"),
-        ("F=fifty", "--set F=fifty: `parameters.F = fifty` has the wrong type: it must be a number"),
-        ("e=0.5", "--set e=0.5: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`; set `axis.0.min`"),
-        ("omgea=1", "--set omgea=1: unknown field `parameters.omgea = 1`; did you mean `omega`?"),
-        (
-            "integraton.x=1",
-            "--set integraton.x=1: unknown field `integraton = { ... }`; did you mean `integration`?",
-        ),
-        (
-            "axis.1.count=4",
-            "--set axis.1.count=4: unknown field `axis.1.count = 4`; `1` must be a number below 1",
-        ),
-        ("axis.x=4", "`x` must be a number below 1"),
-        ("title.x=4", "--set title.x=4: unknown field `title.x = 4`; `\"A scene\"` has no fields; drop `.x`"),
-        (
-            "start.state=[1,2,nan,4]",
-            "--set start.state=[1,2,nan,4]: `start.state = [1,2,nan,4]` does not fit",
-        ),
-        (
-            "integration=3",
-            "--set integration=3: `integration = 3` has the wrong type: it must be a table, [integration]",
-        ),
-        ("e", "--set e: expected NAME=VALUE"),
-        ("=3", "--set =3: expected NAME=VALUE"),
-        ("F=", "--set F=: expected NAME=VALUE"),
-        ("axis..count=3", "--set axis..count=3: expected NAME=VALUE"),
-    ];
-    for (set, expected) in cases {
-        assert_says(&set_refusal(set), &[expected]);
+    for [set, expected] in test_cases(
+        r#"
+axis.0.count=1 | --set axis.0.count=1: `axis.0.count = 1` is out of range
+F=fifty | --set F=fifty: `parameters.F = fifty` has the wrong type: it must be a number
+e=0.5 | --set e=0.5: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`; set `axis.0.min`
+omgea=1 | --set omgea=1: unknown field `parameters.omgea = 1`; did you mean `omega`?
+integraton.x=1 | --set integraton.x=1: unknown field `integraton = { ... }`; did you mean `integration`?
+axis.1.count=4 | --set axis.1.count=4: unknown field `axis.1.count = 4`; `1` must be a number below 1
+axis.x=4 | `x` must be a number below 1
+title.x=4 | --set title.x=4: unknown field `title.x = 4`; `"A scene"` has no fields; remove `.x`
+start.state=[1,2,nan,4] | --set start.state=[1,2,nan,4]: `start.state = [1,2,nan,4]` does not fit
+integration=3 | --set integration=3: `integration = 3` has the wrong type: it must be a table, [integration]
+e | --set e: expected NAME=VALUE
+=3 | --set =3: expected NAME=VALUE
+F= | --set F=: expected NAME=VALUE
+axis..count=3 | --set axis..count=3: expected NAME=VALUE
+"#,
+    ) {
+        assert_says(&parse(GOOD, &[&set]).expect_err(&set).to_string(), &[&expected]);
     }
 }
 

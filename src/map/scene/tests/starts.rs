@@ -62,27 +62,30 @@ fn what_does_not_go_with_starts_is_said() {
             &["axis.0.min=nan"],
             &["`axis.0.min = nan` is out of range: it must be a finite number, as `v1` is"],
         ),
-        (&["start.policy=up"], &["`start.policy = up`", "starts of their own", "use \"rest\" or \"state\""]),
-        (&["start.policy=down"], &["`start.policy = down`", "starts of their own"]),
+        (
+            &["start.policy=up"],
+            &["`start.policy = up`", "give each cell its start", "use \"rest\" or \"state\""],
+        ),
+        (&["start.policy=down"], &["`start.policy = down`", "give each cell its start"]),
         (&["start.policy=both"], &["`start.policy = both`"]),
-        (&["start.count=3"], &["`start.count = 3`", "starts of their own here; drop the count"]),
+        (&["start.count=3"], &["`start.count = 3`", "give each cell its start; remove the count"]),
         (
             &["axis.0.start=v1", "axis.0.parameter=e"],
             &["`axis.0.start = v1`", "`axis.0.parameter` is given, too"],
         ),
         (
             &["axis.1.parameter=omega", "axis.1.values=[2,4]", "refine.rounds=2"],
-            &["`refine", "told the same only once all are known", "or drop [refine]"],
+            &["`refine", "can be matched only after all cells are known", "or remove [refine]"],
         ),
     ] {
         assert_says(&refused(sets), expected);
     }
     let both = PLANE.replacen("start = 'v1'", "start = 'v1'\nparameter = 'omega'", 1);
-    assert_says(&map(&both, &[]).unwrap_err().to_string(), &["s.toml:5:9:", "drop either"]);
+    assert_says(&map(&both, &[]).unwrap_err().to_string(), &["s.toml:5:9:", "remove one of the two"]);
     let neither = PLANE.replacen("start = 'v1'\n", "", 1);
     assert_says(
         &map(&neither, &[]).unwrap_err().to_string(),
-        &["`axis.0.parameter` is missing", "or with `start` a component of the start"],
+        &["`axis.0.parameter` is missing", "or a component of the start with `start`"],
     );
     let line = "[[axis]]\nstart = 'v1'\nmin = 0\nmax = 1\ncount = 2\n";
     let message = parse(&format!("[parameters]\ne = 0.5\n{line}"), &[]).unwrap_err().to_string();
@@ -91,7 +94,7 @@ fn what_does_not_go_with_starts_is_said() {
     let plane = format!("{line}[[axis]]\nparameter = 'e'\nmin = 0\nmax = 1\ncount = 2\n");
     let find: FindFile<'_> = &|_, _| unreachable!();
     let read = Scene::parse_with_files(&plane, "s.toml", &[], Purpose::Bifurcation, Some(&along), find);
-    assert_says(&read.unwrap_err().to_string(), &["`axis.0.start = 'v1'`", "starts are for `map`"]);
+    assert_says(&read.unwrap_err().to_string(), &["`axis.0.start = 'v1'`", "(`map`) can sweep the start"]);
 }
 
 #[test]
@@ -113,10 +116,10 @@ fn a_list_may_have_columns_of_the_start() {
     let refused = |table: &str, sets: &[&str]| read(table, sets).unwrap_err().to_string();
     assert_says(
         &refused("v2,v3\n1,0.5\n", &[]),
-        &["p.csv:1:2: `column 2 = v3` is not known", "or of the start x1"],
+        &["p.csv:1:2: `column 2 = v3` is not known", "components of the start: x1"],
     );
-    assert_says(&refused("v2,v2\n1,0.5\n", &[]), &["another column sets it already"]);
-    assert_says(&refused("v2,e\n1,0.5\n", &["start.count=2"]), &["drop the count"]);
+    assert_says(&refused("v2,v2\n1,0.5\n", &[]), &["another column sets it"]);
+    assert_says(&refused("v2,e\n1,0.5\n", &["start.count=2"]), &["remove the count"]);
 }
 
 #[test]
