@@ -6,27 +6,27 @@
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::{Record, Records, valid};
-use rattlemap_dynamics::model::Parameter;
 
-/// Relative tolerance for rounding errors of engines in single and in double precision.
-pub const ROUNDING: [f64; 2] = [1e-3, 1e-6];
+/// Relative tolerance for rounding errors of engines in single precision.
+const SINGLE_TOLERANCE: f64 = 1e-3;
 
-/// Returns the swept parameters along whose axis all integrated cells are equal within the relative tolerance `rounding`.
+/// Relative tolerance for rounding errors of engines in double precision.
+const DOUBLE_TOLERANCE: f64 = 1e-6;
+
+/// Returns the names of the swept parameters along whose axis all integrated cells are equal within rounding errors. The
+/// tolerance depends on `precision`: `f64`, else single.
 ///
 /// Filled cells are ignored. The result is empty if cells start from their neighbours, because then more than the parameter
 /// changes along an axis, and for a list, which has no axes.
 ///
 /// # Panics
 /// If the number of records is not that of the runs.
-pub fn without_effect<'p>(
-    plan: &'p Plan,
-    records: &(impl Records + ?Sized),
-    rounding: f64,
-) -> Vec<&'p Parameter> {
+pub fn names(plan: &Plan, records: &(impl Records + ?Sized), precision: &str) -> Vec<String> {
     assert_eq!(plan.run_count(), records.count(), "one record per run");
     if plan.policy().follows() {
         return Vec::new();
     }
+    let tolerance = if precision == "f64" { DOUBLE_TOLERANCE } else { SINGLE_TOLERANCE };
     let counts = plan.counts();
     let changes_nothing = |axis: usize| {
         let mut compared = 0;
@@ -37,7 +37,7 @@ pub fn without_effect<'p>(
                 let mut integrated = cells.filter(|record| record.valid & valid::FILLED == 0);
                 let Some(first) = integrated.next() else { continue };
                 for record in integrated {
-                    if !is_same(&first, &record, rounding) {
+                    if !is_same(&first, &record, tolerance) {
                         return false;
                     }
                     compared += 1;
@@ -48,21 +48,12 @@ pub fn without_effect<'p>(
     };
     // Components of the start are not parameters.
     let axes = plan.axes().iter().enumerate().filter(|(_, axis)| !axis.target().is_start());
-    axes.filter(|&(i, _)| changes_nothing(i)).map(|(_, axis)| axis.parameter()).collect()
+    let found = axes.filter(|&(i, _)| changes_nothing(i));
+    found.map(|(_, axis)| axis.parameter().name.to_string()).collect()
 }
 
-/// Returns the names of the parameters without effect, with the tolerance of `precision`: `f64`, else single.
-///
-/// # Panics
-/// As for [`without_effect`].
-pub fn names(plan: &Plan, records: &(impl Records + ?Sized), precision: &str) -> Vec<String> {
-    let rounding = ROUNDING[usize::from(precision == "f64")];
-    let found = without_effect(plan, records, rounding);
-    found.into_iter().map(|parameter| parameter.name.to_string()).collect()
-}
-
-fn is_same(a: &Record, b: &Record, rounding: f64) -> bool {
-    let near = |a: f64, b: f64| a == b || (a - b).abs() <= rounding * a.abs().max(b.abs());
+fn is_same(a: &Record, b: &Record, tolerance: f64) -> bool {
+    let near = |a: f64, b: f64| a == b || (a - b).abs() <= tolerance * a.abs().max(b.abs());
     let both = |bit: u32, same: bool| a.valid & bit == b.valid & bit && (a.valid & bit == 0 || same);
     classify(a) == classify(b)
         && both(valid::LYAPUNOV, near(a.lyapunov, b.lyapunov))
@@ -91,7 +82,7 @@ mod tests {
     }
 
     fn named(plan: &Plan, records: &[Record]) -> Vec<String> {
-        without_effect(plan, records, 1e-6).iter().map(|parameter| parameter.name.to_string()).collect()
+        names(plan, records, "f64")
     }
 
     #[test]

@@ -68,7 +68,7 @@ pub enum ShardError {
     #[error("it must be two whole numbers, such as 3/16: the third of 16 shards")]
     NotAShard,
     /// The number of shards is 0.
-    #[error("there must be one shard at least, such as 1/1")]
+    #[error("there must be at least one shard, such as 1/1")]
     NoShards,
     /// The index is not between 1 and the number of shards.
     #[error("shards are counted from 1: of {count} the first is 1/{count}, the last {count}/{count}")]

@@ -8,16 +8,9 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Keys of `[motion]`.
+#[rustfmt::skip]
 const MOTION_KEYS: [&str; 10] = [
-    "coordinates",
-    "velocities",
-    "bodies",
-    "mass",
-    "damping",
-    "stiffness",
-    "force",
-    "load",
-    "frequency",
+    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "load", "frequency",
     "gap",
 ];
 

@@ -19,33 +19,11 @@ const LONGEST_PARAMETER_NAME: usize = 32;
 const LONGEST_MEANING: usize = 120;
 
 /// Names of columns of tables, which cannot be names of parameters.
+#[rustfmt::skip]
 pub(super) const COLUMNS: [&str; 26] = [
-    "i",
-    "j",
-    "t",
-    "z",
-    "w",
-    "n",
-    "phase",
-    "class",
-    "period",
-    "lyapunov",
-    "lyapunov_error",
-    "impacts_per_period",
-    "mesh_fraction",
-    "symmetric",
-    "word",
-    "pattern",
-    "status",
-    "periods_run",
-    "source",
-    "attractor",
-    "attractors",
-    "domain",
-    "event",
-    "side",
-    "kind",
-    "moment",
+    "i", "j", "t", "z", "w", "n", "phase", "class", "period", "lyapunov", "lyapunov_error",
+    "impacts_per_period", "mesh_fraction", "symmetric", "word", "pattern", "status", "periods_run",
+    "source", "attractor", "attractors", "domain", "event", "side", "kind", "moment",
 ];
 
 /// A parameter as written in the file. Its use in the model is found later.

@@ -3,7 +3,6 @@
 //! Serde would lose the places before ranges are checked, and `--set` arguments have none.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use toml::Spanned;
@@ -22,7 +21,7 @@ pub(crate) struct Node {
     /// Place of the value.
     pub(crate) place: Place,
     /// The value as written, shortened for messages.
-    pub(crate) shown: String,
+    pub(crate) excerpt: String,
     /// The value.
     pub(crate) value: Value,
 }
@@ -46,12 +45,13 @@ pub(crate) fn read(text: &str, file: &str) -> Result<Node, SceneError> {
     let table = DeTable::parse(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
         let line = shorten(source.line_of(at));
-        source.error(at, Problem::Syntax { message: error.message().replace('\n', ", "), line })
+        let problem = Problem::Syntax { message: error.message().replace('\n', ", "), line };
+        SceneError { place: source.place(at), problem }
     })?;
     Ok(Node {
         name_place: source.place(0),
         place: source.place(0),
-        shown: "the file".into(),
+        excerpt: "the file".into(),
         value: Value::Table(source.table(table.into_inner())),
     })
 }
@@ -63,7 +63,7 @@ pub(crate) fn read_argument(value: &str, argument: &Arc<str>) -> Node {
         Err(_) => value.parse().map_or_else(|_| Value::Text(value.to_owned()), Value::Float),
     };
     let place = Place::Set { argument: argument.clone() };
-    let mut node = Node { name_place: place.clone(), place, shown: shorten(value), value: parsed };
+    let mut node = Node { name_place: place.clone(), place, excerpt: shorten(value), value: parsed };
     node.relocate();
     node
 }
@@ -133,11 +133,11 @@ impl<'a> Source<'a> {
         let from = self.line_starts[self.line(offset.min(self.text.len()))];
         self.text[from..].lines().next().unwrap_or_default()
     }
+
     fn table(&self, table: DeTable<'_>) -> Table {
-        let entry = |(key, value): (Spanned<_>, Spanned<DeValue<'_>>)| {
+        let entry = |(key, value): (Spanned<std::borrow::Cow<'_, str>>, Spanned<DeValue<'_>>)| {
             let name_place = self.place(key.span().start);
-            let name: std::borrow::Cow<'_, str> = key.into_inner();
-            (name.into_owned(), Node { name_place, ..self.node(value) })
+            (key.into_inner().into_owned(), Node { name_place, ..self.node(value) })
         };
         table.into_iter().map(entry).collect()
     }
@@ -145,8 +145,12 @@ impl<'a> Source<'a> {
     fn node(&self, value: Spanned<DeValue<'_>>) -> Node {
         let span = value.span();
         let place = self.place(span.start);
-        let shown = self.shown(span, value.get_ref());
-        Node { name_place: place.clone(), place, shown, value: self.value(value.into_inner()) }
+        let excerpt = match value.get_ref() {
+            // The span of a table is only its header.
+            DeValue::Table(_) => "{ ... }".to_owned(),
+            _ => shorten(self.text.get(span).unwrap_or_default()),
+        };
+        Node { name_place: place.clone(), place, excerpt, value: self.value(value.into_inner()) }
     }
 
     fn value(&self, value: DeValue<'_>) -> Value {
@@ -163,28 +167,11 @@ impl<'a> Source<'a> {
         }
     }
 
-    fn shown(&self, span: Range<usize>, value: &DeValue<'_>) -> String {
-        match value {
-            // The span of a table is only its header.
-            DeValue::Table(_) => "{ ... }".to_owned(),
-            _ => shorten(self.text.get(span).unwrap_or_default()),
-        }
-    }
-
     fn place(&self, offset: usize) -> Place {
-        let (line, column) = self.line_and_column(offset);
-        Place::Text { file: self.file.clone(), line, column }
-    }
-
-    fn error(&self, offset: usize, problem: Problem) -> SceneError {
-        SceneError { place: self.place(offset), problem }
-    }
-
-    fn line_and_column(&self, offset: usize) -> (usize, usize) {
         let offset = offset.min(self.text.len());
         let line = self.line(offset);
         let column = self.characters_before(offset) - self.characters_before(self.line_starts[line]);
-        (line + 1, column + 1)
+        Place::Text { file: self.file.clone(), line: line + 1, column: column + 1 }
     }
 }
 

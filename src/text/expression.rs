@@ -65,9 +65,9 @@ pub enum ExpressionError {
 }
 
 fn place(rest: &str) -> String {
-    let shown: String = rest.chars().take(LONGEST_REST).collect();
-    let more = if shown.len() < rest.len() { "..." } else { "" };
-    if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{shown}{more}` on") }
+    let excerpt: String = rest.chars().take(LONGEST_REST).collect();
+    let more = if excerpt.len() < rest.len() { "..." } else { "" };
+    if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{excerpt}{more}` on") }
 }
 
 /// An expression that can be evaluated.

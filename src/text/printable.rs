@@ -27,15 +27,15 @@ fn escaped(text: &str, stays: impl Fn(char) -> bool) -> Cow<'_, str> {
     if text.chars().all(&stays) {
         return Cow::Borrowed(text);
     }
-    let mut shown = String::with_capacity(text.len() + 16);
+    let mut excerpt = String::with_capacity(text.len() + 16);
     for c in text.chars() {
         if stays(c) {
-            shown.push(c);
+            excerpt.push(c);
         } else {
-            shown.extend(c.escape_default());
+            excerpt.extend(c.escape_default());
         }
     }
-    Cow::Owned(shown)
+    Cow::Owned(excerpt)
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ impl<'a> Section<'a> {
             1 => format!("{}; 1 more field is unknown", suggest(name, known, all)),
             more => format!("{}; {more} more fields are unknown", suggest(name, known, all)),
         };
-        let (field, value) = (section.path_of(&shorten(name)), node.shown.clone());
+        let (field, value) = (section.path_of(&shorten(name)), node.excerpt.clone());
         let problem = Problem::value(Fault::UnknownField, field, value, remedy);
         Err(SceneError { place: node.name_place.clone(), problem })
     }
@@ -283,7 +283,7 @@ impl<'a> Field<'a> {
         self.refuse(Fault::Conflict, remedy.into())
     }
 
-    /// Builds the error for a value that is none of the `known` names; `list` is shown as the list of them.
+    /// Builds the error for a value that is none of the `known` names; `list` is excerpt as the list of them.
     pub(crate) fn unknown_name(&self, name: &str, known: &[&str], list: &str) -> SceneError {
         self.refuse(Fault::UnknownName, suggest(name, known, list))
     }
@@ -299,7 +299,7 @@ impl<'a> Field<'a> {
     }
 
     fn refuse(&self, fault: Fault, detail: String) -> SceneError {
-        self.error(Problem::value(fault, &self.path, &self.node.shown, detail))
+        self.error(Problem::value(fault, &self.path, &self.node.excerpt, detail))
     }
 
     fn error(&self, problem: Problem) -> SceneError {

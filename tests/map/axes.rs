@@ -1,6 +1,6 @@
 //! Logarithmic and listed axes, derived parameters, lists of cells: every cell is the oscillator that they say.
 
-use rattlemap::findings::effect::{ROUNDING, without_effect};
+use rattlemap::findings::effect;
 use rattlemap::job;
 use rattlemap::job::run::Processor;
 use rattlemap::map::plan::Plan;
@@ -93,8 +93,7 @@ fn parameters_of_teeth_that_do_not_meet_have_no_effect() {
         let scene =
             built().parameter("e", e).log_axis("k", 100.0..=10000.0, 4).axis("F", forces, 5).build().unwrap();
         let map = job::run(&scene, Processor::Cpu).unwrap();
-        let named = without_effect(map.plan(), map.records(), ROUNDING[1]);
-        named.iter().map(|parameter| parameter.name.to_string()).collect::<Vec<_>>()
+        effect::names(map.plan(), map.records(), "f64")
     };
     let plan = Plan::new(&built().axis("k", 100.0..=200.0, 2).axis("F", 1.0..=2.0, 2).build().unwrap());
     assert!(Flow::new(&plan.oscillator(0)).non_impacting().is_some());

@@ -141,7 +141,7 @@ fn fix(root: &mut Table, name: &str, value: Node, is_argument: bool) -> Result<(
     let empty = || Node {
         name_place: place.clone(),
         place: place.clone(),
-        shown: "{ ... }".into(),
+        excerpt: "{ ... }".into(),
         value: Value::Table(Table::new()),
     };
     let parameters = root.entry("parameters".to_owned()).or_insert_with(empty);
@@ -153,7 +153,7 @@ fn fix(root: &mut Table, name: &str, value: Node, is_argument: bool) -> Result<(
             problem: Problem::value(
                 Fault::Conflict,
                 format!("parameters.{name}"),
-                other.shown,
+                other.excerpt,
                 format!("--at gives `{name}` its value; remove one of the two"),
             ),
         }),

@@ -206,8 +206,8 @@ pub(super) fn refuse_starts(root: &Section<'_>, axes: &[Axis], command: &str) ->
 
 /// Builds the node that an error about the number of axes shows: the place of the first superfluous axis, and the number.
 fn count_node(at: &Node, count: usize) -> Node {
-    let shown = format!("{count} {}", if count == 1 { "table" } else { "tables" });
-    Node { place: at.name_place.clone(), shown, value: Value::Other, ..at.clone() }
+    let excerpt = format!("{count} {}", if count == 1 { "table" } else { "tables" });
+    Node { place: at.name_place.clone(), excerpt, value: Value::Other, ..at.clone() }
 }
 
 fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axis, SceneError> {

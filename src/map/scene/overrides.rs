@@ -29,7 +29,7 @@ pub(super) fn apply(document: &mut Node, argument: &str) -> Result<(), SceneErro
     }
     let node = read_argument(value, &argument);
     let unknown = |remedy| {
-        let (field, value) = (shorten(&path.join(".")), node.shown.clone());
+        let (field, value) = (shorten(&path.join(".")), node.excerpt.clone());
         fail(Problem::value(Fault::UnknownField, field, value, remedy))
     };
     if path.len() > DEEPEST {
@@ -53,7 +53,7 @@ fn insert(parent: &mut Node, path: &[&str], leaf: &Node) -> Result<(), String> {
     match &mut parent.value {
         Value::Table(table) => {
             let empty =
-                || Node { value: Value::Table(Table::new()), shown: "{ ... }".into(), ..leaf.clone() };
+                || Node { value: Value::Table(Table::new()), excerpt: "{ ... }".into(), ..leaf.clone() };
             insert(table.entry(name.to_owned()).or_insert_with(empty), rest, leaf)
         }
         Value::List(items) => {
@@ -66,6 +66,6 @@ fn insert(parent: &mut Node, path: &[&str], leaf: &Node) -> Result<(), String> {
                 )),
             }
         }
-        _ => Err(format!("`{}` has no fields; remove `.{}`", parent.shown, shorten(name))),
+        _ => Err(format!("`{}` has no fields; remove `.{}`", parent.excerpt, shorten(name))),
     }
 }

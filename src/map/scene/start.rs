@@ -43,7 +43,7 @@ impl Start {
         }
     }
 
-    /// Describes the start for the end of a title: it decides which attractor is shown.
+    /// Describes the start for the end of a title: it decides which attractor is excerpt.
     pub fn in_words(&self) -> &'static str {
         match self {
             Start::Rest => "from rest",

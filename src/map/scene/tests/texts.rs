@@ -42,7 +42,7 @@ fn places_are_where_they_stand() {
         for (name, child) in children {
             for (place, text) in [
                 (&child.name_place, name),
-                (&child.place, Some(&*child.shown).filter(|shown| *shown != "{ ... }")),
+                (&child.place, Some(&*child.excerpt).filter(|excerpt| *excerpt != "{ ... }")),
             ] {
                 let Some(text) = text else { continue };
                 let Place::Text { line, column, .. } = place else { panic!("{place:?}") };
@@ -97,7 +97,7 @@ F = 50.0
     assert_says(&message, &["`parameters.G = 2`", "; 1 more field is unknown"]);
 }
 
-/// A name of a million letters is compared with nothing, and shown as far as one reads.
+/// A name of a million letters is compared with nothing, and excerpt as far as one reads.
 #[test]
 fn names_without_end_are_cut() {
     let name = "omega".repeat(200_000);
