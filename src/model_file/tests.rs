@@ -1,4 +1,4 @@
-//! What files say, and every kind of refusal.
+//! Reading of model files: the values of valid files, and every kind of error.
 
 use rattlemap_dynamics::model::{Contact, Domain, Model, Range, Shapes, Side};
 
@@ -83,7 +83,7 @@ fn check_refusals(text: &str, cases: &str) {
 }
 
 #[test]
-fn a_file_says_all_that_a_model_is() {
+fn all_fields_of_a_file_are_read() {
     let model = read(ONE_DEGREE);
     assert_eq!((model.name(), model.title(), model.source()), ("stop", "One stop", Some("a book")));
     assert_eq!((model.state_names(), model.bodies()), (vec!["x", "v"], vec!["x"]));
@@ -125,7 +125,7 @@ fn two_degrees_of_freedom_and_walls_of_different_laws() {
     assert_eq!(oscillator.walls, [0.25, -0.25]);
     assert_eq!(oscillator.free.damping, [[0.5, -0.5], [-0.5, 0.75]]);
     let [right, left] = oscillator.meshing;
-    // k g g' and k at g.
+    // The spring adds k g g' to the stiffness and k at g to the load.
     assert_eq!(right.stiffness, [[103.0, -203.0], [-203.0, 404.0]]);
     assert_eq!((right.damping, right.load), (oscillator.free.damping, [25.0, -50.0]));
     assert_eq!(left.stiffness, [[33.0, -63.0], [-63.0, 124.0]]);
@@ -138,7 +138,7 @@ fn two_degrees_of_freedom_and_walls_of_different_laws() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_by_name_with_the_limit() {
+fn errors_name_the_field_and_the_limit() {
     check_refusals(
         ONE_DEGREE,
         r#"
@@ -205,7 +205,7 @@ at = "-d" | at = "2*d" | `contact.0.at = "2*d"` does not fit: at the defaults of
 }
 
 #[test]
-fn every_model_that_is_built_in_is_read_under_its_name() {
+fn every_built_in_model_can_be_read() {
     for (name, text) in BUILT_IN {
         let model = FileModel::parse(text, name).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(model.name(), *name);
@@ -220,7 +220,7 @@ fn every_model_that_is_built_in_is_read_under_its_name() {
 }
 
 #[test]
-fn equations_are_written_as_the_field_writes_them() {
+fn equations_are_written_in_usual_notation() {
     assert_eq!(
         FileModel::built_in("gear-pair").unwrap().equations(),
         [

@@ -1,4 +1,4 @@
-//! Every kind of refusal, and what a good scene says.
+//! Reading of scenes: the values of a valid scene, and every kind of error.
 
 mod along;
 mod axes;
@@ -49,7 +49,7 @@ fn parse(text: &str, sets: &[&str]) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml", &sets, Purpose::Bifurcation)
 }
 
-/// The message for GOOD with `old` replaced by `new`.
+/// Returns the message for GOOD with `old` replaced by `new`.
 fn refusal(old: &str, new: &str) -> String {
     assert!(GOOD.contains(old), "{old:?} is not in the scene");
     parse(&GOOD.replacen(old, new, 1), &[]).expect_err(new).to_string()
@@ -78,7 +78,7 @@ fn assert_says(message: &str, parts: &[&str]) {
 }
 
 #[test]
-fn a_good_scene_is_read_whole() {
+fn all_fields_of_a_scene_are_read() {
     let scene = parse(GOOD, &[]).unwrap();
     assert_eq!(scene.title(), "A scene");
     assert_eq!(scene.text(), GOOD);
@@ -127,7 +127,7 @@ fn a_map_takes_two_axes_in_their_order() {
 }
 
 #[test]
-fn a_map_refuses_what_it_would_ignore() {
+fn a_map_refuses_settings_that_contradict_following() {
     let text = format!("{GOOD}{SECOND_AXIS}");
     let refused = |text: &str| Scene::parse(text, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
     for policy in ["up", "down"] {
@@ -144,7 +144,7 @@ fn a_map_refuses_what_it_would_ignore() {
 }
 
 #[test]
-fn the_identity_tells_scenes_apart_that_compute_otherwise() {
+fn the_identity_differs_for_scenes_with_other_records() {
     let scene = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         Scene::parse(&format!("{GOOD}{SECOND_AXIS}"), "s", &sets, Purpose::Map).unwrap().identity()
@@ -161,7 +161,7 @@ fn the_identity_tells_scenes_apart_that_compute_otherwise() {
 }
 
 #[test]
-fn text_that_is_not_toml() {
+fn syntax_errors_show_the_line() {
     assert_says(&refusal("min = 0.1", "min = = 0.1"), &["s.toml:9:7: not valid TOML", "min = = 0.1"]);
     assert_says(&refusal("F = 50.0", "F = 1.0\nF = 2.0"), &["s.toml:6:1", "duplicate key"]);
     assert_says(&refusal("F = 50.0", "F = fifty"), &["s.toml:5:5", "F = fifty"]);
@@ -227,7 +227,7 @@ fn missing_fields() {
 }
 
 #[test]
-fn values_that_contradict_each_other() {
+fn contradicting_values_are_refused() {
     let two = format!(
         "{GOOD}{}",
         SECOND_AXIS.replacen("omega", "e", 1).replacen("12.0", "1.0", 1).replacen("1.0", "0.0", 1)

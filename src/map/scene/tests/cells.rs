@@ -21,7 +21,7 @@ fn refused(scene: &str, table: &str, sets: &[&str]) -> String {
 }
 
 #[test]
-fn a_list_says_which_cells_there_are() {
+fn a_list_defines_the_cells() {
     let scene = read(SCENE, TABLE, &[]).unwrap();
     let list = scene.list().unwrap();
     let names: Vec<&str> = list.parameters().map(|parameter| &*parameter.name).collect();
@@ -31,7 +31,7 @@ fn a_list_says_which_cells_there_are() {
     assert_eq!(scene.outputs().files, [Format::Csv, Format::Npy]);
     assert_eq!(scene.title(), "Gear pair: the cells of points.csv");
     assert!(scene.fixed().all(|(name, _)| name != "e" && name != "omega"));
-    // The same list, written as the folder of a map keeps it.
+    // The list is stored in this form in the folder of a map.
     let text = list.to_csv();
     assert_eq!(text, "e,omega\n0.5,5.6\n0.25,4.0\n0.5,5.6\n0.5,7.0\n");
     let again = read(SCENE, &text, &[]).unwrap();
@@ -44,7 +44,7 @@ fn a_list_says_which_cells_there_are() {
     assert_eq!(differing, ["cells.hash"]);
 }
 
-/// Cells that are equal in what a flow depends on share it, wherever they stand.
+/// Cells with equal parameters of the oscillator share a flow, at any place of the list.
 #[test]
 fn cells_of_a_list_share_flows_and_laws() {
     let scene = read(&format!("{SCENE}[derived]\nk2 = \"4*omega\"\n"), TABLE, &[]).unwrap();
@@ -66,7 +66,7 @@ fn cells_of_a_list_share_flows_and_laws() {
 }
 
 #[test]
-fn tables_that_are_none_are_named_with_line_and_field() {
+fn errors_in_tables_name_line_and_field() {
     for [table, expected] in test_cases(
         r#"
 e,omgea\n | dir/points.csv:1:2: `column 2 = omgea` is not known; did you mean `omega`?
@@ -86,7 +86,7 @@ e,omega\n | dir/points.csv:1:1: it has no cells
 }
 
 #[test]
-fn what_does_not_go_with_a_list_is_refused() {
+fn settings_that_contradict_a_list_are_refused() {
     let with = |more: &str, sets: &[&str]| refused(&format!("{SCENE}{more}"), TABLE, sets);
     assert_says(
         &with("[[axis]]\nparameter = \"k\"\nmin = 1.0\nmax = 2.0\ncount = 2\n", &[]),

@@ -1,9 +1,9 @@
-//! Parameters that follow others.
+//! Derived parameters.
 
 use super::*;
 use crate::map::plan::Plan;
 
-/// A map over the force and the first support's stiffness, to which the second's is coupled.
+/// Reads a map over the force and the stiffness of the first support, with derived parameters.
 fn coupled(derived: &str, sets: &[&str]) -> Result<Scene, SceneError> {
     let text = format!(
         "[parameters]\ne = 0.5\n[derived]\n{derived}\n[[axis]]\nparameter = \"F\"\nmin = 10.0\nmax = 50.0\ncount = 5\n\
@@ -31,16 +31,16 @@ fn derived_parameters_follow_the_cell() {
     let fixed: Vec<&str> = scene.fixed().map(|(name, _)| name).collect();
     assert_eq!(fixed, ["m1", "r1", "r", "k", "omega", "b", "e", "mesh_speed"]);
     let derived: Vec<(&str, &str)> = scene.derived().map(|(p, text)| (&*p.name, text)).collect();
-    // Each after those that it follows.
+    // Each rule comes after those that it needs.
     assert_eq!(derived, [("k2", "0.5*k1"), ("m2", "1.5"), ("r2", "2*r1 + k2/100")]);
     let by_argument = coupled("m2 = 1.5", &["derived.k2=0.25*k1"]).unwrap();
     assert_eq!(by_argument.cell(&[0, 3]).get("k2"), Ok(10.0));
     assert_ne!(scene.identity(), by_argument.identity());
 }
 
-/// Cells share a flow where they agree in all that it depends on, through chains, too.
+/// Cells share a flow if all its parameters are equal, including derived ones.
 #[test]
-fn what_is_derived_from_an_axis_has_flows_of_its_own() {
+fn cells_with_different_derived_parameters_have_different_flows() {
     let scene = |derived: &str| {
         let text = format!(
             "[parameters]\n[derived]\n{derived}\n[[axis]]\nparameter = \"e\"\nmin = 0.25\nmax = 0.75\ncount = 3\n\
@@ -68,7 +68,7 @@ fn what_is_derived_from_an_axis_has_flows_of_its_own() {
 }
 
 #[test]
-fn what_cannot_be_derived_is_said() {
+fn errors_in_expressions_name_the_field() {
     for [derived, expected] in test_cases(
         r#"
 K2 = "k1" | s.toml:4:1: unknown field `derived.K2 = "k1"`; did you mean `k2`?
@@ -91,7 +91,7 @@ k2 = "m2"\nm2 = "m2 + k1" | `derived.m2 = "m2 + k1"` does not fit: it depends on
         &refused("k2 = \"k1\"", &["k2=3"]),
         &["--set k2=3: `parameters.k2 = 3` does not fit: `derived.k2`"],
     );
-    // An expression by argument takes the place of the text's value.
+    // An expression in an argument overrides a value in the text.
     let text = "k2 = \"k1\"";
     assert!(coupled(text, &["derived.e=k1/100"]).is_ok());
     assert_says(
@@ -100,7 +100,7 @@ k2 = "m2"\nm2 = "m2 + k1" | `derived.m2 = "m2 + k1"` does not fit: it depends on
     );
 }
 
-/// At a corner with the scene, elsewhere by the plan: before anything is computed.
+/// Derived values out of range are found before the computation: at corners by the scene, elsewhere by the plan.
 #[test]
 fn values_out_of_range_are_named_with_their_cell() {
     let message = refused("k2 = \"k1 - 20\"", &[]);

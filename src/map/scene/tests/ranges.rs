@@ -1,9 +1,9 @@
-//! Values of a wrong type or out of their range.
+//! Values of a wrong type or out of range.
 
 use super::*;
 
 #[test]
-fn wrong_types_say_what_is_expected() {
+fn wrong_types_are_refused_with_the_expected_type() {
     check_refusals(
         r#"
 "A scene" | 7 | s.toml:1:9: `title = 7` has the wrong type: it must be text in quotes

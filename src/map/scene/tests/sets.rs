@@ -1,10 +1,10 @@
-//! `--set`: what it changes, and that its messages name the argument.
+//! `--set`: changes of the scene, and messages that name the argument.
 
 use super::*;
 use crate::model_file::FileModel;
 
 #[test]
-fn sets_win_over_the_text() {
+fn arguments_override_the_text() {
     let sets =
         ["F=40", "parameters.omega=.7", "axis.0.count=8", "integration.max_period=2", "title=Set", "F=41"];
     let scene = parse(GOOD, &sets).unwrap();
@@ -16,7 +16,7 @@ fn sets_win_over_the_text() {
 }
 
 #[test]
-fn bad_sets_name_themselves_instead_of_a_line() {
+fn errors_of_arguments_name_the_argument() {
     for [set, expected] in test_cases(
         r#"
 axis.0.count=1 | --set axis.0.count=1: `axis.0.count = 1` is out of range
@@ -40,7 +40,7 @@ axis..count=3 | --set axis..count=3: expected NAME=VALUE
 }
 
 #[test]
-fn single_cells_come_from_sets_alone() {
+fn a_single_cell_is_set_by_arguments() {
     let model = FileModel::built_in("gear-pair").unwrap();
     let sets = |sets: &[&str]| single_cell(&model, &sets.iter().map(ToString::to_string).collect::<Vec<_>>());
     assert_eq!(pair(&*sets(&[]).unwrap()), GearPair::paper(0.605));
@@ -56,9 +56,9 @@ fn single_cells_come_from_sets_alone() {
     );
 }
 
-/// Arguments win over the text, so an axis that one names does over the text's value.
+/// An axis whose parameter is named by an argument overrides the value of the parameter in the text.
 #[test]
-fn an_axis_named_by_an_argument_replaces_the_value_of_the_text() {
+fn an_axis_named_by_an_argument_overrides_the_text() {
     let sets = ["e=0.5", "axis.0.parameter=F", "axis.0.min=40", "axis.0.max=60"];
     let scene = parse(GOOD, &sets).unwrap();
     assert_eq!(scene.axes()[0].parameter().name, "F");
@@ -68,9 +68,9 @@ fn an_axis_named_by_an_argument_replaces_the_value_of_the_text() {
         &parse(GOOD, &both).unwrap_err().to_string(),
         &["--set F=50: `parameters.F = 50` does not fit: axis 0 sweeps `F`"],
     );
-    // What was the axis has no value any more.
+    // The parameter of the replaced axis has no value.
     assert_says(&parse(GOOD, &sets[1..]).unwrap_err().to_string(), &["restitution", "no default"]);
-    // Text against text stays an error, whatever else of the axis an argument changes.
+    // If both are in the text it is an error, even if an argument changes the axis' range.
     let text = GOOD.replace("\"e\"", "\"F\"");
     assert_says(
         &parse(&text, &["e=0.5", "axis.0.max=60"]).unwrap_err().to_string(),

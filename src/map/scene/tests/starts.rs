@@ -5,7 +5,7 @@ use crate::map::plan::Plan;
 use crate::map::scene::{CompanionFile, FileText};
 use rattlemap_dynamics::model::Stops;
 
-const PLANE: &str = "[parameters]\ne = 0.5\n\n[[axis]]\nstart = 'v1'\nmin = -2\nmax = 2\ncount = 5\n\n\
+const START_PLANE: &str = "[parameters]\ne = 0.5\n\n[[axis]]\nstart = 'v1'\nmin = -2\nmax = 2\ncount = 5\n\n\
                      [[axis]]\nstart = 'x2'\nvalues = [-0.5, 0.25]\n";
 
 fn map(text: &str, sets: &[&str]) -> Result<Scene, SceneError> {
@@ -14,16 +14,16 @@ fn map(text: &str, sets: &[&str]) -> Result<Scene, SceneError> {
 }
 
 fn refused(sets: &[&str]) -> String {
-    map(PLANE, sets).expect_err(&sets.join(" ")).to_string()
+    map(START_PLANE, sets).expect_err(&sets.join(" ")).to_string()
 }
 
 #[test]
-fn every_cell_has_its_own_start_and_the_flow_of_all() {
+fn cells_have_different_starts_and_share_one_flow() {
     for (sets, others) in [
         (&[][..], [0.0; 4]),
         (&["start.policy=state", "start.state=[0.1, 7, 8, -0.25]"][..], [0.1, 7.0, 8.0, -0.25]),
     ] {
-        let scene = map(PLANE, sets).unwrap();
+        let scene = map(START_PLANE, sets).unwrap();
         assert!(scene.is_basin() && scene.sweeps_start());
         let plan = Plan::new(&scene);
         assert_eq!((plan.flow_count(), plan.law_count(), plan.is_basin()), (1, 1, true));
@@ -38,20 +38,21 @@ fn every_cell_has_its_own_start_and_the_flow_of_all() {
 
 #[test]
 fn one_axis_may_be_a_parameter() {
-    let scene = map(PLANE, &["axis.1.parameter=omega", "axis.1.values=[2,4]"]).unwrap();
+    let scene = map(START_PLANE, &["axis.1.parameter=omega", "axis.1.values=[2,4]"]).unwrap();
     let plan = Plan::new(&scene);
     assert_eq!((plan.flow_count(), plan.law_count()), (2, 1));
     assert_eq!(plan.cell(9).start, [0.0, 2.0, 0.0, 0.0]);
     assert_eq!(plan.model(9).get("omega"), Ok(4.0));
     assert!(scene.is_basin());
     assert!(scene.fixed().all(|(name, _)| name != "omega"));
-    // What is said the other way round.
-    let text = PLANE.replace("start = 'x2'\nvalues = [-0.5, 0.25]", "parameter = 'omega'\nvalues = [2, 4]");
+    // An argument can also replace a parameter by a component of the start.
+    let text =
+        START_PLANE.replace("start = 'x2'\nvalues = [-0.5, 0.25]", "parameter = 'omega'\nvalues = [2, 4]");
     assert_eq!(map(&text, &["axis.1.start=v2"]).unwrap().axes()[1].target(), Target::Start(3));
 }
 
 #[test]
-fn what_does_not_go_with_starts_is_said() {
+fn settings_that_contradict_axes_of_the_start_are_refused() {
     for (sets, expected) in [
         (
             &["axis.0.start=w1"][..],
@@ -80,9 +81,9 @@ fn what_does_not_go_with_starts_is_said() {
     ] {
         assert_says(&refused(sets), expected);
     }
-    let both = PLANE.replacen("start = 'v1'", "start = 'v1'\nparameter = 'omega'", 1);
+    let both = START_PLANE.replacen("start = 'v1'", "start = 'v1'\nparameter = 'omega'", 1);
     assert_says(&map(&both, &[]).unwrap_err().to_string(), &["s.toml:5:9:", "remove one of the two"]);
-    let neither = PLANE.replacen("start = 'v1'\n", "", 1);
+    let neither = START_PLANE.replacen("start = 'v1'\n", "", 1);
     assert_says(
         &map(&neither, &[]).unwrap_err().to_string(),
         &["`axis.0.parameter` is missing", "or a component of the start with `start`"],
