@@ -283,7 +283,7 @@ impl<'a> Field<'a> {
         self.refuse(Fault::Conflict, remedy.into())
     }
 
-    /// Builds the error for a value that is none of the `known` names; `list` is excerpt as the list of them.
+    /// Builds the error for a value that is none of the `known` names; the message lists them as `list`.
     pub(crate) fn unknown_name(&self, name: &str, known: &[&str], list: &str) -> SceneError {
         self.refuse(Fault::UnknownName, suggest(name, known, list))
     }

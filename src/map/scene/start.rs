@@ -43,7 +43,7 @@ impl Start {
         }
     }
 
-    /// Describes the start for the end of a title: it decides which attractor is excerpt.
+    /// Describes the start for the end of a title: it decides which attractor is shown.
     pub fn in_words(&self) -> &'static str {
         match self {
             Start::Rest => "from rest",
