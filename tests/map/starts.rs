@@ -312,39 +312,6 @@ fn attractors_are_distinguished_by_their_states() {
     assert_eq!(counted(11.0, 0.5, &[cycle(1, far), cycle(1, near)]), 1);
 }
 
-#[test]
-fn starts_that_make_no_sense_are_refused() {
-    let refused = |sets: &[&str], purpose| {
-        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-        Scene::parse(SCENE, "s.toml", &sets, purpose).unwrap_err().to_string()
-    };
-    for (sets, part) in [
-        (
-            &["refine.max_error=0.01"][..],
-            "filled cells have no last state for their neighbours to start from",
-        ),
-        (&["start.count=4"], "cells that follow their neighbours have one start each"),
-        (
-            &["start.policy=rest", "start.count=4", "refine.max_error=0.01"],
-            "attractors are not counted in filled cells",
-        ),
-        (
-            &["start.policy=rest", "start.count=0"],
-            "`start.count = 0` is out of range: it must be a whole number",
-        ),
-        (&["start.policy=rest", "start.count=256"], "from 1 to 255"),
-        (&["start.policy=rest", "start.seed=3"], "a seed needs start.count above 1"),
-        (&["start.policy=upp"], "did you mean `up`?"),
-    ] {
-        let message = refused(sets, Purpose::Map);
-        assert!(message.contains(part), "{message}");
-    }
-    let one = SCENE.replacen("[[axis]]\nparameter = \"omega\"\nmin = 5.6\nmax = 5.61\ncount = 2\n", "", 1);
-    let sets = ["start.policy=rest".to_owned(), "start.count=2".to_owned()];
-    let message = Scene::parse(&one, "s.toml", &sets, Purpose::Bifurcation).unwrap_err().to_string();
-    assert!(message.contains("`bifurcation` follows one motion per column"), "{message}");
-}
-
 fn run(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
     Command::cargo_bin("rattlemap").unwrap().current_dir(folder).args(arguments).assert()
 }

@@ -141,6 +141,10 @@ fn a_map_refuses_settings_that_contradict_following() {
         let message = refused(&text.replace("[start]", "[start]\ncount = 3"));
         assert_says(&message, &["s.toml:21:9", "`start.count = 3`", "have one start each"]);
     }
+    let message = refused(&text.replace("[start]", "[refine]\n[start]\ncount = 3"));
+    assert_says(&message, &["`start.count = 3`", "attractors are not counted in filled cells"]);
+    let message = refused(&text.replace("[start]", "[start]\nseed = 3"));
+    assert_says(&message, &["`start.seed = 3`", "a seed needs start.count above 1"]);
 }
 
 #[test]
