@@ -67,14 +67,10 @@ fn is_same(a: &Record, b: &Record, tolerance: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::scene::{Purpose, Scene};
+    use crate::map::plan::test_plan;
 
     fn plan(more: &str) -> Plan {
-        let axis = |name: &str, count| {
-            format!("[[axis]]\nparameter = '{name}'\nmin = 0.25\nmax = 0.75\ncount = {count}\n")
-        };
-        let text = axis("e", 3) + &axis("k", 2) + more;
-        Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+        test_plan([("e", 3), ("k", 2)], more)
     }
 
     fn record(period: u32, lyapunov: f64) -> Record {

@@ -100,7 +100,8 @@ pub fn column_count(cells: usize, start: Start) -> usize {
     if start == Start::Both { 2 * cells } else { cells }
 }
 
-/// Integrates every cell and calls `progress` with the number of finished columns.
+/// Integrates every cell and calls `progress` with the number of finished columns. Returns none if `halt` was raised before
+/// the last column ended.
 ///
 /// Columns that start from one state are independent and run in parallel. Columns that follow the attractor run one
 /// after the other, the first of them from rest. With [`Start::Both`] there are two columns per cell, those followed
@@ -108,21 +109,6 @@ pub fn column_count(cells: usize, start: Start) -> usize {
 ///
 /// # Errors
 /// [`ModelError`] of a cell without motion, before any is integrated.
-pub fn run(
-    cells: &[(f64, Box<dyn Model>)],
-    start: Start,
-    settings: &Settings,
-    progress: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<Column>, ModelError> {
-    let columns = run_until(cells, start, settings, progress, &AtomicBool::new(false))?;
-    // The flag is never raised, so there is always a result.
-    Ok(columns.unwrap_or_default())
-}
-
-/// Does the work of [`run`] until `halt` is raised; returns none if it was raised before the last column ended.
-///
-/// # Errors
-/// As for [`run`].
 pub fn run_until(
     cells: &[(f64, Box<dyn Model>)],
     start: Start,

@@ -384,26 +384,27 @@ pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
     counts
 }
 
+/// Plans a map over two parameters from 0.5 to 1, with further lines of the scene.
+#[cfg(test)]
+pub(crate) fn test_plan(axes: [(&str, usize); 2], more: &str) -> Plan {
+    let [first, second] = axes.map(|(name, count)| {
+        format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1.0\ncount = {count}\n")
+    });
+    let text = format!("{first}{second}{more}");
+    Plan::new(&Scene::parse(&text, "s", &[], crate::map::scene::Purpose::Map).unwrap())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::scene::Purpose;
-
-    fn plan(first: &str, second: &str, counts: [usize; 2]) -> Plan {
-        let axis = |name, count| {
-            format!("[[axis]]\nparameter = '{name}'\nmin = 0.25\nmax = 0.75\ncount = {count}\n")
-        };
-        let text = axis(first, counts[0]) + &axis(second, counts[1]);
-        let e = if first == "e" || second == "e" { vec![] } else { vec!["e=0.5".to_owned()] };
-        Plan::new(&Scene::parse(&text, "s", &e, Purpose::Map).unwrap())
-    }
 
     #[test]
     fn every_cell_has_the_flow_and_law_of_its_model() {
         for (first, second, flows, laws) in
             [("e", "omega", 5, 3), ("omega", "e", 3, 5), ("e", "mesh_speed", 1, 15), ("k", "omega", 15, 1)]
         {
-            let plan = plan(first, second, [3, 5]);
+            let e = if [first, second].contains(&"e") { "" } else { "[parameters]\ne = 0.5\n" };
+            let plan = test_plan([(first, 3), (second, 5)], e);
             assert_eq!((plan.flow_count(), plan.law_count()), (flows, laws), "{first} {second}");
             for id in 0..15 {
                 let (cell, model) = (plan.cell(id), plan.model(id));
@@ -418,7 +419,7 @@ mod tests {
 
     #[test]
     fn the_order_is_that_of_the_keys_and_has_every_cell_once() {
-        let plan = plan("e", "omega", [7, 5]);
+        let plan = test_plan([("e", 7), ("omega", 5)], "");
         let keys: Vec<u64> = plan.order().iter().map(|&id| morton_key(plan.indices(id))).collect();
         assert!(keys.is_sorted());
         let mut ids = plan.order();

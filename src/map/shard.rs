@@ -211,13 +211,10 @@ impl FromStr for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::scene::{Purpose, Scene};
+    use crate::map::plan::test_plan;
 
-    fn plan(counts: [usize; 2], more: &str) -> Plan {
-        let axis =
-            |name, count| format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1.0\ncount = {count}\n");
-        let text = format!("{}{}{more}", axis("e", counts[0]), axis("omega", counts[1]));
-        Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+    fn plan([columns, rows]: [usize; 2], more: &str) -> Plan {
+        test_plan([("e", columns), ("omega", rows)], more)
     }
 
     #[test]

@@ -32,11 +32,7 @@ fn plan(refine: &str) -> Plan {
 /// Records of the map in which every cell is integrated.
 static WHOLE: LazyLock<Vec<Record>> = LazyLock::new(|| {
     let plan = plan("");
-    let cells = plan.cells(0..plan.cell_count());
-    let computed = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&cells)).unwrap();
-    let mut records = vec![Record::default(); cells.len()];
-    cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
-    records
+    crate::computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), plan.cell_count())
 });
 
 /// Computes the adaptive map with `audited` cells in its only audit.

@@ -241,10 +241,7 @@ fn lanes_label_as_the_reference_does() {
     let reference = job::run(&scene, Processor::Cpu).unwrap();
     let expected = reference.basins().unwrap();
     for precision in Precision::ALL {
-        let cells = plan.cells(0..plan.cell_count());
-        let computed = pollster::block_on(gpu::engine(&plan, precision).run(&cells)).unwrap();
-        let mut records = vec![Record::default(); cells.len()];
-        cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
+        let records = crate::computed(&plan, &mut gpu::engine(&plan, precision), plan.cell_count());
         let lanes = attractors::basins(&plan, &records, &[]).unwrap();
         check_counts(&lanes);
         let mut differing = 0;

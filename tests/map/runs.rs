@@ -1,8 +1,8 @@
 //! Maps computed through the library: comparison with single orbits, independence of batches and threads, failures.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
+use crate::{Swept, computed, swept};
 use rattlemap::map::engine::{Cpu, Engine, EngineError, Fake};
 use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{Purpose, Scene};
@@ -29,21 +29,9 @@ fn scene(count: usize, sets: &[&str]) -> Scene {
     Scene::parse(&text, "test", &sets, Purpose::Map).unwrap()
 }
 
-/// Computes all records, in batches of `size`.
-fn records(plan: &Plan, engine: &mut Engine<'_>, size: usize) -> Vec<Record> {
-    let mut records = vec![Record::default(); plan.cell_count()];
-    for from in (0..records.len()).step_by(size) {
-        let cells = plan.cells(from..records.len().min(from + size));
-        let computed = pollster::block_on(engine.run(&cells)).unwrap();
-        assert_eq!(computed.len(), cells.len());
-        cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
-    }
-    records
-}
-
 fn on_cpu(scene: &Scene) -> Vec<Record> {
     let plan = Plan::new(scene);
-    records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), 64)
+    computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), 64)
 }
 
 /// Whether the motion from rest is still far from `orbit` after `periods`.
@@ -123,13 +111,13 @@ fn records_do_not_depend_on_batches_or_threads() {
     let plan = Plan::new(&scene);
     let with = |threads: usize, size: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), size))
+        pool.install(|| computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), size))
     };
     let one = with(1, 1);
     for (threads, size) in [(1, 100), (2, 7), (5, 33)] {
         assert_eq!(with(threads, size), one, "{threads} threads, batches of {size}");
     }
-    let rule = |size| records(&plan, &mut Engine::Fake(Fake::new(by_id)), size);
+    let rule = |size| computed(&plan, &mut Engine::Fake(Fake::new(by_id)), size);
     assert_eq!(rule(1), rule(64));
 }
 
@@ -150,20 +138,11 @@ fn by_id(cell: &Cell) -> Record {
     Record { period: cell.id + 1, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
 }
 
-/// Continues a map after the records of `before` with a fake engine. Returns the result and the stored cells in order.
-fn sweep(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, Vec<u32>) {
-    let (mut schedule, mut stored) = (Schedule::new(plan), Vec::new());
-    let mut records = vec![Record::default(); plan.cell_count()];
+/// Continues a map after the records of the cells `before` with a fake engine. Returns the result and the stored cells.
+fn sweep_fake(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, Vec<u32>) {
     let done: Vec<_> = before.iter().map(|&id| (id, by_id(&plan.cell(id)))).collect();
-    assert!(sweep::replay(&mut schedule, &mut records, &done));
-    let engine = &mut Engine::Fake(fake);
-    let store = |batch: &[(u32, Record)], _| {
-        assert!(batch.iter().all(|(id, record)| record.period == id + 1));
-        stored.extend(batch.iter().map(|(id, _)| *id));
-        Ok(())
-    };
-    let end =
-        pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), store));
+    let Swept { end, records, stored, .. } = swept(plan, &mut Engine::Fake(fake), &done);
+    assert!(stored.iter().all(|&id| records[id as usize].period == id + 1));
     (end, stored)
 }
 
@@ -171,10 +150,10 @@ fn sweep(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, 
 fn another_engine_continues_after_a_lost_engine() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, stored) = sweep(&plan, Fake::lost_after(2, by_id), &[]);
+    let (end, stored) = sweep_fake(&plan, Fake::lost_after(2, by_id), &[]);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::Lost { .. }))), "{end:?}");
     assert!(!stored.is_empty() && stored.len() < plan.cell_count());
-    let (end, rest) = sweep(&plan, Fake::new(by_id), &stored);
+    let (end, rest) = sweep_fake(&plan, Fake::new(by_id), &stored);
     assert!(end.unwrap());
     assert_eq!([stored, rest].concat(), plan.order());
 }
@@ -183,10 +162,10 @@ fn another_engine_continues_after_a_lost_engine() {
 fn batches_shrink_to_the_available_memory() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, stored) = sweep(&plan, Fake::with_memory(3, by_id), &[]);
+    let (end, stored) = sweep_fake(&plan, Fake::with_memory(3, by_id), &[]);
     assert!(end.unwrap());
     assert_eq!(stored, plan.order());
-    let (end, stored) = sweep(&plan, Fake::with_memory(0, by_id), &[]);
+    let (end, stored) = sweep_fake(&plan, Fake::with_memory(0, by_id), &[]);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::OutOfMemory { cells: 1, .. }))), "{end:?}");
     assert!(stored.is_empty());
 }
@@ -218,21 +197,7 @@ fn slow_cells_do_not_delay_other_cells() {
             Record { period, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
         };
         let run = |fake: Fake| {
-            let (mut schedule, mut stored) = (Schedule::new(&plan), Vec::new());
-            let mut records = vec![Record::default(); plan.cell_count()];
-            let store = |batch: &[(u32, Record)], _| {
-                stored.extend(batch.iter().map(|(id, _)| *id));
-                Ok(())
-            };
-            let engine = &mut Engine::Fake(fake);
-            let end = pollster::block_on(sweep::run(
-                &plan,
-                &mut schedule,
-                engine,
-                &mut records,
-                &Arc::default(),
-                store,
-            ));
+            let Swept { end, schedule, mut records, stored } = swept(&plan, &mut Engine::Fake(fake), &[]);
             assert!(end.unwrap());
             let refined = schedule.finish(&mut records);
             (stored, records, refined)
@@ -263,13 +228,8 @@ type Ends = BTreeSet<(u32, u32)>;
 fn refinement_waits_less_for_slow_cells_than_rounds_would() {
     let sets = ["refine.minimum_grid=8", "refine.max_error=0.02", "integration.undecided_periods=1584"];
     let plan = Plan::new(&scene(256, &sets));
-    let mut measured = vec![Record::default(); plan.cell_count()];
-    let engine = &mut Engine::Cpu(Cpu::new(&plan));
-    let (halt, store) = (Arc::default(), |_: &[(u32, Record)], _| Ok(()));
-    let mut schedule = Schedule::new(&plan);
-    assert!(
-        pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, &halt, store)).unwrap()
-    );
+    let Swept { end, schedule, records: measured, .. } = swept(&plan, &mut Engine::Cpu(Cpu::new(&plan)), &[]);
+    assert!(end.unwrap());
     let mut integrated = schedule.sequence().to_vec();
     integrated.sort_unstable();
     let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();

@@ -4,10 +4,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use crate::common::pair_at;
-use crate::common::{REST, apart, gpu};
+use crate::common::{REST, apart, gpu, pair_at};
+use crate::swept;
 use assert_cmd::Command;
 use rattlemap::findings::coexistence::attractors;
 use rattlemap::gpu::Precision;
@@ -15,8 +15,6 @@ use rattlemap::map::bifurcation;
 use rattlemap::map::engine::{Cpu, Engine, Fake};
 use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{Purpose, Scene, Start};
-use rattlemap::map::schedule::Schedule;
-use rattlemap::map::sweep;
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
@@ -51,26 +49,19 @@ fn plan(sets: &[&str]) -> Plan {
 }
 
 /// Computes all records, by run.
-fn swept(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
-    let mut schedule = Schedule::new(plan);
-    let mut records = vec![Record::default(); plan.run_count()];
-    let store = |_: &[(u32, Record)], expected| {
-        assert_eq!(expected, plan.run_count());
-        Ok(())
-    };
-    assert!(
-        pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), store))
-            .unwrap()
-    );
-    records
+fn records(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
+    let swept = swept(plan, engine, &[]);
+    assert!(swept.end.unwrap());
+    assert_eq!(swept.schedule.expected(), plan.run_count());
+    swept.records
 }
 
 fn on_cpu(plan: &Plan) -> Vec<Record> {
-    swept(plan, &mut Engine::Cpu(Cpu::new(plan)))
+    records(plan, &mut Engine::Cpu(Cpu::new(plan)))
 }
 
 fn on_lanes(plan: &Plan, precision: Precision) -> Vec<Record> {
-    swept(plan, &mut gpu::engine(plan, precision))
+    records(plan, &mut gpu::engine(plan, precision))
 }
 
 /// Returns the period of a cell; 0 without one.
@@ -89,7 +80,7 @@ fn record_of_start(cell: &Cell) -> Record {
 fn cells_start_in_the_last_state_of_their_neighbour() {
     for (policy, order) in [("up", [0, 1, 2, 3, 4]), ("down", [4, 3, 2, 1, 0])] {
         let plan = plan(&[&format!("start.policy={policy}"), "axis.0.count=3", "axis.1.count=5"]);
-        let records = swept(&plan, &mut Engine::Fake(Fake::new(record_of_start)));
+        let records = records(&plan, &mut Engine::Fake(Fake::new(record_of_start)));
         for i in 0..3 {
             let mut sum = 0.0;
             for (nth, j) in order.into_iter().enumerate() {
@@ -111,7 +102,7 @@ fn a_cell_after_a_failed_neighbour_starts_at_rest() {
         if cell.id / 2 == 3 { failed } else { record_of_start(cell) }
     };
     let plan = plan(&[]);
-    let records = swept(&plan, &mut Engine::Fake(Fake::new(fails)));
+    let records = records(&plan, &mut Engine::Fake(Fake::new(fails)));
     assert_eq!((records[8].strobe[0], records[10].strobe[0]), (1.0, 2.0));
     assert_eq!(plan.start(8, &records), REST);
 }
@@ -142,7 +133,9 @@ fn a_column_agrees_with_a_bifurcation_diagram() {
         let plan = plan(&[&sets[..], &[&format!("start.policy={policy}")]].concat());
         let records = on_cpu(&plan);
         let line: Vec<_> = (0..91).map(|j| 2 * j).map(|id| (pair_at(&plan, id).e, plan.model(id))).collect();
-        let columns = bifurcation::run(&line, start, &plan.budget().settings, &|_| {}).unwrap();
+        let columns =
+            bifurcation::run_until(&line, start, &plan.budget().settings, &|_| {}, &AtomicBool::new(false));
+        let columns = columns.unwrap().unwrap();
         let mut compared = 0;
         for (j, column) in columns.iter().enumerate() {
             let class = classify(&records[2 * j]);

@@ -1,7 +1,7 @@
 //! Adaptive maps of test pictures, with the number of integrated cells.
 
 use super::*;
-use crate::map::scene::{Purpose, Scene};
+use crate::map::plan::test_plan;
 use crate::record::classify::classify;
 use crate::record::valid;
 use rattlemap_dynamics::orbit::Class;
@@ -25,23 +25,20 @@ fn shown(number: u32) -> Record {
     record
 }
 
-fn plan(counts: [usize; 2], refine: &str) -> Plan {
-    let axis =
-        |name, count| format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1.0\ncount = {count}\n");
-    let text = format!("{}{}[refine]\n{refine}", axis("e", counts[0]), axis("omega", counts[1]));
-    Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+fn plan([columns, rows]: [usize; 2], refine: &str) -> Plan {
+    test_plan([("e", columns), ("omega", rows)], &format!("[refine]\n{refine}"))
 }
 
 /// Runs a schedule on a picture, a function that gives every cell a number.
 fn run(plan: &Plan, picture: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
-    run_in(plan, std::mem::take, picture)
+    run_in(plan, std::mem::take, |i, j| shown(picture(i, j)))
 }
 
-/// Runs a schedule on a picture. `arrive` removes the cells whose records arrive next from those under way.
+/// Runs a schedule. `record` computes a record; `arrive` removes the cells whose records arrive next from those under way.
 fn run_in(
     plan: &Plan,
     mut arrive: impl FnMut(&mut Vec<u32>) -> Vec<u32>,
-    picture: impl Fn(usize, usize) -> u32,
+    record: impl Fn(usize, usize) -> Record,
 ) -> (Vec<Record>, Refined) {
     let mut schedule = Schedule::new(plan);
     let mut records = vec![Record::default(); plan.cell_count()];
@@ -51,7 +48,7 @@ fn run_in(
         for id in arrive(&mut waiting) {
             let [i, j] = plan.indices(id);
             assert_eq!(records[id as usize].periods_run, 0, "cell {id} was asked for twice");
-            records[id as usize] = shown(picture(i, j));
+            records[id as usize] = record(i, j);
             assert!(schedule.is_waiting_for(id));
             schedule.take(id, &records);
         }
@@ -265,7 +262,7 @@ fn integrated_cells_do_not_depend_on_the_order_of_records() {
                 1 => waiting.split_off(waiting.len() - (waiting.len() / 3).max(1)),
                 _ => waiting.split_off(usize::from(waiting.len() > 1)),
             };
-            let (others, other) = run_in(&plan, arrive, picture);
+            let (others, other) = run_in(&plan, arrive, |i, j| shown(picture(i, j)));
             assert_eq!(refined, other, "{seed}");
             assert!(records == others, "{seed}");
         }
@@ -293,16 +290,7 @@ fn the_audit_reports_errors_of_filled_values() {
         }
     };
     let audit_of = |plan: &Plan| {
-        let mut schedule = Schedule::new(plan);
-        let mut records = vec![Record::default(); plan.cell_count()];
-        while !schedule.is_finished() {
-            for cell in schedule.next(plan, usize::MAX) {
-                let [i, j] = plan.indices(cell.id);
-                records[cell.id as usize] = record(number(i, j));
-                schedule.take(cell.id, &records);
-            }
-        }
-        let refined = schedule.finish(&mut records).unwrap();
+        let (_, refined) = run_in(plan, std::mem::take, |i, j| record(number(i, j)));
         let [audit] = refined.audits[..] else { panic!("{refined:?}") };
         audit
     };
