@@ -9,12 +9,14 @@ use std::{env, fs};
 use sha2::{Digest, Sha256};
 
 /// Files and folders that decide the bits of a record or the order in which a resumed run repeats its cells.
-const DECIDING: [&str; 20] = [
+const DECIDING: [&str; 23] = [
     "dynamics/src",
     "models/gear_pair.toml",
     "shaders",
     "src/gpu",
     "src/record",
+    "src/map/catalogue.rs",
+    "src/map/cycle.rs",
     "src/map/engine.rs",
     "src/map/engine",
     "src/map/plan.rs",
@@ -27,6 +29,7 @@ const DECIDING: [&str; 20] = [
     "src/map/schedule.rs",
     "src/map/schedule",
     "src/map/shard.rs",
+    "src/map/statistics.rs",
     "src/model_file",
     "src/text/expression.rs",
     "src/text/expression",

@@ -1,4 +1,4 @@
-//! Lanes on a graphics device as an engine.
+//! Lanes on a graphics device, as an engine.
 
 use std::collections::HashMap;
 use std::ops::Deref;
@@ -7,18 +7,19 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::EngineError;
+use super::{Device, EngineError};
 use crate::gpu::{self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Pool, Tables};
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::map::scene::Steps;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::{Contact, Oscillator};
 
-/// Least cells of a first batch: enough to keep a hardware device busy, or a software device for a second.
+/// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
+/// Smallest batch on a software device: about a second of work.
 const LEAST_IN_SOFTWARE: usize = 256;
 
-/// Most cells with a flow of their own that run at a time on a software device: some seconds of work.
+/// Largest number of cells with distinct flows per batch on a software device: some seconds of work.
 const FLOWS_IN_SOFTWARE: usize = 8_192;
 
 /// The engine of a plan's lanes on one device, in one precision.
@@ -26,19 +27,21 @@ pub struct Gpu<'p> {
     plan: PlanRef<'p>,
     device: gpu::Gpu,
     settings: LaneSettings,
-    /// All flows and laws; `None` if there are too many to be kept.
+    /// All flows and laws; none if they are too many to be stored.
     tables: Option<Tables>,
-    /// Free steps of all lanes so far.
+    /// Number of free steps so far.
     steps: u64,
+    /// Least and most free steps per forcing period, over all flows that lanes can carry.
     steps_per_period: Option<[u32; 2]>,
-    /// Cells under way, if there are tables.
+    /// Cells under way, if all tables are stored.
     pool: Option<Pool>,
-    /// Cells to run, if there are no tables; and the most that run at a time.
+    /// Cells under way, if tables are loaded for each batch.
     waiting: Vec<Cell>,
+    /// Largest number of cells of such a batch.
     most_waiting: usize,
 }
 
-/// A borrowed plan, or one with several owners.
+/// A borrowed or shared plan.
 enum PlanRef<'p> {
     Borrowed(&'p Plan),
     Shared(Arc<Plan>),
@@ -56,27 +59,27 @@ impl Deref for PlanRef<'_> {
 }
 
 impl Gpu<'static> {
-    /// Opens the engine for a plan that it shares, so that it can run in another thread.
+    /// Builds an engine that can move to another thread.
     ///
     /// # Errors
-    /// Those of [`Gpu::new`].
+    /// As for [`Gpu::new`].
     pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
         Gpu::open(PlanRef::Shared(plan), device).await
     }
 }
 
 impl<'p> Gpu<'p> {
-    /// Opens the engine for the cells of a plan on an open device.
+    /// Builds an engine for the cells of a plan on an open device.
     ///
     /// # Errors
-    /// [`EngineError`] if the device refuses the constants or the shaders.
+    /// [`EngineError`] if the device cannot store the constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         Gpu::open(PlanRef::Borrowed(plan), device).await
     }
 
     async fn open(plan: PlanRef<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        // Each oscillator is derived once: if the flows are kept, together with its constants.
-        let (constants, survey) = if plan.keeps_flows() {
+        // Each oscillator is derived once: if the flows are stored, together with its constants.
+        let (constants, survey) = if plan.stores_flows() {
             let derived = survey_flows(&plan, |oscillator, steps| Constants::new(oscillator, steps));
             let (constants, surveys): (Vec<_>, Vec<_>) = derived.unzip();
             (Some(constants), surveys.into_iter().fold(Survey::default(), Survey::and))
@@ -101,18 +104,18 @@ impl<'p> Gpu<'p> {
         if let Some(constants) = constants {
             let laws: Vec<u32> = (0..engine.plan.law_count() as u32).collect();
             engine.tables = match engine.load(constants, &laws).await {
-                // Batches that need fewer flows may fit.
+                // The tables of single batches may fit.
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
                 other => Some(other.map_err(|error| engine.error(error, engine.plan.cell_count()))?),
             };
         }
-        // Compiles the shaders before the first cells arrive.
+        // The shader is compiled now, so that the first batch does not wait for it.
         let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
-        engine.pool = engine.plan.keeps_flows().then_some(pool);
+        engine.pool = engine.plan.stores_flows().then_some(pool);
         Ok(engine)
     }
 
-    /// Returns the device, for another plan.
+    /// Returns the device for another plan.
     pub fn into_device(self) -> gpu::Gpu {
         self.device
     }
@@ -121,45 +124,8 @@ impl<'p> Gpu<'p> {
         self.device.id()
     }
 
-    pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
-        self.device.stop_on(halt);
-    }
-
-    pub(super) fn precision(&self) -> &'static str {
-        self.device.precision().name()
-    }
-
-    pub(super) fn device(&self) -> String {
-        gpu::describe(self.device.adapter())
-    }
-
-    pub(super) fn least_batch(&self) -> usize {
-        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
-    }
-
-    /// Returns the most bytes of device memory that the plan takes. Constants that are not kept count with their limit.
-    pub(super) fn device_bytes(&self) -> u64 {
-        let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
-        self.device.bytes_of_lanes(self.plan.run_count()) + constants
-    }
-
     fn is_hardware(&self) -> bool {
         gpu::is_hardware(self.device.adapter())
-    }
-
-    /// Returns the free steps of all lanes so far.
-    pub(super) fn steps(&self) -> u64 {
-        self.steps
-    }
-
-    /// Returns the least and the most free steps per forcing period, over all flows that lanes can carry.
-    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
-        self.steps_per_period
-    }
-
-    /// Returns the number of cells that may begin now.
-    pub(super) fn room(&self) -> usize {
-        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
     }
 
     pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
@@ -191,11 +157,11 @@ impl<'p> Gpu<'p> {
             _ => self.run_waiting().await,
         };
         let mut ended = ended.map_err(|error| self.error(error, self.waiting.len()))?;
-        ended.iter_mut().for_each(|(_, record)| keep(record, self.plan.needs()));
+        ended.iter_mut().for_each(|(_, record)| drop_unrequested(record, self.plan.needs()));
         Ok(ended)
     }
 
-    /// Runs the last of the waiting cells: as many as the memory of their flows allows.
+    /// Computes some of the waiting cells with tables of their own; fewer if they do not fit into the memory.
     async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
         while !self.waiting.is_empty() {
             let steps = self.settings.steps_per_period;
@@ -254,13 +220,51 @@ impl<'p> Gpu<'p> {
     }
 }
 
-/// Returns the free steps of lanes from their records and their steps per period.
+impl Device for Gpu<'_> {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.device.stop_on(halt);
+    }
+
+    fn precision(&self) -> &'static str {
+        self.device.precision().name()
+    }
+
+    fn device(&self) -> String {
+        gpu::describe(self.device.adapter())
+    }
+
+    fn least_batch(&self) -> usize {
+        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+    }
+
+    fn device_bytes(&self) -> Option<u64> {
+        let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
+        Some(self.device.bytes_of_lanes(self.plan.run_count()) + constants)
+    }
+
+    fn lane_steps(&self) -> Option<u64> {
+        Some(self.steps)
+    }
+
+    fn steps_per_period(&self) -> Option<[u32; 2]> {
+        self.steps_per_period
+    }
+
+    fn room(&self) -> usize {
+        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
+    }
+}
+
+/// Returns the number of free steps of lanes, given their records and steps per period.
 fn steps_of<'r>(lanes: impl Iterator<Item = (&'r Record, u32)>) -> u64 {
     lanes.map(|(record, steps)| u64::from(record.periods_run) * u64::from(steps)).sum()
 }
 
-/// Returns how many items with these sizes run at a time: at least one, at most `most`, and together no more than
-/// [`gpu::MOST_BYTES`].
+/// Returns how many tables of these sizes fit into [`gpu::MOST_BYTES`], between 1 and `most`.
 fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
     let total = bytes.take(most).scan(0, |total, bytes| {
         *total += bytes;
@@ -269,7 +273,7 @@ fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
     total.take_while(|&total| total <= gpu::MOST_BYTES).count().max(1)
 }
 
-/// Returns the flows and laws of these cells, from the last cell to the first, and their lanes with indices of these.
+/// Returns the flows and laws of some cells, and their lanes with indices into these lists.
 fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
     let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
     let lanes =
@@ -281,7 +285,7 @@ fn lane(cell: &Cell, flow: u32, law: u32) -> Lane {
     Lane { flow, law, start: cell.start }
 }
 
-/// Numbers in the order of their first occurrence.
+/// Numbers things in the order of their first occurrence.
 #[derive(Default)]
 struct Numbering {
     list: Vec<u32>,
@@ -375,19 +379,21 @@ fn survey_flows<T: Send>(
 }
 
 /// Clears the fields of a record that the scene did not request.
-pub(crate) fn keep(record: &mut Record, needs: &Needs) {
-    let mut drop = |requested: bool, bits: u32, clear: fn(&mut Record)| {
-        if !requested {
+pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
+    let mut clear_unless = |is_requested: bool, bits: u32, clear: fn(&mut Record)| {
+        if !is_requested {
             record.valid &= !bits;
             clear(record);
         }
     };
-    drop(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
-    drop(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
-    drop(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
-    drop(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
-    drop(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
-    drop(needs.pattern, valid::PATTERN, |r| (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0));
+    clear_unless(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
+    clear_unless(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
+    clear_unless(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
+    clear_unless(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
+    clear_unless(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
+    clear_unless(needs.pattern, valid::PATTERN, |r| {
+        (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
+    });
 }
 
 #[cfg(test)]
@@ -404,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_that_were_not_requested_are_cleared() {
+    fn quantities_that_are_not_requested_are_cleared() {
         let mut record = Record {
             lyapunov: 1.0,
             lyapunov_error: 1.0,
@@ -421,9 +427,9 @@ mod tests {
             ..Record::default()
         };
         let whole = record;
-        keep(&mut record, &Needs::EVERYTHING);
+        drop_unrequested(&mut record, &Needs::EVERYTHING);
         assert_eq!(record, whole);
-        keep(
+        drop_unrequested(
             &mut record,
             &Needs {
                 exponent: false,

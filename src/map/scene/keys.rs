@@ -1,8 +1,6 @@
 //! Table of every key of a scene. The parser takes its names from here, and `docs/scenes.md` lists it.
 
-use super::axis::MAX_COUNT;
-use super::settings::{LONGEST_TITLE, MAX_PERIODS};
-use super::start::MAX_STARTS;
+use super::limits::{LONGEST_TITLE, MAX_COUNT, MAX_PERIODS, MAX_STARTS};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 
 /// A key of a scene.
