@@ -35,7 +35,7 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     let count = |id: usize| {
         let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
-        let mut found = CellAttractors::new(plan.law(cell.law));
+        let mut found = CellAttractors { law: plan.law(cell.law), chaos: false, cycles: Vec::new() };
         flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
         found.count()
     };
@@ -50,10 +50,6 @@ struct CellAttractors {
 }
 
 impl CellAttractors {
-    fn new(law: Law) -> CellAttractors {
-        CellAttractors { law, chaos: false, cycles: Vec::new() }
-    }
-
     fn count(&self) -> u8 {
         (self.cycles.len() + usize::from(self.chaos)) as u8
     }

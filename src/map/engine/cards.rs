@@ -58,6 +58,7 @@ pub struct Cards {
 /// Callback for losses of cards.
 type Listener = Box<dyn Fn(&Loss) + Send>;
 
+#[derive(Default)]
 struct Shared {
     state: Mutex<PoolState>,
     /// Signals that there are cells to take, or that no more will come.
@@ -68,6 +69,7 @@ struct Shared {
     stop: Arc<AtomicBool>,
 }
 
+#[derive(Default)]
 struct PoolState {
     queue: VecDeque<Cell>,
     ended: Vec<(u32, Record)>,
@@ -91,6 +93,23 @@ struct Card {
     lost: Option<EngineError>,
 }
 
+impl Card {
+    fn new(adapter: AdapterId, most: usize, least: usize) -> Card {
+        let under_way = HashMap::new();
+        Card {
+            adapter,
+            under_way,
+            most,
+            least,
+            rate: None,
+            cells: 0,
+            steps: None,
+            is_at_work: false,
+            lost: None,
+        }
+    }
+}
+
 impl Cards {
     /// Combines engines of one plan, each on a card of its own.
     ///
@@ -98,30 +117,12 @@ impl Cards {
     /// Without engines.
     pub fn new(engines: Vec<(AdapterId, Engine<'static>)>) -> Cards {
         let (_, first) = engines.first().expect("one card at least");
-        let cards = engines.iter().map(|(adapter, engine)| Card {
-            adapter: adapter.clone(),
-            under_way: HashMap::new(),
-            most: engine.room(),
-            least: engine.least_batch(),
-            rate: None,
-            cells: 0,
+        let card = |(adapter, engine): &(AdapterId, Engine<'static>)| Card {
             steps: engine.lane_steps(),
-            is_at_work: false,
-            lost: None,
-        });
-        let state = PoolState {
-            queue: VecDeque::new(),
-            ended: Vec::new(),
-            cards: cards.collect(),
-            losses: Vec::new(),
-            is_closed: false,
+            ..Card::new(adapter.clone(), engine.room(), engine.least_batch())
         };
-        let shared = Arc::new(Shared {
-            state: Mutex::new(state),
-            work: Condvar::new(),
-            news: Condvar::new(),
-            stop: Arc::default(),
-        });
+        let state = PoolState { cards: engines.iter().map(card).collect(), ..PoolState::default() };
+        let shared = Arc::new(Shared { state: Mutex::new(state), ..Shared::default() });
         let (name, precision, device) = (first.name(), first.precision(), first.device());
         let steps_per_period = first.steps_per_period();
         let bytes = engines.iter().map(|(_, engine)| engine.device_bytes());
@@ -609,26 +610,10 @@ mod tests {
 
     #[test]
     fn shares_follow_rates_and_leave_a_quarter_in_the_queue() {
-        let card = |least, rate| Card {
-            adapter: adapter(0),
-            under_way: HashMap::new(),
-            most: 1000,
-            least,
-            rate,
-            cells: 0,
-            steps: None,
-            is_at_work: false,
-            lost: None,
-        };
+        let card = |least, rate| Card { rate, ..Card::new(adapter(0), 1000, least) };
         let shares = |cards: Vec<Card>, queued: u32| {
             let count = cards.len();
-            let state = PoolState {
-                queue: cells(queued).into(),
-                ended: Vec::new(),
-                cards,
-                losses: Vec::new(),
-                is_closed: false,
-            };
+            let state = PoolState { queue: cells(queued).into(), cards, ..PoolState::default() };
             (0..count).map(|nth| state.share(nth)).collect::<Vec<_>>()
         };
         // More cells than needed: a quarter waits.

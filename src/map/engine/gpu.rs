@@ -1,7 +1,7 @@
 //! Lanes on a graphics device, as an engine.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
-use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -24,7 +24,7 @@ const FLOWS_IN_SOFTWARE: usize = 8_192;
 
 /// Lanes on one device, in one precision.
 pub struct Gpu<'p> {
-    plan: PlanRef<'p>,
+    plan: Cow<'p, Plan>,
     device: gpu::Gpu,
     settings: LaneSettings,
     /// All flows and laws; none if they are too many to be stored.
@@ -39,30 +39,13 @@ pub struct Gpu<'p> {
     most_waiting: usize,
 }
 
-/// A borrowed or shared plan.
-enum PlanRef<'p> {
-    Borrowed(&'p Plan),
-    Shared(Arc<Plan>),
-}
-
-impl Deref for PlanRef<'_> {
-    type Target = Plan;
-
-    fn deref(&self) -> &Plan {
-        match self {
-            PlanRef::Borrowed(plan) => plan,
-            PlanRef::Shared(plan) => plan,
-        }
-    }
-}
-
 impl Gpu<'static> {
     /// Builds an engine that can move to another thread.
     ///
     /// # Errors
     /// As for [`Gpu::new`].
     pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
-        Gpu::open(PlanRef::Shared(plan), device).await
+        Gpu::open(Cow::Owned(Arc::unwrap_or_clone(plan)), device).await
     }
 }
 
@@ -72,10 +55,10 @@ impl<'p> Gpu<'p> {
     /// # Errors
     /// [`EngineError`] if the device cannot store the constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        Gpu::open(PlanRef::Borrowed(plan), device).await
+        Gpu::open(Cow::Borrowed(plan), device).await
     }
 
-    async fn open(plan: PlanRef<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+    async fn open(plan: Cow<'p, Plan>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
         let settings = lane_settings(&plan);
         let mut engine = Gpu {
             plan,
