@@ -130,10 +130,12 @@ mod tests {
         assert!(through(state).passes(&flow, &state, 1));
         for i in 0..4 {
             for value in [f64::NAN, f64::INFINITY] {
-                let mut lost = state;
-                lost[i] = value;
-                assert!(!through(state).passes(&flow, &lost, 1) && !through(lost).passes(&flow, &state, 1));
-                assert!(!through(lost).passes(&flow, &lost, 1), "{i}: {value}");
+                let mut broken = state;
+                broken[i] = value;
+                assert!(
+                    !through(state).passes(&flow, &broken, 1) && !through(broken).passes(&flow, &state, 1)
+                );
+                assert!(!through(broken).passes(&flow, &broken, 1), "{i}: {value}");
             }
         }
     }

@@ -268,7 +268,7 @@ impl Plan {
         let nth = id as usize / self.cell_count();
         match nth {
             0 => self.points.start(id as usize, self.starts.first()),
-            _ => self.starts.drawn(nth, &self.oscillator(self.flow_of(id))),
+            _ => self.starts.random(nth, &self.oscillator(self.flow_of(id))),
         }
     }
 
@@ -278,9 +278,9 @@ impl Plan {
     }
 
     /// Whether records can be results of this plan. Periods longer than the longest search show damaged records.
-    pub fn admits(&self, kept: &[(u32, Record)]) -> bool {
+    pub fn admits(&self, batch: &[(u32, Record)]) -> bool {
         let longest = self.budget.settings.max_period.max(1);
-        kept.iter().all(|(_, record)| record.period <= longest)
+        batch.iter().all(|(_, record)| record.period <= longest)
     }
 
     /// Returns the smallest resolution of the lanes' time grid.

@@ -30,7 +30,7 @@ pub(crate) fn backlash(omega: f64) -> Walled {
     Walled { free, walls: [tooth(1.0), tooth(-1.0)] }
 }
 
-/// zeta, F_m, F_a.
+/// Parameters zeta, F_m, F_a of the backlash model.
 pub(crate) const BACKLASH: (f64, f64, f64) = (0.05, 0.1, 0.05);
 
 fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) {

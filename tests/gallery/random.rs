@@ -120,11 +120,11 @@ pub(crate) fn random_cell(seed: u64) -> RandomCell {
     };
     let names = if degrees == 1 { "[\"x\"]" } else { "[\"x1\", \"x2\"]" };
     let text = format!(
-        "name = \"drawn\"\ntitle = \"RandomCell\"\n[parameters]\nomega = {{ default = {omega:?}, min = 0.0, open = true }}\n\
+        "name = \"random\"\ntitle = \"Random\"\n[parameters]\nomega = {{ default = {omega:?}, min = 0.0, open = true }}\n\
          [motion]\ncoordinates = {names}\nmass = {mass}\ndamping = {damping}\nstiffness = {stiffness}\nforce = {force}\n\
          load = {load}\nfrequency = \"omega\"\ngap = {gap}\n{walls}"
     );
-    let model = FileModel::parse(&text, "drawn.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let model = FileModel::parse(&text, "random.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let mut start = [0.0; 4];
     if random.unit() < 0.5 {
         (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));

@@ -1,4 +1,4 @@
-//! Many motions: plans, schedules, engines, starts.
+//! Tests of maps: plans, schedules, engines, starts, basins.
 
 use std::sync::Arc;
 

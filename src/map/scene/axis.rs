@@ -171,11 +171,11 @@ fn geometric(min: f64, max: f64, count: usize) -> Arc<[f64]> {
     (0..count).map(value).collect()
 }
 
-/// Reads the `[[axis]]` tables. `command`, which messages name, needs `wanted` of them.
+/// Reads the `[[axis]]` tables. `command`, which messages name, needs `required` of them.
 pub(super) fn read(
     root: &Section<'_>,
     model: &dyn Model,
-    wanted: usize,
+    required: usize,
     command: &str,
 ) -> Result<Vec<Axis>, SceneError> {
     let list = root.require("axis", EXAMPLE)?;
@@ -184,12 +184,11 @@ pub(super) fn read(
     for table in &tables {
         axes.push(read_one(table, model, &axes)?);
     }
-    if axes.len() != wanted {
-        let excess = tables.get(wanted).unwrap_or(&list);
-        let plural = if wanted == 1 { "axis" } else { "axes" };
-        return Err(Field { path: "axis".into(), node: &count_node(excess.node, axes.len()) }.conflict(
-            format!("`{command}` needs {wanted} {plural}; add or remove [[axis]] tables to have as many"),
-        ));
+    if axes.len() != required {
+        let excess = tables.get(required).unwrap_or(&list);
+        let plural = if required == 1 { "axis" } else { "axes" };
+        return Err(Field { path: "axis".into(), node: &count_node(excess.node, axes.len()) }
+            .conflict(format!("`{command}` needs {required} {plural}; add or remove [[axis]] tables")));
     }
     Ok(axes)
 }
@@ -281,10 +280,10 @@ fn listed_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneEr
 }
 
 fn read_values(field: &Field<'_>, parameter: Parameter, target: Target) -> Result<Axis, SceneError> {
-    let wanted = format!("a list of 2 to {MAX_COUNT} numbers, each greater than the one before it");
-    let items = field.list(&wanted)?;
+    let requirement = format!("a list of 2 to {MAX_COUNT} numbers, each greater than the one before it");
+    let items = field.list(&requirement)?;
     if !(2..=MAX_COUNT as usize).contains(&items.len()) {
-        return Err(field.out_of_range(&wanted));
+        return Err(field.out_of_range(&requirement));
     }
     let mut table: Vec<f64> = Vec::with_capacity(items.len());
     for item in &items {

@@ -179,7 +179,7 @@ const FORMATS: [(&str, Format); 6] = [
 ];
 
 impl Quantity {
-    /// The name in scenes.
+    /// Returns the name in scenes.
     pub fn name(self) -> &'static str {
         name(&QUANTITIES, self)
     }
