@@ -68,13 +68,13 @@ impl<'a> Section<'a> {
         &self.path
     }
 
-    /// Returns the fields fields in the order of their names.
+    /// Returns the given fields in the order of their names.
     pub(crate) fn fields(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> {
         let fields = self.table.into_iter().flatten();
         fields.map(|(name, node)| (name.as_str(), Field { path: self.path_of(name), node }))
     }
 
-    /// Returns the fields fields in the order of the text.
+    /// Returns the given fields in the order of the text.
     pub(crate) fn fields_as_written(&self) -> Vec<(&'a str, Field<'a>)> {
         let mut fields: Vec<_> = self.fields().collect();
         fields.sort_by_key(|(_, field)| field.node.name_place.line_and_column());
@@ -86,13 +86,13 @@ impl<'a> Section<'a> {
         self.table.is_some()
     }
 
-    /// Returns the field `name`, if it is fields.
+    /// Returns the field `name`, if it is given.
     pub(crate) fn get(&self, name: &str) -> Option<Field<'a>> {
         let node = self.table?.get(name)?;
         Some(Field { path: self.path_of(name), node })
     }
 
-    /// Returns the field `name`, which must be fields. `remedy` says what to write.
+    /// Returns the field `name`, which must be given. `remedy` says what to write.
     pub(crate) fn require(&self, name: &str, remedy: &str) -> Result<Field<'a>, SceneError> {
         self.get(name).ok_or_else(|| self.missing(name, remedy))
     }

@@ -118,7 +118,7 @@ mod tests {
         }
         assert!(ranges.iter().all(|[low, high]| *low < -0.95 && *high > 0.95), "{ranges:?}");
         let other = Starts::new(Start::Rest, Some(Draw { count: 200, seed: 8 }));
-        assert_ne!(starts.random(1, &small), other.drawn(1, &small));
+        assert_ne!(starts.random(1, &small), other.random(1, &small));
     }
 
     #[test]
