@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::map::printable::line;
 use rattlemap::map::scene::Place;
 use rattlemap::model_file::{BUILT_IN, FileModel};
+use rattlemap::text::printable::line;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Model};
 

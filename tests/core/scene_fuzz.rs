@@ -3,8 +3,8 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::map::printable::line;
 use rattlemap::map::scene::{Axis, Fault, FileText, Place, Problem, Purpose, Scene, SceneError, Steps};
+use rattlemap::text::printable::line;
 use rattlemap_dynamics::model::{GearPair, Parameter};
 
 const SCENES: [&str; 5] = [
