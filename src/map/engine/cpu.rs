@@ -12,7 +12,7 @@ use super::flows::Flows;
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::orbit::{Measured, measure_until};
+use rattlemap_dynamics::orbit::{Measurement, measure_until};
 
 /// Time after which a batch begins no more cells and returns those that have ended.
 const BATCH_TIME: Duration = Duration::from_secs(2);
@@ -81,7 +81,7 @@ impl Device for Cpu<'_> {
 }
 
 /// Converts a measurement to a record with the requested quantities.
-pub fn record(measured: &Measured, needs: &Needs) -> Record {
+pub fn record(measured: &Measurement, needs: &Needs) -> Record {
     let mut record = Record {
         strobe: measured.strobe,
         periods_run: measured.periods_run,

@@ -8,11 +8,11 @@ use std::sync::atomic::AtomicBool;
 use rayon::prelude::*;
 
 use super::{Device, EngineError};
-use crate::gpu::{self, AdapterId, Constants, Ended, GpuError, Lane, LaneSettings, Pool, Tables};
+use crate::gpu::{self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Pool, Tables};
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::map::scene::Steps;
 use crate::record::{Record, valid};
-use rattlemap_dynamics::model::Contact;
+use rattlemap_dynamics::model::{Contact, Oscillator};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
@@ -22,7 +22,7 @@ const LEAST_IN_SOFTWARE: usize = 256;
 /// Largest number of cells with distinct flows per batch on a software device: some seconds of work.
 const FLOWS_IN_SOFTWARE: usize = 8_192;
 
-/// Lanes on one device, in one precision.
+/// The engine of a plan's lanes on one device, in one precision.
 pub struct Gpu<'p> {
     plan: Cow<'p, Plan>,
     device: gpu::Gpu,
@@ -31,6 +31,8 @@ pub struct Gpu<'p> {
     tables: Option<Tables>,
     /// Number of free steps so far.
     steps: u64,
+    /// Least and most free steps per forcing period, over all flows that lanes can carry.
+    steps_per_period: Option<[u32; 2]>,
     /// Cells under way, if all tables are stored.
     pool: Option<Pool>,
     /// Cells under way, if tables are loaded for each batch.
@@ -59,13 +61,22 @@ impl<'p> Gpu<'p> {
     }
 
     async fn open(plan: Cow<'p, Plan>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        let settings = lane_settings(&plan);
+        // Each oscillator is derived once: if the flows are stored, together with its constants.
+        let (constants, survey) = if plan.stores_flows() {
+            let derived = survey_flows(&plan, |oscillator, steps| Constants::new(oscillator, steps));
+            let (constants, surveys): (Vec<_>, Vec<_>) = derived.unzip();
+            (Some(constants), surveys.into_iter().fold(Survey::default(), Survey::and))
+        } else {
+            (None, survey(&plan))
+        };
+        let settings = settings_after(&plan, &survey);
         let mut engine = Gpu {
             plan,
             device,
             settings,
             tables: None,
             steps: 0,
+            steps_per_period: survey.steps,
             pool: None,
             waiting: Vec::new(),
             most_waiting: gpu::MOST_FLOWS,
@@ -73,14 +84,12 @@ impl<'p> Gpu<'p> {
         if !engine.is_hardware() {
             engine.most_waiting = FLOWS_IN_SOFTWARE;
         }
-        let plan = &engine.plan;
-        if plan.stores_flows() {
-            let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
-            let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
-            engine.tables = match engine.load(&flows, &laws).await {
+        if let Some(constants) = constants {
+            let laws: Vec<u32> = (0..engine.plan.law_count() as u32).collect();
+            engine.tables = match engine.load(constants, &laws).await {
                 // The tables of single batches may fit.
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
-                other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
+                other => Some(other.map_err(|error| engine.error(error, engine.plan.cell_count()))?),
             };
         }
         // The shader is compiled now, so that the first batch does not wait for it.
@@ -109,18 +118,18 @@ impl<'p> Gpu<'p> {
         };
         let count = pool.under_way() + cells.len();
         let lanes: Vec<_> = cells.iter().map(|cell| (cell.id, lane(cell, cell.flow, cell.law))).collect();
-        self.device.begin(pool, tables, &lanes).await.map_err(|error| self.error(error, count))
+        pool.begin(&self.device, tables, &lanes).await.map_err(|error| self.error(error, count))
     }
 
     pub(super) async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         let ended = match (&self.tables, &mut self.pool) {
-            (Some(tables), Some(pool)) => match self.device.advance(pool, tables, until).await {
+            (Some(tables), Some(pool)) => match pool.advance(&self.device, tables, until).await {
                 Ok(ended) => {
                     let constants = tables.constants();
-                    let read = |ended: &Ended| (ended.number(), ended.record(constants));
-                    let records: Vec<_> = ended.par_iter().map(read).collect();
-                    let steps = |id: u32| tables.steps_per_period(self.plan.cell(id).flow);
-                    self.steps += steps_of(records.iter().map(|(id, record)| (record, steps(*id))));
+                    let record = |ended: &LaneResult| (ended.number(), ended.record(constants));
+                    let records: Vec<_> = ended.par_iter().map(record).collect();
+                    let steps = ended.iter().map(|ended| tables.steps_per_period(ended.flow()));
+                    self.steps += steps_of(records.iter().map(|(_, record)| record).zip(steps));
                     Ok(records)
                 }
                 Err(error) => {
@@ -138,40 +147,48 @@ impl<'p> Gpu<'p> {
     /// Computes some of the waiting cells with tables of their own; fewer if they do not fit into the memory.
     async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
         while !self.waiting.is_empty() {
-            let bytes = |cell: &Cell| {
-                gpu::table_bytes(&self.plan.oscillator(cell.flow), self.settings.steps_per_period)
-            };
-            let left = self.waiting.len() - fitting(self.waiting.iter().rev().map(bytes), self.most_waiting);
-            let cells = self.waiting[left..].to_vec();
-            match self.run_cells(&cells).await {
-                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if cells.len() > 1 => {
-                    self.most_waiting = cells.len() / 2;
+            let steps = self.settings.steps_per_period;
+            let candidates = &self.waiting[self.waiting.len().saturating_sub(self.most_waiting)..];
+            let (flows, laws, lanes) = renumbered(candidates);
+            let plan: &Plan = &self.plan;
+            let oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
+            let bytes = |lane: &Lane| gpu::table_bytes(&oscillators[lane.flow as usize], steps);
+            let count = fitting(lanes.iter().map(bytes), self.most_waiting);
+            match self.run_cells(&oscillators, &laws, &lanes[..count]).await {
+                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if count > 1 => {
+                    self.most_waiting = count / 2;
                 }
                 Err(GpuError::Halted) => return Ok(Vec::new()),
                 Err(error) => return Err(error),
                 Ok(records) => {
-                    self.waiting.truncate(left);
-                    return Ok(cells.iter().map(|cell| cell.id).zip(records).collect());
+                    let cells = self.waiting.split_off(self.waiting.len() - count);
+                    return Ok(cells.iter().map(|cell| cell.id).zip(records.into_iter().rev()).collect());
                 }
             }
         }
         Ok(Vec::new())
     }
 
-    async fn run_cells(&mut self, cells: &[Cell]) -> Result<Vec<Record>, GpuError> {
-        let (flows, laws, lanes) = renumbered(cells);
-        let tables = self.load(&flows, &laws).await?;
-        let records = self.device.run_on(&tables, &lanes, &self.settings).await?;
+    /// Runs lanes on the flows that they use: the first of `oscillators`.
+    async fn run_cells(
+        &mut self,
+        oscillators: &[Oscillator],
+        laws: &[u32],
+        lanes: &[Lane],
+    ) -> Result<Vec<Record>, GpuError> {
+        let steps = self.settings.steps_per_period;
+        let flows = lanes.iter().map(|lane| lane.flow as usize + 1).max().unwrap_or(0);
+        let constants = oscillators[..flows].par_iter().map(|flow| Constants::new(flow, steps)).collect();
+        let tables = self.load(constants, laws).await?;
+        let records = self.device.run_on(&tables, lanes, &self.settings).await?;
         let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
         self.steps += steps_of(records.iter().zip(steps));
         Ok(records)
     }
 
-    async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
-        let (plan, steps): (&Plan, _) = (&self.plan, self.settings.steps_per_period);
-        let derive = |&flow: &u32| Constants::new(&plan.oscillator(flow), steps);
-        let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
-        self.device.load_derived(flows.par_iter().map(derive).collect(), &laws).await
+    async fn load(&self, constants: Vec<Option<Constants>>, laws: &[u32]) -> Result<Tables, GpuError> {
+        let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
+        self.device.load_constants(constants, &laws).await
     }
 
     fn error(&self, error: GpuError, cells: usize) -> EngineError {
@@ -192,7 +209,7 @@ impl Device for Gpu<'_> {
     }
 
     fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
-        self.device.heed(halt);
+        self.device.stop_on(halt);
     }
 
     fn precision(&self) -> &'static str {
@@ -217,10 +234,7 @@ impl Device for Gpu<'_> {
     }
 
     fn steps_per_period(&self) -> Option<[u32; 2]> {
-        let (plan, requested) = (&*self.plan, self.settings.steps_per_period);
-        let steps = |flow| Constants::steps(&plan.oscillator(flow), requested);
-        let all = (0..plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
-        all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])
+        self.steps_per_period
     }
 
     fn room(&self) -> usize {
@@ -245,7 +259,8 @@ fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
 /// Returns the flows and laws of some cells, and their lanes with indices into these lists.
 fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
     let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
-    let lanes = cells.iter().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
+    let lanes =
+        cells.iter().rev().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
     (flows.list, laws.list, lanes)
 }
 
@@ -261,9 +276,9 @@ struct Numbering {
 }
 
 impl Numbering {
-    fn place(&mut self, thing: u32) -> u32 {
-        *self.places.entry(thing).or_insert_with(|| {
-            self.list.push(thing);
+    fn place(&mut self, number: u32) -> u32 {
+        *self.places.entry(number).or_insert_with(|| {
+            self.list.push(number);
             self.list.len() as u32 - 1
         })
     }
@@ -271,40 +286,79 @@ impl Numbering {
 
 /// Returns the settings of a plan's lanes.
 pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
+    settings_after(plan, &survey(plan))
+}
+
+fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
     let budget = plan.budget();
     let default = LaneSettings::within(budget);
-    let [chatter, kinds] = branches(plan);
     LaneSettings {
         word: plan.needs().word,
         pattern: plan.needs().pattern,
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
-        chatter,
-        kinds,
+        chatter: survey.chatter,
+        kinds: survey.kinds,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
-        steps_per_period: match plan.steps_per_period() {
-            Steps::Auto => None,
-            Steps::PerPeriod(steps) => Some(steps),
-        },
+        steps_per_period: requested_steps(plan),
         ..default
     }
 }
 
-/// Whether any cell may need short flights for chatter, and whether any cell has an elastic or rigid wall.
-fn branches(plan: &Plan) -> [bool; 2] {
+fn requested_steps(plan: &Plan) -> Option<u32> {
+    match plan.steps_per_period() {
+        Steps::Auto => None,
+        Steps::PerPeriod(steps) => Some(steps),
+    }
+}
+
+/// Properties of flows that decide which shaders a plan needs.
+#[derive(Clone, Copy, Default)]
+struct Survey {
+    /// Whether any cell may follow chatter by short flights.
+    chatter: bool,
+    /// Whether any wall is elastic or rigid.
+    kinds: bool,
+    /// Least and most free steps per forcing period, of flows that lanes can carry.
+    steps: Option<[u32; 2]>,
+}
+
+impl Survey {
+    /// Returns the properties of both.
+    fn and(self, other: Survey) -> Survey {
+        let steps = self.steps.into_iter().chain(other.steps);
+        Survey {
+            chatter: self.chatter || other.chatter,
+            kinds: self.kinds || other.kinds,
+            steps: steps.reduce(|[least, most], [low, high]| [least.min(low), most.max(high)]),
+        }
+    }
+}
+
+fn survey(plan: &Plan) -> Survey {
+    survey_flows(plan, |_, _| ()).map(|((), survey)| survey).reduce(Survey::default, Survey::and)
+}
+
+/// Derives each oscillator of a plan, and returns the result of `of` with its survey. `of` also gets the requested
+/// free steps per forcing period.
+fn survey_flows<T: Send>(
+    plan: &Plan,
+    of: impl Fn(&Oscillator, Option<u32>) -> T + Sync + Send,
+) -> impl IndexedParallelIterator<Item = (T, Survey)> {
     let laws = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed);
     let least =
         laws.fold([f64::INFINITY; 2], |least, speeds| [0, 1].map(|side| speeds[side].min(least[side])));
-    let of = |flow| {
+    let steps = requested_steps(plan);
+    (0..plan.flow_count() as u32).into_par_iter().map(move |flow| {
         let oscillator = plan.oscillator(flow);
-        let follows = (0..2).any(|side| {
+        let chatter = (0..2).any(|side| {
             let bounces = oscillator.walls[side].is_finite() && oscillator.contacts[side] != Contact::Elastic;
             bounces && gpu::follows_chatter(&oscillator, least[side])
         });
-        [follows, gpu::has_elastic_or_rigid_wall(&oscillator)]
-    };
-    let flows = (0..plan.flow_count() as u32).into_par_iter().map(of);
-    flows.reduce(|| [false; 2], |a, b| [a[0] || b[0], a[1] || b[1]])
+        let kinds = gpu::has_elastic_or_rigid_wall(&oscillator);
+        let survey = Survey { chatter, kinds, steps: Constants::steps(&oscillator, steps).map(|n| [n; 2]) };
+        (of(&oscillator, steps), survey)
+    })
 }
 
 /// Clears the fields of a record that the scene did not request.
