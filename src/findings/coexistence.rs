@@ -1,14 +1,14 @@
 //! Coexistence: the number of attractors that the starts of a cell reach.
 //!
 //! Two periodic runs have one attractor if the last strobe state of one is on the cycle of the other, within a relative
-//! distance of [`CYCLE_TOLERANCE`](crate::map::cycle::CYCLE_TOLERANCE), and if one period divides the other. Near a period
-//! doubling, rounding can turn a period into a multiple. Newton's method finds the cycle that an unsettled run approaches.
-//! Symmetry-conjugate orbits count as one attractor, because they always coexist after a symmetric cycle has split.
-//! Contact-free motion is one attractor, even if a run has not reached it yet. All chaotic runs share one attractor, because
-//! records do not distinguish chaotic attractors. Undecided and failed runs are ignored.
+//! distance of [`CYCLE_TOLERANCE`](crate::map::cycle::CYCLE_TOLERANCE), and if one period divides the other. Near a
+//! period doubling, rounding can turn a period into a multiple. Newton's method finds the cycle that an unsettled run
+//! approaches. Symmetry-conjugate orbits count as one attractor, because they always coexist after a symmetric cycle
+//! has split. Contact-free motion is one attractor, even if a run has not reached it yet. All chaotic runs share one
+//! attractor, because records do not distinguish chaotic attractors. Undecided and failed runs are ignored.
 //!
-//! The number is a lower bound, with one exception: a chaotic transient longer than the budget counts as chaos, in addition
-//! to the cycle that it reaches later.
+//! The number is a lower bound, with one exception: a chaotic transient longer than the budget counts as chaos, in
+//! addition to the cycle that it reaches later.
 
 use rayon::prelude::*;
 

@@ -1,7 +1,8 @@
 //! Engines compute the cells of a plan.
 //!
 //! An [`Engine`] accepts cells at any time and returns one record for each, in any order. A record depends on its cell,
-//! its start and the plan only. It does not depend on other cells under way, on neighbours, or on the number of threads.
+//! its start and the plan only. It does not depend on other cells under way, on neighbours, or on the number of
+//! threads.
 
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 mod cards;
@@ -232,7 +233,8 @@ impl Engine<'_> {
         self.properties().room()
     }
 
-    /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have ended.
+    /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have
+    /// ended.
     pub fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
         let engine: &mut dyn Device = match self {
             Engine::Cpu(cpu) => cpu,

@@ -1,5 +1,5 @@
-//! Random models: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written as a model
-//! file and read.
+//! Random models: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written as
+//! a model file and read.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -47,7 +47,8 @@ fn even(random: &mut Random, reach: f64) -> f64 {
     reach * (2.0 * random.unit() - 1.0)
 }
 
-/// Returns a symmetric matrix with the given diagonal, definite if the diagonal is positive, and coupled with probability 1/2.
+/// Returns a symmetric matrix with the given diagonal, definite if the diagonal is positive, and coupled with
+/// probability 1/2.
 fn matrix(random: &mut Random, degrees: usize, diagonal: [f64; 2]) -> String {
     let [a, b] = diagonal;
     let coupling = even(random, 0.9);

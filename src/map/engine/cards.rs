@@ -1,10 +1,10 @@
 //! Several equal cards as one engine: one thread per card, one queue for all.
 //!
-//! A card takes cells when it has room. Its share of all cells that are queued or under way is proportional to the rate at
-//! which it has computed so far, so that all cards are busy for about the same time. While there are more cells than the
-//! cards need to be busy, a quarter of them stays in the queue for the card that ends first. The last cells are all under
-//! way at once. So a slow card gets few of them, and no card idles while another has a queue. The cells of a lost card go
-//! to the others.
+//! A card takes cells when it has room. Its share of all cells that are queued or under way is proportional to the rate
+//! at which it has computed so far, so that all cards are busy for about the same time. While there are more cells than
+//! the cards need to be busy, a quarter of them stays in the queue for the card that ends first. The last cells are all
+//! under way at once. So a slow card gets few of them, and no card idles while another has a queue. The cells of a lost
+//! card go to the others.
 //!
 //! A record does not depend on which card computed it.
 
@@ -22,8 +22,8 @@ use crate::record::Record;
 /// Longest time that records wait for further records while cells are queued.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
-/// Longest time that records wait for those of other cards without a queue. It is short, because the next cells may depend
-/// on these records. [`GRACE_SHARE`] of the time until the first record is added.
+/// Longest time that records wait for those of other cards without a queue. It is short, because the next cells may
+/// depend on these records. [`GRACE_SHARE`] of the time until the first record is added.
 const GRACE: Duration = Duration::from_millis(2);
 /// Part of the time until the first record that is added to [`GRACE`].
 const GRACE_SHARE: f64 = 0.25;
@@ -277,8 +277,8 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts the next cells of a card into `cells`; none if it continues with cells under way. Waits if there are neither.
-    /// Returns false if no more cells will come.
+    /// Puts the next cells of a card into `cells`; none if it continues with cells under way. Waits if there are
+    /// neither. Returns false if no more cells will come.
     fn next(&self, nth: usize, cells: &mut Vec<Cell>) -> bool {
         let mut state = self.lock();
         loop {
@@ -459,7 +459,8 @@ mod tests {
         rule(cell)
     }
 
-    /// Runs cells as a sweep does, at most `at_a_time` under way. Returns the cells that ended, and the error if there was one.
+    /// Runs cells as a sweep does, at most `at_a_time` under way. Returns the cells that ended, and the error if there
+    /// was one.
     fn run(cards: &mut Cards, cells: &[Cell], at_a_time: usize) -> (Vec<u32>, Option<EngineError>) {
         let (mut left, mut under_way, mut ended_ids) = (cells, 0, Vec::new());
         while under_way > 0 || !left.is_empty() {

@@ -39,7 +39,8 @@ impl<'p> Cpu<'p> {
     pub(super) fn advance(&mut self) -> Vec<(u32, Record)> {
         let cells = std::mem::take(&mut self.under_way);
         let clock = Instant::now();
-        // Costs of cells differ by a factor of 1000, so each task has one cell. If many are slow, some wait for the next call.
+        // Costs of cells differ by a factor of 1000, so each task has one cell. If many are slow, some wait for the
+        // next call.
         let ended: Vec<Option<(u32, Record)>> = cells
             .par_iter()
             .with_max_len(1)

@@ -6,15 +6,16 @@ use crate::record::classify::status;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::{Oscillator, REST, State};
 
-/// Range of random starts: displacements are within this many scales of length of the middle, velocities within this many
-/// times the corresponding velocity. The attractors of the paper's plane are inside.
+/// Range of random starts: displacements are within this many scales of length of the middle, velocities within this
+/// many times the corresponding velocity. The attractors of the paper's plane are inside.
 const START_RANGE: f64 = 4.0;
 
 /// The starts of every cell, in units that depend on the cell.
 #[derive(Clone, Debug)]
 pub(super) struct Starts {
     policy: Start,
-    /// Random starts after the first. All cells have the same ones, so that neighbouring cells differ only in their parameters.
+    /// Random starts after the first. All cells have the same ones, so that neighbouring cells differ only in their
+    /// parameters.
     draws: Vec<[f64; 4]>,
 }
 
@@ -42,8 +43,8 @@ impl Starts {
         }
     }
 
-    /// Returns the random start `nth`, from 1. With the scale of length `l`, the gap is uniform between the walls, or within `2 l`
-    /// of a single wall; the second displacement is within `4 l`, both velocities within `4 l omega`.
+    /// Returns the random start `nth`, from 1. With the scale of length `l`, the gap is uniform between the walls, or
+    /// within `2 l` of a single wall; the second displacement is within `4 l`, both velocities within `4 l omega`.
     pub(super) fn random(&self, nth: usize, oscillator: &Oscillator) -> State {
         let [gap, v1, x2, v2] = self.draws[nth - 1];
         let length = oscillator.length_scale();

@@ -140,8 +140,8 @@ impl Axis {
     /// exp10((log10(min) * (n - i) + log10(max) * i) / n)
     /// ```
     ///
-    /// The first value is exactly `min` and the last exactly `max`. No value is outside, whatever the rounding, so each is in
-    /// the parameter's range.
+    /// The first value is exactly `min` and the last exactly `max`. No value is outside, whatever the rounding, so each
+    /// is in the parameter's range.
     pub fn value(&self, i: usize) -> f64 {
         let last = self.count - 1;
         if i >= last {
@@ -203,7 +203,8 @@ pub(super) fn refuse_starts(root: &Section<'_>, axes: &[Axis], command: &str) ->
     }
 }
 
-/// Builds the node that an error about the number of axes shows: the place of the first superfluous axis, and the number.
+/// Builds the node that an error about the number of axes shows: the place of the first superfluous axis, and the
+/// number.
 fn count_node(at: &Node, count: usize) -> Node {
     let excerpt = format!("{count} {}", if count == 1 { "table" } else { "tables" });
     Node { place: at.name_place.clone(), excerpt, value: Value::Other, ..at.clone() }
@@ -233,8 +234,8 @@ fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axi
     }
 }
 
-/// Returns the field that names the swept quantity, and whether it is a component of the start. An argument overrides the
-/// text.
+/// Returns the field that names the swept quantity, and whether it is a component of the start. An argument overrides
+/// the text.
 fn swept_name<'a>(section: &Section<'a>) -> Result<(Field<'a>, bool), SceneError> {
     match (section.get("parameter"), section.get("start")) {
         (Some(parameter), Some(start)) if parameter.is_argument() == start.is_argument() => Err(start
@@ -263,8 +264,8 @@ pub(super) fn component(model: &dyn Model, place: usize) -> Parameter {
     }
 }
 
-/// Returns the field `values` if it defines the axis. Both `values` and a range may be given if one of them is an argument,
-/// which overrides the text.
+/// Returns the field `values` if it defines the axis. Both `values` and a range may be given if one of them is an
+/// argument, which overrides the text.
 fn listed_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneError> {
     let Some(values) = section.get("values") else { return Ok(None) };
     let others = ["min", "max", "count", "scale"].map(|name| section.get(name));

@@ -34,7 +34,8 @@ fn run(plan: &Plan, picture: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refi
     run_in(plan, std::mem::take, |i, j| record_of(picture(i, j)))
 }
 
-/// Runs a schedule. `record` computes a record; `arrive` removes the cells whose records arrive next from those under way.
+/// Runs a schedule. `record` computes a record; `arrive` removes the cells whose records arrive next from those under
+/// way.
 fn run_in(
     plan: &Plan,
     mut arrive: impl FnMut(&mut Vec<u32>) -> Vec<u32>,
@@ -136,8 +137,8 @@ fn the_audit_finds_planted_islands_and_mends_the_map() {
     assert_eq!(wrong(&records, 241, one), 0, "{refined:?}");
 }
 
-/// If only classes are borders, narrow blocks are not halved for touching one until an audit fails. Here islands near a border
-/// meet no corner of the blocks.
+/// If only classes are borders, narrow blocks are not halved for touching one until an audit fails. Here islands near a
+/// border meet no corner of the blocks.
 #[test]
 fn after_a_failed_audit_borders_are_first_followed_in_narrower_blocks() {
     let beaded = |i: usize, j: usize| {
@@ -231,8 +232,8 @@ fn rounds_bound_the_refinement() {
     assert!(refined.integrated < 1000, "{refined:?}");
 }
 
-/// The order of the records changes neither the integrated cells nor the audits, for discs, bands and scattered cells, and with
-/// failed and prolonged audits.
+/// The order of the records changes neither the integrated cells nor the audits, for discs, bands and scattered cells,
+/// and with failed and prolonged audits.
 #[test]
 fn integrated_cells_do_not_depend_on_the_order_of_records() {
     let picture = |i: usize, j: usize| {
