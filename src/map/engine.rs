@@ -11,6 +11,7 @@ mod fake;
 mod flows;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod requested;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -20,13 +21,15 @@ use thiserror::Error;
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 pub use cards::Cards;
 pub use cpu::Cpu;
-pub use cpu::record as measured_record;
 pub use fake::Fake;
 pub(crate) use flows::Flows;
 #[cfg(feature = "gpu")]
 pub use gpu::Gpu;
 #[cfg(feature = "gpu")]
-pub(crate) use gpu::{drop_unrequested, lane_settings};
+pub(crate) use gpu::lane_settings;
+#[cfg(feature = "gpu")]
+pub(crate) use requested::drop_unrequested;
+pub use requested::measured_record;
 
 #[cfg(feature = "gpu")]
 use crate::gpu::AdapterId;

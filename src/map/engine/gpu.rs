@@ -7,11 +7,11 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::{Device, EngineError};
+use super::{Device, EngineError, drop_unrequested};
 use crate::gpu::{self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Pool, Tables};
-use crate::map::plan::{Cell, Needs, Plan};
+use crate::map::plan::{Cell, Plan};
 use crate::map::scene::Steps;
-use crate::record::{Record, valid};
+use crate::record::Record;
 use rattlemap_dynamics::model::{Contact, Oscillator};
 
 /// Smallest batch on a hardware device: enough to keep it busy.
@@ -361,24 +361,6 @@ fn survey_flows<T: Send>(
     })
 }
 
-/// Clears the fields of a record that the scene did not request.
-pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
-    let mut clear_unless = |is_requested: bool, bits: u32, clear: fn(&mut Record)| {
-        if !is_requested {
-            record.valid &= !bits;
-            clear(record);
-        }
-    };
-    clear_unless(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
-    clear_unless(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
-    clear_unless(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
-    clear_unless(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
-    clear_unless(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
-    clear_unless(needs.pattern, valid::PATTERN, |r| {
-        (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -390,40 +372,5 @@ mod tests {
         assert_eq!(fitting([1; 10].into_iter(), 8), 8);
         assert_eq!(fitting([1; 10].into_iter(), 80), 10);
         assert_eq!(fitting([4 * third; 2].into_iter(), 8), 1);
-    }
-
-    #[test]
-    fn quantities_that_are_not_requested_are_cleared() {
-        let mut record = Record {
-            lyapunov: 1.0,
-            lyapunov_error: 1.0,
-            impacts_per_period: 1.0,
-            mesh_fraction: 1.0,
-            word: [1; 4],
-            word_hash: 1,
-            word_length: 1,
-            pattern: [1; 4],
-            pattern_hash: 1,
-            pattern_length: 1,
-            symmetric: 1,
-            valid: !valid::FILLED & (u32::MAX >> 23),
-            ..Record::default()
-        };
-        let whole = record;
-        drop_unrequested(&mut record, &Needs::EVERYTHING);
-        assert_eq!(record, whole);
-        drop_unrequested(
-            &mut record,
-            &Needs {
-                exponent: false,
-                lyapunov: false,
-                impacts: false,
-                mesh: false,
-                symmetric: false,
-                word: false,
-                pattern: false,
-            },
-        );
-        assert_eq!(record, Record { valid: valid::PERIOD | valid::STROBE, ..Record::default() });
     }
 }

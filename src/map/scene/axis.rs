@@ -97,17 +97,6 @@ impl Axis {
         self.target
     }
 
-    /// Sets the parameter in `model` to value `i` of the axis.
-    pub(crate) fn set(&self, model: &mut dyn Model, i: usize) {
-        // The value is in the parameter's range: both ends are, and the range is an interval.
-        self.target.set(model, self.value(i));
-    }
-
-    /// Sets the component of `start` to value `i` of the axis.
-    pub(crate) fn begin(&self, start: &mut State, i: usize) {
-        self.target.begin(start, self.value(i));
-    }
-
     /// Returns the first value.
     pub fn min(&self) -> f64 {
         self.min
