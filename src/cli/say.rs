@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io::{Write, stderr};
 use std::path::Path;
 
-use crate::map::printable;
+use crate::text::printable;
 
 /// Says a line on stderr, one whatever it quotes. Where stderr is closed or full it is dropped: nobody would read it,
 /// and the run goes on.

@@ -2,8 +2,8 @@
 
 use std::io::{ErrorKind, Write, stdout};
 
-use crate::map::printable;
 use crate::store::error::OutputError;
+use crate::text::printable;
 
 /// Prints a line, or several, to stdout. What they hold from outside reaches no terminal raw: see [`printable`].
 ///
