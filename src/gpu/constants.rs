@@ -130,7 +130,7 @@ pub fn has_elastic_or_rigid_wall(oscillator: &model::Oscillator) -> bool {
 fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> {
     let beside_rest = || {
         let is_alone = oscillator.degrees == 1;
-        is_alone.then(|| model::NonImpacting::beside_rest(oscillator)).flatten()
+        is_alone.then(|| model::NonImpacting::with_one_at_rest(oscillator)).flatten()
     };
     model::NonImpacting::new(oscillator).or_else(beside_rest)
 }

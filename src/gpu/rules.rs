@@ -2,7 +2,7 @@
 
 use super::precision::Precision;
 use rattlemap_dynamics::orbit::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, ON_STROBE_TURNS, SHOWN_CYCLES,
+    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEUTRAL_ORDER, ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
@@ -79,7 +79,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("MOST_NEWTON_STEPS", MOST_NEWTON_STEPS),
         ("MOST_FAILED_SEARCHES", MOST_FAILED_SEARCHES),
         ("TRAIL", TRAIL as u32),
-        ("REQUIRED_CYCLES", SHOWN_CYCLES as u32),
+        ("REQUIRED_CYCLES", BRANCH_CYCLES as u32),
         ("WINDOW_SHARE", WINDOW_SHARE),
     ];
     let singles = [
@@ -97,7 +97,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("GRAZING_SPEED", GRAZING_SPEED),
         ("NO_SPEED", NO_SPEED),
         ("NO_THRESHOLD", NO_THRESHOLD),
-        ("LINEAR", LINEAR),
+        ("LINEAR", LINEAR_TOLERANCE),
         ("ON_STROBE", on_strobe),
     ];
     let count = |(name, value): (&str, u32)| format!("const {name}: u32 = {value}u;\n");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Every Markdown file of the repository that is its own.
 fn texts() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = ["", "docs", "results", "benches", "benches/peers", "fuzz"];
+    let folders = ["", "docs", "docs/decisions", "results", "benches", "benches/peers", "fuzz"];
     let mut texts = Vec::new();
     for folder in folders.map(|folder| root.join(folder)) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -54,12 +54,35 @@ fn links_lead_somewhere() {
     assert!(seen > 50, "{seen} links");
 }
 
+/// Code spans that begin with a folder of the repository are paths of it.
+#[test]
+fn paths_in_documents_for_developers_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let is_for_developers = |path: &PathBuf| {
+        path.ends_with("ARCHITECTURE.md")
+            || path.ends_with("CONTRIBUTING.md")
+            || path.parent().is_some_and(|folder| folder.ends_with("docs/decisions"))
+    };
+    let mut found = 0;
+    for document in texts().into_iter().filter(is_for_developers) {
+        let text = fs::read_to_string(&document).unwrap();
+        for span in text.split('`').skip(1).step_by(2).filter(|span| !span.contains([' ', '\n'])) {
+            let is_path = span.split_once('/').is_some_and(|(folder, _)| root.join(folder).is_dir());
+            if is_path {
+                assert!(root.join(span).exists(), "{}: no {span}", document.display());
+                found += 1;
+            }
+        }
+    }
+    assert!(found > 80, "{found} paths");
+}
+
 #[test]
 fn readme_and_map_of_the_code_stay_short() {
-    for name in ["README.md", "ARCHITECTURE.md"] {
-        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
-        assert!(text.lines().count() <= 150, "{name} has more than 150 lines");
-    }
+    let text = |name| fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+    assert!(text("README.md").lines().count() <= 150, "README.md has more than 150 lines");
+    let words = text("ARCHITECTURE.md").split_whitespace().count();
+    assert!(words <= 1_300, "ARCHITECTURE.md has {words} words, more than 1,300");
 }
 
 #[test]

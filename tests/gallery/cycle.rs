@@ -6,7 +6,7 @@ use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Oscillator, State};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
 use crate::common::apart;
@@ -15,7 +15,7 @@ use crate::common::apart;
 pub(crate) struct Followed {
     /// Where it ends.
     pub(crate) end: State,
-    pub(crate) events: Vec<Happening>,
+    pub(crate) events: Vec<GapEvent>,
     /// What differences beside it become.
     pub(crate) monodromy: Matrix4<f64>,
     pub(crate) meshing_time: f64,

@@ -19,7 +19,7 @@ use rattlemap::validate::independent::flight::Flight;
 use rattlemap::validate::{Draw, Kind, Lanes, Rate, Sample, Stratum, Subject, differences, replay};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, Oscillator, State};
-use rattlemap_dynamics::orbit::{Budget, Class, Measured, Settings, Status, measure};
+use rattlemap_dynamics::orbit::{Budget, Class, Measurement, Settings, Status, measure};
 use rattlemap_dynamics::reference::Trajectory;
 
 use crate::common::apart;
@@ -146,7 +146,7 @@ pub(crate) fn budget() -> Budget {
 }
 
 /// What the reference says, and how long it took.
-fn measured(cell: &Drawn) -> (Measured, Duration) {
+fn measured(cell: &Drawn) -> (Measurement, Duration) {
     let clock = Instant::now();
     (measure(&Flow::new(&cell.oscillator), cell.law, cell.start, &budget()), clock.elapsed())
 }

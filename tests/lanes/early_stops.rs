@@ -154,7 +154,7 @@ fn random_cells(side: u32, count: usize) -> Vec<u32> {
 
 /// Classes are compared with runs of 2,000 + 512 periods. Early stops give no more wrong classes than 400 + 128 periods
 /// for every cell, in about a tenth of the periods; without exponents, in a twelfth or less. Of these cells 11.4 % are
-/// chaotic, of the whole plane 9.6 %. The bars are earlier ratios of 12 and 15, divided by 1.1 (docs/decisions.md).
+/// chaotic, of the whole plane 9.6 %. The bars are earlier ratios of 12 and 15, divided by 1.1 (docs/decisions/dynamics.md).
 #[test]
 fn a_tenth_of_the_work_is_as_right_as_brute_force() {
     check_savings(By::Reference, [10.9, 13.6]);
@@ -204,7 +204,7 @@ fn searches_cost_little_of_the_work_that_is_saved() {
             let pair = crate::common::pair_at(&plan, id);
             let flow = flow_of(&pair);
             let measured = measure(&flow, pair.law(), REST, plan.budget());
-            [measured.periods_run, measured.periods_beside].map(f64::from)
+            [measured.periods_run, measured.search_periods].map(f64::from)
         };
         let [run, searches] =
             ids.iter().map(work).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);

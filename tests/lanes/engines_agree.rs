@@ -10,7 +10,7 @@ use rattlemap::record::distance::{farther, is_within};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
-use rattlemap_dynamics::reference::{EventKind, Happening, Observer, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Trajectory};
 use rayon::prelude::*;
 
 /// Returns the strobe states of the reference after `periods` and after one more.
@@ -152,7 +152,7 @@ fn every_kind_of_motion_agrees() {
 struct Impacts(u32);
 
 impl Observer for Impacts {
-    fn event(&mut self, happening: &Happening) {
+    fn event(&mut self, happening: &GapEvent) {
         self.0 += u32::from(happening.kind == EventKind::Impact);
     }
 }

@@ -11,7 +11,7 @@ use super::flows::Flows;
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::orbit::{Measured, measure_until};
+use rattlemap_dynamics::orbit::{Measurement, measure_until};
 
 /// Cells that have ended wait no longer than this for others to begin.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -66,7 +66,7 @@ impl<'p> Cpu<'p> {
 }
 
 /// What somebody asked for of what was measured.
-pub fn record(measured: &Measured, needs: &Needs) -> Record {
+pub fn record(measured: &Measurement, needs: &Needs) -> Record {
     let mut record = Record {
         strobe: measured.strobe,
         periods_run: measured.periods_run,

@@ -35,7 +35,7 @@ pub(super) fn read(
     beside: Beside<'_>,
 ) -> Result<Box<dyn Model>, SceneError> {
     let section = root.section_among("parameters", &names(model), &meanings(model))?;
-    let mut base = model.boxed();
+    let mut base = model.clone_model();
     for (index, parameter) in model.parameters().iter().enumerate() {
         let name = &*parameter.name;
         let field = section.get(name);

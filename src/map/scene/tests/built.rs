@@ -1,5 +1,5 @@
 use rattlemap_dynamics::model::{
-    Boxed, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Stops,
+    CloneModel, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Stops,
 };
 
 use super::*;
@@ -147,7 +147,7 @@ impl Model for Driven {
 fn cells_without_motion_are_named_before_anything_is_computed() {
     let scene = |wrong: [f64; 2]| {
         let model = Driven(Stops::with_restitution(0.5), wrong);
-        assert_eq!(*model.boxed(), model);
+        assert_eq!(*model.clone_model(), model);
         Scene::builder(model).axis("F", 1.0..=2.0, 3).axis("omega", 1.0..=3.0, 5).build()
     };
     let corner = scene([0.0, 1.2]).unwrap_err();
