@@ -26,7 +26,7 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
         .allowing(Allowance::UNLIMITED.until(cell.halt));
     let cycle = refine(&seed, StrobeMap::Periods(period))?;
     let is_slow = status(record) == Status::Slow;
-    let reach = if is_slow { rules::near() } else { rules::ON_CYCLE };
+    let reach = if is_slow { rules::recurrence_distance() } else { rules::ON_CYCLE };
     let is_there = cell.apart(&record.strobe, &cycle.state) <= FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };

@@ -1,14 +1,14 @@
-//! Flows of a plan, solved once where cells share them.
+//! Flows of a plan. A flow that several cells share is solved once.
 
 use std::sync::OnceLock;
 
 use crate::map::plan::Plan;
 use rattlemap_dynamics::flow::Flow;
 
-/// The flows of a plan; any thread may ask.
+/// The flows of a plan, for any number of threads.
 pub(crate) struct Flows<'p> {
     plan: &'p Plan,
-    /// Solved when first needed; empty where every cell has its own.
+    /// Flows that have been solved, by index; empty if they are not kept.
     kept: Vec<OnceLock<Box<Flow>>>,
 }
 
@@ -18,7 +18,7 @@ impl<'p> Flows<'p> {
         Flows { plan, kept: (0..kept).map(|_| OnceLock::new()).collect() }
     }
 
-    /// What `of` makes of the flow with this index in the plan.
+    /// Calls `of` with the flow of this index.
     pub(crate) fn with<T>(&self, index: u32, of: impl FnOnce(&Flow) -> T) -> T {
         let solve = || Box::new(Flow::new(&self.plan.oscillator(index)));
         match self.kept.get(index as usize) {
