@@ -189,7 +189,7 @@ phase "lints" cargo clippy --workspace --all-targets -- -D warnings
 phase "docs, warnings denied" docs
 phase "dependencies" dependencies
 phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
-phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu --lib
+phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu,figures --lib
 phase "the program on Windows" cargo check --target "$windows" -p rattlemap
 if [[ "${#ignored[@]}" -eq 0 ]]; then
     phase "the library on macOS" cargo check --target "$macos" -p rattlemap --no-default-features --features gpu --lib

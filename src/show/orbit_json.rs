@@ -1,14 +1,14 @@
-//! `orbit --json`: one object, its fields a contract.
+//! `orbit --json`: one object. Its fields are part of the contract with scripts.
 
 use serde::Serialize;
 
+use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::parameters::Parameters;
-use crate::store::orbit::Instant;
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{Event, Orbit};
 
-/// The object; not-a-number becomes null, as JSON has no word for it.
+/// The object. Numbers that are not finite become null.
 #[derive(Serialize)]
 struct OrbitObject<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -27,13 +27,14 @@ struct OrbitObject<'a> {
     impacts_per_period: f64,
     mesh_fraction: f64,
     status: &'static str,
-    /// Forcing periods that the motion was followed for.
+    /// Number of integrated forcing periods.
     periods_run: u64,
     strobe: Vec<f64>,
     events: Vec<EventObject>,
-    /// Since the start, as asked for, and the state then.
+    /// Requested time since the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     time: Option<f64>,
+    /// State at that time.
     #[serde(skip_serializing_if = "Option::is_none")]
     state: Option<Vec<f64>>,
 }
@@ -49,35 +50,35 @@ struct EventObject {
 }
 
 impl EventObject {
-    fn new(event: &Event, shown: impl Fn(State) -> Vec<f64>) -> Self {
+    fn new(event: &Event, components: impl Fn(State) -> Vec<f64>) -> Self {
         EventObject {
             kind: names::kind(event.kind),
-            side: names::side(event.side),
+            side: names::side_code(event.side),
             t: event.t,
             t_mod_period: event.t_mod_period,
-            before: shown(event.before),
-            after: shown(event.after),
+            before: components(event.before),
+            after: components(event.after),
         }
     }
 }
 
-/// The orbit of a model as a JSON object of several lines; floats are shortest round-trip
-/// decimals, what is absent or not finite is null.
+/// Returns the orbit of a model as a JSON object of several lines. Numbers are the shortest decimals that read back as the
+/// same number.
 ///
 /// # Errors
-/// None that an [`Orbit`] can cause; serialisation is fallible by signature.
+/// Serialization can fail by its signature; no orbit causes it.
 pub(crate) fn to_json(
     model: &dyn Model,
     orbit: &Orbit,
     instant: Option<Instant>,
 ) -> serde_json::Result<String> {
-    let components = model.state_names().len();
-    let shown = |state: State| state[..components].to_vec();
+    let count = model.state_names().len();
+    let components = |state: State| state[..count].to_vec();
     serde_json::to_string_pretty(&OrbitObject {
         e: model.get("e").ok(),
         omega: model.get("omega").ok(),
         parameters: Parameters::of(model),
-        class: names::class(orbit.class),
+        class: orbit.class.name(),
         period: names::period(orbit.class),
         lyapunov: orbit.lyapunov,
         lyapunov_error: orbit.lyapunov_error,
@@ -87,11 +88,11 @@ pub(crate) fn to_json(
         pattern: orbit.word.pattern().time_order(),
         impacts_per_period: orbit.impacts_per_period,
         mesh_fraction: orbit.mesh_fraction,
-        status: names::status(orbit.status),
+        status: orbit.status.name(),
         periods_run: orbit.periods_run,
-        strobe: shown(orbit.strobe),
-        events: orbit.events.iter().map(|event| EventObject::new(event, shown)).collect(),
+        strobe: components(orbit.strobe),
+        events: orbit.events.iter().map(|event| EventObject::new(event, components)).collect(),
         time: instant.map(|instant| instant.time),
-        state: instant.map(|instant| shown(instant.state)),
+        state: instant.map(|instant| components(instant.state)),
     })
 }

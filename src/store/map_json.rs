@@ -9,9 +9,10 @@ use serde_json::Value;
 
 use crate::map::plan::count_classes;
 use crate::show::cells::Cells;
-use crate::show::names;
+use crate::show::refinement::RefinementObject;
 use crate::store::error::OutputError;
-use crate::store::map_manifest::{BasinObject, MadeObject, RefinementObject, Run, basins, statuses, tally};
+use crate::store::map_manifest::{BasinObject, MadeObject, Run, basins, statuses, tally};
+use rattlemap_dynamics::orbit::Class;
 
 #[derive(Serialize)]
 struct MapObject<'a> {
@@ -85,9 +86,9 @@ pub(crate) fn object(
         files,
         made: MadeObject::of(run),
         shards: run.merged.map(|merged| merged.shards),
-        cells: cells.counts().iter().product(),
+        cells: cells.count(),
         runs: cells.runs(),
-        classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
+        classes: Class::NAMES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
         basins: basins(cells),

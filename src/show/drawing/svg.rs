@@ -1,23 +1,26 @@
-//! Pictures as SVG: text stays text, maps are embedded with one pixel per cell.
+//! Pictures as SVG. Text stays text; maps are embedded with one pixel per cell.
 
-use std::fmt::{self, Write};
+use std::fmt::{self, Write as _};
+use std::io::{self, Write};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::show::drawing::canvas::{Item, Shaped};
+use crate::show::color::Color;
+use crate::show::drawing::canvas::{Canvas, Item, Outline};
+use crate::show::drawing::png;
+use crate::show::drawing::shapes::{Align, Point, Rect};
+use crate::show::drawing::style::{DASH, PER_INCH};
 use crate::show::drawing::typeface::runs;
-use crate::show::drawing::{Align, Canvas, DASH, PER_INCH, Point, RGBColor, Rect, png};
-use crate::show::error::DrawError;
+use crate::show::error::WriteError;
 
-/// The typeface that figures are laid out for, then common ones about as wide.
+/// The typeface that determines the layout, then common typefaces of about the same width.
 const FAMILIES: &str = "Ubuntu, 'Ubuntu Sans', 'Open Sans', 'Helvetica Neue', Arial, sans-serif";
 
-/// The file's text.
-pub(crate) fn encoded(canvas: &Canvas<'_>) -> Result<String, DrawError> {
-    let (width, height) = canvas.size;
+/// Writes the picture.
+pub(crate) fn write(svg: &mut impl Write, canvas: &Canvas) -> Result<(), WriteError> {
+    let (width, height) = canvas.size();
     let [inches_wide, inches_high] = [width, height].map(|side| Number(side / PER_INCH));
-    let mut svg = String::new();
     let page = Rect { left: 0.0, top: 0.0, right: width, bottom: height };
     write!(
         svg,
@@ -29,28 +32,27 @@ pub(crate) fn encoded(canvas: &Canvas<'_>) -> Result<String, DrawError> {
         Place(page),
     )?;
     for item in canvas.items.borrow().iter() {
-        draw(&mut svg, item)?;
+        draw(svg, item)?;
     }
-    svg.push_str("</svg>\n");
-    Ok(svg)
+    Ok(writeln!(svg, "</svg>")?)
 }
 
-fn draw(svg: &mut String, item: &Item) -> Result<(), DrawError> {
+fn draw(svg: &mut impl Write, item: &Item) -> Result<(), WriteError> {
     match item {
-        Item::Area { shape, color, opacity } => {
-            match shape {
-                Shaped::Rect(rect) => write!(svg, "<rect{}", Place(*rect))?,
-                Shaped::Circle { center, radius } => {
+        Item::Area { outline, color, opacity } => {
+            match outline {
+                Outline::Rect(rect) => write!(svg, "<rect{}", Place(*rect))?,
+                Outline::Circle { center, radius } => {
                     let [x, y, r] = [center.0, center.1, *radius].map(Number);
                     write!(svg, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\"")?;
                 }
-                Shaped::Polygon(corners) => write!(svg, "<polygon points=\"{}\"", Points(corners))?,
+                Outline::Polygon(corners) => write!(svg, "<polygon points=\"{}\"", Points(corners))?,
             }
             write!(svg, " fill=\"{}\"", Hex(*color))?;
             if *opacity < 1.0 {
                 write!(svg, " fill-opacity=\"{}\"", Number(*opacity))?;
             }
-            svg.push_str("/>\n");
+            writeln!(svg, "/>")?;
         }
         Item::Line { path, width, color, is_dashed } => {
             let (points, color, width) = (Points(path), Hex(*color), Number(*width));
@@ -61,7 +63,7 @@ fn draw(svg: &mut String, item: &Item) -> Result<(), DrawError> {
             if *is_dashed {
                 write!(svg, " stroke-dasharray=\"{}\"", Number(DASH))?;
             }
-            svg.push_str("/>\n");
+            writeln!(svg, "/>")?;
         }
         Item::Text { text, at, em, align, color } => write_text(svg, text, (*at, *em, *align), *color)?,
         Item::Image { rect, bitmap } => {
@@ -82,25 +84,25 @@ fn draw(svg: &mut String, item: &Item) -> Result<(), DrawError> {
 }
 
 fn write_text(
-    svg: &mut String,
+    svg: &mut impl Write,
     text: &str,
     (at, em, align): (Point, f64, Align),
-    color: RGBColor,
-) -> fmt::Result {
+    color: Color,
+) -> io::Result<()> {
     let [x, y] = [at.0, at.1].map(Number);
     write!(svg, "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"", Number(em), Hex(color))?;
     match align {
         Align::Left => {}
-        Align::Center => svg.push_str(" text-anchor=\"middle\""),
-        Align::Right => svg.push_str(" text-anchor=\"end\""),
+        Align::Center => write!(svg, " text-anchor=\"middle\"")?,
+        Align::Right => write!(svg, " text-anchor=\"end\"")?,
         Align::Upwards => write!(svg, " text-anchor=\"middle\" transform=\"rotate(-90 {x} {y})\"")?,
     }
-    svg.push_str(" xml:space=\"preserve\">");
+    write!(svg, " xml:space=\"preserve\">")?;
     let mut height = 0.0;
     for run in runs(text) {
         let (scale, raise) = run.place();
         let text = Escaped(&run.text);
-        // The shift counts from where the run before has left the line.
+        // The shift is relative to the previous run.
         if scale == 1.0 && height == 0.0 {
             write!(svg, "{text}")?;
         } else {
@@ -109,27 +111,26 @@ fn write_text(
         }
         height = raise;
     }
-    svg.push_str("</text>\n");
-    Ok(())
+    writeln!(svg, "</text>")
 }
 
-/// With two decimals at most.
+/// A number with at most two decimals.
 struct Number(f64);
 
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rounded = (self.0 * 100.0).round() / 100.0;
-        // Zero has no sign.
+        // A negative zero would have a sign.
         write!(f, "{}", if rounded == 0.0 { 0.0 } else { rounded })
     }
 }
 
 /// A colour.
-struct Hex(RGBColor);
+struct Hex(Color);
 
 impl fmt::Display for Hex {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let RGBColor(r, g, b) = self.0;
+        let [r, g, b] = self.0;
         write!(f, "#{r:02x}{g:02x}{b:02x}")
     }
 }
@@ -147,7 +148,7 @@ impl fmt::Display for Points<'_> {
     }
 }
 
-/// Attributes of a rectangle.
+/// The attributes of a rectangle.
 struct Place(Rect);
 
 impl fmt::Display for Place {
@@ -158,7 +159,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// Text between tags; XML knows no control characters.
+/// Text between tags. Control characters, which XML does not allow, become spaces.
 struct Escaped<'t>(&'t str);
 
 impl fmt::Display for Escaped<'_> {

@@ -1,13 +1,15 @@
 //! Figures of `bench engines`: throughput against lanes, and where the time goes.
 
-use std::path::Path;
+use std::io::Write;
 
 use super::{Engine, Point, Run, Series, Times};
 use crate::gpu::Precision;
-use crate::show::drawing::axes::{Axis, Frame};
+use crate::map::scene::Format;
+use crate::show::drawing::axis::Axis;
+use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::drawing::{Align, Canvas, DARK, Marker, RGBColor, Rect, SMALL, Shape, save_figure};
-use crate::show::error::{DrawError, FigureError};
+use crate::show::drawing::{Align, Canvas, Color, DARK, Marker, Rect, SMALL, Shape, write_figure};
+use crate::show::error::WriteError;
 
 const SIZE: (u32, u32) = (1700, 1150);
 const LEFT: f64 = 190.0;
@@ -19,34 +21,34 @@ const LEAST_DECADES: f64 = 0.8;
 const END: f64 = 6.0;
 
 /// Hardware in f32 and f64, then software.
-const ON_DEVICE: [RGBColor; 4] = [
-    RGBColor(0xd5, 0x5e, 0x00),
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xe6, 0x9f, 0x00),
-    RGBColor(0x56, 0xb4, 0xe9),
+const ON_DEVICE: [Color; 4] = [
+    [0xd5, 0x5e, 0x00],
+    [0x00, 0x72, 0xb2],
+    [0xe6, 0x9f, 0x00],
+    [0x56, 0xb4, 0xe9],
 ];
 /// Processor threads, from few to many.
-const ON_CPU: [RGBColor; 2] = [RGBColor(0xb8, 0xdc, 0xc8), RGBColor(0x00, 0x5a, 0x3c)];
+const ON_CPU: [Color; 2] = [[0xb8, 0xdc, 0xc8], [0x00, 0x5a, 0x3c]];
 
 /// A stage: its name, its colour and its time.
-type StageOf = (&'static str, RGBColor, fn(&Times) -> f64);
+type StageOf = (&'static str, Color, fn(&Times) -> f64);
 
 /// Stages in their order.
 const STAGES: [StageOf; 5] = [
-    ("set-up", RGBColor(0x96, 0x96, 0x96), |times| times.prepare),
-    ("upload", RGBColor(0xe6, 0x9f, 0x00), |times| times.upload),
-    ("integration", RGBColor(0x00, 0x72, 0xb2), |times| times.integrate),
-    ("read-back", RGBColor(0xcc, 0x79, 0xa7), |times| times.read),
-    ("writing the table", RGBColor(0x00, 0x9e, 0x73), |times| times.write),
+    ("set-up", [0x96, 0x96, 0x96], |times| times.prepare),
+    ("upload", [0xe6, 0x9f, 0x00], |times| times.upload),
+    ("integration", [0x00, 0x72, 0xb2], |times| times.integrate),
+    ("read-back", [0xcc, 0x79, 0xa7], |times| times.read),
+    ("writing the table", [0x00, 0x9e, 0x73], |times| times.write),
 ];
 
 /// Draws throughput against lanes, a curve per engine.
 ///
 /// # Errors
-/// A file that cannot be written, by name.
-pub(super) fn write_rates(path: &Path, all: &[Series], processor: &str) -> Result<(), FigureError> {
+/// If the figure cannot be written.
+pub(super) fn write_rates(out: impl Write, all: &[Series], processor: &str) -> Result<(), WriteError> {
     let all = fastest_first(all);
-    save_figure(path, SIZE, |canvas| {
+    write_figure(out, Format::Png, SIZE, |canvas| {
         let colors = colors(&all);
         let entries: Vec<Entry> = all
             .iter()
@@ -58,13 +60,13 @@ pub(super) fn write_rates(path: &Path, all: &[Series], processor: &str) -> Resul
             "restitution x frequency, from lanes handed over to records read; medians, bars from the slowest run to \
              the fastest; processor: {processor}"
         );
-        let top = draw_head(canvas, title, &subtitle, &entries)? + 10.0;
+        let top = draw_head(canvas, title, &subtitle, &entries) + 10.0;
         let frame = frame(canvas, top, &all);
-        frame.draw_grid(canvas)?;
+        frame.draw_grid(canvas);
         for (&series, &color) in all.iter().zip(&colors) {
-            curve(canvas, &frame, series, color)?;
+            curve(canvas, &frame, series, color);
         }
-        frame.draw_axes(canvas, true)
+        frame.draw_axes(canvas, true);
     })
 }
 
@@ -78,7 +80,7 @@ fn fastest_first(all: &[Series]) -> Vec<&Series> {
     sorted
 }
 
-fn colors(all: &[&Series]) -> Vec<RGBColor> {
+fn colors(all: &[&Series]) -> Vec<Color> {
     let most = all.iter().filter_map(|series| series.engine.threads()).max().unwrap_or(1);
     let color = |series: &&Series| match series.engine {
         Engine::Gpu { precision, is_hardware, .. } => {
@@ -87,15 +89,15 @@ fn colors(all: &[&Series]) -> Vec<RGBColor> {
         Engine::Cpu { threads } => {
             let share = if most > 1 { (threads as f64).ln() / (most as f64).ln() } else { 1.0 };
             let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
-            let [RGBColor(a, b, c), RGBColor(d, e, f)] = ON_CPU;
-            RGBColor(mix(a, d), mix(b, e), mix(c, f))
+            let [[a, b, c], [d, e, f]] = ON_CPU;
+            [mix(a, d), mix(b, e), mix(c, f)]
         }
     };
     all.iter().map(color).collect()
 }
 
 /// All points with some room.
-fn frame(canvas: &Canvas<'_>, top: f64, all: &[&Series]) -> Frame {
+fn frame(canvas: &Canvas, top: f64, all: &[&Series]) -> Frame {
     let points = || all.iter().flat_map(|series| &series.points);
     let lanes = points().map(|point| point.lanes as f64);
     let rates = points().flat_map(|point| {
@@ -109,22 +111,21 @@ fn frame(canvas: &Canvas<'_>, top: f64, all: &[&Series]) -> Frame {
     }
 }
 
-fn curve(canvas: &Canvas<'_>, frame: &Frame, series: &Series, color: RGBColor) -> Result<(), DrawError> {
+fn curve(canvas: &Canvas, frame: &Frame, series: &Series, color: Color) {
     let place = |point: &Point, rate: f64| frame.at(point.lanes as f64, rate);
     let line: Vec<_> =
         series.points.iter().map(|point| place(point, point.spread(Run::rate).median)).collect();
-    canvas.stroke(&line, WIDTH, color)?;
+    canvas.stroke(&line, WIDTH, color);
     for (point, &at) in series.points.iter().zip(&line) {
         let spread = point.spread(Run::rate);
         let (low, high) = (place(point, spread.low), place(point, spread.high));
-        canvas.stroke(&[low, high], 1.5, color)?;
+        canvas.stroke(&[low, high], 1.5, color);
         for end in [low, high] {
-            canvas.stroke(&[(end.0 - END, end.1), (end.0 + END, end.1)], 1.5, color)?;
+            canvas.stroke(&[(end.0 - END, end.1), (end.0 + END, end.1)], 1.5, color);
         }
         let marker = Marker { shape: Shape::Circle, color, radius: RADIUS, hollow: false };
-        canvas.marker(at, marker)?;
+        canvas.marker(at, marker);
     }
-    Ok(())
 }
 
 const LEFT_OF_STAGES: f64 = 80.0;
@@ -134,47 +135,46 @@ const ROW: f64 = 96.0;
 /// Draws, for the largest map of every engine, how its time is shared among the stages.
 ///
 /// # Errors
-/// A file that cannot be written, by name.
-pub(super) fn write_stages(path: &Path, all: &[Series]) -> Result<(), FigureError> {
+/// If the figure cannot be written.
+pub(super) fn write_stages(out: impl Write, all: &[Series]) -> Result<(), WriteError> {
     let rows: Vec<(&Series, &Point)> =
         fastest_first(all).into_iter().filter_map(|series| Some((series, series.largest()?))).collect();
     let height = 320.0 + ROW * rows.len() as f64;
-    save_figure(path, (SIZE.0, height as u32), |canvas| {
+    write_figure(out, Format::Png, (SIZE.0, height as u32), |canvas| {
         let entries: Vec<Entry> = STAGES
             .iter()
             .map(|&(name, color, _)| Entry::new(Key::Patch { color, opacity: 1.0 }, name))
             .collect();
         let title = "Where the time goes: the more of it is integration, the better";
         let subtitle = "the largest map of every engine; medians";
-        let top = draw_head(canvas, title, subtitle, &entries)? + 10.0;
+        let top = draw_head(canvas, title, subtitle, &entries) + 10.0;
         let x = Axis::exact("share of the time, %", 0.0, 100.0);
         let frame = Frame { rect: canvas.panel(LEFT_OF_STAGES, top), x, y: Axis::exact("", 0.0, 1.0) };
         for (nth, (series, point)) in rows.iter().enumerate() {
-            stages(canvas, &frame, top + ROW * nth as f64, series, point)?;
+            stages(canvas, &frame, top + ROW * nth as f64, series, point);
         }
-        frame.draw_x_axis(canvas, true)
+        frame.draw_x_axis(canvas, true);
     })
 }
 
 fn stages(
-    canvas: &Canvas<'_>,
+    canvas: &Canvas,
     frame: &Frame,
     top: f64,
     series: &Series,
     point: &Point,
-) -> Result<(), DrawError> {
+) {
     let medians = STAGES.map(|(_, _, of)| point.spread(|run| of(&run.times)).median);
     let total: f64 = medians.iter().sum();
     let text = format!("{}: {} lanes, {} s", series.engine.label(), grouped(point.lanes), seconds(total));
-    canvas.text(&text, (frame.rect.left, top + 20.0), SMALL, Align::Left, DARK)?;
+    canvas.text(&text, (frame.rect.left, top + 20.0), SMALL, Align::Left, DARK);
     let mut from = 0.0;
     for ((_, color, _), time) in STAGES.iter().zip(medians) {
         let to = from + 100.0 * time / total;
         let column = frame.column(from, to);
-        canvas.fill(Rect { top: top + 38.0, bottom: top + 38.0 + BAR, ..column }, *color, 1.0)?;
+        canvas.fill(Rect { top: top + 38.0, bottom: top + 38.0 + BAR, ..column }, *color, 1.0);
         from = to;
     }
-    Ok(())
 }
 
 /// Three significant digits.

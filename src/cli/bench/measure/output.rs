@@ -1,7 +1,7 @@
 //! The folder of `bench engines`: tables, figures and manifest.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::io::Write;
 
 use crate::gpu::DeviceTimes;
 use crate::show::error::WriteError;
@@ -43,10 +43,10 @@ pub struct Asked {
 /// If a file cannot be written.
 pub fn write(folder: &Folder, series: &[Series], asked: &Asked) -> Result<Vec<&'static str>, OutputError> {
     folder.remove(&[MANIFEST, TABLE, RUNS, FIGURE, STAGES])?;
-    folder.replace(TABLE, |path| write_table(path, series, asked))?;
-    folder.replace(RUNS, |path| write_runs(path, series))?;
-    folder.replace(FIGURE, |path| Ok(figure::write_rates(path, series, &asked.processor)?))?;
-    folder.replace(STAGES, |path| Ok(figure::write_stages(path, series)?))?;
+    folder.replace(TABLE, |out| write_table(out, series, asked))?;
+    folder.replace(RUNS, |out| write_runs(out, series))?;
+    folder.replace(FIGURE, |out| figure::write_rates(out, series, &asked.processor))?;
+    folder.replace(STAGES, |out| figure::write_stages(out, series))?;
     let files = [TABLE, RUNS, FIGURE, STAGES];
     let listed = inventory::entries(folder, &files)?;
     inventory::write_manifest(folder, &manifest(series, asked, &listed))?;
@@ -113,8 +113,8 @@ fn keys(series: &Series, point: &Point) -> Vec<String> {
 }
 
 /// One row per engine and size.
-fn write_table(path: &Path, all: &[Series], asked: &Asked) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+fn write_table(out: impl Write, all: &[Series], asked: &Asked) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
     let mut header: Vec<String> = KEYS.map(ToOwned::to_owned).to_vec();
     header.push("runs".to_owned());
     header.extend(STAGE_FIELDS.map(|(name, _)| name.to_owned()));
@@ -145,8 +145,8 @@ fn write_table(path: &Path, all: &[Series], asked: &Asked) -> Result<(), WriteEr
 }
 
 /// One row per run.
-fn write_runs(path: &Path, all: &[Series]) -> Result<(), WriteError> {
-    let mut table = csv::Writer::from_path(path)?;
+fn write_runs(out: impl Write, all: &[Series]) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
     let fields = STAGE_FIELDS.iter().chain(&RATE_FIELDS);
     let header = KEYS.into_iter().chain(["run"]).chain(fields.clone().map(|(name, _)| *name));
     table.write_record(header)?;

@@ -205,7 +205,7 @@ impl<'a> Bench<'a> {
         run.times.prepare += planned;
         let clock = Instant::now();
         let cells = Cells::new(scene, &plan, &records);
-        let made = map::Made {
+        let made = map::Provenance {
             engine: self.engine.name(),
             precision: self.engine.precision(),
             device: self.engine.device(),
