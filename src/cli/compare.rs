@@ -15,8 +15,8 @@ use crate::job::finished_map::{self, Manifest};
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::show::cells::{Cells, Survey};
-use crate::store;
 use crate::show::map_pair::{MapPair, MapSide};
+use crate::store;
 use crate::store::folder::Folder;
 use crate::store::map::Provenance;
 

@@ -28,7 +28,8 @@ const XYZ: Matrix = [
 
 /// Returns the least difference of two colours over the three kinds of vision.
 pub(crate) fn least_difference(a: Color, b: Color) -> f64 {
-    let differences = [NORMAL_VISION, PROTANOPE, DEUTERANOPE].map(|vision| difference(lab(a, vision), lab(b, vision)));
+    let differences =
+        [NORMAL_VISION, PROTANOPE, DEUTERANOPE].map(|vision| difference(lab(a, vision), lab(b, vision)));
     differences.into_iter().fold(f64::INFINITY, f64::min)
 }
 

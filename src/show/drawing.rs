@@ -22,9 +22,7 @@ use std::io::Write;
 pub use crate::show::color::Color;
 pub use canvas::{Bitmap, Canvas};
 pub use shapes::{Align, Marker, Point, Rect, Shape};
-pub use style::{
-    BELOW, DARK, FAINT, GEAR_1, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL, WHITE, wall_color,
-};
+pub use style::{BELOW, DARK, FAINT, GEAR_1, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL, WHITE, wall_color};
 pub(crate) use ticks::superscript;
 
 use crate::map::scene::Format;

@@ -81,8 +81,11 @@ impl MapPair<'_> {
         self.classes().for_each(|[a, b]| counts[a.index()][b.index()] += 1);
         let pairs = (0..4).flat_map(|a| (0..4).map(move |b| (a, b)));
         let differing = pairs.filter(|&(a, b)| a != b && counts[a][b] > 0);
-        let transition =
-            |(a, b): (usize, usize)| ClassTransition { a: Class::NAMES[a], b: Class::NAMES[b], cells: counts[a][b] };
+        let transition = |(a, b): (usize, usize)| ClassTransition {
+            a: Class::NAMES[a],
+            b: Class::NAMES[b],
+            cells: counts[a][b],
+        };
         differing.map(transition).collect()
     }
 }

@@ -158,9 +158,10 @@ pub(crate) fn write(
         axes: scene.axes().iter().map(AxisData::from).collect(),
         derived: derived(scene),
         replay: replay::arguments(scene),
-        starts: scene.start().follows().then(|| {
-            packed("f64", &(0..cells.count()).map(|id| cells.start(id)).collect::<Vec<[f64; 4]>>())
-        }),
+        starts: scene
+            .start()
+            .follows()
+            .then(|| packed("f64", &(0..cells.count()).map(|id| cells.start(id)).collect::<Vec<[f64; 4]>>())),
         components,
         start: scene.sweeps_start().then(|| cells.start(0)[..components].to_vec()),
         layers: layers.par_iter().map(LayerData::from).collect(),
@@ -266,11 +267,7 @@ const VALUES: [(&str, Option<Quantity>, PageValue); 9] = [
     ("lyapunov_error", Some(Quantity::Lyapunov), PageValue::F32(|row| row.lyapunov_error)),
     ("impacts_per_period", Some(Quantity::Impacts), PageValue::F32(|row| row.impacts_per_period)),
     ("mesh_fraction", Some(Quantity::Mesh), PageValue::F32(|row| row.mesh_fraction)),
-    (
-        "symmetric",
-        Some(Quantity::Symmetric),
-        PageValue::U8(|row| row.symmetric.map_or(u8::MAX, u8::from)),
-    ),
+    ("symmetric", Some(Quantity::Symmetric), PageValue::U8(|row| row.symmetric.map_or(u8::MAX, u8::from))),
 ];
 
 /// Returns the values that the page shows for a cell.

@@ -63,7 +63,8 @@ pub fn write(
         folder.replace(COLUMNS_CSV, |out| bifurcation_tables::write_columns(out, axis, columns))?;
         files.extend([CSV, COLUMNS_CSV]);
         if fixed.is_some() {
-            folder.replace(STROBE_CSV, |out| bifurcation_tables::write_strobes(out, axis, &names, columns))?;
+            folder
+                .replace(STROBE_CSV, |out| bifurcation_tables::write_strobes(out, axis, &names, columns))?;
             files.push(STROBE_CSV);
         }
     }

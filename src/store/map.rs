@@ -27,9 +27,9 @@ use crate::store::validation_json::ValidationObject;
 use crate::store::{inventory, map_manifest, unfinished};
 use crate::validate::Validation;
 
-pub use crate::store::manifest::MANIFEST;
 pub use crate::show::provenance::Provenance;
 pub use crate::show::replay::MODEL;
+pub use crate::store::manifest::MANIFEST;
 pub use crate::store::map_manifest::{Merged, Run};
 
 const CSV: &str = "cells.csv";
@@ -259,7 +259,8 @@ fn write_pictures(
     }
     let layers = layers::of(cells, words);
     if wants_figures {
-        let figures = layers.iter().flat_map(|layer| names(layer.name).map(move |(f, name)| (layer, f, name)));
+        let figures =
+            layers.iter().flat_map(|layer| names(layer.name).map(move |(f, name)| (layer, f, name)));
         let figures: Vec<_> = figures.filter(|(.., name)| wanted(name)).collect();
         let draw = |(layer, format, name): &(&Layer, Format, String)| {
             folder.replace(name, |out| figure::map::write(out, *format, cells, layer))

@@ -62,7 +62,8 @@ pub struct Asked {
 
 /// Files of the figures of the motion.
 static FIGURES: LazyLock<Vec<(OrbitFigure, Format, String)>> = LazyLock::new(|| {
-    let files = |figure: OrbitFigure| names::figures(figure.name()).map(|(format, name)| (figure, format, name));
+    let files =
+        |figure: OrbitFigure| names::figures(figure.name()).map(|(format, name)| (figure, format, name));
     OrbitFigure::ALL.into_iter().flat_map(files).collect()
 });
 /// Files of the figure of the spectrum.

@@ -204,13 +204,8 @@ pub(super) fn stiffness(out: impl Write, device: &str, rows: &[stiffness::Row]) 
 
 /// Share of the contacts that are missed against steps per period.
 pub(super) fn grid(out: impl Write, device: &str, rows: &[grid::Swings]) -> Result<(), WriteError> {
-    const DEPTH_COLORS: [Color; 5] = [
-        [0x00, 0x9e, 0x73],
-        [0x56, 0xb4, 0xe9],
-        [0xe6, 0x9f, 0x00],
-        [0xcc, 0x79, 0xa7],
-        [0x60, 0x60, 0x60],
-    ];
+    const DEPTH_COLORS: [Color; 5] =
+        [[0x00, 0x9e, 0x73], [0x56, 0xb4, 0xe9], [0xe6, 0x9f, 0x00], [0xcc, 0x79, 0xa7], [0x60, 0x60, 0x60]];
     let mut depths: Vec<f64> = rows.iter().map(|row| row.depth).collect();
     depths.sort_by(|a, b| b.total_cmp(a));
     depths.dedup();

@@ -59,7 +59,12 @@ pub(super) struct Shown {
 ///
 /// # Errors
 /// If the figure cannot be written.
-pub(super) fn write(out: impl Write, subtitle: &str, shown: Shown, points: &[Point]) -> Result<(), WriteError> {
+pub(super) fn write(
+    out: impl Write,
+    subtitle: &str,
+    shown: Shown,
+    points: &[Point],
+) -> Result<(), WriteError> {
     write_figure(out, Format::Png, SIZE, |canvas| draw(canvas, subtitle, shown, points))
 }
 

@@ -33,8 +33,7 @@ impl Labels {
     /// opposite side if there is room, and to the right if there is room nowhere.
     pub fn add(&mut self, canvas: &Canvas, text: String, at: Point, before: Option<Point>, color: Color) {
         let face = Typeface::of_figures();
-        let half =
-            (canvas.text_width(&text, self.size) / 2.0, face.cap_height(face.em(self.size)) / 2.0);
+        let half = (canvas.text_width(&text, self.size) / 2.0, face.cap_height(face.em(self.size)) / 2.0);
         let place = |(x, y): Point| {
             let x_off = if y == 0.0 { OFF + half.0 } else { half.0 };
             Rect::around((at.0 + x * x_off, at.1 + y * (OFF + half.1)), half)

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
 use tiny_skia::{
-    Color as SkiaColor, FillRule, FilterQuality, IntSize, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap,
-    PixmapPaint, Rect as SkiaRect, Stroke, StrokeDash, Transform,
+    Color as SkiaColor, FillRule, FilterQuality, IntSize, LineCap, LineJoin, Paint, Path, PathBuilder,
+    Pixmap, PixmapPaint, Rect as SkiaRect, Stroke, StrokeDash, Transform,
 };
 use ttf_parser::{GlyphId, OutlineBuilder};
 
@@ -117,8 +117,7 @@ fn draw(page: &mut Pixmap, item: &Item) {
         }
         Item::Image { rect, bitmap } => {
             let [columns, rows] = bitmap.size;
-            let scale =
-                [(rect.right - rect.left) / columns as f64, (rect.bottom - rect.top) / rows as f64];
+            let scale = [(rect.right - rect.left) / columns as f64, (rect.bottom - rect.top) / rows as f64];
             let [sx, sy, left, top] = [scale[0], scale[1], rect.left, rect.top].map(|v| v as f32);
             let place = Transform::from_row(sx, 0.0, 0.0, sy, left, top);
             let quality = if bitmap.is_smooth { FilterQuality::Bilinear } else { FilterQuality::Nearest };

@@ -16,8 +16,8 @@ use crate::show::drawing::legend::{Entry, Key, draw_head};
 use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Rect, wall_color, write_figure};
 use crate::show::error::WriteError;
 use coloring::{Coloring, STROBE, both_directions, class_color, direction_color, mixed};
-pub use panels::Panels;
 use panels::Panel;
+pub use panels::Panels;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
 

@@ -58,8 +58,7 @@ fn bar_top(layer: &Layer) -> f64 {
 
 fn draw(canvas: &Canvas, cells: &Cells<'_>, layer: &Layer, layout: &MapLayout) {
     let scene = cells.scene();
-    let subtitle =
-        format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
+    let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
     draw_head(canvas, scene.title(), &subtitle, &[]);
     layout.draw_map(canvas, cells, |id| layer.palette[usize::from(layer.indices[id])]);
     for (row, entry) in layer.entries.iter().enumerate() {

@@ -14,8 +14,8 @@ use std::io::Write;
 use crate::map::scene::Format;
 use crate::show::drawing::write_figure;
 use crate::show::error::WriteError;
-pub use plot::OrbitPlot;
 use plot::ORBIT_WIDTH;
+pub use plot::OrbitPlot;
 
 /// A figure of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -51,7 +51,10 @@ const LEVELS: u8 = 255;
 
 /// Returns the layers of the continuous quantities that the scene requests.
 pub(crate) fn layers(cells: &Cells<'_>) -> impl Iterator<Item = Layer> {
-    CONTINUOUS.iter().filter(|continuous| cells.has(continuous.quantity)).map(|continuous| continuous.layer(cells))
+    CONTINUOUS
+        .iter()
+        .filter(|continuous| cells.has(continuous.quantity))
+        .map(|continuous| continuous.layer(cells))
 }
 
 impl Continuous {

@@ -105,7 +105,7 @@ mod tests {
         // One of them may be the word without events, which has its own colour.
         let near = |apart: usize| (0..LISTED_WORDS - apart).map(move |i| (i, i + apart));
         let among = near(1).chain(near(2)).map(|(i, j)| (named[i], named[j]));
-        let any = texts.iter().flat_map(|&color| [(color, WITHOUT_EVENTS), (color, CHAOTIC)]);
+        let any = named.iter().flat_map(|&color| [(color, WITHOUT_EVENTS), (color, CHAOTIC)]);
         let last = named[LISTED_WORDS - 2..].iter().map(|&color| (color, RARE));
         let ends = [RARE, NOT_KNOWN, CHAOTIC, WITHOUT_EVENTS];
         let ends = (0..4).flat_map(|i| (0..i).map(move |j| (ends[i], ends[j])));

@@ -10,7 +10,8 @@ use crate::show::names::{self, float, optional};
 use rattlemap_dynamics::orbit::Class;
 
 /// Columns before and after the strobe state.
-const FIELDS_BEFORE: [&str; 7] = ["label", "class", "period", "word", "exponent", "largest_multiplier", "symmetric"];
+const FIELDS_BEFORE: [&str; 7] =
+    ["label", "class", "period", "word", "exponent", "largest_multiplier", "symmetric"];
 const FIELDS_AFTER: [&str; 2] = ["cells", "share"];
 
 /// Returns the name of an attractor in legends.
@@ -43,7 +44,8 @@ pub(crate) fn write(out: impl io::Write, cells: &Cells<'_>, basins: &Basins) -> 
         .map(|(i, axis)| (i, &*axis.parameter().name))
         .collect();
     let before = FIELDS_BEFORE.iter().map(ToString::to_string);
-    let after = FIELDS_AFTER.iter().map(ToString::to_string).chain(swept.iter().map(|(_, name)| (*name).to_owned()));
+    let after =
+        FIELDS_AFTER.iter().map(ToString::to_string).chain(swept.iter().map(|(_, name)| (*name).to_owned()));
     table.write_record(before.chain(states).chain(after))?;
     let total = basins.labels().len() as f64;
     for (label, attractor) in basins.attractors().iter().enumerate() {

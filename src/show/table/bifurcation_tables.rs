@@ -136,9 +136,10 @@ pub(crate) fn points(axis: &str, names: &[&str], columns: &[Column]) -> Vec<(Str
     let direction = |column: &Column| Direction::BOTH.iter().position(|way| Some(*way) == column.direction);
     let kind = |point: &SectionPoint| KINDS.iter().position(|kind| *kind == point.kind).unwrap_or_default();
     let mut list = vec![(axis.to_owned(), floats(&|column, _| column.value))];
-    list.extend(direction_field(columns).map(|name| {
-        (name.to_owned(), codes(&|column, _| direction(column).unwrap_or_default() as i8))
-    }));
+    list.extend(
+        direction_field(columns)
+            .map(|name| (name.to_owned(), codes(&|column, _| direction(column).unwrap_or_default() as i8))),
+    );
     let [side, kinds, time] = POINT_FIELDS.map(str::to_owned);
     list.push((side, codes(&|_, point| names::side_code(point.side))));
     list.push((kinds, codes(&|_, point| kind(point) as i8)));
@@ -205,8 +206,7 @@ mod tests {
             after: [1.0, 0.1 + 0.2, 1.5, f64::NAN],
         };
         let periodic = Column::plain(0.25, Class::Periodic { period: 2 });
-        let columns =
-            [Column { points: vec![point, point], ..periodic }, Column::plain(1.0, Class::Chaotic)];
+        let columns = [Column { points: vec![point, point], ..periodic }, Column::plain(1.0, Class::Chaotic)];
         let row = "0.25,periodic,2,ok,-1,mesh_start,0.1,1.0,-2.0,1.5,1e-7,1.0,0.30000000000000004,1.5,";
         let expected = format!(
             "e,class,period,status,side,kind,t_mod_period,x1_before,v1_before,x2_before,v2_before,x1,v1,x2,v2\n\

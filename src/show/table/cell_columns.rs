@@ -197,8 +197,7 @@ pub(crate) fn requested(cells: &Cells<'_>) -> Vec<&'static CellColumn> {
 /// Returns all columns of `cells.npy`, by name.
 pub(crate) fn read(cells: &Cells<'_>, rows: &WordRows<'_>) -> Vec<(String, Values)> {
     let count = cells.count();
-    let mut indices: Vec<Vec<u32>> =
-        index_names(cells).iter().map(|_| Vec::with_capacity(count)).collect();
+    let mut indices: Vec<Vec<u32>> = index_names(cells).iter().map(|_| Vec::with_capacity(count)).collect();
     let mut swept: Vec<Vec<f64>> = swept_names(cells).map(|_| Vec::with_capacity(count)).collect();
     let columns = requested(cells);
     let mut measured: Vec<Values> = columns.iter().map(|column| column.value.empty(count)).collect();

@@ -21,12 +21,8 @@ const LEAST_DECADES: f64 = 0.8;
 const END: f64 = 6.0;
 
 /// Hardware in f32 and f64, then software.
-const ON_DEVICE: [Color; 4] = [
-    [0xd5, 0x5e, 0x00],
-    [0x00, 0x72, 0xb2],
-    [0xe6, 0x9f, 0x00],
-    [0x56, 0xb4, 0xe9],
-];
+const ON_DEVICE: [Color; 4] =
+    [[0xd5, 0x5e, 0x00], [0x00, 0x72, 0xb2], [0xe6, 0x9f, 0x00], [0x56, 0xb4, 0xe9]];
 /// Processor threads, from few to many.
 const ON_CPU: [Color; 2] = [[0xb8, 0xdc, 0xc8], [0x00, 0x5a, 0x3c]];
 
@@ -157,13 +153,7 @@ pub(super) fn write_stages(out: impl Write, all: &[Series]) -> Result<(), WriteE
     })
 }
 
-fn stages(
-    canvas: &Canvas,
-    frame: &Frame,
-    top: f64,
-    series: &Series,
-    point: &Point,
-) {
+fn stages(canvas: &Canvas, frame: &Frame, top: f64, series: &Series, point: &Point) {
     let medians = STAGES.map(|(_, _, of)| point.spread(|run| of(&run.times)).median);
     let total: f64 = medians.iter().sum();
     let text = format!("{}: {} lanes, {} s", series.engine.label(), grouped(point.lanes), seconds(total));

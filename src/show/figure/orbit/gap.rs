@@ -71,7 +71,8 @@ impl OrbitPlot<'_> {
         if !are_two || is_elastic {
             ends.extend([high + MOTION_MARGIN * extent, low - MOTION_MARGIN * extent]);
             let near = [(right, right - high, 1.0), (left, low - left, -1.0)];
-            let near = near.into_iter().filter(|(wall, away, _)| wall.is_finite() && *away < FAR_WALL * extent);
+            let near =
+                near.into_iter().filter(|(wall, away, _)| wall.is_finite() && *away < FAR_WALL * extent);
             ends.extend(near.map(|(wall, _, sign)| wall + sign * MOTION_MARGIN * extent));
         }
         let least_span = if are_two { length } else { self.decayed() };
