@@ -34,7 +34,7 @@ fn parameters_and(model: &dyn Model, is_swept: impl Fn(&Parameter) -> bool, deri
 }
 
 /// Describes the oscillators of a scene by their fixed and derived parameters.
-pub(crate) fn of_scene(scene: &Scene) -> String {
+pub fn of_scene(scene: &Scene) -> String {
     let is_fixed = |parameter: &Parameter| scene.fixed().any(|(name, _)| name == parameter.name);
     parameters_and(scene.base(), |parameter| !is_fixed(parameter), derived(scene).collect())
 }

@@ -14,7 +14,7 @@ use rattlemap_dynamics::orbit::{Class, Status};
 
 /// Origin of a cell's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Source {
+pub enum Source {
     /// The cell was integrated.
     Integrated,
     /// The cell was filled from its neighbours, which agree.
@@ -23,10 +23,10 @@ pub(crate) enum Source {
 
 impl Source {
     /// All sources. Their positions are their codes in tables.
-    pub(crate) const ALL: [Source; 2] = [Source::Integrated, Source::Filled];
+    pub const ALL: [Source; 2] = [Source::Integrated, Source::Filled];
 
     /// Returns the name in tables.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Source::Integrated => "integrated",
             Source::Filled => "filled",
@@ -122,7 +122,7 @@ impl<'a> Cells<'a> {
     }
 
     /// Returns the number of cells.
-    pub(crate) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.plan.cell_count()
     }
 
@@ -171,12 +171,12 @@ impl<'a> Cells<'a> {
     }
 
     /// Returns the number of attractors per cell, by id, if they were counted.
-    pub(crate) fn attractors(&self) -> Option<&'a [u8]> {
+    pub fn attractors(&self) -> Option<&'a [u8]> {
         self.survey?.attractors.as_deref()
     }
 
     /// Returns the basins, in a map of basins.
-    pub(crate) fn basins(&self) -> Option<&'a Basins> {
+    pub fn basins(&self) -> Option<&'a Basins> {
         self.survey?.basins.as_ref()
     }
 
@@ -191,17 +191,17 @@ impl<'a> Cells<'a> {
     }
 
     /// Returns the scene.
-    pub(crate) fn scene(&self) -> &'a Scene {
+    pub fn scene(&self) -> &'a Scene {
         self.scene
     }
 
     /// Whether the scene requests a quantity.
-    pub(crate) fn has(&self, quantity: Quantity) -> bool {
+    pub fn has(&self, quantity: Quantity) -> bool {
         self.scene.outputs().quantities.contains(&quantity)
     }
 
     /// Returns the record of the run `id`.
-    pub(crate) fn record(&self, id: usize) -> Record {
+    pub fn record(&self, id: usize) -> Record {
         self.records.record(id)
     }
 

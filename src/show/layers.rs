@@ -12,8 +12,9 @@ mod continuous;
 mod layer;
 mod words;
 
-pub(crate) use bar::{Bar, share};
-pub(crate) use layer::{Layer, NamedColor};
+pub use bar::Bar;
+pub(crate) use bar::share;
+pub use layer::{Layer, NamedColor};
 
 use crate::map::scene::Quantity;
 use crate::show::cells::Cells;
@@ -30,7 +31,7 @@ pub struct SharedColors {
 }
 
 /// Returns the colours of the program's figures.
-pub(crate) fn shared_colors() -> SharedColors {
+pub fn shared_colors() -> SharedColors {
     let named = vec![
         ("commonest", words::COMMONEST),
         ("period 1", colors::SYMMETRIC),
@@ -44,10 +45,10 @@ pub(crate) fn shared_colors() -> SharedColors {
 }
 
 /// Name of the layer of classes in maps whose main layer shows basins.
-pub(crate) const CLASS: &str = "class";
+pub const CLASS: &str = "class";
 
 /// Returns the layers that the scene requests, the main layer first, patterns before words.
-pub(crate) fn of(cells: &Cells<'_>, words: &MapWords) -> Vec<Layer> {
+pub fn of(cells: &Cells<'_>, words: &MapWords) -> Vec<Layer> {
     let mut layers: Vec<Layer> = cells.basins().map(basins::layer).into_iter().collect();
     if cells.has(Quantity::Class) {
         let classes = classes::layer(cells);

@@ -5,17 +5,17 @@ use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::{Class, EventKind};
 
 /// Returns the name of a figure's file.
-pub(crate) fn figure(what: &str, format: Format) -> String {
+pub fn figure(what: &str, format: Format) -> String {
     format!("{what}.{}", format.name())
 }
 
 /// Returns the names of a figure's files in all formats.
-pub(crate) fn figures(what: &str) -> [(Format, String); 3] {
+pub fn figures(what: &str) -> [(Format, String); 3] {
     Format::FIGURES.map(|format| (format, figure(what, format)))
 }
 
 /// Returns the forcing periods per cycle of a periodic motion.
-pub(crate) fn period(class: Class) -> Option<u32> {
+pub fn period(class: Class) -> Option<u32> {
     match class {
         Class::Periodic { period } => Some(period),
         _ => None,
@@ -23,7 +23,7 @@ pub(crate) fn period(class: Class) -> Option<u32> {
 }
 
 /// Returns the name of a kind of event.
-pub(crate) fn kind(kind: EventKind) -> &'static str {
+pub fn kind(kind: EventKind) -> &'static str {
     match kind {
         EventKind::Impact => "impact",
         EventKind::MeshStart => "mesh_start",
@@ -32,7 +32,7 @@ pub(crate) fn kind(kind: EventKind) -> &'static str {
 }
 
 /// Returns 1 for the right wall, -1 for the left wall.
-pub(crate) fn side_code(side: Side) -> i8 {
+pub fn side_code(side: Side) -> i8 {
     match side {
         Side::Right => 1,
         Side::Left => -1,
@@ -40,7 +40,7 @@ pub(crate) fn side_code(side: Side) -> i8 {
 }
 
 /// Returns the name of a side in texts.
-pub(crate) fn side(side: Side) -> &'static str {
+pub fn side(side: Side) -> &'static str {
     match side {
         Side::Right => "right",
         Side::Left => "left",

@@ -20,7 +20,7 @@ const CYCLE_SAMPLES: usize = 1 << 20;
 const WINDOW_SAMPLES: usize = 1 << 19;
 
 /// Returns the samples per forcing period that figures need: 400, or 20 per oscillation of the teeth in meshing if that is more.
-pub(crate) fn samples_per_period(oscillator: &Oscillator) -> usize {
+pub fn samples_per_period(oscillator: &Oscillator) -> usize {
     let stiffness = Side::BOTH.map(|side| oscillator.added(side)[0]).into_iter().fold(0.0, f64::max);
     let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
     (20.0 * ringing).clamp(400.0, 50_000.0) as usize
@@ -28,7 +28,7 @@ pub(crate) fn samples_per_period(oscillator: &Oscillator) -> usize {
 
 /// Amplitudes at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Line {
+pub struct Line {
     /// Frequency in multiples of the forcing frequency.
     pub(crate) frequency: f64,
     /// Amplitudes of the gap and of its velocity; at frequency 0 the absolute value of the mean.
@@ -37,7 +37,7 @@ pub(crate) struct Line {
 
 /// A spectrum.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Spectrum {
+pub struct Spectrum {
     /// Lines in order of frequency.
     pub(crate) lines: Vec<Line>,
     /// Forcing periods of the cycle; none if windows were used.
@@ -49,7 +49,7 @@ impl Spectrum {
     ///
     /// # Errors
     /// [`ModelError`] if the model is not valid.
-    pub(crate) fn of(model: &dyn Model, orbit: &Orbit) -> Result<Option<Spectrum>, ModelError> {
+    pub fn of(model: &dyn Model, orbit: &Orbit) -> Result<Option<Spectrum>, ModelError> {
         let oscillator = model.oscillator()?;
         let cycle = matches!(orbit.class, Class::Periodic { .. }).then_some(orbit.cycle_periods);
         // Velocity jumps have high harmonics, which cause aliasing, so a cycle needs dense samples.

@@ -11,7 +11,7 @@ use rattlemap_dynamics::orbit::{Class, Event, Orbit, Status};
 const DECIMALS: usize = 5;
 
 /// Returns a summary of the orbit of a model in lines of aligned text.
-pub(crate) fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
+pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
     let mut text = String::new();
     let instant = instant.map(|instant| ("state".to_owned(), state(model, instant)));
     for (label, value) in facts(model, orbit).into_iter().chain(instant) {

@@ -16,7 +16,7 @@ impl Parameters {
     }
 
     /// Returns the fixed parameters of a scene.
-    pub(crate) fn of_scene(scene: &Scene) -> Parameters {
+    pub fn of_scene(scene: &Scene) -> Parameters {
         Parameters(scene.fixed().map(|(name, value)| (name.to_owned(), value)).collect())
     }
 }

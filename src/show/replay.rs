@@ -52,7 +52,7 @@ fn start(model: &dyn Model, state: State) -> String {
 }
 
 /// Returns the command that replays the run `id`.
-pub(crate) fn command(cells: &Cells<'_>, id: usize) -> String {
+pub fn command(cells: &Cells<'_>, id: usize) -> String {
     let scene = cells.scene();
     let targets = scene.points().targets();
     let swept = targets.zip(scene.swept().map(|parameter| &*parameter.name).zip(cells.values(id)));

@@ -13,168 +13,64 @@ use bytemuck::NoUninit;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
 use crate::show::cells::{Cells, Row, Source};
 use crate::show::color::Color;
 use crate::show::error::WriteError;
-use crate::show::layers::{Layer, NamedColor};
-use crate::show::refinement::RefinementObject;
+use crate::show::layers::{Bar, Layer, NamedColor};
 use crate::show::symbols::symbol;
 use crate::show::table::attractors_csv::attractor_name;
 use crate::show::words::{MapWords, WordIndex};
-use crate::show::{caption, replay};
+use crate::show::{caption, refinement, replay};
 use rattlemap_dynamics::orbit::{Class, Status};
 
 const PAGE: &str = include_str!("report/page.html");
 const STYLE: &str = include_str!("report/page.css");
 const SCRIPT: &str = include_str!("report/page.js");
 
-#[derive(Serialize)]
-struct PageData<'a> {
-    title: String,
-    subtitle: String,
-    /// Fixed and derived parameters.
-    fixed: String,
-    /// Literature source of the model.
-    source: Option<String>,
-    axes: Vec<AxisData>,
-    derived: Vec<DerivedData>,
-    /// Arguments of the replay command that are the same for all cells.
-    replay: String,
-    /// Start states of cells that follow their neighbours: four numbers per cell.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    starts: Option<Packed>,
-    /// Start state of the first cell, if axes sweep components of it.
-    start: Option<Vec<f64>>,
-    /// Number of components of a state.
-    components: usize,
-    layers: Vec<LayerData<'a>>,
-    values: CellValues,
-    classes: [&'static str; 4],
-    statuses: Vec<&'static str>,
-    sources: [&'static str; 2],
-    words: Vec<String>,
-    patterns: Vec<String>,
-    /// Names of attractors by label.
-    attractors: Vec<String>,
-    refinement: Option<RefinementObject>,
-    validation: Option<&'a serde_json::Value>,
-}
-
-#[derive(Serialize)]
-struct AxisData {
-    parameter: String,
-    symbol: String,
-    meaning: String,
-    min: f64,
-    max: f64,
-    count: usize,
-    scale: &'static str,
-    /// Index of the component of the start that the axis sweeps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    start: Option<usize>,
-    /// Values of an axis that is not linear.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    values: Option<Vec<f64>>,
-}
-
-/// Values of a derived parameter, along the axes that it depends on.
-#[derive(Serialize)]
-struct DerivedData {
-    parameter: String,
-    along: [bool; 2],
-    #[serde(flatten)]
-    values: Packed,
-}
-
-#[derive(Serialize)]
-struct LayerData<'a> {
-    name: &'static str,
-    short: &'static str,
-    title: &'static str,
-    palette: Vec<String>,
-    entries: Vec<EntryData<'a>>,
-    bar: Option<BarData>,
-    #[serde(flatten)]
-    indices: Packed,
-}
-
-#[derive(Serialize)]
-struct EntryData<'a> {
-    color: String,
-    text: &'a str,
-    cells: usize,
-}
-
-#[derive(Serialize)]
-struct BarData {
-    label: &'static str,
-    colors: Vec<String>,
-    low: f64,
-    high: f64,
-    /// Sentences about values beyond the ends.
-    left_out: Vec<String>,
-}
-
-/// A compressed array.
-#[derive(Serialize)]
-struct Packed {
-    #[serde(rename = "type")]
-    kind: &'static str,
-    data: String,
-}
-
-/// Arrays of the values that the page shows for a cell, by name.
-struct CellValues(Vec<(&'static str, Packed)>);
-
-impl Serialize for CellValues {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, values)| (name, values)))
-    }
-}
-
 /// Writes the page, with a section on the validation if there was one.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write(
+pub fn write(
     mut page: impl Write,
     cells: &Cells<'_>,
     layers: &[Layer],
     words: &MapWords,
-    validation: Option<&serde_json::Value>,
+    validation: Option<&Value>,
 ) -> Result<(), WriteError> {
     let scene = cells.scene();
     let components = scene.base().state_names().len();
     let attractors = cells.basins().into_iter().flat_map(|basins| basins.attractors().iter().enumerate());
-    let data = PageData {
-        title: scene.title().to_owned(),
-        subtitle: caption::integration(scene),
-        fixed: caption::all_fixed(scene),
-        source: scene.base().source().map(str::to_owned),
-        axes: scene.axes().iter().map(AxisData::from).collect(),
-        derived: derived(scene),
-        replay: replay::arguments(scene),
-        starts: scene
-            .start()
-            .follows()
-            .then(|| packed("f64", &(0..cells.count()).map(|id| cells.start(id)).collect::<Vec<[f64; 4]>>())),
-        components,
-        start: scene.sweeps_start().then(|| cells.start(0)[..components].to_vec()),
-        layers: layers.par_iter().map(LayerData::from).collect(),
-        values: values(cells, words),
-        classes: Class::NAMES,
-        statuses: Status::ALL.iter().map(|status| status.name()).collect(),
-        sources: Source::ALL.map(Source::name),
-        words: words.words.as_ref().map_or(Vec::new(), WordIndex::spellings),
-        patterns: words.patterns.as_ref().map_or(Vec::new(), WordIndex::spellings),
-        attractors: attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect(),
-        refinement: cells.refinement().map(RefinementObject::from),
-        validation,
-    };
+    let spellings = |index: &Option<WordIndex>| index.as_ref().map_or(Vec::new(), WordIndex::spellings);
+    let mut data = json!({
+        "title": scene.title(),
+        "subtitle": caption::integration(scene),
+        "fixed": caption::all_fixed(scene),
+        "source": scene.base().source(),
+        "axes": scene.axes().iter().map(axis).collect::<Vec<_>>(),
+        "derived": derived(scene),
+        // Arguments of the replay command that are the same for all cells.
+        "replay": replay::arguments(scene),
+        "components": components,
+        // Start state of the first cell, if axes sweep components of it.
+        "start": scene.sweeps_start().then(|| cells.start(0)[..components].to_vec()),
+        "layers": layers.par_iter().map(layer).collect::<Vec<_>>(),
+        "values": values(cells, words),
+        "classes": Class::NAMES,
+        "statuses": Status::ALL.iter().map(|status| status.name()).collect::<Vec<_>>(),
+        "sources": Source::ALL.map(Source::name),
+        "words": spellings(&words.words),
+        "patterns": spellings(&words.patterns),
+        "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
+        "refinement": cells.refinement().map(refinement::object),
+        "validation": validation,
+    });
+    // Start states of cells that follow their neighbours, four numbers per cell.
+    if scene.start().follows() {
+        let starts: Vec<[f64; 4]> = (0..cells.count()).map(|id| cells.start(id)).collect();
+        data["starts"] = packed("f64", &starts);
+    }
     let [style, script] = [STYLE, SCRIPT].map(inline);
     let policy = policy(&style, &script);
     let title = scene.title().replace('&', "&amp;").replace('<', "&lt;");
@@ -230,124 +126,117 @@ fn policy(style: &str, script: &str) -> String {
     format!("default-src 'none'; script-src {script}; style-src {style}; base-uri 'none'; form-action 'none'")
 }
 
-/// Returns the derived parameters in the order of the scene.
-fn derived(scene: &Scene) -> Vec<DerivedData> {
+/// Returns the derived parameters in the order of the scene. Values are stored along the axes that they depend on.
+fn derived(scene: &Scene) -> Vec<Value> {
     let points = scene.points();
     let [columns, rows] = points.counts();
-    let data = |rule: &Rule| {
+    let object = |rule: &Rule| {
         let follows = |axis: &Axis| axis.target().parameter().is_some_and(|index| rule.follows(index));
         let along = [0, 1].map(|i| scene.axes().get(i).is_some_and(follows));
         let counts = [if along[0] { columns } else { 1 }, if along[1] { rows } else { 1 }];
         let cells = (0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| j * columns + i));
         let values: Vec<f64> = cells.map(|cell| points.model(cell).value(rule.index())).collect();
-        let parameter = rule.parameter().name.to_string();
-        DerivedData { parameter, along, values: packed("f64", &values) }
+        let mut object = packed("f64", &values);
+        object["parameter"] = rule.parameter().name.as_ref().into();
+        object["along"] = json!(along);
+        object
     };
-    points.derived().rules().iter().map(data).collect()
+    points.derived().rules().iter().map(object).collect()
 }
 
-/// A function that reads one value of a cell, by its type in the page.
-enum PageValue {
-    U8(fn(&Row) -> u8),
-    U32(fn(&Row) -> u32),
-    F32(fn(&Row) -> Option<f64>),
-}
-
-/// Values of a cell and the quantities that the scene must request for them.
-const VALUES: [(&str, Option<Quantity>, PageValue); 9] = [
-    ("status", None, PageValue::U8(|row| row.status.code() as u8)),
-    ("periods_run", None, PageValue::U32(|row| row.periods_run)),
-    (
-        "class",
-        Some(Quantity::Class),
-        PageValue::U8(|row| row.class.map_or(u8::MAX, |class| class.index() as u8)),
-    ),
-    ("period", Some(Quantity::Class), PageValue::U8(|row| row.period.unwrap_or(0) as u8)),
-    ("lyapunov", Some(Quantity::Lyapunov), PageValue::F32(|row| row.lyapunov)),
-    ("lyapunov_error", Some(Quantity::Lyapunov), PageValue::F32(|row| row.lyapunov_error)),
-    ("impacts_per_period", Some(Quantity::Impacts), PageValue::F32(|row| row.impacts_per_period)),
-    ("mesh_fraction", Some(Quantity::Mesh), PageValue::F32(|row| row.mesh_fraction)),
-    ("symmetric", Some(Quantity::Symmetric), PageValue::U8(|row| row.symmetric.map_or(u8::MAX, u8::from))),
-];
-
-/// Returns the values that the page shows for a cell.
-fn values(cells: &Cells<'_>, words: &MapWords) -> CellValues {
+/// Returns the arrays of values that the page shows for a cell, by name.
+fn values(cells: &Cells<'_>, words: &MapWords) -> Value {
     let rows = || cells.ids().map(|id| cells.row(id));
-    let pack = |value: &PageValue| match *value {
-        PageValue::U8(value) => packed("u8", &rows().map(|row| value(&row)).collect::<Vec<_>>()),
-        PageValue::U32(value) => packed("u32", &rows().map(|row| value(&row)).collect::<Vec<_>>()),
-        PageValue::F32(value) => {
-            packed("f32", &rows().map(|row| value(&row).unwrap_or(f64::NAN) as f32).collect::<Vec<_>>())
-        }
+    let bytes = |value: fn(&Row) -> u8| packed("u8", &rows().map(|row| value(&row)).collect::<Vec<_>>());
+    let floats = |value: fn(&Row) -> Option<f64>| {
+        packed("f32", &rows().map(|row| value(&row).unwrap_or(f64::NAN) as f32).collect::<Vec<_>>())
     };
-    let requested = VALUES.iter().filter(|(_, quantity, _)| quantity.is_none_or(|it| cells.has(it)));
-    let mut list: Vec<(&str, Packed)> = requested.map(|(name, _, value)| (*name, pack(value))).collect();
+    let mut object = json!({
+        "status": bytes(|row| row.status.code() as u8),
+        "periods_run": packed("u32", &rows().map(|row| row.periods_run).collect::<Vec<_>>()),
+    });
+    if cells.has(Quantity::Class) {
+        object["class"] = bytes(|row| row.class.map_or(u8::MAX, |class| class.index() as u8));
+        object["period"] = bytes(|row| row.period.unwrap_or(0) as u8);
+    }
+    if cells.has(Quantity::Lyapunov) {
+        object["lyapunov"] = floats(|row| row.lyapunov);
+        object["lyapunov_error"] = floats(|row| row.lyapunov_error);
+    }
+    if cells.has(Quantity::Impacts) {
+        object["impacts_per_period"] = floats(|row| row.impacts_per_period);
+    }
+    if cells.has(Quantity::Mesh) {
+        object["mesh_fraction"] = floats(|row| row.mesh_fraction);
+    }
+    if cells.has(Quantity::Symmetric) {
+        object["symmetric"] = bytes(|row| row.symmetric.map_or(u8::MAX, u8::from));
+    }
     if cells.refinement().is_some() {
-        list.push(("source", pack(&PageValue::U8(|row| row.source as u8))));
+        object["source"] = bytes(|row| row.source as u8);
     }
     if let Some(basins) = cells.basins() {
         let labels: Vec<u32> = basins.labels().iter().map(|&label| label.into()).collect();
-        list.push(("attractor", packed("u32", &labels)));
+        object["attractor"] = packed("u32", &labels);
     }
     if let Some(counts) = cells.attractors() {
-        list.push(("attractors", packed("u8", counts)));
+        object["attractors"] = packed("u8", counts);
     }
     for (name, index) in [("word", &words.words), ("pattern", &words.patterns)] {
-        list.extend(index.as_ref().map(|index| (name, packed("u32", &index.numbers))));
+        index.iter().for_each(|index| object[name] = packed("u32", &index.numbers));
     }
-    CellValues(list)
+    object
 }
 
-fn packed<T: NoUninit>(kind: &'static str, values: &[T]) -> Packed {
+/// Returns a compressed array.
+fn packed<T: NoUninit>(kind: &'static str, values: &[T]) -> Value {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
     // Writing to memory cannot fail.
     let bytes = encoder.write_all(bytemuck::cast_slice(values)).and_then(|()| encoder.finish());
-    Packed { kind, data: STANDARD.encode(bytes.unwrap_or_default()) }
+    json!({ "type": kind, "data": STANDARD.encode(bytes.unwrap_or_default()) })
 }
 
-impl From<&Axis> for AxisData {
-    fn from(axis: &Axis) -> Self {
-        let parameter = axis.parameter();
-        AxisData {
-            parameter: parameter.name.to_string(),
-            symbol: symbol(&parameter.name),
-            meaning: parameter.meaning.to_string(),
-            min: axis.min(),
-            max: axis.max(),
-            count: axis.count(),
-            scale: axis.scale().name(),
-            start: match axis.target() {
-                Target::Start(place) => Some(place),
-                Target::Parameter(_) => None,
-            },
-            values: (axis.scale() != Scale::Linear).then(|| axis.values().collect()),
-        }
+fn axis(axis: &Axis) -> Value {
+    let parameter = axis.parameter();
+    let mut object = json!({
+        "parameter": parameter.name,
+        "symbol": symbol(&parameter.name),
+        "meaning": parameter.meaning,
+        "min": axis.min(),
+        "max": axis.max(),
+        "count": axis.count(),
+        "scale": axis.scale().name(),
+    });
+    // Index of the component of the start that the axis sweeps.
+    if let Target::Start(component) = axis.target() {
+        object["start"] = component.into();
     }
+    if axis.scale() != Scale::Linear {
+        object["values"] = axis.values().collect();
+    }
+    object
 }
 
-impl<'a> From<&'a Layer> for LayerData<'a> {
-    fn from(layer: &'a Layer) -> Self {
-        let entry = |entry: &'a NamedColor| EntryData {
-            color: hex(&entry.color),
-            text: &entry.text,
-            cells: entry.cells,
-        };
-        LayerData {
-            name: layer.name,
-            short: layer.short,
-            title: layer.title,
-            palette: layer.palette.iter().map(hex).collect(),
-            entries: layer.entries.iter().map(entry).collect(),
-            bar: layer.bar.as_ref().map(|bar| BarData {
-                label: bar.label,
-                colors: bar.colors.iter().step_by(6).map(hex).collect(),
-                low: bar.low,
-                high: bar.high,
-                left_out: bar.remarks(layer.indices.len()),
-            }),
-            indices: packed("u8", &layer.indices),
-        }
-    }
+fn layer(layer: &Layer) -> Value {
+    let entry =
+        |entry: &NamedColor| json!({ "color": hex(&entry.color), "text": entry.text, "cells": entry.cells });
+    let bar = |bar: &Bar| {
+        json!({
+            "label": bar.label,
+            "colors": bar.colors.iter().step_by(6).map(hex).collect::<Vec<_>>(),
+            "low": bar.low,
+            "high": bar.high,
+            "left_out": bar.remarks(layer.indices.len()),
+        })
+    };
+    let mut object = packed("u8", &layer.indices);
+    object["name"] = layer.name.into();
+    object["short"] = layer.short.into();
+    object["title"] = layer.title.into();
+    object["palette"] = layer.palette.iter().map(hex).collect();
+    object["entries"] = layer.entries.iter().map(entry).collect();
+    object["bar"] = layer.bar.as_ref().map(bar).into();
+    object
 }
 
 fn hex([r, g, b]: &Color) -> String {

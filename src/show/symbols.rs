@@ -12,7 +12,7 @@ const GREEK: [(&str, char); 25] = [
 ];
 
 /// Returns the symbol of a name: `omega` becomes a Greek letter, the digits of `x1` or `omega_0` become subscripts.
-pub(crate) fn symbol(name: &str) -> String {
+pub fn symbol(name: &str) -> String {
     let stem = name.trim_end_matches(|sign: char| sign.is_ascii_digit());
     let digits = &name[stem.len()..];
     let letters = if digits.is_empty() { stem } else { stem.trim_end_matches('_') };
@@ -25,7 +25,7 @@ pub(crate) fn symbol(name: &str) -> String {
 }
 
 /// Returns the label of a parameter's axis.
-pub(crate) fn axis_label(parameter: &Parameter) -> String {
+pub fn axis_label(parameter: &Parameter) -> String {
     let symbol = symbol(&parameter.name);
     // A parameter without a description has its name as meaning.
     if parameter.meaning == parameter.name { symbol } else { format!("{}, {symbol}", parameter.meaning) }

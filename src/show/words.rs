@@ -17,7 +17,7 @@ pub(crate) const UNKNOWN: u32 = u32::MAX - 1;
 
 /// Every word (or every pattern) of a map, and the word of each cell.
 #[derive(Clone, Debug)]
-pub(crate) struct WordIndex {
+pub struct WordIndex {
     /// Words by number, the most frequent first, with the number of their cells.
     pub(crate) list: Vec<(Spelling, usize)>,
     /// Number of each cell's word, by id; [`APERIODIC`] or [`UNKNOWN`] if it has none.
@@ -26,13 +26,13 @@ pub(crate) struct WordIndex {
 
 /// Words and patterns of a map, if the scene requests them.
 #[derive(Clone, Debug)]
-pub(crate) struct MapWords {
+pub struct MapWords {
     pub(crate) words: Option<WordIndex>,
     pub(crate) patterns: Option<WordIndex>,
 }
 
 /// Collects the words and the patterns of a map.
-pub(crate) fn read(cells: &Cells<'_>) -> MapWords {
+pub fn read(cells: &Cells<'_>) -> MapWords {
     let (words, patterns) = rayon::join(
         || cells.has(Quantity::Word).then(|| WordIndex::read(cells, &WORD)),
         || cells.has(Quantity::Pattern).then(|| WordIndex::read(cells, &PATTERN)),
@@ -41,12 +41,12 @@ pub(crate) fn read(cells: &Cells<'_>) -> MapWords {
 }
 
 /// A packed word with hash and length. It is faster to read than a spelling.
-type Packed = ([u64; 4], u64, u32);
+type PackedWord = ([u64; 4], u64, u32);
 
 /// Access to the word or to the pattern of a record.
 struct WordField {
     bit: u32,
-    packed: fn(&Record) -> Packed,
+    packed: fn(&Record) -> PackedWord,
     spelling: fn(&Record) -> Option<Spelling>,
 }
 
@@ -64,7 +64,7 @@ const PATTERN: WordField = WordField {
 
 impl WordIndex {
     fn read(cells: &Cells<'_>, field: &WordField) -> WordIndex {
-        let mut by_packed: HashMap<Packed, u32> = HashMap::new();
+        let mut by_packed: HashMap<PackedWord, u32> = HashMap::new();
         let mut by_spelling: HashMap<Spelling, u32> = HashMap::new();
         let mut list: Vec<(Spelling, usize)> = Vec::new();
         let mut numbers = Vec::with_capacity(cells.count());

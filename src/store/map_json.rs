@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::map::plan::count_classes;
 use crate::show::cells::Cells;
-use crate::show::refinement::RefinementObject;
+use crate::show::refinement;
 use crate::store::error::OutputError;
 use crate::store::map_manifest::{BasinObject, MadeObject, Run, basins, statuses, tally};
 use rattlemap_dynamics::orbit::Class;
@@ -35,7 +35,7 @@ struct MapObject<'a> {
     /// Attractors of a map of basins, by label.
     #[serde(skip_serializing_if = "Option::is_none")]
     basins: Option<Vec<BasinObject>>,
-    refinement: Option<RefinementObject>,
+    refinement: Option<Value>,
     /// Forcing periods integrated.
     periods: u64,
     /// Swept parameters that changed nothing that was measured.
@@ -92,7 +92,7 @@ pub(crate) fn object(
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
         basins: basins(cells),
-        refinement: cells.refinement().map(RefinementObject::from),
+        refinement: cells.refinement().map(refinement::object),
         periods: cells.periods(),
         without_effect: &run.without_effect,
         resumed: ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() },

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::findings::attractors::Attractor;
 use crate::gpu::AdapterId;
@@ -14,7 +15,7 @@ use crate::show::cells::{Cells, Source};
 use crate::show::names;
 use crate::show::parameters::Parameters;
 use crate::show::provenance::Provenance;
-use crate::show::refinement::RefinementObject;
+use crate::show::refinement;
 use crate::show::table::cell_columns::ABSENT;
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
@@ -134,7 +135,7 @@ pub(crate) struct Manifest<'a> {
     /// Of all runs that the map took.
     elapsed_seconds: f64,
     resumed_cells: usize,
-    refinement: Option<RefinementObject>,
+    refinement: Option<Value>,
     timings: TimingsObject,
     files: &'a [FileEntry],
 }
@@ -307,7 +308,7 @@ pub(crate) fn map<'a>(
         codes: codes(),
         elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,
-        refinement: cells.refinement().map(RefinementObject::from),
+        refinement: cells.refinement().map(refinement::object),
         timings: TimingsObject {
             open: run.opening.as_secs_f64(),
             integrate: (run.elapsed_before + run.elapsed).as_secs_f64(),

@@ -80,8 +80,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
 pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Result<(), OutputError> {
-    let text =
-        if json { to_json(model, orbit, asked.instant)? } else { summary(model, orbit, asked.instant) };
+    let text = if json { to_json(model, orbit, asked.instant) } else { summary(model, orbit, asked.instant) };
     crate::store::stdout::print(&text)
 }
 
@@ -100,7 +99,7 @@ pub fn write(
     let clock = Clock::now();
     // Figures of an earlier orbit must not stand beside this one.
     folder.remove(&names().collect::<Vec<_>>())?;
-    let json = to_json(model, orbit, asked.instant)?;
+    let json = to_json(model, orbit, asked.instant);
     folder.replace(JSON, |out| Ok(writeln!(out, "{json}")?))?;
     let mut files = vec![JSON];
     if orbit.class != Class::Failed {
@@ -163,10 +162,7 @@ pub fn moments(
     Ok(orbit_tables::moments(&model.oscillator()?, orbit, &trace, samples_per_period))
 }
 
-/// What `orbit --json` prints.
-///
-/// # Errors
-/// [`OutputError`] if it cannot be put into JSON.
-pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> Result<String, OutputError> {
-    Ok(to_json(model, orbit, instant)?)
+/// Returns what `orbit --json` prints.
+pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
+    to_json(model, orbit, instant)
 }

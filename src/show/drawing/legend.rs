@@ -10,7 +10,7 @@ const KEY: f64 = 38.0;
 /// Room between a key and its text, between entries, and from one row to the next.
 const AFTER_KEY: f64 = 10.0;
 const BETWEEN: f64 = 34.0;
-const ROW: f64 = 34.0;
+const LEGEND_ROW: f64 = 34.0;
 /// Smallest type of a title that is too long, and the margin at its sides.
 const SMALLEST_TITLE: f64 = 16.0;
 const SIDE_MARGIN: f64 = 40.0;
@@ -80,7 +80,7 @@ pub fn draw_head(canvas: &Canvas, title: &str, subtitle: &str, entries: &[Entry]
             canvas.text(&entry.text, (x + KEY + AFTER_KEY, y), SMALL, Align::Left, DARK);
             x += width + BETWEEN;
         }
-        y += ROW;
+        y += LEGEND_ROW;
     }
     y
 }

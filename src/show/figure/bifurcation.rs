@@ -43,9 +43,6 @@ const CURVE_DOT: f64 = 1.3;
 /// of a chaotic band. In a diagram of two passes they are coloured by direction, and grey where both passes agree. Columns that
 /// are undecided or failed have a mark at the lower edge. There may be no columns and no points; values that are not finite are
 /// skipped. `axis` is the label and the scale of the parameter.
-///
-/// # Errors
-/// [`WriteError`] if the figure cannot be encoded or written.
 pub fn write(
     out: impl Write,
     format: Format,

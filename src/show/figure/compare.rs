@@ -63,10 +63,7 @@ fn color_index(classes: [Class; 2]) -> usize {
 }
 
 /// Draws the comparison and writes it.
-///
-/// # Errors
-/// [`WriteError`] if the figure cannot be encoded or written.
-pub(crate) fn write(out: impl Write, format: Format, pair: &MapPair<'_>) -> Result<(), WriteError> {
+pub fn write(out: impl Write, format: Format, pair: &MapPair<'_>) -> Result<(), WriteError> {
     let index = |(classes, kind): ([Class; 2], &Option<Kind>)| match kind {
         Some(kind) if !kind.is_decisive() => OTHER_PATTERN,
         _ => color_index(classes),

@@ -27,15 +27,7 @@ const BAR_HEAD: f64 = 50.0;
 const ABOVE_BAR: f64 = 26.0;
 
 /// Draws a layer and writes it.
-///
-/// # Errors
-/// [`WriteError`] if the figure cannot be encoded or written.
-pub(crate) fn write(
-    out: impl Write,
-    format: Format,
-    cells: &Cells<'_>,
-    layer: &Layer,
-) -> Result<(), WriteError> {
+pub fn write(out: impl Write, format: Format, cells: &Cells<'_>, layer: &Layer) -> Result<(), WriteError> {
     let layout = MapLayout::new(cells, LEGEND_WIDTH, legend_height(layer).max(LEAST_HEIGHT));
     write_figure(out, format, layout.size, |canvas| draw(canvas, cells, layer, &layout))
 }

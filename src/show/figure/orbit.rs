@@ -6,7 +6,7 @@ mod heading;
 mod motion;
 mod phase_planes;
 mod plot;
-pub(crate) mod spectrum;
+pub mod spectrum;
 mod time_history;
 
 use std::io::Write;
@@ -42,9 +42,6 @@ impl OrbitFigure {
     }
 
     /// Draws the figure of an orbit and writes it.
-    ///
-    /// # Errors
-    /// [`WriteError`] if the figure cannot be encoded or written.
     pub fn write(self, out: impl Write, format: Format, plot: &OrbitPlot<'_>) -> Result<(), WriteError> {
         let height = match self {
             OrbitFigure::PhasePlane => 980,

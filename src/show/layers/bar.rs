@@ -9,7 +9,7 @@ const LARGEST_SHARE_BEYOND: f64 = 0.005;
 
 /// A range of colours that represents a range of numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct Bar {
+pub struct Bar {
     pub(crate) label: &'static str,
     pub(crate) colors: Vec<Color>,
     pub(crate) low: f64,

@@ -5,7 +5,7 @@ use crate::show::layers::bar::Bar;
 
 /// One view of a map.
 #[derive(Clone, Debug)]
-pub(crate) struct Layer {
+pub struct Layer {
     /// Name of its figure's file.
     pub(crate) name: &'static str,
     /// Label of its button in the report.
@@ -24,7 +24,7 @@ pub(crate) struct Layer {
 
 /// A colour with a name.
 #[derive(Clone, Debug)]
-pub(crate) struct NamedColor {
+pub struct NamedColor {
     pub(crate) color: Color,
     pub(crate) text: String,
     /// Number of cells with this colour.

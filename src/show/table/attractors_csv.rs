@@ -30,10 +30,7 @@ pub(crate) fn attractor_name(label: usize, attractor: &Attractor) -> String {
 
 /// Writes the table: one attractor per row, the largest basin first. The last columns are the swept parameters at which the
 /// attractor was found.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write(out: impl io::Write, cells: &Cells<'_>, basins: &Basins) -> Result<(), WriteError> {
+pub fn write(out: impl io::Write, cells: &Cells<'_>, basins: &Basins) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
     let scene = cells.scene();
     let names = scene.base().state_names();

@@ -33,10 +33,7 @@ const COLUMN_FIELDS: [&str; 11] = [
 const KINDS: [EventKind; 3] = [EventKind::Impact, EventKind::MeshStart, EventKind::MeshEnd];
 
 /// Writes `bifurcation.csv`: the section points, with the states before and after the event.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write_points(
+pub fn write_points(
     out: impl io::Write,
     axis: &str,
     names: &[&str],
@@ -55,10 +52,7 @@ pub(crate) fn write_points(
 }
 
 /// Writes `bifurcation_strobe.csv`: the states at phase 0.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write_strobes(
+pub fn write_strobes(
     out: impl io::Write,
     axis: &str,
     names: &[&str],
@@ -98,10 +92,7 @@ fn write_rows(
 }
 
 /// Writes `bifurcation_columns.csv`: class, word, exponent and averages at each value of the axis.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write_columns(out: impl io::Write, axis: &str, columns: &[Column]) -> Result<(), WriteError> {
+pub fn write_columns(out: impl io::Write, axis: &str, columns: &[Column]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record([axis].into_iter().chain(direction_field(columns)).chain(COLUMN_FIELDS))?;
     for column in columns {
@@ -124,7 +115,7 @@ pub(crate) fn write_columns(out: impl io::Write, axis: &str, columns: &[Column])
 
 /// Returns the section points by column, without class, period and status. Values of the axis without points are left out.
 /// Kinds and directions are codes; see [`point_codes`].
-pub(crate) fn points(axis: &str, names: &[&str], columns: &[Column]) -> Vec<(String, Values)> {
+pub fn points(axis: &str, names: &[&str], columns: &[Column]) -> Vec<(String, Values)> {
     let all = || columns.iter().flat_map(|column| column.points.iter().map(move |point| (column, point)));
     let floats = |of: &dyn Fn(&Column, &SectionPoint) -> f64| {
         let finite = |x: f64| if x.is_finite() { x } else { f64::NAN };
@@ -151,7 +142,7 @@ pub(crate) fn points(axis: &str, names: &[&str], columns: &[Column]) -> Vec<(Str
 }
 
 /// Returns the names of kinds and directions, by code.
-pub(crate) fn point_codes() -> [Vec<&'static str>; 2] {
+pub fn point_codes() -> [Vec<&'static str>; 2] {
     [KINDS.map(names::kind).to_vec(), Direction::BOTH.map(Direction::name).to_vec()]
 }
 

@@ -8,7 +8,7 @@ use crate::show::table::words_csv::WordRows;
 use rattlemap_dynamics::orbit::Class;
 
 /// Code of an absent class or an absent symmetry.
-pub(crate) const ABSENT: i8 = -1;
+pub const ABSENT: i8 = -1;
 
 /// A cell whose columns are read.
 pub(crate) struct CellRow<'a> {
@@ -195,7 +195,7 @@ pub(crate) fn requested(cells: &Cells<'_>) -> Vec<&'static CellColumn> {
 }
 
 /// Returns all columns of `cells.npy`, by name.
-pub(crate) fn read(cells: &Cells<'_>, rows: &WordRows<'_>) -> Vec<(String, Values)> {
+pub fn read(cells: &Cells<'_>, rows: &WordRows<'_>) -> Vec<(String, Values)> {
     let count = cells.count();
     let mut indices: Vec<Vec<u32>> = index_names(cells).iter().map(|_| Vec::with_capacity(count)).collect();
     let mut swept: Vec<Vec<f64>> = swept_names(cells).map(|_| Vec::with_capacity(count)).collect();

@@ -15,10 +15,7 @@ const BLOCK: usize = 1 << 16;
 const PART: usize = 1 << 12;
 
 /// Writes the table.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write(mut out: impl Write, cells: &Cells<'_>) -> Result<(), WriteError> {
+pub fn write(mut out: impl Write, cells: &Cells<'_>) -> Result<(), WriteError> {
     let columns = of_csv(cells);
     let mut header = csv::Writer::from_writer(&mut out);
     header.write_record(location_names(cells).chain(columns.iter().map(|column| column.name)))?;

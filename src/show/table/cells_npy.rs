@@ -14,10 +14,7 @@ const ALIGNMENT: usize = 64;
 ///
 /// Classes, statuses and sources are codes. Words and patterns are rows of `words.csv`. Absent values are 0 (period, word,
 /// pattern), NaN (numbers) or -1 (class, symmetry, attractor).
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write(mut out: impl Write, cells: &Cells<'_>, rows: &WordRows<'_>) -> Result<(), WriteError> {
+pub fn write(mut out: impl Write, cells: &Cells<'_>, rows: &WordRows<'_>) -> Result<(), WriteError> {
     let columns = requested(cells);
     let fields: String =
         numpy_types(cells, &columns).map(|(name, kind)| format!("('{name}', '{kind}'), ")).collect();

@@ -9,16 +9,14 @@ use crate::show::table::cell_columns::{CellRow, location_names};
 use rattlemap_dynamics::orbit::Class;
 
 /// Columns after indices and swept values.
-const FIELDS: [&str; 7] = ["class_a", "period_a", "class_b", "period_b", "lyapunov_a", "lyapunov_b", "kind"];
+const COMPARE_FIELDS: [&str; 7] =
+    ["class_a", "period_a", "class_b", "period_b", "lyapunov_a", "lyapunov_b", "kind"];
 
 /// Writes the table.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write(out: impl Write, pair: &MapPair<'_>) -> Result<(), WriteError> {
+pub fn write(out: impl Write, pair: &MapPair<'_>) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
     let cells = pair.sides.map(|side| side.cells);
-    table.write_record(location_names(cells[0]).chain(FIELDS))?;
+    table.write_record(location_names(cells[0]).chain(COMPARE_FIELDS))?;
     let differing = pair.comparison.kinds.iter().enumerate();
     for (id, kind) in differing.filter_map(|(id, kind)| Some((id, (*kind)?))) {
         let [a, b] = cells.map(|cells| cells.row(id));

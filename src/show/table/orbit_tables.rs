@@ -28,7 +28,7 @@ pub struct Moment {
 /// Merges the samples of `trace` with the states before and after every event.
 ///
 /// `trace` has `samples_per_period` samples per forcing period, begins at phase 0 and spans the events.
-pub(crate) fn moments(
+pub fn moments(
     oscillator: &Oscillator,
     orbit: &Orbit,
     trace: &[Sample],
@@ -61,14 +61,7 @@ pub(crate) fn moments(
 }
 
 /// Writes `trajectory.csv`, one row per moment.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write_trajectory(
-    out: impl Write,
-    state_names: &[&str],
-    moments: &[Moment],
-) -> Result<(), WriteError> {
+pub fn write_trajectory(out: impl Write, state_names: &[&str], moments: &[Moment]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
     let head = ["t", "phase", "z", "w"].into_iter().chain(state_names.iter().copied());
     table.write_record(head.chain(["domain", "event", "side", "moment"]))?;
@@ -95,10 +88,7 @@ fn domain_name(meshing: Option<Side>) -> &'static str {
 }
 
 /// Writes `spectrum.csv`, one row per line of the spectrum.
-///
-/// # Errors
-/// [`WriteError`] if it cannot be written.
-pub(crate) fn write_spectrum(out: impl Write, spectrum: &Spectrum) -> Result<(), WriteError> {
+pub fn write_spectrum(out: impl Write, spectrum: &Spectrum) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record(["frequency", "z", "w"])?;
     for line in &spectrum.lines {

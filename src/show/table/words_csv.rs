@@ -9,7 +9,7 @@ use crate::show::words::{MapWords, WordIndex};
 
 /// Rows of the table, and the rows of each cell's word and pattern. Row 0 is for cells without one.
 #[derive(Clone, Debug)]
-pub(crate) struct WordRows<'s> {
+pub struct WordRows<'s> {
     /// Rows from 1 on: words, then patterns that are not also words, the most frequent first.
     list: Vec<&'s Spelling>,
     word: Option<IndexRows<'s>>,
@@ -25,7 +25,7 @@ struct IndexRows<'s> {
 
 impl<'s> WordRows<'s> {
     /// Assigns rows to the words and patterns of a map.
-    pub(crate) fn new(words: &'s MapWords) -> WordRows<'s> {
+    pub fn new(words: &'s MapWords) -> WordRows<'s> {
         let (mut list, mut known) = (Vec::new(), HashMap::new());
         let mut rows = |index: &'s WordIndex| {
             let row = |(spelling, _): &'s (Spelling, usize)| {
@@ -52,16 +52,13 @@ impl<'s> WordRows<'s> {
     }
 
     /// Returns the texts by row.
-    pub(crate) fn texts(&self) -> Vec<String> {
+    pub fn texts(&self) -> Vec<String> {
         let texts = self.list.iter().map(|spelling| spelling.in_table());
         std::iter::once(String::new()).chain(texts).collect()
     }
 
     /// Writes the table.
-    ///
-    /// # Errors
-    /// [`WriteError`] if it cannot be written.
-    pub(crate) fn write(&self, out: impl Write) -> Result<(), WriteError> {
+    pub fn write(&self, out: impl Write) -> Result<(), WriteError> {
         let mut table = csv::Writer::from_writer(out);
         table.write_record(["row", "text"])?;
         for (row, text) in self.texts().into_iter().enumerate() {

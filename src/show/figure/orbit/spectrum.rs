@@ -22,13 +22,10 @@ const SMALLEST_SHARE: f64 = 1e-5;
 const THICK_LINES: usize = 200;
 
 /// Name of the figure's file without its extension.
-pub(crate) const NAME: &str = "spectrum";
+pub const NAME: &str = "spectrum";
 
 /// Draws a spectrum and writes it.
-///
-/// # Errors
-/// [`WriteError`] if the figure cannot be encoded or written.
-pub(crate) fn write(
+pub fn write(
     out: impl Write,
     format: Format,
     model: &dyn Model,
