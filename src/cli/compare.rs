@@ -67,7 +67,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         MapSide {
             name: &names[i],
             cells: &cells[i],
-            made: Provenance { engine, precision, device },
+            provenance: Provenance { engine, precision, device },
             crate_version,
             commit,
         }

@@ -15,7 +15,7 @@ pub struct MapSide<'a> {
     /// Cells.
     pub cells: &'a Cells<'a>,
     /// Engine and device that computed it.
-    pub made: Provenance<'a>,
+    pub provenance: Provenance<'a>,
     /// Version of the program that computed it.
     pub crate_version: &'a str,
     /// Commit of that program.

@@ -106,9 +106,9 @@ impl<'a> Object<'a> {
         let [a, b] = sides.map(|side| SideObject {
             folder: side.name,
             title: side.cells.scene().title(),
-            engine: side.made.engine,
-            precision: side.made.precision,
-            device: side.made.device,
+            engine: side.provenance.engine,
+            precision: side.provenance.precision,
+            device: side.provenance.device,
             crate_version: side.crate_version,
             commit: side.commit,
         });

@@ -12,7 +12,6 @@ use rattlemap::show::figure::bifurcation::{self, Panels};
 use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
 use rattlemap_dynamics::model::{GearPair, Model, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, Event, EventKind, Orbit, Sample, Settings, Status};
-use rattlemap_dynamics::word::Word;
 
 /// Label and scale of an axis.
 const E: (&str, Scale) = ("coefficient of restitution, e", Scale::Linear);
@@ -66,22 +65,13 @@ fn meshing() -> [f64; 2] {
 }
 
 fn orbit(events: Vec<Event>) -> Orbit {
+    let orbit = orbit::analyse(&GearPair::paper(0.605), REST, &Settings::default()).unwrap();
     Orbit {
         class: Class::Periodic { period: 1 },
-        status: Status::Ok,
-        lyapunov: -0.15,
-        lyapunov_error: None,
-        floquet: None,
-        symmetric: Some(false),
-        word: Word::default(),
-        impacts_per_period: 1.0,
-        mesh_fraction: 0.1,
         strobe: state(0.0),
-        strobe_meshing: None,
         events,
-        cycle_periods: 1,
         forcing_period: PERIOD,
-        periods_run: 0,
+        ..orbit
     }
 }
 

@@ -103,7 +103,7 @@ fn draw(canvas: &Canvas, subtitle: &str, shown: Shown, points: &[Point]) {
     let place = |point: &Point| frame.at(microseconds(point), error(point));
     let markers: Vec<_> =
         drawn().filter(|(style, _)| style.method != MEASURE).map(|(_, point)| place(point)).collect();
-    let mut labels = Labels::beside(&markers, RADIUS, frame.rect, SMALLEST);
+    let mut labels = Labels::new(&markers, RADIUS, frame.rect, SMALLEST);
     for (style, points) in &present {
         if style.method == MEASURE {
             let x = frame.at(microseconds(points[0]), 1.0).0;

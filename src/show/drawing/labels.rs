@@ -24,7 +24,7 @@ pub struct Labels {
 impl Labels {
     /// Returns an empty list of labels of type size `size`. They will lie `within` a rectangle and avoid `markers` of the
     /// given radius.
-    pub fn beside(markers: &[Point], radius: f64, within: Rect, size: f64) -> Labels {
+    pub fn new(markers: &[Point], radius: f64, within: Rect, size: f64) -> Labels {
         let obstacles = markers.iter().map(|at| Rect::around(*at, (radius, radius))).collect();
         Labels { within, obstacles, labels: Vec::new(), size }
     }

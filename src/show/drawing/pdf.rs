@@ -197,8 +197,8 @@ impl<'c> Page<'c> {
         for (bitmap, ids) in self.images.iter().zip(images) {
             write_image(&mut pdf, ids, bitmap);
         }
-        let drawn = compressed(&self.content.finish());
-        pdf.stream(content, &drawn).filter(Filter::FlateDecode);
+        let data = compressed(&self.content.finish());
+        pdf.stream(content, &data).filter(Filter::FlateDecode);
         let ids = [font, next(), next(), next(), next()];
         write_font(&mut pdf, ids, &self.glyphs, &self.signs)?;
         pdf.document_info(next()).producer(TextStr("rattlemap"));

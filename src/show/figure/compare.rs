@@ -93,7 +93,7 @@ fn subtitle(pair: &MapPair<'_>) -> String {
         format!("{name}: {} in A, {} in B", difference.a, difference.b)
     };
     let mut parts: Vec<String> = differences.iter().map(part).collect();
-    let engine = |side: MapSide<'_>| format!("{} {}", side.made.engine, side.made.precision);
+    let engine = |side: MapSide<'_>| format!("{} {}", side.provenance.engine, side.provenance.precision);
     if engine(a) != engine(b) {
         parts.push(format!("A on {}, B on {}", engine(a), engine(b)));
     }

@@ -38,13 +38,13 @@ pub(crate) struct MapLayout {
 }
 
 impl MapLayout {
-    /// Computes the positions for a map with a legend of width `beside`. Map and legend are at least `least_height` high.
-    pub(crate) fn new(cells: &Cells<'_>, beside: f64, least_height: f64) -> MapLayout {
+    /// Computes the positions for a map with a legend of width `legend_width`. Map and legend are at least `least_height` high.
+    pub(crate) fn new(cells: &Cells<'_>, legend_width: f64, least_height: f64) -> MapLayout {
         let [width, height] = cells.counts().map(side);
         let map = Rect { left: MAP_LEFT, top: MAP_TOP, right: MAP_LEFT + width, bottom: MAP_TOP + height };
         let left = map.right + LEGEND_GAP;
-        let size = (left + beside, MAP_TOP + height.max(least_height) + BELOW);
-        let right = left + beside - LEGEND_GAP - LEGEND_MARGIN;
+        let size = (left + legend_width, MAP_TOP + height.max(least_height) + BELOW);
+        let right = left + legend_width - LEGEND_GAP - LEGEND_MARGIN;
         MapLayout { size: (size.0 as u32, size.1 as u32), map, left, top: MAP_TOP, right }
     }
 

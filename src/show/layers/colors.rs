@@ -38,31 +38,17 @@ pub(crate) const FAILED: Color = hex(0x8d130f);
 pub(crate) const NO_VALUE: Color = hex(0x8f8f8f);
 
 /// The colour map Viridis in nine steps.
+#[rustfmt::skip]
 const SEQUENTIAL: [Color; 9] = [
-    hex(0x440154),
-    hex(0x472d7b),
-    hex(0x3b528b),
-    hex(0x2c728e),
-    hex(0x21918c),
-    hex(0x28ae80),
-    hex(0x5ec962),
-    hex(0xaddc30),
-    hex(0xfde725),
+    hex(0x440154), hex(0x472d7b), hex(0x3b528b), hex(0x2c728e), hex(0x21918c),
+    hex(0x28ae80), hex(0x5ec962), hex(0xaddc30), hex(0xfde725),
 ];
 
 /// ColorBrewer's palette RdBu, with blue for negative numbers.
+#[rustfmt::skip]
 const DIVERGING: [Color; 11] = [
-    hex(0x053061),
-    hex(0x2166ac),
-    hex(0x4393c3),
-    hex(0x92c5de),
-    hex(0xd1e5f0),
-    hex(0xf7f7f7),
-    hex(0xfddbc7),
-    hex(0xf4a582),
-    hex(0xd6604d),
-    hex(0xb2182b),
-    hex(0x67001f),
+    hex(0x053061), hex(0x2166ac), hex(0x4393c3), hex(0x92c5de), hex(0xd1e5f0), hex(0xf7f7f7),
+    hex(0xfddbc7), hex(0xf4a582), hex(0xd6604d), hex(0xb2182b), hex(0x67001f),
 ];
 
 /// Returns the colour of a period of 2 or more.

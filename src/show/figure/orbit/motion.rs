@@ -118,27 +118,12 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rattlemap_dynamics::orbit::{Class, Status};
-    use rattlemap_dynamics::word::Word;
+    use rattlemap_dynamics::model::{GearPair, REST};
+    use rattlemap_dynamics::orbit::{Settings, analyse};
 
     fn orbit(events: Vec<Event>) -> Orbit {
-        Orbit {
-            class: Class::Periodic { period: 1 },
-            status: Status::Ok,
-            lyapunov: -0.1,
-            lyapunov_error: None,
-            floquet: None,
-            symmetric: None,
-            word: Word::default(),
-            impacts_per_period: 0.0,
-            mesh_fraction: 0.0,
-            strobe: [0.0; 4],
-            strobe_meshing: None,
-            events,
-            cycle_periods: 1,
-            forcing_period: 2.0,
-            periods_run: 0,
-        }
+        let orbit = analyse(&GearPair::paper(0.605), REST, &Settings::default()).unwrap();
+        Orbit { events, strobe_meshing: None, forcing_period: 2.0, ..orbit }
     }
 
     fn event(kind: EventKind, t: f64) -> Event {
