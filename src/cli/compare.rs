@@ -180,7 +180,8 @@ fn summary(compared: &MapPair<'_>, scene: &Scene) -> String {
             say::quoted(format_args!("{}: {} in A, {} in B", differing.name, differing.a, differing.b))
         })
         .collect();
-    let [a, b] = sides.map(|side| say::quoted(format_args!("{} {}", side.made.engine, side.made.precision)));
+    let [a, b] = sides
+        .map(|side| say::quoted(format_args!("{} {}", side.provenance.engine, side.provenance.precision)));
     if a != b {
         lines.push(format!("engine: {a} in A, {b} in B"));
     }
