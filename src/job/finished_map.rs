@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::job::kept::order;
 use crate::map::plan::Plan;
-use crate::map::scene::{FileBeside, FileText, Purpose, Scene};
+use crate::map::scene::{CompanionFile, FileText, Purpose, Scene};
 use crate::map::schedule::{Refined, Schedule};
 use crate::map::shard::Shard;
 use crate::map::sweep;
@@ -156,7 +156,7 @@ impl Manifest {
         let name = dir.join(MANIFEST).display().to_string();
         // The folder's own copy: the file that the scene names may be elsewhere by now, or another.
         let find = |what, _: &str| {
-            if what == FileBeside::Model {
+            if what == CompanionFile::Model {
                 let text = self.model.as_ref().and_then(|model| model.text.clone());
                 let text = text.ok_or("is not told by the manifest; make the map again with --force")?;
                 return Ok(FileText { name: format!("{name}, model"), text });
@@ -170,7 +170,7 @@ impl Manifest {
             })?;
             Ok(FileText { name: path.display().to_string(), text })
         };
-        let scene = Scene::parse_beside(&self.scene, &name, &self.set, Purpose::Map, &find)?;
+        let scene = Scene::parse_with_files(&self.scene, &name, &self.set, Purpose::Map, None, &find)?;
         capacity::check_finished(&scene)?;
         Ok(FinishedMap { manifest: self, dir: dir.to_owned(), scene })
     }

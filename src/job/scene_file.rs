@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::cli::arguments::{FigureFormat, SceneOptions};
 use crate::job::capacity::bytes;
-use crate::map::scene::{Along, FileBeside, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::map::scene::{Along, CompanionFile, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 
 /// The most bytes that a table of cells may have.
 const MOST: u64 = 256_000_000;
@@ -57,7 +57,7 @@ fn load_from(
     })?;
     let find = |what, file: &str| {
         let beside = path.parent().unwrap_or(Path::new("")).join(file);
-        if what == FileBeside::Model {
+        if what == CompanionFile::Model {
             return find_model(&beside);
         }
         match kept.filter(|kept| !beside.exists() && kept.exists()) {
@@ -65,7 +65,7 @@ fn load_from(
             None => find(&beside, MOST),
         }
     };
-    Scene::parse_along(&text, &name, sets, purpose, along, &find)
+    Scene::parse_with_files(&text, &name, sets, purpose, along, &find)
 }
 
 /// Reads the file of a model; the error is the end of a sentence that names it.

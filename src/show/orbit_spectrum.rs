@@ -21,7 +21,8 @@ const WINDOW_SAMPLES: usize = 1 << 19;
 
 /// Returns the samples per forcing period that figures need: 400, or 20 per oscillation of the teeth in meshing if that is more.
 pub fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let stiffness = Side::BOTH.map(|side| oscillator.added(side)[0]).into_iter().fold(0.0, f64::max);
+    let stiffness =
+        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
     let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
     (20.0 * ringing).clamp(400.0, 50_000.0) as usize
 }

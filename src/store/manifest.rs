@@ -21,7 +21,8 @@ pub struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
-    /// Of the program; `unknown` where it was built outside of its repository, or not for release.
+    /// Commit that the program was built from, with `-modified` added if its sources had changed; `unknown` in
+    /// development builds.
     commit: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! Lanes on a device, against the reference and against themselves.
+//! Lanes on a device, compared with the reference and with each other.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -6,6 +6,7 @@ mod common;
 mod chatter;
 mod classes;
 mod counters;
+mod counting;
 mod early_stops;
 mod engines_agree;
 mod independence;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::map::plan::Plan;
-use crate::map::scene::{FileBeside, FileText, Purpose, Scene};
+use crate::map::scene::{CompanionFile, FileText, Purpose, Scene};
 use crate::map::shard::Shard;
 use crate::record::Record;
 use crate::store::inventory::{self, FileEntry};
@@ -63,7 +63,7 @@ impl Manifest {
     pub(crate) fn scene(&self, folder: &Path) -> Result<Scene, MergeError> {
         let name = folder.join(MANIFEST).display().to_string();
         let find = |what, _: &str| {
-            if what == FileBeside::Model {
+            if what == CompanionFile::Model {
                 let text = self.model.text.clone().ok_or("is not told by the manifest")?;
                 return Ok(FileText { name: format!("{name}, model"), text });
             }
@@ -73,7 +73,7 @@ impl Manifest {
             })?;
             Ok(FileText { name: path.display().to_string(), text })
         };
-        Ok(Scene::parse_beside(&self.scene, &name, &self.set, Purpose::Map, &find)?)
+        Ok(Scene::parse_with_files(&self.scene, &name, &self.set, Purpose::Map, None, &find)?)
     }
 
     /// The command that makes a shard, if it names a folder in that one.

@@ -139,7 +139,7 @@ fn a_line_of_such_a_plane_is_a_diagram() {
     assert!(!folder.path().join("x").exists());
     let list = with_list();
     let list = command(&list, &["bifurcation", "l.toml", "--quiet"]).assert().code(2);
-    list.stderr(says(&["l.toml:7:1: `cells = { ... }` does not fit: `bifurcation` takes an axis"]));
+    list.stderr(says(&["l.toml:7:1: `cells = { ... }` does not fit: `bifurcation` needs an axis"]));
 }
 
 #[test]

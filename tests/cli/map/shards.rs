@@ -166,11 +166,11 @@ fn what_no_shard_can_be_is_refused() {
     cpu("0/4", &["'0/4'", "--shard <I/N>", "counted from 1", "1/4"]);
     cpu("5/4", &["'5/4'", "the last 4/4"]);
     cpu("3", &["'3'", "such as 3/16"]);
-    cpu("1/321", &["--shard 1/321", "the map has 320 cells", "320 shards at most"]);
+    cpu("1/321", &["--shard 1/321", "the map has only 320 cells", "at most 320 shards"]);
     let refined = ["--engine", "cpu", "--shard", "1/4", "--set", "refine.max_error=0.01"];
-    refused(&refined, &["--shard 1/4: which cells an adaptive map integrates", "drop [refine]"]);
+    refused(&refined, &["--shard 1/4: an adaptive map needs the records of all cells", "remove [refine]"]);
     let rows = ["--engine", "cpu", "--shard", "1/21", "--set", "start.policy=up"];
-    refused(&rows, &["20 columns of cells that follow each other", "20 shards at most"]);
+    refused(&rows, &["20 columns of cells that follow each other", "at most 20 shards"]);
 }
 
 #[test]
