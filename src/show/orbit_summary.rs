@@ -42,57 +42,46 @@ fn state(model: &dyn Model, instant: Instant) -> String {
     format!("{} at t = {:?}", values.join(" "), instant.time)
 }
 
+/// Returns labels and values of the lines before the events.
 fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
-    let mut facts = vec![
-        ("parameters", parameters(model)),
-        ("class", class(orbit)),
-        ("status", status(orbit.status).to_owned()),
-    ];
+    let mut facts = Vec::new();
+    let mut add = |label: &str, value: String| facts.push((label.to_owned(), value));
+    add("parameters", parameters(model));
+    add("class", class(orbit));
+    add("status", status(orbit.status).to_owned());
     if orbit.class == Class::Failed {
-        return labelled(facts);
+        return facts;
     }
-    let names = model.state_names();
-    facts.extend([
-        ("word, in time", or_dash(orbit.word.time_order())),
-        ("word, as printed", or_dash(orbit.word.paper_notation())),
-    ]);
+    add("word, in time", or_dash(orbit.word.time_order()));
+    add("word, as printed", or_dash(orbit.word.paper_notation()));
     let pattern = orbit.word.pattern();
     if pattern != orbit.word {
-        facts.push(("pattern", pattern.time_order()));
+        add("pattern", pattern.time_order());
     }
-    facts.push(("Lyapunov exponent", exponent(orbit)));
+    add("Lyapunov exponent", exponent(orbit));
     if let Some(multipliers) = &orbit.floquet {
         let listed: Vec<String> = multipliers.iter().copied().map(complex).collect();
-        facts.push(("Floquet multipliers", listed.join(", ")));
+        add("Floquet multipliers", listed.join(", "));
     }
     if let Some(symmetric) = orbit.symmetric {
-        facts.push((
-            "symmetric",
-            match (symmetric, has_mirror_images(model)) {
-                (true, _) => "yes",
-                (false, true) => "no, a symmetry-conjugate orbit coexists",
-                (false, false) => "no; the model itself is not symmetric",
-            }
-            .to_owned(),
-        ));
+        let text = match (symmetric, has_mirror_images(model)) {
+            (true, _) => "yes",
+            (false, true) => "no, a symmetry-conjugate orbit coexists",
+            (false, false) => "no; the model itself is not symmetric",
+        };
+        add("symmetric", text.to_owned());
     }
-    facts.extend([
-        ("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period)),
-        ("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction)),
-    ]);
-    let mut facts = labelled(facts);
+    add("impacts per period", format!("{:.DECIMALS$}", orbit.impacts_per_period));
+    add("fraction meshing", format!("{:.DECIMALS$}", orbit.mesh_fraction));
+    let names = model.state_names();
     let strobe = numbers(&orbit.strobe[..names.len()]).trim_start().to_owned();
-    facts.push((format!("strobe {}", names.join(" ")), strobe));
+    add(&format!("strobe {}", names.join(" ")), strobe);
     facts
 }
 
 /// Whether the mirror image of every motion, shifted by half a forcing period, is a motion of the same model.
 pub(crate) fn has_mirror_images(model: &dyn Model) -> bool {
     model.law().is_symmetric() && model.oscillator().is_ok_and(|oscillator| oscillator.mirror_symmetric())
-}
-
-fn labelled(facts: Vec<(&str, String)>) -> Vec<(String, String)> {
-    facts.into_iter().map(|(label, value)| (label.to_owned(), value)).collect()
 }
 
 fn parameters(model: &dyn Model) -> String {

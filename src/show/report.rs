@@ -18,7 +18,7 @@ use sha2::{Digest, Sha256};
 
 use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
 use crate::show::cells::{Cells, Row, Source};
-use crate::show::color::Color;
+use crate::show::color::hex;
 use crate::show::error::WriteError;
 use crate::show::layers::{Bar, Layer, NamedColor};
 use crate::show::symbols::symbol;
@@ -219,11 +219,11 @@ fn axis(axis: &Axis) -> Value {
 
 fn layer(layer: &Layer) -> Value {
     let entry =
-        |entry: &NamedColor| json!({ "color": hex(&entry.color), "text": entry.text, "cells": entry.cells });
+        |entry: &NamedColor| json!({ "color": hex(entry.color), "text": entry.text, "cells": entry.cells });
     let bar = |bar: &Bar| {
         json!({
             "label": bar.label,
-            "colors": bar.colors.iter().step_by(6).map(hex).collect::<Vec<_>>(),
+            "colors": bar.colors.iter().step_by(6).copied().map(hex).collect::<Vec<_>>(),
             "low": bar.low,
             "high": bar.high,
             "left_out": bar.remarks(layer.indices.len()),
@@ -233,12 +233,8 @@ fn layer(layer: &Layer) -> Value {
     object["name"] = layer.name.into();
     object["short"] = layer.short.into();
     object["title"] = layer.title.into();
-    object["palette"] = layer.palette.iter().map(hex).collect();
+    object["palette"] = layer.palette.iter().copied().map(hex).collect();
     object["entries"] = layer.entries.iter().map(entry).collect();
     object["bar"] = layer.bar.as_ref().map(bar).into();
     object
-}
-
-fn hex([r, g, b]: &Color) -> String {
-    format!("{r:02x}{g:02x}{b:02x}")
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::show::color::Color;
+use crate::show::color::{Color, hex};
 use crate::show::drawing::canvas::{Canvas, Item, Outline};
 use crate::show::drawing::png;
 use crate::show::drawing::shapes::{Align, Point, Rect};
@@ -52,7 +52,7 @@ fn draw(svg: &mut impl Write, item: &Item) -> Result<(), WriteError> {
                 opacity if opacity < 1.0 => format!(" fill-opacity=\"{}\"", rounded(opacity)),
                 _ => String::new(),
             };
-            writeln!(svg, " fill=\"{}\"{opacity}/>", hex(*color))?;
+            writeln!(svg, " fill=\"#{}\"{opacity}/>", hex(*color))?;
         }
         Item::Line { path, width, color, is_dashed } => {
             let dashes = match is_dashed {
@@ -62,7 +62,7 @@ fn draw(svg: &mut impl Write, item: &Item) -> Result<(), WriteError> {
             let (points, color, width) = (points(path), hex(*color), rounded(*width));
             writeln!(
                 svg,
-                "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\"{dashes}/>"
+                "<polyline points=\"{points}\" fill=\"none\" stroke=\"#{color}\" stroke-width=\"{width}\"{dashes}/>"
             )?;
         }
         Item::Text { text, at, em, align, color } => write_text(svg, text, (*at, *em, *align), *color)?,
@@ -98,7 +98,7 @@ fn write_text(
     let (size, color) = (rounded(em), hex(color));
     write!(
         svg,
-        "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{color}\"{anchor} xml:space=\"preserve\">"
+        "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"#{color}\"{anchor} xml:space=\"preserve\">"
     )?;
     let mut height = 0.0;
     for run in runs(text) {
@@ -119,10 +119,6 @@ fn write_text(
 /// Rounds to two decimals. Zero becomes positive, because a negative zero would have a sign.
 fn rounded(value: f64) -> f64 {
     (value * 100.0).round() / 100.0 + 0.0
-}
-
-fn hex([r, g, b]: Color) -> String {
-    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 fn points(points: &[Point]) -> String {
