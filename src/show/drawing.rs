@@ -23,7 +23,6 @@ pub use crate::show::color::Color;
 pub use canvas::{Bitmap, Canvas};
 pub use shapes::{Align, Marker, Point, Rect, Shape};
 pub use style::{BELOW, DARK, FAINT, GEAR_1, GEAR_2, GRID, LARGE, MEDIUM, MESHING, SMALL, WHITE, wall_color};
-pub(crate) use ticks::superscript;
 
 use crate::map::scene::Format;
 use crate::show::error::WriteError;

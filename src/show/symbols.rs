@@ -41,6 +41,22 @@ pub(crate) fn equation(name: &str, value: f64) -> String {
     format!("{} = {}", symbol(name), number(value))
 }
 
+/// Returns the superscript of a digit or minus.
+pub(crate) fn superscript(sign: char) -> char {
+    match sign {
+        '-' | '\u{2212}' => '\u{207b}',
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        _ => sign.to_digit(10).and_then(|digit| char::from_u32(0x2070 + digit)).unwrap_or(sign),
+    }
+}
+
+/// Returns the digit or minus of a superscript.
+pub(crate) fn lowered(sign: char) -> Option<char> {
+    "\u{2212}0123456789".chars().find(|&plain| superscript(plain) == sign)
+}
+
 #[cfg(test)]
 mod tests {
     use crate::show::symbols::symbol;

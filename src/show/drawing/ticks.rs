@@ -1,7 +1,7 @@
 //! Ticks of an axis: which values are marked, and their labels.
 
 use crate::show::drawing::axis::{Axis, Scale};
-use crate::show::symbols::number;
+use crate::show::symbols::{number, superscript};
 
 /// A mark on an axis.
 #[derive(Clone, Debug)]
@@ -140,17 +140,6 @@ fn power_label(part: u32, power: i32, is_plain: bool) -> String {
     }
     let raised: String = power.to_string().chars().map(superscript).collect();
     if part == 1 { format!("10{raised}") } else { format!("{part}\u{b7}10{raised}") }
-}
-
-/// Returns the superscript of a digit or minus.
-pub(crate) fn superscript(sign: char) -> char {
-    match sign {
-        '-' | '\u{2212}' => '\u{207b}',
-        '1' => '\u{b9}',
-        '2' => '\u{b2}',
-        '3' => '\u{b3}',
-        _ => sign.to_digit(10).and_then(|digit| char::from_u32(0x2070 + digit)).unwrap_or(sign),
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use epaint_default_fonts::UBUNTU_LIGHT;
 use ttf_parser::{Face, GlyphId};
 
 use crate::show::drawing::shapes::{Align, Point};
+use crate::show::symbols::lowered;
 
 /// Size and height of superscripts, as shares of the line's type size.
 const RAISED: (f64, f64) = (0.7, 0.36);
@@ -59,17 +60,6 @@ pub(crate) fn runs(text: &str) -> Vec<Run> {
         }
     }
     runs
-}
-
-fn lowered(sign: char) -> Option<char> {
-    match sign {
-        '\u{207b}' => Some('\u{2212}'),
-        '\u{b9}' => Some('1'),
-        '\u{b2}' => Some('2'),
-        '\u{b3}' => Some('3'),
-        '\u{2070}' | '\u{2074}'..='\u{2079}' => char::from_digit(sign as u32 - 0x2070, 10),
-        _ => None,
-    }
 }
 
 impl Typeface {

@@ -88,14 +88,8 @@ fn palette() -> Vec<Color> {
 
 /// Returns the legend: low periods first, then chaos, undecided and failed.
 fn entries(indices: &[u8], palette: &[Color], shows_chaos: bool, shows_symmetry: bool) -> Vec<NamedColor> {
-    let counts = indices.par_iter().fold(
-        || [0usize; 256],
-        |mut counts, &index| {
-            counts[usize::from(index)] += 1;
-            counts
-        },
-    );
-    let counts = counts.reduce(|| [0; 256], |a, b| std::array::from_fn(|i| a[i] + b[i]));
+    let mut counts = [0usize; 256];
+    indices.iter().for_each(|&index| counts[usize::from(index)] += 1);
     let entry = |index: usize, text: String| NamedColor { color: palette[index], text, cells: counts[index] };
     let has_several_kinds = counts[0] + counts[2] + counts[3] > 0;
     let with_contact = match (has_several_kinds, shows_symmetry) {

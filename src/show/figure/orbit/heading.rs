@@ -1,8 +1,8 @@
 //! Title and subtitle of an orbit's figures.
 
 use crate::show::caption;
-use crate::show::drawing::superscript;
 use crate::show::orbit_summary::has_mirror_images;
+use crate::show::symbols::superscript;
 use rattlemap_dynamics::model::Model;
 use rattlemap_dynamics::orbit::{Class, Orbit};
 
