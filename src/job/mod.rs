@@ -11,7 +11,7 @@ pub mod error;
 pub mod finished_map;
 #[cfg(feature = "cli")]
 pub mod forecast;
-#[cfg(feature = "figures")]
+#[cfg(feature = "files")]
 pub mod kept;
 #[cfg(feature = "cli")]
 pub mod model_choice;

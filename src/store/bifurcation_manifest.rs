@@ -9,13 +9,13 @@ use crate::findings::hysteresis::{self, Hysteresis};
 use crate::map::bifurcation::Column;
 use crate::map::plan::count_classes;
 use crate::map::scene::Scene;
-use crate::show::names;
 use crate::show::parameters::Parameters;
 use crate::store::bifurcation::Asked;
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::{
     AxisObject, DerivedObject, Head, ModelObject, StartObject, TimingsObject, derived, start,
 };
+use rattlemap_dynamics::orbit::Class;
 
 /// It names neither the machine nor where on it the run took place.
 #[derive(Serialize)]
@@ -102,7 +102,7 @@ impl<'a> Manifest<'a> {
                 observed_periods: settings.observed_periods,
                 max_period: settings.max_period,
             },
-            classes: names::CLASSES.into_iter().zip(classes).collect(),
+            classes: Class::NAMES.into_iter().zip(classes).collect(),
             hysteresis: hysteresis::hysteresis(columns).map(HysteresisObject::from),
             elapsed_seconds: elapsed.as_secs_f64(),
             timings: TimingsObject { integrate: elapsed.as_secs_f64(), write: writing.as_secs_f64() },

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::show::error::{FigureError, WriteError};
+use crate::show::error::WriteError;
 use rattlemap_dynamics::model::ModelError;
 
 /// A result that was not written; its text is one line with the file and the reason.
@@ -31,9 +31,6 @@ pub enum OutputError {
     /// A result could not be put into JSON.
     #[error("cannot put the result into JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// A figure could not be made.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
     /// What was to be shown has no motion.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -1,7 +1,7 @@
 //! Which files belong to a folder, and are they still what they were? The list `files` of its manifest.
 
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -192,7 +192,7 @@ pub(crate) fn update(folder: &Folder, names: &[&str], timing: (&str, f64)) -> Re
 /// As [`Folder::replace`].
 pub fn write_manifest(folder: &Folder, manifest: &impl Serialize) -> Result<(), OutputError> {
     let text = sealed(serde_json::to_value(manifest)?)?;
-    folder.replace(MANIFEST, |path| Ok(fs::write(path, text)?))
+    folder.replace(MANIFEST, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
 /// The text of a manifest with its own hash in it: that of the same text with an empty one.

@@ -9,9 +9,10 @@ use serde_json::Value;
 
 use crate::map::plan::count_classes;
 use crate::show::cells::Cells;
-use crate::show::names;
+use crate::show::refinement;
 use crate::store::error::OutputError;
-use crate::store::map_manifest::{BasinObject, MadeObject, RefinementObject, Run, basins, statuses, tally};
+use crate::store::map_manifest::{BasinObject, MadeObject, Run, basins, statuses, tally};
+use rattlemap_dynamics::orbit::Class;
 
 #[derive(Serialize)]
 struct MapObject<'a> {
@@ -34,7 +35,7 @@ struct MapObject<'a> {
     /// Attractors of a map of basins, by label.
     #[serde(skip_serializing_if = "Option::is_none")]
     basins: Option<Vec<BasinObject>>,
-    refinement: Option<RefinementObject>,
+    refinement: Option<Value>,
     /// Forcing periods integrated.
     periods: u64,
     /// Swept parameters that changed nothing that was measured.
@@ -85,13 +86,13 @@ pub(crate) fn object(
         files,
         made: MadeObject::of(run),
         shards: run.merged.map(|merged| merged.shards),
-        cells: cells.counts().iter().product(),
+        cells: cells.count(),
         runs: cells.runs(),
-        classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
+        classes: Class::NAMES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
         basins: basins(cells),
-        refinement: cells.refinement().map(RefinementObject::from),
+        refinement: cells.refinement().map(refinement::object),
         periods: cells.periods(),
         without_effect: &run.without_effect,
         resumed: ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() },

@@ -4,33 +4,24 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::findings::attractors::Attractor;
 use crate::gpu::AdapterId;
 use crate::map::engine::{CardReport, Engine};
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
-use crate::map::schedule::{Audit, Deviation, Refined};
-use crate::show::cells::{Cells, SOURCES};
+use crate::show::cells::{Cells, Source};
 use crate::show::names;
 use crate::show::parameters::Parameters;
+use crate::show::provenance::Provenance;
+use crate::show::refinement;
 use crate::show::table::cell_columns::ABSENT;
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
 use crate::store::map::LIST;
 use crate::store::record_file::Identity;
-use rattlemap_dynamics::orbit::Status;
-
-/// Who computed a map.
-#[derive(Clone, Copy, Debug)]
-pub struct Made<'a> {
-    /// The engine's name.
-    pub engine: &'a str,
-    /// Its precision.
-    pub precision: &'a str,
-    /// What it ran on.
-    pub device: &'a str,
-}
+use rattlemap_dynamics::orbit::{Class, Status};
 
 /// Who computed a map and in what time.
 #[derive(Clone, Debug)]
@@ -38,7 +29,7 @@ pub struct Run<'a> {
     /// The `--set` arguments.
     pub sets: &'a [String],
     /// Who computed it.
-    pub made: Made<'a>,
+    pub made: Provenance<'a>,
     /// The graphics adapter, where one was at work.
     pub adapter: Option<AdapterId>,
     /// What each card did, where several were at work.
@@ -63,7 +54,7 @@ pub struct Run<'a> {
 
 impl<'a> Run<'a> {
     /// A run of which no more is known, in no time.
-    pub fn new(made: Made<'a>, sets: &'a [String], processor: &'a str) -> Run<'a> {
+    pub fn new(made: Provenance<'a>, sets: &'a [String], processor: &'a str) -> Run<'a> {
         Run {
             sets,
             made,
@@ -144,7 +135,7 @@ pub(crate) struct Manifest<'a> {
     /// Of all runs that the map took.
     elapsed_seconds: f64,
     resumed_cells: usize,
-    refinement: Option<RefinementObject>,
+    refinement: Option<Value>,
     timings: TimingsObject,
     files: &'a [FileEntry],
 }
@@ -163,7 +154,7 @@ pub(crate) struct MadeObject<'a> {
 
 impl<'a> MadeObject<'a> {
     pub(crate) fn of(run: &'a Run<'_>) -> MadeObject<'a> {
-        let Made { engine, precision, device } = run.made;
+        let Provenance { engine, precision, device } = run.made;
         MadeObject {
             engine,
             precision,
@@ -220,7 +211,7 @@ pub(crate) fn basins(cells: &Cells<'_>) -> Option<Vec<BasinObject>> {
     let basins = cells.basins()?;
     let total = basins.labels().len() as f64;
     let object = |attractor: &Attractor| BasinObject {
-        class: names::class(attractor.class),
+        class: attractor.class.name(),
         period: names::period(attractor.class),
         cells: attractor.cells,
         share: attractor.cells as f64 / total,
@@ -272,100 +263,6 @@ pub(crate) struct IntegrationObject {
     max_period: u32,
 }
 
-/// An adaptive map: how much was integrated, and how good the rest is.
-#[derive(Serialize)]
-pub(crate) struct RefinementObject {
-    integrated: usize,
-    filled: usize,
-    rounds: usize,
-    audits: Vec<AuditObject>,
-}
-
-/// `rate` is the fraction of filled cells that integration shows to be wrong, `interval` its
-/// 95 % interval (Wilson); `words` of the sampled cells had been filled with a word, of which
-/// `wrong_words` were not theirs; `patterns` and `wrong_patterns` are the same of patterns.
-#[derive(Serialize)]
-struct AuditObject {
-    filled: usize,
-    sampled: usize,
-    wrong: usize,
-    rate: f64,
-    interval: [f64; 2],
-    words: usize,
-    wrong_words: usize,
-    patterns: usize,
-    wrong_patterns: usize,
-    errors: ErrorsObject,
-}
-
-/// Absolute differences between what the sampled cells had been filled with and what integration shows; null
-/// where filled cells show no such quantity.
-#[derive(Serialize)]
-struct ErrorsObject {
-    lyapunov: Option<DeviationObject>,
-    impacts_per_period: Option<DeviationObject>,
-    mesh_fraction: Option<DeviationObject>,
-}
-
-/// `empty` cells have a value but were filled with none, and are not `compared`.
-#[derive(Serialize)]
-struct DeviationObject {
-    compared: usize,
-    empty: usize,
-    median: f64,
-    p95: f64,
-    worst: f64,
-    #[serde(flatten)]
-    off_by_one: Option<OffByOneObject>,
-}
-
-/// Cells whose counts differ by 1 or more.
-#[derive(Serialize)]
-struct OffByOneObject {
-    off_by_one: usize,
-    off_by_one_rate: f64,
-    off_by_one_interval: [f64; 2],
-}
-
-impl DeviationObject {
-    fn of(deviation: Deviation) -> DeviationObject {
-        let Deviation { compared, empty, median, p95, worst, .. } = deviation;
-        DeviationObject { compared, empty, median, p95, worst, off_by_one: None }
-    }
-
-    fn of_counts(deviation: Deviation) -> DeviationObject {
-        let off_by_one = OffByOneObject {
-            off_by_one: deviation.off_by_one,
-            off_by_one_rate: deviation.off_by_one_rate(),
-            off_by_one_interval: deviation.off_by_one_interval(),
-        };
-        DeviationObject { off_by_one: Some(off_by_one), ..DeviationObject::of(deviation) }
-    }
-}
-
-impl From<&Refined> for RefinementObject {
-    fn from(refined: &Refined) -> Self {
-        let audit = |audit: &Audit| AuditObject {
-            filled: audit.filled,
-            sampled: audit.sampled,
-            wrong: audit.wrong,
-            rate: audit.rate(),
-            interval: audit.interval(),
-            words: audit.words,
-            wrong_words: audit.wrong_words,
-            patterns: audit.patterns,
-            wrong_patterns: audit.wrong_patterns,
-            errors: ErrorsObject {
-                lyapunov: audit.errors.lyapunov.map(DeviationObject::of),
-                impacts_per_period: audit.errors.impacts.map(DeviationObject::of_counts),
-                mesh_fraction: audit.errors.mesh.map(DeviationObject::of),
-            },
-        };
-        let Refined { integrated, filled, rounds, ref audits, .. } = *refined;
-        RefinementObject { integrated, filled, rounds, audits: audits.iter().map(audit).collect() }
-    }
-}
-
 /// What small integers in `cells.npy` stand for.
 #[derive(Serialize)]
 struct Codes {
@@ -401,8 +298,8 @@ pub(crate) fn map<'a>(
         start: start(scene),
         integration: integration(scene, run.lane_grid),
         quantities: scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect(),
-        cells: cells.counts().iter().product(),
-        classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
+        cells: cells.count(),
+        classes: Class::NAMES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
         attractors: cells.attractors().map(tally),
         basins: basins(cells),
@@ -411,7 +308,7 @@ pub(crate) fn map<'a>(
         codes: codes(),
         elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,
-        refinement: cells.refinement().map(RefinementObject::from),
+        refinement: cells.refinement().map(refinement::object),
         timings: TimingsObject {
             open: run.opening.as_secs_f64(),
             integrate: (run.elapsed_before + run.elapsed).as_secs_f64(),
@@ -439,9 +336,9 @@ pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Integra
 }
 
 pub(crate) fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
-    let mut counts: BTreeMap<_, _> = Status::ALL.iter().map(|&s| (names::status(s), 0)).collect();
+    let mut counts: BTreeMap<_, _> = Status::ALL.iter().map(|s| (s.name(), 0)).collect();
     for status in cells.statuses() {
-        *counts.entry(names::status(status)).or_default() += 1;
+        *counts.entry(status.name()).or_default() += 1;
     }
     counts
 }
@@ -454,12 +351,12 @@ pub(crate) fn tally(list: &[u8]) -> BTreeMap<u8, usize> {
 
 fn codes() -> Codes {
     let numbered = |names: Vec<&'static str>| names.into_iter().zip(0..).collect::<BTreeMap<_, _>>();
-    let mut class = numbered(names::CLASSES.to_vec());
+    let mut class = numbered(Class::NAMES.to_vec());
     class.insert("absent", ABSENT);
     Codes {
         class,
-        status: numbered(Status::ALL.iter().map(|&status| names::status(status)).collect()),
-        source: numbered(SOURCES.iter().map(|&source| names::source(source)).collect()),
+        status: numbered(Status::ALL.iter().map(|status| status.name()).collect()),
+        source: numbered(Source::ALL.map(Source::name).to_vec()),
         symmetric: [("false", 0), ("true", 1), ("absent", ABSENT)].into_iter().collect(),
     }
 }

@@ -42,9 +42,10 @@ use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
 use crate::record::{Record, RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
+use crate::show::provenance::Provenance;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
-use crate::store::map::{self, Made, Merged as Origin, Run};
+use crate::store::map::{self, Merged as Origin, Run};
 use crate::store::record_file::{Identity, RECORDS, RecordFile};
 use crate::store::{in_memory, map_json, unfinished};
 use part::{Begun, Part, Seen};
@@ -387,7 +388,7 @@ impl Gathered {
         let survey = Survey::of(plan, records, None);
         let cells = Cells::new(&parts.scene, plan, records).surveyed(&survey);
         let processor = parts.processors();
-        let made = Made { engine: &first.engine, precision: &first.precision, device: &first.device };
+        let made = Provenance { engine: &first.engine, precision: &first.precision, device: &first.device };
         // Adapters and cards are told by each part's own manifest.
         let run = Run {
             opening: parts.sum(|part| part.manifest.timings.open),

@@ -1,14 +1,17 @@
 //! One orbit on the terminal and in its folder: `orbit.json`, tables and figures.
 
-use std::fs;
+use std::io::Write;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant as Clock};
 
 use serde::Serialize;
 
 use crate::map::scene::Format;
-use crate::show::figure;
+use crate::show::figure::orbit::{OrbitFigure, OrbitPlot, spectrum};
+pub use crate::show::instant::Instant;
+use crate::show::names;
 use crate::show::orbit_json::to_json;
-use crate::show::orbit_spectrum::Spectrum;
+use crate::show::orbit_spectrum::{Spectrum, samples_per_period};
 use crate::show::orbit_summary::summary;
 use crate::show::parameters::Parameters;
 use crate::show::table::orbit_tables;
@@ -17,17 +20,8 @@ use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
 use crate::store::manifest::{Head, MANIFEST, ModelObject, TimingsObject};
-use rattlemap_dynamics::model::{Model, ModelError, Oscillator, Side, State};
+use rattlemap_dynamics::model::{Model, ModelError, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
-
-/// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
-/// in meshing where that is more.
-pub(crate) fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let stiffness =
-        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
-    let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
-    (20.0 * ringing).clamp(400.0, 50_000.0) as usize
-}
 
 const JSON: &str = "orbit.json";
 const TRAJECTORY: &str = "trajectory.csv";
@@ -66,19 +60,19 @@ pub struct Asked {
     pub instant: Option<Instant>,
 }
 
-/// A state and its time since the start.
-#[derive(Clone, Copy, Debug)]
-pub struct Instant {
-    /// Since the start at phase 0.
-    pub time: f64,
-    /// Then.
-    pub state: State,
-}
+/// Files of the figures of the motion.
+static FIGURES: LazyLock<Vec<(OrbitFigure, Format, String)>> = LazyLock::new(|| {
+    let files =
+        |figure: OrbitFigure| names::figures(figure.name()).map(|(format, name)| (figure, format, name));
+    OrbitFigure::ALL.into_iter().flat_map(files).collect()
+});
+/// Files of the figure of the spectrum.
+static SPECTRUM_FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures(spectrum::NAME));
 
 /// Every file that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    let figures = figure::orbit::NAMES.into_iter().chain(crate::show::figure::orbit::spectrum::NAMES);
-    [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures)
+    let figures = FIGURES.iter().map(|(.., name)| name).chain(SPECTRUM_FIGURES.iter().map(|(_, name)| name));
+    [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures.map(String::as_str))
 }
 
 /// Prints the orbit to stdout, as JSON or as a summary for the eye.
@@ -86,8 +80,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
 pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Result<(), OutputError> {
-    let text =
-        if json { to_json(model, orbit, asked.instant)? } else { summary(model, orbit, asked.instant) };
+    let text = if json { to_json(model, orbit, asked.instant) } else { summary(model, orbit, asked.instant) };
     crate::store::stdout::print(&text)
 }
 
@@ -106,25 +99,26 @@ pub fn write(
     let clock = Clock::now();
     // Figures of an earlier orbit must not stand beside this one.
     folder.remove(&names().collect::<Vec<_>>())?;
-    let json = to_json(model, orbit, asked.instant)?;
-    folder.replace(JSON, |path| Ok(fs::write(path, json + "\n")?))?;
+    let json = to_json(model, orbit, asked.instant);
+    folder.replace(JSON, |out| Ok(writeln!(out, "{json}")?))?;
     let mut files = vec![JSON];
     if orbit.class != Class::Failed {
         let samples = samples_per_period(&model.oscillator()?);
         let trace = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples)?;
-        figure::orbit::write_each(model, orbit, &trace, formats, |name, save| {
+        let plot = OrbitPlot::new(model, orbit, &trace)?;
+        for (figure, format, name) in FIGURES.iter().filter(|(_, format, _)| formats.contains(format)) {
+            folder.replace(name, |out| figure.write(out, *format, &plot))?;
             files.push(name);
-            folder.replace(name, |path| Ok(save(path)?))
-        })?;
+        }
         write_trajectory(folder, model, orbit)?;
         files.push(TRAJECTORY);
         if let Some(spectrum) = Spectrum::of(model, orbit)? {
-            folder.replace(SPECTRUM, |path| orbit_tables::write_spectrum(path, &spectrum))?;
+            folder.replace(SPECTRUM, |out| orbit_tables::write_spectrum(out, &spectrum))?;
             files.push(SPECTRUM);
-            figure::orbit::spectrum::write_each(model, orbit, &spectrum, formats, |name, save| {
+            for (format, name) in SPECTRUM_FIGURES.iter().filter(|(format, _)| formats.contains(format)) {
+                folder.replace(name, |out| spectrum::write(out, *format, model, orbit, &spectrum))?;
                 files.push(name);
-                folder.replace(name, |path| Ok(save(path)?))
-            })?;
+            }
         }
     }
     let listed = inventory::entries(folder, &files)?;
@@ -152,7 +146,7 @@ pub fn write(
 fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {
     let samples = TABLED.div_ceil(orbit.cycle_periods.max(1) as usize).max(LEAST_TABLED);
     let moments = moments(model, orbit, samples)?;
-    folder.replace(TRAJECTORY, |path| orbit_tables::write_trajectory(path, &model.state_names(), &moments))
+    folder.replace(TRAJECTORY, |out| orbit_tables::write_trajectory(out, &model.state_names(), &moments))
 }
 
 /// An orbit's motion over the periods that its events span: so many samples in a forcing period, and every event.
@@ -168,10 +162,7 @@ pub fn moments(
     Ok(orbit_tables::moments(&model.oscillator()?, orbit, &trace, samples_per_period))
 }
 
-/// What `orbit --json` prints.
-///
-/// # Errors
-/// [`OutputError`] if it cannot be put into JSON.
-pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> Result<String, OutputError> {
-    Ok(to_json(model, orbit, instant)?)
+/// Returns what `orbit --json` prints.
+pub fn json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
+    to_json(model, orbit, instant)
 }

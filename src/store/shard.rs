@@ -11,7 +11,6 @@ use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::record::Record;
 use crate::record::classify::{classify, status};
-use crate::show::names;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
@@ -52,12 +51,12 @@ impl Tally {
     }
 
     fn classes(&self) -> BTreeMap<&'static str, usize> {
-        names::CLASSES.into_iter().zip(self.classes).collect()
+        Class::NAMES.into_iter().zip(self.classes).collect()
     }
 
     fn statuses(&self) -> BTreeMap<&'static str, usize> {
         let count = |status: Status| self.statuses.get(&status.code()).copied().unwrap_or(0);
-        Status::ALL.iter().map(|&status| (names::status(status), count(status))).collect()
+        Status::ALL.iter().map(|&status| (status.name(), count(status))).collect()
     }
 }
 

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::show::cells::Cells;
+use crate::show::provenance::Provenance;
 use crate::show::replay;
 use crate::store::manifest::Head;
-use crate::store::map_manifest::Made;
 use crate::validate::{
     ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation,
     Value,
@@ -142,7 +142,7 @@ impl ValidationObject {
     /// `again_on` is the device that ran lanes again, if one did.
     pub(crate) fn new(
         cells: &Cells<'_>,
-        made: &Made<'_>,
+        made: &Provenance<'_>,
         again_on: Option<&str>,
         validation: &Validation,
     ) -> ValidationObject {
@@ -163,7 +163,7 @@ impl ValidationObject {
                 Judge::Independent => "dop853",
             },
             seed: validation.seed,
-            cells: cells.counts().iter().product(),
+            cells: cells.count(),
             counted: validation.counted(),
             runs: validation.runs,
             integrated: validation.runs - validation.filled,

@@ -21,7 +21,7 @@ use crate::map::shard::Shard;
 use crate::map::sweep;
 use crate::record::Record;
 use crate::store::inventory::{self, Finding};
-use crate::store::map::{Made, Run};
+use crate::store::map::{Provenance, Run};
 use crate::store::record_file::{Identity, RECORDS, RecordFile};
 use crate::store::shard::{self, Finished, Tally};
 
@@ -112,7 +112,7 @@ pub(super) fn finish(
 ) -> Result<(), Failure> {
     let &Ended { shard, opening, kept, tally } = ended;
     let (device, processor, elapsed) = (engine.device(), processor::described(), kept.elapsed());
-    let made = Made { engine: engine.name(), precision: engine.precision(), device: &device };
+    let made = Provenance { engine: engine.name(), precision: engine.precision(), device: &device };
     let run = Run {
         opening,
         elapsed,
