@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
-# Everything that must hold before a change is taken: formatting, lints, docs, dependencies, checks for other systems, tests.
-# Installs what is missing: a software Vulkan driver, so that shader tests run anywhere, Rust's targets, and Slurm, whose
-# daemons run in the tests' own folders only.
-# With --all the tests run, too, that take minutes each, all of the program is checked for macOS, and the Python package is
-# installed in an environment of its own. Ends with the time of each phase and the ten slowest tests.
+# Runs every check that a change must pass: format, lints, documentation, dependencies, WebAssembly, tests.
+#
+#     scripts/test.sh [--all]
+#
+# Installs what is missing: a software Vulkan driver, so that shader tests run on any machine, and Rust's WebAssembly
+# target. With --all it also runs the tests that take minutes, checks the program for Windows and macOS, starts a Slurm
+# cluster of one node, and installs the Python package into an environment of its own. It prints the time of each phase
+# and the ten slowest tests at the end.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -13,13 +16,13 @@ fail() {
     exit 1
 }
 
-# Checked, not built: no linker and no C compiler is wanted for them.
+# Targets that are checked but not built, so that no linker or C compiler is needed for them.
 wasm=wasm32-unknown-unknown
 windows=x86_64-pc-windows-gnu
 macos=aarch64-apple-darwin
 
 add_target() {
-    # Rust without rustup may come with the target.
+    # A distribution's Rust may include the target without rustup.
     if [[ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ]]; then return; fi
     command -v rustup >/dev/null ||
         fail "Rust's target $1 is missing, and rustup, which would add it; install Rust from https://rustup.rs"
@@ -27,21 +30,21 @@ add_target() {
 }
 
 require_tools() {
-    say "tools: cargo, rustfmt, clippy, $wasm, $windows, $macos"
+    say "tools: cargo, rustfmt, clippy, ${targets[*]}"
     command -v cargo >/dev/null || fail "cargo is missing; install Rust from https://rustup.rs"
     cargo fmt --version >/dev/null 2>&1 || fail "rustfmt is missing; run: rustup component add rustfmt"
     cargo clippy --version >/dev/null 2>&1 || fail "clippy is missing; run: rustup component add clippy"
     local target
-    for target in "$wasm" "$windows" "$macos"; do add_target "$target"; done
+    for target in "${targets[@]}"; do add_target "$target"; done
 }
 
-# True if the Vulkan loader would find both itself and the description of a driver.
+# Succeeds if a Vulkan loader and the description of a driver are installed.
 has_vulkan() {
     local loader_cache
     loader_cache="$( (ldconfig -p || /sbin/ldconfig -p) 2>/dev/null || true)"
     grep -q 'libvulkan\.so' <<<"$loader_cache" || return 1
     local drivers driver
-    # The loader reads nothing else where one of these is set.
+    # If one of these variables is set, the loader searches nowhere else.
     drivers="${VK_DRIVER_FILES:-${VK_ICD_FILENAMES:-}}"
     if [[ -n "$drivers" ]]; then
         while IFS= read -r -d: driver; do
@@ -52,22 +55,22 @@ has_vulkan() {
     compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null
 }
 
-# Packages of Debian and its kin. False where there is no installing them; `why` says the reason.
+# Installs packages of Debian or Ubuntu. On failure the variable `why` holds the reason.
 why=
 apt_install() {
     local as_root=()
     if ! command -v apt-get >/dev/null; then
-        why="no apt-get to install one"
+        why="there is no apt-get to install it"
         return 1
     fi
     if [[ "$(id -u)" -ne 0 ]]; then
         if ! command -v sudo >/dev/null; then
-            why="neither root nor sudo to install one"
+            why="installing it needs root or sudo"
             return 1
         fi
         as_root=(sudo)
     fi
-    why="apt-get could not install one"
+    why="apt-get could not install it"
     "${as_root[@]}" apt-get update -qq &&
         "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"
 }
@@ -76,12 +79,12 @@ require_vulkan() {
     case "$(uname -s)" in
         Linux) ;;
         *)
-            say "graphics: the system's own"
+            say "graphics: the system's own driver"
             return
             ;;
     esac
     if has_vulkan; then
-        say "graphics: a Vulkan driver is there"
+        say "graphics: a Vulkan driver is installed"
         return
     fi
     local remedy="install a Vulkan driver and its loader (Debian, Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1; Fedora: dnf install mesa-vulkan-drivers vulkan-loader; Arch: pacman -S vulkan-swrast vulkan-icd-loader)"
@@ -90,22 +93,19 @@ require_vulkan() {
     has_vulkan || fail "still no Vulkan driver after installing one; check VK_DRIVER_FILES and VK_ICD_FILENAMES"
 }
 
-# For tests of scripts/slurm, which say so where it is missing. Its daemons live in /usr/sbin.
+# Installs Slurm for the test of scripts/slurm.sh. Its daemons are in /usr/sbin.
 require_slurm() {
     [[ "$(uname -s)" == Linux ]] || return 0
-    local program missing=''
+    local program
     for program in sbatch slurmctld slurmd munged; do
-        (PATH="$PATH:/usr/sbin:/sbin" && command -v "$program") >/dev/null || missing="$program"
-    done
-    if [[ -z "$missing" ]]; then
-        say "batch system: Slurm is there"
+        (PATH="$PATH:/usr/sbin:/sbin" && command -v "$program") >/dev/null && continue
+        say "batch system: installing slurm-wlm and munge"
+        apt_install slurm-wlm munge || fail "$program is missing, and $why"
         return
-    fi
-    say "batch system: no $missing; installing slurm-wlm and munge"
-    apt_install slurm-wlm munge || say "tests of scripts/slurm will be skipped: $why"
+    done
 }
 
-# Runs a command under a title, and notes how long it took.
+# Runs a command under a title and records its time.
 phases=()
 phase() {
     local title="$1" began=$SECONDS
@@ -117,14 +117,14 @@ phase() {
 
 docs() { RUSTDOCFLAGS="-D warnings" cargo doc --quiet --workspace --no-deps; }
 
-# Times of single tests are an unstable option of the test program. The compiler must not see what unlocks it, or
-# build scripts that look for it would have everything compiled anew: a runner sets it for the test program alone.
+# Times of single tests are an unstable option of the test program, which RUSTC_BOOTSTRAP enables. A runner sets it for
+# the test programs alone: if the compiler saw it, build scripts would be run again and everything compiled anew.
 timed_tests() {
     cargo test --workspace --tests --no-fail-fast --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' \
         -- -Zunstable-options --report-time "$@" 2>&1 | tee "$log"
 }
 
-# The ten slowest of `test NAME ... ok <1.234s>`, with the binary that they are in.
+# Prints the ten slowest tests with their binary, from lines such as `test NAME ... ok <1.234s>`.
 slowest_tests() {
     awk '
         $1 == "Running" { binary = $NF; sub(/.*\//, "", binary); sub(/-[0-9a-f]+\)$/, "", binary) }
@@ -132,10 +132,11 @@ slowest_tests() {
     ' "$log" | sort -rn | awk 'NR <= 10 { printf "%7.1f s  %s: %s\n", $1, $2, $3 }'
 }
 
-# What tests could not do for want of a program: they say so past the harness, which keeps what passing tests print.
+# Prints what tests skipped because a program is missing. They write it to stderr, past the test harness.
 skipped() { grep -o 'SKIPPED: .*' "$log" | sort | uniq -c || true; }
 
-# Licences, sources and advisories of all dependencies: deny.toml. What cannot be looked at is told here and at the end.
+# Checks licences, sources and advisories of all dependencies by deny.toml. Checks that cannot run are listed here and at
+# the end.
 unchecked=()
 skip() {
     say "SKIPPED: $1"
@@ -146,9 +147,9 @@ dependencies() {
         skip "licences, sources and advisories of dependencies: no cargo-deny (cargo install cargo-deny --locked)"
         return
     fi
-    # It reads the crates of every platform.
+    # cargo-deny reads the crates of every platform.
     if ! cargo fetch --locked --quiet; then
-        skip "licences and sources of dependencies: crates of other platforms are not here and cannot be fetched"
+        skip "licences and sources of dependencies: crates of other platforms cannot be fetched"
         return
     fi
     cargo deny --offline check licenses bans sources
@@ -159,22 +160,23 @@ dependencies() {
     fi
 }
 
-# How many tests passed and how many wait for --all, over all binaries.
+# Prints how many tests passed and how many need --all. Fails if none passed.
 totals() {
     awk '/^test result:/ { passed += $4; ignored += $8 }
         END { printf "%d passed, %d ignored", passed, ignored; exit passed == 0 }' "$log"
 }
 
+all=false ignored=() targets=("$wasm")
 case "${1:-}" in
-    "") ignored=() ;;
-    --all) ignored=(--include-ignored) ;;
+    "") ;;
+    --all) all=true ignored=(--include-ignored) targets+=("$windows" "$macos") ;;
     *) fail "unknown argument $1; usage: scripts/test.sh [--all]" ;;
 esac
 
-# Between runs either nothing is compiled, or what makes the second time fast would only take room.
+# Incremental compilation would take disk space and save no time here.
 export CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-0}"
-# Mesa's software driver takes some five seconds to compile a lane's shader, a third less where LLVM does not optimise it:
-# most tests run a shader for less time than that. Every process finds it here, and the next run.
+# Most tests run a shader for a shorter time than Mesa's software driver takes to compile it (about five seconds). LLVM
+# compiles it a third faster without optimisation. The cache serves all test processes and the next run.
 export GALLIVM_PERF="${GALLIVM_PERF:-nopt}"
 export MESA_SHADER_CACHE_DIR="${MESA_SHADER_CACHE_DIR:-${CARGO_TARGET_DIR:-$PWD/target}/shader-cache}"
 mkdir -p "$MESA_SHADER_CACHE_DIR"
@@ -183,26 +185,22 @@ trap 'rm -f "$log"' EXIT
 
 require_tools
 require_vulkan
-require_slurm
+if $all; then require_slurm; fi
 phase "format" cargo fmt --all --check
 phase "lints" cargo clippy --workspace --all-targets -- -D warnings
 phase "docs, warnings denied" docs
 phase "dependencies" dependencies
 phase "one motion in a web page" cargo check --target "$wasm" -p rattlemap-dynamics
 phase "the library in a web page" cargo check --target "$wasm" -p rattlemap --no-default-features --features gpu --lib
-phase "the program on Windows" cargo check --target "$windows" -p rattlemap
-if [[ "${#ignored[@]}" -eq 0 ]]; then
-    phase "the library on macOS" cargo check --target "$macos" -p rattlemap --no-default-features --features gpu --lib
-else
+if $all; then
+    phase "the program on Windows" cargo check --target "$windows" -p rattlemap
     phase "the program on macOS" cargo check --target "$macos" -p rattlemap
 fi
 phase "compilation of tests" cargo test --workspace --tests --benches --no-run
 phase "tests" timed_tests "${ignored[@]}"
 phase "examples in docs" cargo test --workspace --doc
 phase "benchmarks at tiny sizes" cargo test --quiet --workspace --bench reference --bench lane
-if [[ "${#ignored[@]}" -ne 0 ]]; then
-    phase "the Python package, installed" scripts/python.sh
-fi
+if $all; then phase "the Python package, installed" scripts/python.sh; fi
 say "time by phase"
 printf '%s\n' "${phases[@]}"
 say "the ten slowest tests"

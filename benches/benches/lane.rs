@@ -1,17 +1,15 @@
-//! What a lane costs: time per forcing period, work per period, instructions per pass. See
-//! `README.md`.
+//! Time per forcing period of a lane, and of two other forms of its shader. See `README.md`.
 
 use std::time::Instant;
 
-use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision, Variant};
+use rattlemap::gpu::{AdapterChoice, Gpu, Lane, LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator};
 
 #[path = "lane/rewrite.rs"]
 mod rewrite;
 
-use rattlemap::cli::bench::measure::{LOOPS, counting, instructions};
-use rattlemap::cli::bench::statistics::Spread;
+use rattlemap::cli::bench::spread::Spread;
 use rewrite::{CHECKS, Rewrite};
 
 /// Sizes of one run.
@@ -81,61 +79,25 @@ fn seconds(plane: &Plane, size: &Size, gpus: &mut [Gpu], exponent: bool) -> Vec<
     times.into_iter().map(|times| Spread::of(times).median).collect()
 }
 
-/// Mean over the cells of what a counting variant reports in place of impacts.
-fn count(plane: &Plane, size: &Size, precision: Precision, function: &str) -> f64 {
-    let mut gpu = open(precision, counting(function));
-    let (_, records) = plane.run(&mut gpu, size, false);
-    records.iter().map(|record| record.impacts_per_period).sum::<f64>() / records.len() as f64
-}
-
-/// What scenes ask for, and what is compiled for it.
-fn variants(precision: Precision) -> [(&'static str, Variant); 7] {
-    let everything = Variant::of(precision);
-    let class = Variant { word: false, pattern: false, mesh: false, symmetry: false, ..everything };
-    [
-        ("everything", everything),
-        ("everything, before the exponent", Variant { growth: false, ..everything }),
-        ("class, exponent, word", Variant { word: true, ..class }),
-        ("class, exponent", class),
-        ("class, before the exponent", Variant { growth: false, ..class }),
-        ("averages and words, no class", Variant { exponent: false, growth: false, ..everything }),
-        ("impacts alone", Variant { exponent: false, growth: false, ..class }),
-    ]
-}
-
 fn main() {
     let size = size();
     let plane = Plane::new(size.side);
     let lane_periods = plane.lanes.len() as f64 * f64::from(size.periods);
     println!("{0} x {0} cells, {1} periods from rest, median of {2}", size.side, size.periods, size.runs);
     for precision in Precision::ALL {
-        println!("\n{precision:?}, work per lane-period:");
-        let work = LOOPS.map(|(function, what)| (what, count(&plane, &size, precision, function)));
-        for (what, count) in work {
-            println!("  {count:8.2} {what}");
-        }
-        let [(_, steps), ..] = work;
         for exponent in [false, true] {
             println!("{precision:?}, exponent {exponent}: forms in one run");
             let mut gpus: Vec<_> = CHECKS.iter().map(|&(_, rewrite)| open(precision, rewrite)).collect();
             let times = seconds(&plane, &size, &mut gpus, exponent);
             for (time, (name, _)) in times.iter().zip(CHECKS) {
                 println!(
-                    "  {name:<9} {:8.0} lane-periods/s, {:6.1} ns per scan step, {:.2} of the first",
+                    "  {name:<9} {:8.0} lane-periods/s, {:.2} of the first's time",
                     lane_periods / time,
-                    1e9 * time / lane_periods / steps,
                     time / times[0],
                 );
             }
             let results: Vec<_> = gpus.iter_mut().map(|gpu| plane.run(gpu, &size, exponent).1).collect();
             assert!(results.iter().all(|other| *other == results[0]), "the forms differ in their results");
-        }
-        println!("{precision:?}: arithmetic instructions of the text, by variant");
-        println!("  {:<44} {:>6} {:>8} {:>6} {:>7}", "", "scan", "careful", "root", "all");
-        for (name, variant) in variants(precision) {
-            let counts = instructions(&variant.source());
-            let [scan, careful, root, all] = [counts.scan, counts.careful, counts.root, counts.all];
-            println!("  {name:<44} {scan:6} {careful:8} {root:6} {all:7}");
         }
     }
 }

@@ -127,14 +127,6 @@ pub(crate) struct Engines {
     /// that no other has. One of several equal cards is measured unless another is named
     #[arg(long, value_name = "N|NAME", value_parser = adapter)]
     pub(crate) adapter: Option<Wanted>,
-
-    /// Peak of the hardware adapter in f32, in 10^12 operations per second, if it is not known
-    #[arg(long, value_name = "TERA")]
-    pub(crate) peak_f32: Option<f64>,
-
-    /// The same in f64
-    #[arg(long, value_name = "TERA")]
-    pub(crate) peak_f64: Option<f64>,
 }
 
 /// Where measurements go, and how thorough they are.

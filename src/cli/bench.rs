@@ -1,165 +1,141 @@
-//! `rattlemap bench engines`: the same scene on every engine.
+//! `rattlemap bench engines`: the main map on every engine of this machine, in growing sizes.
 
-pub mod measure;
-pub mod statistics;
+mod figure;
+mod measure;
+pub mod spread;
+mod table;
 
 use std::time::Instant;
 
-use crate::cli::bench::measure::check::check;
-use crate::cli::bench::measure::output::{Asked, device_share, shares_of_peak, write};
-use crate::cli::bench::measure::work::work;
-use crate::cli::bench::measure::{
-    Answers, Bench, Engine, Extent, LEAST_RUNS, Point, QUICK_SIDES, RUNS, Run, SIDES, Series, peak,
-};
-use crate::gpu::{self, AdapterReport, Precision};
-use crate::map::scene::Scene;
-use crate::store::folder::Folder;
-use crate::validate::{DEFAULT_SAMPLES, Kind};
 use anyhow::anyhow;
 
 use crate::cli::arguments::{EngineChoice, Engines};
 use crate::cli::say;
+use crate::gpu::{self, AdapterReport};
 use crate::job::capacity;
 use crate::job::error::Failure;
-use crate::job::processor;
+use crate::record::Record;
+use crate::store::folder::Folder;
+use crate::validate::{DEFAULT_SAMPLES, Kind};
+use measure::{Bench, Point, Run, Series, Target, scene};
 
-/// Side of the map on which operations are counted.
-const COUNTED_SIDE: u32 = 24;
+/// Sides of the maps: 10^3 to 10^7 cells, two sizes per decade.
+const SIDES: [u32; 9] = [32, 56, 100, 178, 316, 562, 1000, 1778, 3162];
 
-/// Share of the time that checks and counting may be left with.
-const FOR_CHECKS: f64 = 0.15;
+/// Sides of the maps with `--quick`, which only shows that everything works.
+const QUICK_SIDES: [u32; 2] = [6, 9];
 
-/// Measures every engine there is, writes, and says what came out.
+/// Largest number of runs of one size.
+const MAX_RUNS: usize = 5;
+
+/// Share of the time budget that is kept for comparing samples with the reference.
+const CHECK_SHARE: f64 = 0.15;
+
+/// Measures every engine, writes the folder after each, and prints a summary.
 pub(crate) fn run(ask: &Engines) -> Result<(), Failure> {
     let adapters = pollster::block_on(gpu::adapters());
     let adapters = match &ask.adapter {
         Some(wanted) => wanted.among(&adapters).map_err(|error| Failure::Usage(error.into()))?,
         None => &adapters,
     };
-    let engines = engines(adapters);
+    let targets = targets(adapters);
     let out = ask.run.out("engines");
     let folder = Folder::open(&out, ask.run.force)?;
-    let scratch = Folder::open(&out.join("scratch"), true)?;
     let clock = Instant::now();
-    let budget = if ask.run.quick { 0.0 } else { f64::from(ask.budget) };
-    let mut answers = Answers::new();
+    let budget = if ask.run.quick { f64::INFINITY } else { f64::from(ask.budget) };
     let mut all: Vec<Series> = Vec::new();
-    for (nth, engine) in engines.iter().enumerate() {
-        let left = (1.0 - FOR_CHECKS) * budget - clock.elapsed().as_secs_f64();
-        let seconds =
-            if ask.run.quick { f64::INFINITY } else { left.max(0.0) / (engines.len() - nth) as f64 };
-        let is_first_lane = !all.iter().any(|series| series.engine.threads().is_none());
-        match measure(ask, engine, &scratch, seconds, &mut answers, is_first_lane) {
+    let mut files = [""; 3];
+    for (nth, target) in targets.iter().enumerate() {
+        note(ask, &format!("{}:", target.label()));
+        let left = ((1.0 - CHECK_SHARE) * budget - clock.elapsed().as_secs_f64()).max(0.0);
+        match measure(ask, target, left / (targets.len() - nth) as f64, all.first(), &folder) {
             Ok(series) => {
                 all.push(series);
-                // Whoever is stopped before the last engine has the others.
-                write(&folder, &all, &asked_of(ask, &all, budget))?;
+                // A run that is stopped before the last engine leaves the results of the others.
+                files = table::write(&folder, &all, f64::from(ask.budget))?;
             }
-            // The others are there to be measured all the same.
-            Err(error) => say(ask, &format!("{} is left out: {error:#}", engine.label())),
+            Err(error) => note(ask, &format!("{} is left out: {error:#}", target.label())),
         }
     }
-    std::fs::remove_dir_all(scratch.path()).map_err(anyhow::Error::from)?;
-    let asked = asked_of(ask, &all, budget);
-    let files = write(&folder, &all, &asked)?;
     if !ask.run.quiet {
-        let summary = summary(&all, &asked);
-        say::notes(format_args!("{summary}\n{}: {}", say::path(&out), files.join(", ")));
+        say::notes(format_args!("{}\n{}: {}", summary(&all), say::path(&out), files.join(", ")));
     }
     verdict(&all)
 }
 
-fn asked_of(ask: &Engines, all: &[Series], budget_seconds: f64) -> Asked {
-    Asked {
-        budget_seconds,
-        quick: ask.run.quick,
-        cores: processor::cores(),
-        processor: processor::described(),
-        peaks: all.iter().map(|series| peak_of(ask, &series.engine)).collect(),
-    }
-}
-
-/// The CPU on all cores, which the others are compared with; adapters, the best first; the CPU
-/// on fewer cores.
-fn engines(adapters: &[AdapterReport]) -> Vec<Engine> {
-    let most = processor::cores();
-    let mut list = vec![Engine::Cpu { threads: most }];
+/// Lists the processor, then each graphics card once in each of its precisions.
+fn targets(adapters: &[AdapterReport]) -> Vec<Target> {
+    let mut list = vec![Target::cpu()];
     let mut cards: Vec<Card> = Vec::new();
     for adapter in adapters {
         let card = [adapter.info.vendor, adapter.info.device];
-        if is_listed(card, &cards) {
-            continue;
+        if !is_listed(card, &cards) {
+            cards.push(card);
+            list.extend(adapter.precisions.iter().map(|&precision| Target::gpu(adapter, precision)));
         }
-        cards.push(card);
-        let device = gpu::describe(&adapter.info);
-        let is_hardware = gpu::is_hardware(&adapter.info);
-        let number = adapter.number;
-        let lanes =
-            |&precision: &Precision| Engine::Gpu { precision, number, device: device.clone(), is_hardware };
-        list.extend(adapter.precisions.iter().map(lanes));
-    }
-    let mut threads = 1;
-    while threads < most {
-        list.push(Engine::Cpu { threads });
-        threads *= 2;
     }
     list
 }
 
-/// Maker and model, 0 where an interface does not tell.
+/// Vendor and model of a card, 0 where an interface does not report it.
 type Card = [u32; 2];
 
-/// Whether a card has been listed by a better interface: OpenGL does not tell the model.
-fn is_listed([maker, model]: Card, cards: &[Card]) -> bool {
-    cards.iter().any(|&[other, its]| other == maker && (its == model || model == 0))
+/// Whether a better interface has listed the card already. OpenGL does not report the model.
+fn is_listed([vendor, model]: Card, cards: &[Card]) -> bool {
+    cards.iter().any(|&[other, its]| other == vendor && (its == model || model == 0))
 }
 
+/// Measures growing maps on one engine until the next one would exceed its time or the machine's memory.
 fn measure(
     ask: &Engines,
-    engine: &Engine,
-    scratch: &Folder,
+    target: &Target,
     seconds: f64,
-    answers: &mut Answers,
-    is_first_lane: bool,
+    first: Option<&Series>,
+    folder: &Folder,
 ) -> anyhow::Result<Series> {
-    say(ask, &format!("{}:", engine.label()));
-    let mut bench = match engine {
-        Engine::Cpu { threads } => Bench::cpu(*threads, scratch)?,
-        Engine::Gpu { precision, number, .. } => Bench::gpu(*precision, *number, scratch)?,
-    };
-    let choice = if engine.threads().is_some() { EngineChoice::Cpu } else { EngineChoice::Gpu };
-    let misfit = |scene: &Scene| {
-        capacity::check(scene, None, choice, scratch.path()).err().map(|failure| failure.to_string())
-    };
-    let sides = if ask.run.quick { &QUICK_SIDES[..] } else { &SIDES };
-    let runs = if ask.run.quick { LEAST_RUNS } else { RUNS };
-    let extent = Extent { sides, runs, seconds, misfit: &misfit };
-    let report = &mut |_: &Engine, point: &Point| say(ask, &progress(point));
-    let mut series = Series::measure(&mut bench, &extent, answers, report)?;
-    if let Some((lanes, why)) = series.skipped.first() {
-        say(ask, &format!("{lanes:>10} lanes and more are left out: {why}"));
+    let clock = Instant::now();
+    let mut bench = Bench::open(target)?;
+    let open_seconds = bench.open_seconds;
+    let mut series =
+        Series { target: target.clone(), open_seconds, points: Vec::new(), skipped: None, check: None };
+    let choice = if target.adapter.is_some() { EngineChoice::Gpu } else { EngineChoice::Cpu };
+    let mut largest: Option<(u32, Vec<Record>)> = None;
+    for &side in if ask.run.quick { &QUICK_SIDES[..] } else { &SIDES } {
+        let (scene, lanes) = (scene(side), (side * side) as usize);
+        let left = (seconds - clock.elapsed().as_secs_f64()).max(0.0);
+        let needed = series.points.last().map_or(0.0, |point| {
+            2.0 * point.spread(|run| run.prepare + run.integrate).median * lanes as f64 / point.lanes as f64
+        });
+        let misfit = capacity::check(&scene, None, choice, folder.path()).err();
+        if needed > left {
+            series.skipped =
+                Some((lanes, format!("it would take about {needed:.0} s, {left:.0} s are left")));
+        } else if let Some(misfit) = misfit {
+            series.skipped = Some((lanes, misfit.to_string()));
+        }
+        if let Some((lanes, reason)) = &series.skipped {
+            note(ask, &format!("{lanes:>10} lanes and more are left out: {reason}"));
+            break;
+        }
+        drop(largest.take());
+        let runs = if ask.run.quick { 2 } else { MAX_RUNS };
+        let (mut point, records) = bench.point(&scene, runs, left)?;
+        let same_size = first.and_then(|first| first.points.iter().find(|other| other.lanes == lanes));
+        let differing =
+            |other: &Point| point.classes.iter().zip(&other.classes).filter(|(own, its)| own != its).count();
+        point.differing = same_size.map(differing);
+        note(ask, &progress(&point));
+        series.points.push(point);
+        largest = Some((side, records));
     }
-    // The reference on fewer threads is the same reference.
-    if engine.threads().is_none_or(|threads| threads == processor::cores()) {
-        series.check = check(&mut bench, if ask.run.quick { 9 } else { DEFAULT_SAMPLES });
-    }
-    if peak_of(ask, engine).is_some() || ask.run.quick && is_first_lane {
-        series.work = work(&mut bench, if ask.run.quick { 4 } else { COUNTED_SIDE })?;
+    if let Some((side, records)) = largest {
+        let samples = if ask.run.quick { 9 } else { DEFAULT_SAMPLES };
+        series.check = Some(bench.check(&scene(side), &records, samples)?);
     }
     Ok(series)
 }
 
-/// What was given, or else is known of the adapter.
-fn peak_of(ask: &Engines, engine: &Engine) -> Option<f64> {
-    let Engine::Gpu { precision, device, is_hardware, .. } = engine else { return None };
-    let given = match precision {
-        Precision::F32 => ask.peak_f32,
-        Precision::F64 => ask.peak_f64,
-    };
-    given.filter(|_| *is_hardware).map(|tera| 1e12 * tera).or_else(|| peak::of(device, *precision))
-}
-
-fn say(ask: &Engines, text: &str) {
+fn note(ask: &Engines, text: &str) {
     if !ask.run.quiet {
         say::note(text);
     }
@@ -167,75 +143,62 @@ fn say(ask: &Engines, text: &str) {
 
 fn progress(point: &Point) -> String {
     let rate = point.spread(Run::rate);
-    let time = point.spread(|run| run.times.running());
     format!(
-        "{:>10} lanes: {} lane-periods/s ({} to {}), {:.3} s, {} runs",
+        "{:>10} lanes: {:.2e} lane-periods/s ({:.2e} to {:.2e}), {:.3} s, {} runs",
         point.lanes,
-        figure(rate.median),
-        figure(rate.low),
-        figure(rate.high),
-        time.median,
+        rate.median,
+        rate.low,
+        rate.high,
+        point.spread(|run| run.integrate).median,
         point.runs.len()
     )
 }
 
-/// Three significant digits.
-fn figure(x: f64) -> String {
-    format!("{x:.2e}")
-}
-
-fn summary(all: &[Series], asked: &Asked) -> String {
+/// Builds the table of the largest map of each engine, and the result of its comparison with the reference.
+fn summary(all: &[Series]) -> String {
     let mut lines = vec![format!(
-        "{:<44} {:>10} {:>10} {:>9} {:>9} {:>8} {:>8}",
-        "largest map on each engine", "lanes", "periods/s", "steps/s", "device", "of peak", "differ"
+        "{:<44} {:>10} {:>10} {:>9} {:>8}",
+        "largest map on each engine", "lanes", "periods/s", "device", "differ"
     )];
-    for (series, &peak) in all.iter().zip(&asked.peaks) {
-        let Some(point) = series.largest() else { continue };
-        let known = |x: f64, text: String| if x.is_finite() { text } else { "-".to_owned() };
-        let steps = point.spread(Run::step_rate).median;
-        let device = point.spread(device_share).median;
-        let shares = shares_of_peak(series, point, peak);
+    for series in all {
+        let Some(point) = series.points.last() else { continue };
+        let device = point.spread(Run::device_share).median;
         lines.push(format!(
-            "{:<44} {:>10} {:>10} {:>9} {:>9} {:>8} {:>8}",
-            series.engine.label(),
+            "{:<44} {:>10} {:>10.2e} {:>9} {:>8}",
+            series.target.label(),
             point.lanes,
-            figure(point.spread(Run::rate).median),
-            known(steps, figure(steps)),
-            known(device, format!("{:.0} %", 100.0 * device)),
-            shares.map_or("-".to_owned(), |[low, high]| format!("{:.0}-{:.0} %", 100.0 * low, 100.0 * high)),
+            point.spread(Run::rate).median,
+            if device.is_finite() { format!("{:.0} %", 100.0 * device) } else { "-".to_owned() },
             point.differing.map_or("-".to_owned(), |count| count.to_string()),
         ));
     }
-    lines.extend(all.iter().filter_map(checked));
+    lines.extend(all.iter().filter_map(|series| {
+        let validation = &series.check.as_ref()?.validation;
+        Some(format!(
+            "{}: {} cells compared with the reference: {} mismatches, {} unexplained",
+            series.target.label(),
+            validation.replayed,
+            validation.mismatches.len(),
+            validation.of_kind(Kind::Unexplained)
+        ))
+    }));
     lines.join("\n")
 }
 
-fn checked(series: &Series) -> Option<String> {
-    let check = series.check.as_ref()?;
-    let validation = &check.validation;
-    Some(format!(
-        "{}: {} of {} cells replayed: {} mismatches, {} unexplained",
-        series.engine.label(),
-        validation.replayed,
-        check.lanes,
-        validation.mismatches.len(),
-        validation.of_kind(Kind::Unexplained)
-    ))
-}
-
+/// Fails if nothing was measured, or if more cells of an engine differ without an explanation than are allowed.
 fn verdict(all: &[Series]) -> Result<(), Failure> {
     if all.iter().all(|series| series.points.is_empty()) {
         return Err(Failure::Run(anyhow!("nothing could be measured")));
     }
-    let of = |series: &Series| {
+    let fault = |series: &Series| {
         let check = series.check.as_ref()?;
-        let cells: Vec<String> =
-            check.unexplained.iter().map(|[e, omega]| format!("e = {e}, omega = {omega}")).collect();
         let faults = check.validation.faults();
-        let told = || format!("{}: {}: {}", series.engine.label(), faults.join("; "), cells.join("; "));
-        (!faults.is_empty()).then(told)
+        let cells = check.unexplained.iter().map(|[e, omega]| format!("e = {e}, omega = {omega}"));
+        let cells: Vec<String> = cells.collect();
+        (!faults.is_empty())
+            .then(|| format!("{}: {}: {}", series.target.label(), faults.join("; "), cells.join("; ")))
     };
-    let faults: Vec<String> = all.iter().filter_map(of).collect();
+    let faults: Vec<String> = all.iter().filter_map(fault).collect();
     if faults.is_empty() { Ok(()) } else { Err(Failure::Run(anyhow!("{}", faults.join(". ")))) }
 }
 
@@ -244,11 +207,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_card_is_measured_by_one_interface() {
+    fn a_card_is_measured_through_one_interface_only() {
         let listed = [[0x10de, 0x2331]];
         assert!(is_listed([0x10de, 0x2331], &listed), "the same card");
-        assert!(is_listed([0x10de, 0], &listed), "the same maker's, by an interface that tells no more");
+        assert!(
+            is_listed([0x10de, 0], &listed),
+            "the same vendor, by an interface that does not report the model"
+        );
         assert!(!is_listed([0x10de, 0x2335], &listed), "another model");
-        assert!(!is_listed([0x1002, 0], &listed), "another maker's");
+        assert!(!is_listed([0x1002, 0], &listed), "another vendor");
     }
 }

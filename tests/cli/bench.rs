@@ -1,6 +1,4 @@
-//! The instruments of `rattlemap bench` at tiny sizes: they must not rot.
-//!
-//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+//! `rattlemap bench engines` at tiny sizes. It needs a graphics adapter, which `scripts/test.sh` installs.
 
 use std::collections::HashMap;
 use std::fs;
@@ -14,7 +12,7 @@ fn rows(path: &std::path::Path) -> Vec<Row> {
 }
 
 #[test]
-fn engines_agree_and_say_where_their_time_goes() {
+fn every_engine_is_measured_and_agrees() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
         let mut command = Command::cargo_bin("rattlemap").unwrap();
@@ -26,7 +24,7 @@ fn engines_agree_and_say_where_their_time_goes() {
     let out = folder.path().join("out/bench/engines");
     let mut names: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();
-    assert_eq!(names, ["engines.csv", "engines.png", "manifest.json", "runs.csv", "stages.png"]);
+    assert_eq!(names, ["engines.csv", "engines.png", "manifest.json"]);
 
     let table = rows(&out.join("engines.csv"));
     let number = |row: &Row, name: &str| row[name].parse::<f64>().unwrap_or(f64::NAN);
@@ -43,11 +41,10 @@ fn engines_agree_and_say_where_their_time_goes() {
             .map(|name| number(row, name));
         assert!(0.0 < low && low <= median && median <= high, "{row:?}");
         let is_gpu = row["engine"] == "gpu";
-        assert_eq!(row["threads"].is_empty(), is_gpu);
-        assert_eq!(number(row, "lane_steps_per_s") > 0.0, is_gpu, "{row:?}");
-        assert_eq!(number(row, "upload_s") > 0.0 && number(row, "read_s") > 0.0, is_gpu, "{row:?}");
+        assert!(number(row, "integrate_s") > 0.0, "{row:?}");
         // No class differs on so few cells; the first series is what others are compared with.
         assert!(row["cells_differing"].is_empty() || row["cells_differing"] == "0", "{row:?}");
+        assert!(is_gpu || row["device_share"].is_empty(), "the processor has no device clock: {row:?}");
         if !row["device_share"].is_empty() {
             assert!((0.01..1.01).contains(&number(row, "device_share")), "{row:?}");
             let [busy, dispatch, idle, gap] =
@@ -57,23 +54,13 @@ fn engines_agree_and_say_where_their_time_goes() {
             assert!(0.0 <= gap && gap <= 1.5 * idle + 1e-9, "{row:?}");
         }
     }
-    let runs = rows(&out.join("runs.csv"));
-    assert_eq!(runs.len(), 2 * table.len());
-
     let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
     let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
-    assert_eq!((&manifest["command"], &manifest["quick"]), (&"bench engines".into(), &true.into()));
+    assert_eq!(manifest["command"], "bench engines");
     let series = manifest["series"].as_array().unwrap();
     assert!(series.iter().filter(|series| series["check"]["faults"] == serde_json::json!([])).count() >= 3);
-    let work = series.iter().map(|series| &series["work"]).find(|work| !work.is_null()).unwrap();
-    // About thirty steps per period and a hundred instructions each, as benches/README.md says.
-    let [steps, least, most] =
-        ["scan_steps", "operations_at_least", "operations_at_most"].map(|name| work[name].as_f64().unwrap());
-    assert!((10.0..200.0).contains(&steps) && least > 50.0 * steps && most > 1.2 * least, "{work}");
-    for (name, width) in [("engines.png", 1700), ("stages.png", 1700)] {
-        let picture = image::open(out.join(name)).unwrap().to_rgb8();
-        let colors: std::collections::HashSet<_> = picture.pixels().collect();
-        assert!(picture.width() == width && colors.len() > 30, "{name}");
-    }
+    let picture = image::open(out.join("engines.png")).unwrap().to_rgb8();
+    let colors: std::collections::HashSet<_> = picture.pixels().collect();
+    assert!(picture.width() == 1700 && colors.len() > 30);
     run(&[]).code(2);
 }

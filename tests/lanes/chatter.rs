@@ -3,7 +3,7 @@
 
 use crate::common::gpu::{open, run_from_rest as run};
 use crate::common::{REST, apart, flow_of, paper};
-use rattlemap::cli::bench::measure::counting;
+use crate::counting::counting;
 use rattlemap::gpu::{LaneSettings, Precision, follows_chatter};
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, Spelling, WORD_SYMBOLS};

@@ -10,7 +10,7 @@ use std::fmt::Write;
 
 use crate::common::gpu::{open, run_from_rest};
 use crate::common::{REST, flow_of, paper, work_since};
-use rattlemap::cli::bench::measure::{LOOPS, counting};
+use crate::counting::{LOOPS, counting};
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::reference::Trajectory;

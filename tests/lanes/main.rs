@@ -6,6 +6,7 @@ mod common;
 mod chatter;
 mod classes;
 mod counters;
+mod counting;
 mod early_stops;
 mod engines_agree;
 mod independence;

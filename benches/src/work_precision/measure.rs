@@ -9,7 +9,7 @@ use super::lanes::{Device, Form};
 use super::outcome::{Error, Outcome, median_and_worst};
 use super::points::Point;
 use super::{PERIODS, adaptive, fixed_step};
-use rattlemap::cli::bench::statistics::Spread;
+use rattlemap::cli::bench::spread::Spread;
 use rattlemap::gpu::{GpuError, Precision, Tables};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;

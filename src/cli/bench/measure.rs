@@ -1,256 +1,247 @@
-//! The same scene on every engine: same answers, and where the time goes.
-//!
-//! The scene is `scenes/e_omega.toml`, which asks for everything; only its number of cells
-//! changes. A run goes through the stages of [`Times`]. Sizes are taken in order until the next
-//! one would not fit the time or the memory that is left; what was left out is said.
-//!
-//! Throughput is forcing periods integrated, over all lanes, by the time from handing lanes over
-//! to having their records.
+//! Runs of the main map on one engine, timed.
 
-pub mod check;
-mod figure;
-mod instructions;
-mod iterations;
-pub mod output;
-pub mod peak;
-mod run;
-pub mod work;
-
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-pub use instructions::{Instructions, instructions};
-pub use iterations::{LOOPS, counting};
-pub use run::{Bench, Run, Times};
+use anyhow::{Context, Result, anyhow};
 
-use super::statistics::Spread;
-use crate::gpu::Precision;
+use super::spread::Spread;
+use crate::gpu::{self, AdapterChoice, AdapterReport, DeviceTimes, Precision, Stage};
+use crate::map::engine::{Cpu, Engine, Gpu};
+use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Purpose, Scene};
-use check::Check;
+use crate::record::Record;
+use crate::record::classify::classify;
+use crate::validate::{self, Kind, Lanes, Subject, Validation};
 use rattlemap_dynamics::orbit::Class;
-use work::Work;
 
-/// The scene's text.
-pub const SCENE: &str = include_str!("../../../scenes/e_omega.toml");
+/// Text of the scene that is measured. Only its number of cells changes.
+pub(super) const SCENE: &str = include_str!("../../../scenes/e_omega.toml");
 
-/// Sides of the maps: 10^3 to 10^7 lanes, two to a decade.
-pub const SIDES: [u32; 9] = [32, 56, 100, 178, 316, 562, 1000, 1778, 3162];
+/// Largest number of cells handed to an engine at once.
+const BATCH: usize = 1 << 20;
 
-/// Sides that only show that everything works.
-pub const QUICK_SIDES: [u32; 2] = [6, 9];
+/// Seed of the sample of cells that the reference recomputes.
+const SEED: u64 = 1;
 
-/// Runs of a point, if time allows; [`LEAST_RUNS`] of them in any case.
-pub const RUNS: usize = 5;
-const FEW_RUNS: usize = 3;
-
-/// A single number says nothing of its spread.
-pub const LEAST_RUNS: usize = 2;
-
-/// Points whose runs take longer than this, in seconds, get fewer of them.
-const LONG: f64 = 2.0;
-
-/// What a series is measured on.
+/// What is measured: an engine, its precision and its device.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Engine {
-    /// The reference on so many threads.
-    Cpu {
-        /// Threads.
-        threads: usize,
-    },
-    /// Lanes on an adapter.
-    Gpu {
-        /// Their precision.
-        precision: Precision,
-        /// Its number among the adapters.
-        number: usize,
-        /// The adapter, as manifests have it.
-        device: String,
-        /// Whether it is more than a program on the processor.
-        is_hardware: bool,
-    },
+pub(super) struct Target {
+    /// Description of the device as manifests have it.
+    pub(super) device: String,
+    pub(super) precision: Precision,
+    /// Index of the adapter; none for the processor.
+    pub(super) adapter: Option<usize>,
+    pub(super) is_hardware: bool,
 }
 
-impl Engine {
-    /// `cpu` or `gpu`.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Engine::Cpu { .. } => "cpu",
-            Engine::Gpu { .. } => "gpu",
-        }
+impl Target {
+    /// Builds the target of the reference on all processor cores.
+    pub(super) fn cpu() -> Target {
+        let device = "event-driven reference".to_owned();
+        Target { device, precision: Precision::F64, adapter: None, is_hardware: false }
     }
 
-    /// The precision's name.
-    pub fn precision(&self) -> &'static str {
-        match self {
-            Engine::Cpu { .. } => "f64",
-            Engine::Gpu { precision, .. } => precision.name(),
-        }
+    /// Builds the target of lanes on an adapter.
+    pub(super) fn gpu(adapter: &AdapterReport, precision: Precision) -> Target {
+        let (device, is_hardware) = (gpu::describe(&adapter.info), gpu::is_hardware(&adapter.info));
+        Target { device, precision, adapter: Some(adapter.number), is_hardware }
     }
 
-    /// What it runs on, in words.
-    pub fn device(&self) -> &str {
-        match self {
-            Engine::Cpu { .. } => "event-driven reference",
-            Engine::Gpu { device, .. } => device,
-        }
+    /// Returns `cpu` or `gpu`.
+    pub(super) fn engine(&self) -> &'static str {
+        if self.adapter.is_some() { "gpu" } else { "cpu" }
     }
 
-    /// Threads of the CPU engine.
-    pub fn threads(&self) -> Option<usize> {
-        match self {
-            Engine::Cpu { threads } => Some(*threads),
-            Engine::Gpu { .. } => None,
-        }
-    }
-
-    /// A short name: for legends and progress.
-    pub fn label(&self) -> String {
-        match self {
-            Engine::Cpu { threads: 1 } => "CPU f64, 1 thread".to_owned(),
-            Engine::Cpu { threads } => format!("CPU f64, {threads} threads"),
-            Engine::Gpu { precision, device, .. } => {
-                let name = device.split(" (").next().unwrap_or(device);
-                format!("{name}, {}", precision.name())
-            }
-        }
+    /// Returns a short name for legends and progress lines.
+    pub(super) fn label(&self) -> String {
+        let name =
+            if self.adapter.is_some() { self.device.split(" (").next().unwrap_or_default() } else { "CPU" };
+        format!("{name}, {}", self.precision.name())
     }
 }
 
-/// Repeated runs of one size.
+/// One timed run of a map.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    /// Seconds to number the cells, derive constants and upload them.
+    pub(super) prepare: f64,
+    /// Seconds from the first cell handed to the engine until all records are on the host.
+    pub(super) integrate: f64,
+    /// Forcing periods integrated, over all cells.
+    pub(super) periods: u64,
+    /// Times by the device's own clock; none for the processor and for devices without timestamps.
+    pub(super) device: Option<DeviceTimes>,
+}
+
+impl Run {
+    /// Returns forcing periods per second.
+    pub(super) fn rate(&self) -> f64 {
+        self.periods as f64 / self.integrate
+    }
+
+    /// Returns the share of the integration during which the device worked; NaN without its clock.
+    pub(super) fn device_share(&self) -> f64 {
+        self.device.map_or(f64::NAN, |device| device.busy / self.integrate)
+    }
+}
+
+/// Repeated runs of one map on one engine.
 #[derive(Clone, Debug)]
-pub struct Point {
-    /// Lanes.
-    pub lanes: usize,
-    /// Its runs, in order; at least two.
-    pub runs: Vec<Run>,
-    /// Cells by class: periodic, chaotic, undecided, failed.
-    pub classes: [usize; 4],
-    /// Cells whose class or period is not that of the series that others are compared with, if
-    /// it has this size.
-    pub differing: Option<usize>,
+pub(super) struct Point {
+    pub(super) lanes: usize,
+    pub(super) runs: Vec<Run>,
+    pub(super) classes: Vec<Class>,
+    /// Number of cells whose class differs from the first engine's; none where that has no map of this size.
+    pub(super) differing: Option<usize>,
 }
 
 impl Point {
-    /// A number of every run.
-    pub fn spread(&self, of: impl Fn(&Run) -> f64) -> Spread {
+    /// Computes the spread of a quantity over the runs.
+    pub(super) fn spread(&self, of: impl Fn(&Run) -> f64) -> Spread {
         Spread::of(self.runs.iter().map(of).collect())
     }
-}
 
-/// All sizes on one engine.
-#[derive(Clone, Debug)]
-pub struct Series {
-    /// The engine.
-    pub engine: Engine,
-    /// Seconds to open the device, compile the lane and ask it for known answers; zero on the CPU.
-    pub open_seconds: f64,
-    /// Seconds until the first four lanes of the map are back.
-    pub first_seconds: f64,
-    /// Sizes in order.
-    pub points: Vec<Point>,
-    /// Sizes left out, and why.
-    pub skipped: Vec<(usize, String)>,
-    /// How right the largest map is.
-    pub check: Option<Check>,
-    /// Counted operations per lane-period.
-    pub work: Option<Work>,
-}
-
-/// The scene with `side` x `side` cells, its table alone to be written.
-pub fn scene(side: u32) -> Scene {
-    let sets = [
-        format!("axis.0.count={side}"),
-        format!("axis.1.count={side}"),
-        "outputs.files=[\"npy\"]".to_owned(),
-    ];
-    match Scene::parse(SCENE, "scenes/e_omega.toml", &sets, Purpose::Map) {
-        Ok(scene) => scene,
-        Err(error) => unreachable!("a scene of the repository: {error}"),
+    /// Counts cells by class.
+    pub(super) fn counts(&self) -> [usize; 4] {
+        count_classes(self.classes.iter().copied())
     }
 }
 
-/// Sizes and time of a measurement.
-pub struct Extent<'a> {
-    /// Sides of the maps, from small to large.
-    pub sides: &'a [u32],
-    /// Runs of a point, if time allows.
-    pub runs: usize,
-    /// Seconds that the series may take.
-    pub seconds: f64,
-    /// Says why a map does not fit this machine, if it does not.
-    pub misfit: &'a dyn Fn(&Scene) -> Option<String>,
+/// Comparison of a sample of the largest map with the reference.
+#[derive(Clone, Debug)]
+pub(super) struct Check {
+    pub(super) validation: Validation,
+    /// Restitution and frequency of cells that differ without an explanation.
+    pub(super) unexplained: Vec<[f64; 2]>,
 }
 
-/// Classes of the series that others are compared with, by size.
-pub type Answers = Vec<(usize, Vec<Class>)>;
+/// All measurements of one engine.
+#[derive(Clone, Debug)]
+pub(super) struct Series {
+    pub(super) target: Target,
+    /// Seconds to open the device, compile the lane and compute the first four cells.
+    pub(super) open_seconds: f64,
+    pub(super) points: Vec<Point>,
+    /// Number of cells that was left out, with the reason.
+    pub(super) skipped: Option<(usize, String)>,
+    pub(super) check: Option<Check>,
+}
 
-impl Series {
-    /// Measures every size that fits; `report` is told of each point. Where `answers` is empty
-    /// the series' own are put there, else it is compared with them.
+/// Builds the scene with `side` x `side` cells.
+pub(super) fn scene(side: u32) -> Scene {
+    let sets = [format!("axis.0.count={side}"), format!("axis.1.count={side}")];
+    let scene = Scene::parse(SCENE, "scenes/e_omega.toml", &sets, Purpose::Map);
+    scene.unwrap_or_else(|error| unreachable!("a scene of the repository: {error}"))
+}
+
+/// An engine that is ready to be measured.
+pub(super) struct Bench {
+    /// None for the processor. The engine takes the device and returns it after each run.
+    device: Option<Box<gpu::Gpu>>,
+    /// What the device's clock has counted since it was last read.
+    device_times: Arc<Mutex<Option<DeviceTimes>>>,
+    pub(super) open_seconds: f64,
+}
+
+impl Bench {
+    /// Opens the engine and computes the first four cells, so that shaders are compiled.
     ///
     /// # Errors
-    /// If a run fails for another reason than memory, or its table cannot be written.
-    pub fn measure(
-        bench: &mut Bench<'_>,
-        extent: &Extent<'_>,
-        answers: &mut Answers,
-        report: &mut dyn FnMut(&Engine, &Point),
-    ) -> anyhow::Result<Series> {
+    /// If the device cannot be opened, fails its self test or does not compile the lane.
+    pub(super) fn open(target: &Target) -> Result<Bench> {
         let clock = Instant::now();
-        let is_first = answers.is_empty();
-        let mut series = Series {
-            engine: bench.engine().clone(),
-            open_seconds: bench.open_seconds(),
-            first_seconds: bench.first_seconds(),
-            points: Vec::new(),
-            skipped: Vec::new(),
-            check: None,
-            work: None,
-        };
-        let mut last: Option<(usize, f64)> = None;
-        for &side in extent.sides {
-            let (scene, lanes) = (scene(side), (side * side) as usize);
-            let left = extent.seconds - clock.elapsed().as_secs_f64();
-            let foreseen = last.map_or(0.0, |(before, took)| took * lanes as f64 / before as f64);
-            let runs = if foreseen > LONG { extent.runs.min(FEW_RUNS) } else { extent.runs };
-            if let Some(why) = misfit(extent, &scene, foreseen, left) {
-                series.skipped.push((lanes, why));
-                continue;
-            }
-            let measured = match bench.point(&scene, runs, left)? {
-                Ok(measured) => measured,
-                Err(why) => {
-                    series.skipped.push((lanes, why));
-                    continue;
+        let device_times = Arc::new(Mutex::new(None));
+        let mut bench = Bench { device: None, device_times: Arc::clone(&device_times), open_seconds: 0.0 };
+        if let Some(number) = target.adapter {
+            let choice = AdapterChoice::numbered(number);
+            let mut device = pollster::block_on(gpu::Gpu::open(target.precision, &choice))?;
+            device.watch(move |stage| {
+                if let Stage::Integrated { device: Some(new) } = stage {
+                    let mut sum = device_times.lock().unwrap_or_else(PoisonError::into_inner);
+                    *sum = Some(sum.unwrap_or_default().and(new));
                 }
-            };
-            let run::Measured { runs, classes } = measured;
-            let of_others = answers.iter().find(|(size, _)| *size == lanes && !is_first);
-            let differing = of_others.map(|(_, theirs)| {
-                classes.iter().zip(theirs).filter(|(ours, theirs)| ours != theirs).count()
             });
-            let counts = crate::map::plan::count_classes(classes.iter().copied());
-            let point = Point { lanes, runs, classes: counts, differing };
-            last = Some((lanes, point.spread(|run| run.times.total()).median));
-            report(&series.engine, &point);
-            series.points.push(point);
-            if is_first {
-                answers.push((lanes, classes));
-            }
+            bench.device = Some(Box::new(device));
+            bench.run(&scene(2)).context("the first lanes")?;
         }
-        Ok(series)
+        bench.open_seconds = clock.elapsed().as_secs_f64();
+        Ok(bench)
     }
 
-    /// The largest size measured.
-    pub fn largest(&self) -> Option<&Point> {
-        self.points.last()
+    /// Computes the map of a scene once.
+    ///
+    /// # Errors
+    /// If the engine fails.
+    pub(super) fn run(&mut self, scene: &Scene) -> Result<(Run, Vec<Record>)> {
+        let clock = Instant::now();
+        let plan = Plan::new(scene);
+        let mut engine = match self.device.take() {
+            Some(device) => Engine::Gpu(Box::new(pollster::block_on(Gpu::new(&plan, *device))?)),
+            None => Engine::Cpu(Cpu::new(&plan)),
+        };
+        let prepare = clock.elapsed().as_secs_f64();
+        self.take_device_times();
+        let clock = Instant::now();
+        let mut records = Vec::with_capacity(plan.run_count());
+        for from in (0..plan.run_count()).step_by(BATCH) {
+            let cells = plan.cells(from..plan.run_count().min(from + BATCH));
+            let computed = pollster::block_on(engine.run(&cells))?;
+            records.extend(cells.iter().map(|cell| cell.id).zip(computed));
+        }
+        let integrate = clock.elapsed().as_secs_f64();
+        if let Engine::Gpu(lanes) = engine {
+            self.device = Some(Box::new(lanes.into_device()));
+        }
+        records.sort_unstable_by_key(|(id, _)| *id);
+        let records: Vec<Record> = records.into_iter().map(|(_, record)| record).collect();
+        let periods = records.iter().map(|record| u64::from(record.periods_run)).sum();
+        Ok((Run { prepare, integrate, periods, device: self.take_device_times() }, records))
     }
-}
 
-/// Why a size is left out, if it is.
-fn misfit(extent: &Extent<'_>, scene: &Scene, foreseen: f64, left: f64) -> Option<String> {
-    let needed = foreseen * LEAST_RUNS as f64;
-    if needed > left.max(0.0) {
-        return Some(format!("would take about {needed:.0} s, {:.0} s are left", left.max(0.0)));
+    fn take_device_times(&self) -> Option<DeviceTimes> {
+        self.device_times.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
-    (extent.misfit)(scene)
+
+    /// Computes the map of a scene `runs` times, fewer if `seconds` run out, but at least twice.
+    ///
+    /// # Errors
+    /// As [`Bench::run`].
+    pub(super) fn point(&mut self, scene: &Scene, runs: usize, seconds: f64) -> Result<(Point, Vec<Record>)> {
+        let clock = Instant::now();
+        let (first, mut records) = self.run(scene)?;
+        let mut list = vec![first];
+        while list.len() < 2 || list.len() < runs && clock.elapsed().as_secs_f64() + first.integrate < seconds
+        {
+            let (run, again) = self.run(scene)?;
+            list.push(run);
+            records = again;
+        }
+        let classes = records.iter().map(classify).collect();
+        Ok((Point { lanes: records.len(), runs: list, classes, differing: None }, records))
+    }
+
+    /// Recomputes `samples` cells of a map on the reference and compares.
+    ///
+    /// # Errors
+    /// If the device fails while it computes the sample's lanes again.
+    pub(super) fn check(&mut self, scene: &Scene, records: &[Record], samples: usize) -> Result<Check> {
+        let plan = Plan::new(scene);
+        let device = self.device.as_deref_mut();
+        let precision = device.as_ref().map_or(Precision::F64, |device| device.precision());
+        let subject = Subject { plan: &plan, records, precision, is_lane: device.is_some() };
+        let sample = validate::sample(&plan, records, samples, SEED);
+        let lanes = match device {
+            Some(device) => pollster::block_on(Lanes::run(&subject, &sample, Some(device), None))
+                .map_err(|error| anyhow!("the sample's lanes: {error}"))?,
+            None => Lanes::default(),
+        };
+        let validation = validate::replay(&subject, &sample, &lanes, &|_| {});
+        let unexplained = validation.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
+        let unexplained = unexplained.map(|mismatch| {
+            let [i, j] = plan.indices(mismatch.id);
+            [plan.axes()[0].value(i), plan.axes()[1].value(j)]
+        });
+        Ok(Check { unexplained: unexplained.collect(), validation })
+    }
 }

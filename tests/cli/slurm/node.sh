@@ -1,40 +1,33 @@
 #!/usr/bin/env bash
-# A Slurm of one node, for tests: munged, slurmctld and slurmd, with everything that they read and write in one folder.
+# Starts a Slurm cluster of one node for tests: munged, slurmctld and slurmd. All files are in FOLDER; nothing in /etc is
+# read or written, and root is not needed.
 #
-#     node.sh FOLDER CONTROLLER_PORT NODE_PORT [CPUS]
+#     node.sh FOLDER CONTROLLER_PORT NODE_PORT CPUS
 #
-# As root or as a user; nothing in /etc is read or written. Prints `ready` once the node takes jobs, and runs until its
-# standard input ends: a test that dies takes its node along. Then jobs are cancelled and all is stopped. Commands of Slurm
-# find it by SLURM_CONF=FOLDER/slurm.conf. Exit code 3 where Slurm or munge is not installed, 1 where they do not start.
+# Prints `ready` once the node accepts jobs. When standard input closes, it cancels all jobs and stops the daemons, so that
+# a test that dies leaves nothing behind. Slurm's commands find the node through SLURM_CONF=FOLDER/slurm.conf.
 set -euo pipefail
 export LC_ALL=C PATH="$PATH:/usr/sbin:/sbin"
 
 folder="$(realpath "$1")"
-controller_port="$2" node_port="$3" cpus="${4:-2}"
+controller_port="$2" node_port="$3" cpus="$4"
 export SLURM_CONF="$folder/slurm.conf"
 user="$(id -un)"
 
 unable() {
     echo "no Slurm node: $*" >&2
-    exit "${code:-1}"
+    exit 1
 }
-for program in munged slurmctld slurmd sbatch; do
-    command -v "$program" >/dev/null || code=3 unable "$program is missing (Debian, Ubuntu: apt-get install slurm-wlm munge)"
-done
 
 mkdir -p "$folder"/{munge,state,spool}
 chmod 700 "$folder/munge" "$folder/state" "$folder/spool"
 head -c 1024 /dev/urandom >"$folder/munge/key"
 chmod 400 "$folder/munge/key"
-# From 23.02 on slurmd can do without control groups, but has to be told; before it looks only which kind there is.
+# Slurm 23.02 and later need this line to run without control groups.
 version="$(slurmd -V)"
 [[ "${version##* }" =~ ^([0-9]+)\.([0-9]+) ]] || unable "which version is this: $version?"
 if ((BASH_REMATCH[1] >= 23)); then echo "CgroupPlugin=disabled" >"$folder/cgroup.conf"; fi
-# Cards that nothing computes on.
-for ((card = 0; card < cpus; card++)); do ln -s /dev/null "$folder/card$card"; done
-echo "NodeName=node Name=gpu Type=card File=$folder/card[0-$((cpus - 1))]" >"$folder/gres.conf"
-# More processors than there are may be promised (config_overrides). No control groups, no accounting; jobs are looked at
-# often, because tests wait for them.
+# config_overrides allows more processors than the machine has. The short scheduling intervals save waiting time.
 cat >"$SLURM_CONF" <<CONF
 ClusterName=test
 SlurmctldHost=localhost(127.0.0.1)
@@ -60,18 +53,17 @@ StateSaveLocation=$folder/state
 SlurmdSpoolDir=$folder/spool
 SlurmctldPidFile=$folder/slurmctld.pid
 SlurmdPidFile=$folder/slurmd.pid
-GresTypes=gpu
-NodeName=node NodeHostname=localhost NodeAddr=127.0.0.1 CPUs=$cpus RealMemory=4000 Gres=gpu:card:$cpus Feature=card
+NodeName=node NodeHostname=localhost NodeAddr=127.0.0.1 CPUs=$cpus RealMemory=4000
 PartitionName=all Nodes=node Default=YES MaxTime=INFINITE State=UP
 CONF
 
 daemons=()
-# What a daemon left behind: it was started with this node's configuration, as nothing else was.
+# Lists processes that daemons left behind; only they have this node's configuration in their environment.
 orphans() { grep -lsazxF "SLURM_CONF=$SLURM_CONF" /proc/[0-9]*/environ | cut -d/ -f3 | grep -vx "$$" || true; }
 stop() {
     trap '' INT TERM
     scancel --quiet --user="$user" 2>/dev/null || true
-    # slurmstepd outlives slurmd: jobs end first, their processes after them.
+    # slurmstepd outlives slurmd, so jobs must end first.
     local wait pid
     for ((wait = 0; wait < 50; wait++)); do
         [[ -n "$(squeue --noheader 2>/dev/null)" ]] || break
@@ -111,5 +103,5 @@ for ((wait = 0; wait < 300; wait++)); do
 done
 [[ "$state" == idle ]] || unable "it is '$state' after 15 s: $(tail -qn 2 "$folder"/*.out "$folder"/*.log)"
 echo ready
-# A read that is trapped ends at once; one of a command would not.
+# `read` ends at once when a signal is trapped.
 while read -r _; do :; done

@@ -1,18 +1,18 @@
-//! Median and range of a few repetitions.
+//! Median and range of repeated measurements.
 
-/// What repetitions came to.
+/// Median, minimum and maximum of a list of measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// The middle one; the mean of the two in the middle if their number is even.
+    /// The middle value, or the mean of the two middle values.
     pub median: f64,
-    /// The smallest.
+    /// The smallest value.
     pub low: f64,
-    /// The largest.
+    /// The largest value.
     pub high: f64,
 }
 
 impl Spread {
-    /// The spread of a list; NaN if it is empty.
+    /// Computes the spread of a list; all NaN if the list is empty.
     pub fn of(mut list: Vec<f64>) -> Spread {
         list.sort_by(f64::total_cmp);
         let Some((&low, &high)) = list.first().zip(list.last()) else {

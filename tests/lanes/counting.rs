@@ -1,7 +1,7 @@
-//! Forms of the lane that count their loops' iterations, made from the shader's text.
+//! Variants of the lane's shader that count loop iterations, made by editing its text.
 
-/// Every loop pays for its iterations; counting them function by function counts the work.
-pub const LOOPS: [(&str, &str); 5] = [
+/// Functions with loops, and what one iteration of each is.
+pub(crate) const LOOPS: [(&str, &str); 5] = [
     ("scan", "scan steps"),
     ("careful", "careful passes"),
     ("first_event", "checks of a stretch"),
@@ -9,8 +9,8 @@ pub const LOOPS: [(&str, &str); 5] = [
     ("follow_chatter", "short flights"),
 ];
 
-/// Reports the loop iterations of a function in place of impacts.
-pub fn counting(function: &str) -> fn(String) -> String {
+/// Returns an edit of the shader that reports the loop iterations of a function in place of impacts.
+pub(crate) fn counting(function: &str) -> fn(String) -> String {
     match function {
         "scan" => |source| count_iterations(&source, "scan"),
         "careful" => |source| count_iterations(&source, "careful"),
