@@ -88,7 +88,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         say::notes(format_args!("{}\n{files}", summary(&compared, scenes[0])));
     }
     if ask.json {
-        print_json(&store::compare::object(folder.path(), &files, &compared)?)?;
+        print_json(&store::compare::object(folder.path(), &files, &compared))?;
     }
     match comparison.differing() {
         differing if ask.fail && differing > 0 => Err(Failure::Run(anyhow!(

@@ -127,7 +127,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
         files.join(", ")
     ));
     if ask.json {
-        print_json(&store::map_json::object(folder.path(), &files, &cells, &run, writing)?)?;
+        print_json(&store::map_json::object(folder.path(), &files, &cells, &run, writing))?;
     }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")

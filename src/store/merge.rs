@@ -434,7 +434,7 @@ impl MapRecords {
         let (files, object, classes, writing) = self.with_cells(|cells, run| {
             let files = map::write(folder, cells, run)?;
             let writing = clock.elapsed();
-            let object = map_json::object(folder.path(), &files, cells, run, writing)?;
+            let object = map_json::object(folder.path(), &files, cells, run, writing);
             Ok((files, object, count_classes(cells.classes()), writing))
         })?;
         Ok(MergedMap { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })

@@ -121,7 +121,7 @@ pub(super) fn finish(
     let files = shard::write(kept.folder(), &finished)?;
     progress.finish(&told(&finished, kept.folder().path(), &files));
     if ask.json {
-        print_json(&shard::object(kept.folder().path(), &files, &finished)?)?;
+        print_json(&shard::object(kept.folder().path(), &files, &finished))?;
     }
     if tally.all_failed() && !ask.run.quiet {
         say::note(
