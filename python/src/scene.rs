@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use rattlemap::job;
-use rattlemap::map::scene::{Along, FileBeside, FileText, Purpose, Scene as Read};
+use rattlemap::map::scene::{Along, CompanionFile, FileText, Purpose, Scene as Read};
 use rattlemap::model::Model as _;
 use rattlemap::model_file::FileModel;
 
@@ -59,16 +59,16 @@ impl Scene {
         along: Option<(String, Vec<String>)>,
     ) -> Result<Scene, Problem> {
         let read_for = For::new(purpose, along)?;
-        let find = |what: FileBeside, _: &str| match (what, &model, &cells) {
-            (FileBeside::Model, Some((name, text)), _) => {
+        let find = |what: CompanionFile, _: &str| match (what, &model, &cells) {
+            (CompanionFile::Model, Some((name, text)), _) => {
                 Ok(FileText { name: name.clone(), text: text.clone() })
             }
-            (FileBeside::Cells, _, Some(text)) => {
+            (CompanionFile::Cells, _, Some(text)) => {
                 Ok(FileText { name: "cells".to_owned(), text: text.clone() })
             }
             _ => Err("names a file, and none was given".to_owned()),
         };
-        let scene = Read::parse_written(text, &sets, read_for.purpose, read_for.along.as_ref(), &find)?;
+        let scene = Read::parse_generated(text, &sets, read_for.purpose, read_for.along.as_ref(), &find)?;
         Ok(Scene { scene: Arc::new(scene), sets, read_for })
     }
 

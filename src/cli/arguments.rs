@@ -19,13 +19,16 @@ use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
 use rattlemap_dynamics::orbit::Settings;
 
+/// Version and commit, as `--version` prints them.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_COMMIT"), ")");
+
 /// Motion of a gear pair with backlash: flights between the tooth surfaces in closed form, every
 /// contact located, cycles named by their word, and the Lyapunov exponent of each.
 ///
 /// All quantities are dimensionless. Exit code 0: done; 1: the run or a validation failed; 2: bad usage or scene,
 /// and nothing was computed; 130: interrupted by Ctrl-C, 143: by SIGTERM.
 #[derive(Debug, Parser)]
-#[command(version, bin_name = "rattlemap", arg_required_else_help = true)]
+#[command(version = VERSION, bin_name = "rattlemap", arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
     rattlemap map scenes/e_omega.toml                periods and chaos over restitution and frequency\n  \
     rattlemap orbit --set e=0.06                     the paper's motion with meshing on both sides\n  \

@@ -38,7 +38,7 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
         || interrupt.failure(anyhow!("interrupted before the motion was decided; nothing was written"));
     let at = |time| state_at(&*model, &flow, start, time, &interrupt)?.ok_or_else(interrupted);
     let instant = ask.time.map(|time| at(time).map(|state| At { time, state })).transpose()?;
-    let (shown, halt) = (orbit::SHOWN_PERIODS, interrupt.raised());
+    let (shown, halt) = (orbit::EVENT_PERIODS, interrupt.raised());
     let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(interrupted)?;
     let asked = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
     print(&match ask.json {

@@ -138,7 +138,7 @@ fn run_again(
         true => None,
         false => open(Precision::F64, &own).or_else(|| open(Precision::F64, &AdapterChoice::default())),
     };
-    gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.heed(halt));
+    gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.stop_on(halt));
     let lanes = pollster::block_on(Lanes::run(subject, sample, gpu.as_mut(), double.as_mut()))
         .context("cannot run the sample's lanes again")?;
     Ok((lanes, note))

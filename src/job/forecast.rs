@@ -49,7 +49,7 @@ impl Forecast {
             return row_by_row(plan, engine, runs);
         }
         let halt = halted_after(LONGEST);
-        engine.heed(&halt);
+        engine.stop_on(&halt);
         let mut before: Option<Sample> = None;
         let mut count = runs.min(engine.least_batch());
         loop {
@@ -70,7 +70,7 @@ impl Forecast {
 /// Where every row of cells waits for the one before: by rows as long as the map's.
 fn row_by_row(plan: &Plan, engine: &mut Engine<'_>, runs: usize) -> Result<Forecast, EngineError> {
     let halt = halted_after(LONGEST);
-    engine.heed(&halt);
+    engine.stop_on(&halt);
     let row = plan.axes()[0].count();
     let clock = Instant::now();
     let (mut asked, mut periods) = (0, Vec::new());

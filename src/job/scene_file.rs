@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::cli::arguments::{FigureFormat, SceneOptions};
-use crate::map::scene::{Along, FileBeside, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::map::scene::{Along, CompanionFile, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 use crate::store::finished_map::MOST_LIST_BYTES;
 use crate::store::plain_file::read_text;
 
@@ -54,7 +54,7 @@ fn load_from(
     })?;
     let find = |what, file: &str| {
         let beside = path.parent().unwrap_or(Path::new("")).join(file);
-        if what == FileBeside::Model {
+        if what == CompanionFile::Model {
             return find_model(&beside);
         }
         match kept.filter(|kept| !beside.exists() && kept.exists()) {
@@ -62,7 +62,7 @@ fn load_from(
             None => find(&beside, MOST),
         }
     };
-    Scene::parse_along(&text, &name, sets, purpose, along, &find)
+    Scene::parse_with_files(&text, &name, sets, purpose, along, &find)
 }
 
 /// Reads the file of a model; the error is the end of a sentence that names it.

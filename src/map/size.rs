@@ -1,7 +1,7 @@
 //! How large a map is, estimated before anything is allocated.
 
 use crate::gpu;
-use crate::map::plan::{Parts, keeps_flows};
+use crate::map::plan::{Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
 use crate::record::Record;
@@ -125,7 +125,7 @@ impl Size {
             runs,
             memory: runs.saturating_mul(record + MEMORY_BESIDE).saturating_add(rows * LIST_ROW),
             memory_per_thread: one_cell,
-            flows: if keeps_flows(flow_count, runs) { flow_count * FLOW } else { 0 },
+            flows: if stores_flows(flow_count, runs) { flow_count * FLOW } else { 0 },
             lane_tables: lane_tables(scene, &parts, runs),
             disk: runs.saturating_mul(record_on_disk(scene)).saturating_add(cells.saturating_mul(per_files)),
         }
@@ -199,7 +199,7 @@ fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
         let model = scene.points().model(parts.cell(flow as u32));
         model.oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
     };
-    if keeps_flows(flows, runs) {
+    if stores_flows(flows, runs) {
         let sum: u64 = (0..looked_at).map(bytes).sum();
         (sum as f64 / looked_at as f64 * flows as f64) as u64
     } else {
@@ -235,7 +235,7 @@ mod tests {
         {
             let scene = scene(second, min, max, [5, 400]);
             let (size, plan) = (Size::of(&scene), Plan::new(&scene));
-            assert!(plan.keeps_flows());
+            assert!(plan.stores_flows());
             let oscillators: Vec<_> =
                 (0..plan.flow_count() as u32).map(|flow| plan.oscillator(flow)).collect();
             let flows: usize = oscillators.iter().map(|oscillator| Flow::new(oscillator).bytes()).sum();
@@ -255,7 +255,8 @@ mod tests {
     fn rows_of_a_list_take_room_beside_their_records() {
         let text = "e,omega\n".to_owned() + &"0.5,5.6\n".repeat(100);
         let find = |_, _: &str| Ok(FileText { name: "l.csv".to_owned(), text: text.clone() });
-        let list = Scene::parse_beside("[cells]\nfile = 'l.csv'\n", "s", &[], Purpose::Map, &find).unwrap();
+        let list = Scene::parse_with_files("[cells]\nfile = 'l.csv'\n", "s", &[], Purpose::Map, None, &find)
+            .unwrap();
         let [list, grid] = [list, scene("omega", 1.0, 12.0, [10, 10])].map(|scene| Size::of(&scene).memory);
         assert_eq!(list - grid, 100 * LIST_ROW);
     }

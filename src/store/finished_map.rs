@@ -8,7 +8,7 @@ use serde_json::Value;
 use thiserror::Error;
 
 use crate::map::plan::Plan;
-use crate::map::scene::{FileBeside, FileText, Purpose, Scene, SceneError};
+use crate::map::scene::{CompanionFile, FileText, Purpose, Scene, SceneError};
 use crate::map::schedule::Refined;
 use crate::map::shard::Shard;
 use crate::record::Record;
@@ -291,7 +291,7 @@ impl FinishedMap {
     pub fn scene(&self) -> Result<Scene, FinishedMapError> {
         let name = self.folder.join(MANIFEST).display().to_string();
         let find = |what, _: &str| {
-            if what == FileBeside::Model {
+            if what == CompanionFile::Model {
                 let text = self.manifest.model["text"].as_str();
                 let text = text.ok_or("is not in the manifest; make the map again with --force")?;
                 return Ok(FileText { name: format!("{name}, model"), text: text.to_owned() });
@@ -305,7 +305,14 @@ impl FinishedMap {
             })?;
             Ok(FileText { name: path.display().to_string(), text })
         };
-        Ok(Scene::parse_beside(&self.manifest.scene, &name, &self.manifest.set, Purpose::Map, &find)?)
+        Ok(Scene::parse_with_files(
+            &self.manifest.scene,
+            &name,
+            &self.manifest.set,
+            Purpose::Map,
+            None,
+            &find,
+        )?)
     }
 
     /// Reads the records of a whole map.

@@ -22,7 +22,8 @@ use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 /// Returns the number of samples per forcing period that figures need: 400, or 20 per oscillation of the relative motion
 /// in contact, if that is more.
 pub(crate) fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let stiffness = Side::BOTH.map(|side| oscillator.added(side)[0]).into_iter().fold(0.0, f64::max);
+    let stiffness =
+        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
     let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
     (20.0 * ringing).clamp(400.0, 50_000.0) as usize
 }

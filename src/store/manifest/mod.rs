@@ -23,7 +23,8 @@ pub struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
-    /// Commit of the program; `unknown` if it was built outside of its repository or without release settings.
+    /// Commit that the program was built from, with `-modified` added if its sources had changed; `unknown` in
+    /// development builds.
     commit: &'static str,
 }
 

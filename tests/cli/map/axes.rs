@@ -112,7 +112,7 @@ fn a_line_through_a_plane_is_a_diagram() {
     let parts = ["error: at k1 = ", ": `k2 = -", "is out of range: it must be finite and at least 0"];
     fails(&folder, &format!("{line} --set derived.k2=(k1-20)*(k1-50) --out x"), 2, &parts);
     assert!(!folder.path().join("x").exists());
-    let list = "l.toml:7:1: `cells = { ... }` does not fit: `bifurcation` takes an axis";
+    let list = "l.toml:7:1: `cells = { ... }` does not fit: `bifurcation` needs an axis";
     fails(&with_list(), "bifurcation l.toml --quiet", 2, &[list]);
 }
 

@@ -52,7 +52,7 @@ pub(super) fn moment() -> u64 {
 fn a_run_that_is_stopped_early_says_how_to_resume() {
     let folder = folder();
     let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
-    run.current_dir(folder.path()).args("map s.toml --engine gpu --set".words()).arg("title=it's <b>");
+    run.current_dir(folder.path()).args(words("map s.toml --engine gpu --set")).arg("title=it's <b>");
     // A shader in the driver's cache would be compiled too fast.
     let run = run.env("MESA_SHADER_CACHE_DISABLE", "true").stderr(Stdio::piped()).spawn().unwrap();
     wait_until(|| folder.path().join("out/s").exists());

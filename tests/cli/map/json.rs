@@ -17,7 +17,7 @@ fn json_describes_a_map() {
     assert_eq!(keys(&summary), fields);
     let out = folder.path().join("out/s");
     let manifest = json(&out.join("manifest.json"));
-    for field in "cells classes device engine periods precision statuses without_effect".words() {
+    for field in words("cells classes device engine periods precision statuses without_effect") {
         assert_eq!(summary[field], manifest[field], "{field}");
     }
     assert_eq!((&summary["folder"], &summary["runs"]), (&"out/s".into(), &12.into()));

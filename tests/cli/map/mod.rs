@@ -66,74 +66,43 @@ fn with(scene: &str) -> TempDir {
     folder
 }
 
-/// Arguments: a list, or a line of words that have no spaces.
-trait Words {
-    fn words(&self) -> Vec<&str>;
+/// The words of a line of arguments.
+fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
 }
 
-impl Words for str {
-    fn words(&self) -> Vec<&str> {
-        self.split_whitespace().collect()
-    }
-}
-
-impl Words for String {
-    fn words(&self) -> Vec<&str> {
-        self.split_whitespace().collect()
-    }
-}
-
-impl Words for [&str] {
-    fn words(&self) -> Vec<&str> {
-        self.to_vec()
-    }
-}
-
-impl<const N: usize> Words for [&str; N] {
-    fn words(&self) -> Vec<&str> {
-        self.to_vec()
-    }
-}
-
-impl Words for Vec<&str> {
-    fn words(&self) -> Vec<&str> {
-        self.clone()
-    }
-}
-
-fn command(folder: &TempDir, arguments: &(impl Words + ?Sized)) -> Command {
+fn command(folder: &TempDir, arguments: &str) -> Command {
     let mut command = rattlemap(folder);
-    command.args(arguments.words());
+    command.args(words(arguments));
     command
 }
 
 /// Runs a map on the CPU, unless the arguments say otherwise.
-fn map(folder: &TempDir, arguments: &(impl Words + ?Sized)) -> assert_cmd::assert::Assert {
-    let arguments = arguments.words();
-    let engine: &[&str] = if arguments.contains(&"--engine") { &[] } else { &["--engine", "cpu"] };
-    command(folder, &[&["map", "s.toml"], engine, &arguments].concat()).assert()
+fn map(folder: &TempDir, arguments: &str) -> assert_cmd::assert::Assert {
+    let engine = if arguments.contains("--engine") { "" } else { "--engine cpu " };
+    command(folder, &format!("map s.toml {engine}{arguments}")).assert()
 }
 
 /// Runs a command that must succeed.
-fn succeeds(folder: &TempDir, arguments: &(impl Words + ?Sized)) -> assert_cmd::assert::Assert {
+fn succeeds(folder: &TempDir, arguments: &str) -> assert_cmd::assert::Assert {
     command(folder, arguments).assert().success()
 }
 
 /// Runs a command that must fail with an exit code and these parts of a message.
-fn fails(folder: &TempDir, arguments: &(impl Words + ?Sized), code: i32, parts: &[&str]) {
+fn fails(folder: &TempDir, arguments: &str, code: i32, parts: &[&str]) {
     command(folder, arguments).assert().code(code).stdout("").stderr(says(parts));
 }
 
 /// Runs a command and returns the object that it prints.
-fn printed(folder: &TempDir, arguments: &(impl Words + ?Sized)) -> serde_json::Value {
+fn printed(folder: &TempDir, arguments: &str) -> serde_json::Value {
     let run = succeeds(folder, arguments);
     serde_json::from_slice(&run.get_output().stdout).expect("one JSON object and nothing else")
 }
 
 /// Starts the program in a folder.
-fn begin(folder: &TempDir, arguments: &(impl Words + ?Sized)) -> std::process::Child {
+fn begin(folder: &TempDir, arguments: &str) -> std::process::Child {
     let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
-    run.current_dir(folder.path()).args(arguments.words()).stderr(Stdio::piped()).spawn().unwrap()
+    run.current_dir(folder.path()).args(words(arguments)).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 /// Sends a signal to a run and waits for its end; returns the exit code and the text of stderr.
@@ -200,7 +169,7 @@ fn a_map_writes_the_files_of_the_contract() {
     let texts = check_words(&out.join("words.csv"), &rows);
     check_npy(&fs::read(out.join("cells.npy")).unwrap(), &rows, &texts);
     check_manifest(&out, &rows);
-    for name in SAME.words().into_iter().filter(|name| name.ends_with("png")) {
+    for name in words(SAME).into_iter().filter(|name| name.ends_with("png")) {
         let picture = image::open(out.join(name)).unwrap().to_rgb8();
         let colors: std::collections::HashSet<_> = picture.pixels().collect();
         assert!(picture.width() > 1400 && colors.len() > 30, "{name}");
@@ -393,7 +362,7 @@ fn scenes_that_maps_cannot_do_are_refused() {
         ("refine.max_error=0", "`refine.max_error = 0` is out of range"),
         ("e=0.5", "`parameters.e = 0.5` does not fit: axis 0 sweeps `e`"),
     ] {
-        fails(&folder, &["map", "s.toml", "--set", set], 2, &[&format!("--set {set}: "), part]);
+        fails(&folder, &format!("map s.toml --set {set}"), 2, &[&format!("--set {set}: "), part]);
     }
     assert!(!folder.path().join("out").exists());
 }

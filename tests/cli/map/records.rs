@@ -8,7 +8,7 @@ use super::*;
 /// Contents of the files of `SAME` in a folder.
 pub(super) fn bytes(out: &Path) -> Vec<Vec<u8>> {
     let read = |name| fs::read(out.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
-    SAME.words().into_iter().map(read).collect()
+    words(SAME).into_iter().map(read).collect()
 }
 
 /// All records of a file, in their order.
