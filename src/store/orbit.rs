@@ -140,7 +140,7 @@ pub fn moments(
     Ok(orbit_tables::moments(&model.oscillator()?, orbit, &trace, samples_per_period))
 }
 
-/// What `orbit --json` prints.
+/// Returns the object that `orbit --json` prints.
 ///
 /// # Errors
 /// [`OutputError`] if it cannot be put into JSON.
