@@ -16,7 +16,7 @@ use rattlemap::map::shard::Shard;
 use rattlemap::map::sweep;
 use rattlemap::record::Record;
 use rattlemap::store::folder::{Folder, FolderError};
-use rattlemap::store::map::{Made, Run};
+use rattlemap::store::map::{Provenance, Run};
 use rattlemap::store::run_records::{RunRecords, RunRecordsError, Work, open_folder};
 
 use crate::problem::Problem;
@@ -93,7 +93,7 @@ pub(crate) struct Integrated<'p> {
 impl Integrated<'_> {
     /// Who computed them and in what time.
     pub(crate) fn run<'a>(&self, task: &'a Task, device: &'a str, processor: &'a str) -> Run<'a> {
-        let made = Made { engine: self.engine.name(), precision: self.engine.precision(), device };
+        let made = Provenance { engine: self.engine.name(), precision: self.engine.precision(), device };
         Run {
             opening: self.opening,
             elapsed: self.elapsed,

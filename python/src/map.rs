@@ -10,7 +10,7 @@ use rattlemap::findings::effect;
 use rattlemap::job;
 use rattlemap::map::plan::Plan;
 use rattlemap::show::cells::{Cells, Survey};
-use rattlemap::store::in_memory::Colors;
+use rattlemap::store::in_memory::SharedColors;
 use rattlemap::store::map::Run;
 use rattlemap::store::{self, in_memory};
 
@@ -103,7 +103,7 @@ type Rgb = (u8, u8, u8);
 /// Colours of the program's figures: by name, and of things in a row.
 #[pyfunction]
 pub(crate) fn colors() -> (BTreeMap<&'static str, Rgb>, Vec<Rgb>) {
-    let Colors { named, in_a_row } = in_memory::colors();
+    let SharedColors { named, in_a_row } = in_memory::colors();
     let parts = |[red, green, blue]: [u8; 3]| (red, green, blue);
     (
         named.into_iter().map(|(name, color)| (name, parts(color))).collect(),

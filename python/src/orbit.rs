@@ -25,8 +25,8 @@ pub(crate) struct Orbit {
 #[pymethods]
 impl Orbit {
     /// What `orbit --json` prints.
-    fn json(&self) -> Result<String, Problem> {
-        Ok(store::orbit::json(&*self.model, &self.orbit, None)?)
+    fn json(&self) -> String {
+        store::orbit::json(&*self.model, &self.orbit, None)
     }
 
     /// Forcing periods that the events span.

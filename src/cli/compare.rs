@@ -17,11 +17,11 @@ use crate::job::error::Failure;
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::show::cells::{Cells, Survey};
+use crate::show::map_pair::{MapPair, MapSide};
 use crate::store;
-use crate::store::compare::{Compared, MapSide};
 use crate::store::finished_map::{FinishedMap, StoredManifest, StoredRecords};
 use crate::store::folder::Folder;
-use crate::store::map::Made;
+use crate::store::map::Provenance;
 
 /// Reads both, compares, writes.
 pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
@@ -73,12 +73,12 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
         MapSide {
             name: &names[i],
             cells: &cells[i],
-            made: Made { engine, precision, device },
+            provenance: Provenance { engine, precision, device },
             crate_version,
             commit,
         }
     };
-    let compared = Compared { sides: [side(0), side(1)], comparison: &comparison };
+    let compared = MapPair { sides: [side(0), side(1)], comparison: &comparison };
     if interrupt.is_raised() {
         return Err(stopped());
     }
@@ -175,8 +175,8 @@ fn require_one_grid(dirs: [&PathBuf; 2], scenes: [&Scene; 2]) -> Result<(), Fail
 }
 
 /// What was found, a line for each question.
-fn summary(compared: &Compared<'_>, scene: &Scene) -> String {
-    let Compared { sides, comparison } = compared;
+fn summary(compared: &MapPair<'_>, scene: &Scene) -> String {
+    let MapPair { sides, comparison } = compared;
     let percent = |cells: usize| 100.0 * cells as f64 / comparison.kinds.len() as f64;
     let (differing, cells) = (comparison.differing(), comparison.kinds.len());
     let mut lines: Vec<String> = compared
@@ -186,7 +186,8 @@ fn summary(compared: &Compared<'_>, scene: &Scene) -> String {
             say::quoted(format_args!("{}: {} in A, {} in B", differing.name, differing.a, differing.b))
         })
         .collect();
-    let [a, b] = sides.map(|side| say::quoted(format_args!("{} {}", side.made.engine, side.made.precision)));
+    let [a, b] = sides
+        .map(|side| say::quoted(format_args!("{} {}", side.provenance.engine, side.provenance.precision)));
     if a != b {
         lines.push(format!("engine: {a} in A, {b} in B"));
     }

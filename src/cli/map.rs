@@ -21,7 +21,7 @@ use crate::record::classify::status;
 use crate::show::cells::{Cells, Survey};
 use crate::store;
 use crate::store::folder::Folder;
-use crate::store::map::{LIST, Made, Run};
+use crate::store::map::{LIST, Provenance, Run};
 use crate::store::run_records::{RunRecords, Work, open_folder};
 use anyhow::anyhow;
 use rattlemap_dynamics::orbit::{Class, Status};
@@ -103,7 +103,7 @@ pub(crate) fn run(ask: &Map) -> Result<(), Failure> {
     let survey = Survey::of(&plan, &records, refined);
     let cells = Cells::new(&scene, &plan, &records).surveyed(&survey);
     let (device, processor, lane_steps) = (engine.device(), processor::described(), engine.lane_steps());
-    let made = Made { engine: engine.name(), precision: engine.precision(), device: &device };
+    let made = Provenance { engine: engine.name(), precision: engine.precision(), device: &device };
     let run = Run {
         opening,
         elapsed,

@@ -42,7 +42,7 @@ pub(crate) fn run(ask: &Orbit) -> Result<(), Failure> {
     let orbit = orbit::analyse_until(&*model, start, &settings, shown, halt)?.ok_or_else(interrupted)?;
     let asked = OrbitRequest { start, settings, elapsed: clock.elapsed(), instant };
     print(&match ask.json {
-        true => store::orbit::json(&*model, &orbit, instant)?,
+        true => store::orbit::json(&*model, &orbit, instant),
         false => summary(&*model, &orbit, instant),
     })?;
     let failed = orbit.class == Class::Failed;

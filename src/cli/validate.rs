@@ -13,7 +13,7 @@ use crate::store;
 use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::inventory::Finding;
-use crate::store::map::{MANIFEST, Made, write_validation};
+use crate::store::map::{MANIFEST, Provenance, write_validation};
 use crate::validate::{
     self, HORIZON, HalfMesh, Judge, Kind, Lanes, Sample, StratumResult, Subject, Validation,
 };
@@ -81,7 +81,8 @@ pub(crate) fn run(ask: &Validate) -> Result<(), Failure> {
         validate::replay_until(&subject, survey.basins(), &sample, &lanes, &report, interrupt.raised());
     let Some(validation) = replay else { return Err(interrupted(replayed.into_inner())) };
     let cells = Cells::new(scene, &plan, &records).surveyed(&survey);
-    let made = Made { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
+    let made =
+        Provenance { engine: &manifest.engine, precision: &manifest.precision, device: &manifest.device };
     let device = lanes.device.as_deref();
     let files = write_validation(&folder, &cells, &made, device, &validation, clock.elapsed())?;
     let summary = summary(&validation, device.map(say::quoted).as_deref());

@@ -13,7 +13,7 @@ pub mod forecast;
 pub mod model_choice;
 #[cfg(feature = "cli")]
 pub mod processor;
-#[cfg(feature = "figures")]
+#[cfg(feature = "files")]
 pub mod resumed_engine;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod run;

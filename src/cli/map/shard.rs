@@ -19,7 +19,7 @@ use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::store::finished_map::FinishedMap;
 use crate::store::inventory::{self, Finding};
-use crate::store::map::{Made, Run};
+use crate::store::map::{Provenance, Run};
 use crate::store::record_file::{Identity, RECORDS};
 use crate::store::run_records::{RunRecords, Work};
 use crate::store::shard::{self, FinishedShard, Tally};
@@ -109,7 +109,7 @@ pub(super) fn finish(
 ) -> Result<(), Failure> {
     let &Ended { shard, opening, kept, tally } = ended;
     let (device, processor, elapsed) = (engine.device(), processor::described(), kept.elapsed());
-    let made = Made { engine: engine.name(), precision: engine.precision(), device: &device };
+    let made = Provenance { engine: engine.name(), precision: engine.precision(), device: &device };
     let run = Run {
         opening,
         elapsed,
