@@ -19,7 +19,7 @@ use crate::map::scene::{Points, Quantity, Scene};
 use crate::show::cells::{Cells, Survey};
 use crate::show::map_pair::{MapPair, MapSide};
 use crate::store;
-use crate::store::finished_map::{FinishedMap, StoredManifest, StoredRecords};
+use crate::store::finished_map::{FinishedMap, StoredManifest};
 use crate::store::folder::Folder;
 use crate::store::map::Provenance;
 
@@ -43,10 +43,7 @@ pub(crate) fn run(ask: &Compare) -> Result<(), Failure> {
     interrupt.wait_for(Some("the maps are read"));
     let [a, b] = [maps[0].records(scenes[0], &plans[0])?, maps[1].records(scenes[1], &plans[1])?];
     [&a, &b].into_iter().for_each(check::warn);
-    let (
-        StoredRecords { records: a, refined: refined_a, .. },
-        StoredRecords { records: b, refined: refined_b, .. },
-    ) = (a, b);
+    let [(a, refined_a), (b, refined_b)] = [a, b].map(|stored| (stored.records, stored.refined));
     let counted =
         plans.iter().all(|plan| plan.start_count() > 1) && interrupt.wait_for(Some("attractors are counted"));
     let attractors =

@@ -422,7 +422,7 @@ impl MapRecords {
         Ok(MergedMap { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })
     }
 
-    /// Calls `take` with the cells of the map and a description of its computation.
+    /// Calls `take` with the cells and the computation of the map.
     fn with_cells<T>(
         &self,
         take: impl FnOnce(&Cells<'_>, &Run<'_>) -> Result<T, OutputError>,
