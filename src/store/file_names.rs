@@ -1,6 +1,6 @@
 //! Names of the files in a map's folder that several modules use.
 
-/// What a folder contains, with the hash of each file. A run writes it last: a folder with a manifest is complete.
+/// List of the folder's files, and everything that they can be made from. A run writes it last: a folder with a manifest is complete.
 pub const MANIFEST: &str = "manifest.json";
 /// Records of all runs.
 pub const RECORDS: &str = "records.bin";

@@ -33,14 +33,14 @@ pub struct FileEntry {
 pub struct Finding {
     /// Name of the file.
     pub name: String,
-    /// What is wrong with the file.
+    /// Kind of the difference.
     pub fault: Fault,
 }
 
-/// What is wrong with a file.
+/// Kind of a difference.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The file has changed; the text says in what.
+    /// The file has changed; the text describes the change.
     Damaged(String),
     /// The file is listed and does not exist.
     Missing,
@@ -197,7 +197,7 @@ pub fn write_manifest(folder: &Folder, manifest: &impl Serialize) -> Result<(), 
 /// Returns the text of a manifest with a seal: the hash of the text with an empty seal.
 ///
 /// # Errors
-/// If it is no JSON object.
+/// If it is not a JSON object.
 pub fn sealed(mut manifest: Value) -> serde_json::Result<String> {
     manifest[SEAL] = "".into();
     let hash = hex(Sha256::digest(pretty(&manifest)?));

@@ -295,7 +295,7 @@ fn damaged(map: &FinishedMap, shard: Shard, what: String) -> MergeError {
     MergeError::Damaged { part: map.folder().to_owned(), what, command }
 }
 
-/// Describes what is wrong with a part's record file.
+/// Describes the damage to a part's record file.
 fn fault(error: RecordFileError) -> String {
     match error {
         RecordFileError::Damaged { at, what, .. } => format!("{RECORDS} is damaged at byte {at}: {what}"),

@@ -98,7 +98,7 @@ pub struct RunRecords<'f> {
     file: RecordFile,
     folder: &'f Folder,
     resumed: usize,
-    /// What the records count: cells or runs.
+    /// Unit of the counts: cells or runs.
     unit: &'static str,
     elapsed_before: Duration,
     clock: Instant,

@@ -26,7 +26,7 @@ struct Body {
     identity: Identity,
 }
 
-/// What the first bytes of a file contain.
+/// Contents of the first bytes of a file.
 pub(crate) enum Found {
     /// A header.
     Header {
@@ -38,7 +38,7 @@ pub(crate) enum Found {
     Nothing,
     /// A header of this format whose columns this version does not have.
     OtherFields,
-    /// Bytes that no run leaves; the text says what is wrong.
+    /// Bytes that no run leaves; the text describes the damage.
     Damaged(&'static str),
 }
 

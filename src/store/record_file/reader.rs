@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
         Ok(extent)
     }
 
-    /// Reads the batch at an offset; the error says what is wrong with it. Its number must be at least `least`.
+    /// Reads the batch at an offset; its number must be at least `least`. The inner error describes the damage.
     #[expect(clippy::type_complexity, reason = "used once")]
     fn batch_at(
         &self,

@@ -1,4 +1,4 @@
-//! Engines: the same files from each, and which one is taken.
+//! Engines write the same files, and `auto` chooses one.
 
 use super::*;
 

@@ -1,10 +1,10 @@
-//! Figures in each format: written as asked, listed, mended, and replaced with the others.
+//! Figures in each format: written, listed in the manifest, repaired, and replaced by other formats.
 
 use super::*;
 
 const LAYERS: [&str; 6] = ["impacts", "lyapunov", "map", "mesh", "pattern", "word"];
 
-/// What a folder has beside tables and records.
+/// Names of the figures in a folder.
 fn figures(out: &Path) -> Vec<String> {
     let is_figure = |name: &String| [".png", ".svg", ".pdf"].iter().any(|end| name.ends_with(end));
     names(out).into_iter().filter(is_figure).collect()
