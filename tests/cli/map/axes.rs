@@ -164,7 +164,7 @@ fn the_folder_of_a_list_can_be_resumed_checked_and_validated() {
     refused("--resume", "`cells.hash` was");
     // Without the table the folder's copy is used.
     fs::remove_file(&table).unwrap();
-    refused("--resume --format png", "drop \"png\"");
+    refused("--resume --format png", "remove \"png\"");
     list(&folder, "--quiet --resume").success();
     assert!(cells() == good);
     let table = "l.toml:8:8: `cells.file = \"tables/points.csv\"` cannot be read at tables/points.csv";
