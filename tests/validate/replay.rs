@@ -667,13 +667,10 @@ fn what_is_no_finished_map_is_refused() {
     let records = fs::read(out.join(RECORDS)).unwrap();
     fs::write(out.join(RECORDS), &records[..records.len() - 1]).unwrap();
     ends(1, &["o"], &["records.bin is damaged: it has", "of 576 cells", "--resume"]);
-    // The length of the first copy of its header, and behind it the second.
     let mut bad = records.clone();
-    let head = 16 + u32::from_le_bytes(bad[8..12].try_into().unwrap()) as usize;
     bad[20] ^= 0x10;
-    bad[head + 20] ^= 0x10;
     fs::write(out.join(RECORDS), bad).unwrap();
-    ends(1, &["o"], &["neither copy of its header matches its checksum", "--force"]);
+    ends(1, &["o"], &["its header does not match its checksum", "--force"]);
     fs::remove_file(out.join(RECORDS)).unwrap();
     refused(&["o"], &["there is no records.bin"]);
 }
