@@ -23,7 +23,7 @@ use rattlemap::store::folder::{Folder, FolderError};
 use rattlemap::store::map::{Provenance, Run};
 use rattlemap::store::merge::{MergeError, Parts};
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
-use rattlemap::store::shard::{self, Finished, Tally};
+use rattlemap::store::shard::{self, FinishedShard, Tally};
 use rattlemap_dynamics::flow::Flow;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -134,7 +134,7 @@ pub fn write_shards(ask: Ask, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Taken>), 
             let run = Run::new(made, &[], "none: the records are made up");
             shard::write(
                 &folder,
-                &Finished { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally },
+                &FinishedShard { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally },
             )?;
             Ok(folder.path().to_owned())
         })
