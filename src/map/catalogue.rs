@@ -1,6 +1,6 @@
 //! The catalogue of cycles of one oscillator, built from records.
 //!
-//! A record within [`SETTLED_TOLERANCE`] of a known cycle belongs to it. From any other record, Newton's method finds
+//! A record within `SETTLED_TOLERANCE` of a known cycle belongs to it. From any other record, Newton's method finds
 //! the cycle that the motion approaches; two cycles within the same tolerance are one. So the result does not depend on
 //! the order of the records.
 

@@ -40,9 +40,7 @@ fn impossible_logarithmic_axes_are_refused() {
     let refused = |sets: &[&str]| parse(GOOD, sets).unwrap_err().to_string();
     assert_says(
         &refusal("min = 0.1", "min = 0.0\nscale = \"log\""),
-        &[
-            "s.toml:9:7: `axis.0.min = 0.0` is out of range: it must be greater than 0 where `scale = \"log\"`",
-        ],
+        &["s.toml:9:7: `axis.0.min = 0.0` is out of range: it must be greater than 0 for `scale = \"log\"`"],
     );
     assert_says(&refused(&["axis.0.scale=lgo"]), &["`axis.0.scale = lgo` is not known; did you mean `log`?"]);
     let close =
