@@ -12,8 +12,8 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     }
     if let Some((name, value)) = cli::missing_variable() {
-        #[allow(unsafe_code, reason = "nothing else can be told to a library of the system")]
-        // SAFETY: no thread has been started that could read the environment meanwhile.
+        #[allow(unsafe_code, reason = "a library of the system reads its settings from the environment")]
+        // SAFETY: no other thread exists that could read the environment at the same time.
         unsafe {
             std::env::set_var(name, value);
         }

@@ -52,7 +52,8 @@ fn a_diagram_that_is_stopped_leaves_no_folder() {
     let folder = folder(SLOW);
     for start in ["rest", "up"] {
         let start = format!("start.policy={start}");
-        let says = "error: interrupted after 0 of 5 columns, and none is kept; nothing was written to out/s";
+        let says =
+                "error: interrupted after 0 of 5 columns; no column is stored, and nothing was written to out/s";
         stops(folder.path(), &["bifurcation", "s.toml", "--set", &start], says);
         assert!(!folder.path().join("out").exists());
     }
