@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 use rattlemap::gpu::Constants;
 use rattlemap::job;
-use rattlemap::job::run::{MapError, Processor};
+use rattlemap::job::Processor;
+use rattlemap::job::error::JobError;
 use rattlemap::map::plan::Plan;
 use rattlemap::map::scene::{Quantity, Scene, SceneError};
 use rattlemap::map::schedule::Schedule;
@@ -23,7 +24,7 @@ use rattlemap::store::folder::{Folder, FolderError};
 use rattlemap::store::map::{Made, Run};
 use rattlemap::store::merge::{MergeError, Parts};
 use rattlemap::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
-use rattlemap::store::shard::{self, Finished, Tally};
+use rattlemap::store::shard::{self, FinishedShard, Tally};
 use rattlemap_dynamics::flow::Flow;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -55,7 +56,7 @@ pub enum ScaleError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error(transparent)]
-    Map(#[from] MapError),
+    Map(#[from] JobError),
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error(transparent)]
@@ -103,7 +104,7 @@ pub fn write_shards(ask: Ask, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Taken>), 
     let stretched = Stretched::new(&small, ask.counts.map(|count| count as usize));
     let phase = Phase::begin("plan");
     let plan = Plan::new(&scene);
-    plan.check().map_err(MapError::from)?;
+    plan.check().map_err(JobError::from)?;
     let mut taken = vec![phase.end()];
     let phase = Phase::begin("schedule of a shard");
     drop(Schedule::of(&plan, Shard::all(ask.shards).next()));
@@ -134,7 +135,7 @@ pub fn write_shards(ask: Ask, dir: &Path) -> Result<(Vec<PathBuf>, Vec<Taken>), 
             let run = Run::new(made, &[], "none: the records are made up");
             shard::write(
                 &folder,
-                &Finished { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally },
+                &FinishedShard { shard: of, scene: &scene, plan: &plan, run: &run, tally: &tally },
             )?;
             Ok(folder.path().to_owned())
         })

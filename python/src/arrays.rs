@@ -1,16 +1,16 @@
-//! Columns as NumPy arrays that own them: nothing is copied.
+//! Converts columns to NumPy arrays without copying them.
 
 use numpy::{Element, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rattlemap::show::table::cell_columns::Values;
 
-/// A vector as an array.
+/// Converts a vector.
 pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyAny> {
     PyArray1::from_vec(py, values).into_any()
 }
 
-/// Columns by name, in their order.
+/// Converts columns to a dictionary by name, in their order.
 pub(crate) fn columns(py: Python<'_>, columns: Vec<(String, Values)>) -> PyResult<Bound<'_, PyDict>> {
     let by_name = PyDict::new(py);
     for (name, values) in columns {

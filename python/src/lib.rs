@@ -1,7 +1,7 @@
 //! The native module of the Python package `rattlemap`: the library's functions, and the program.
 //!
-//! What is asked comes as texts and is read by the library, so that errors are the program's. Every computation runs on a
-//! thread of its own, free of the interpreter's lock.
+//! Scenes and models arrive as texts and are parsed by the library, so that error messages are the program's. Every
+//! computation runs on its own thread, without the interpreter's lock.
 
 mod arrays;
 mod bifurcation;

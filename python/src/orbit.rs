@@ -24,12 +24,12 @@ pub(crate) struct Orbit {
 
 #[pymethods]
 impl Orbit {
-    /// What `orbit --json` prints.
+    /// The JSON object that `orbit --json` prints.
     fn json(&self) -> Result<String, Problem> {
         Ok(store::orbit::json(&*self.model, &self.orbit, None)?)
     }
 
-    /// Forcing periods that the events span.
+    /// Number of forcing periods that the events span.
     #[getter]
     fn cycle_periods(&self) -> u32 {
         self.orbit.cycle_periods
@@ -45,7 +45,7 @@ impl Orbit {
         self.model.state_names()
     }
 
-    /// Columns of `trajectory.csv`, with so many samples in a forcing period.
+    /// Columns of `trajectory.csv`, with this number of samples per forcing period.
     fn moments<'py>(&self, py: Python<'py>, samples_per_period: usize) -> PyResult<Bound<'py, PyDict>> {
         let (model, orbit) = (Arc::clone(&self.model), Arc::clone(&self.orbit));
         let moments = waiting::run(py, None, move |_| {
@@ -76,7 +76,7 @@ impl Orbit {
     }
 }
 
-/// The orbit of a model with parameters set by `NAME=VALUE`, from a state at phase 0 or from rest.
+/// Computes the orbit of a model with parameters set by `NAME=VALUE`, from a state at phase 0, by default from rest.
 #[pyfunction]
 #[pyo3(signature = (model, sets, transient, periods, start=None))]
 pub(crate) fn orbit(

@@ -130,8 +130,8 @@ fn finish_shard(
         print_json(&shard::object(folder, &files, &finished)?)?;
     }
     if finished.tally.all_failed() {
-        console.note(
-            "warning: every cell of the shard failed; merging fails if every cell of the other shards failed, too",
+        console.warn(
+            "every cell of the shard failed; merging fails if every cell of the other shards failed, too",
         );
     }
     Ok(())

@@ -263,7 +263,7 @@ impl<'p> MapRun<'p> {
             tally.take(plan, batch);
             *done += batch.len();
             if let Some(failed) = all_failed(batch, plan.unit()).filter(|_| is_first) {
-                observer.note(&failed);
+                observer.warn(&failed);
             }
             is_first = false;
             observer.progress(*done, expected);
@@ -378,7 +378,7 @@ fn all_failed(batch: &[(u32, Record)], unit: &str) -> Option<String> {
     let counts = Status::ALL.iter().map(|&of| (count(of), of.name())).filter(|&(count, _)| count > 0);
     let list: Vec<String> = counts.map(|(count, name)| format!("{count} {name}")).collect();
     Some(format!(
-        "warning: all of the first {} {unit} failed ({}); the others may fail, too: Ctrl-C ends the run",
+        "all of the first {} {unit} failed ({}); the others may fail, too: Ctrl-C ends the run",
         batch.len(),
         list.join(", ")
     ))

@@ -12,7 +12,7 @@ pub fn list() -> Vec<(String, String)> {
     let summary = |model: &FileModel| {
         model.definition().summary.clone().unwrap_or_else(|| model.title().to_owned())
     };
-    FileModel::all_built_in().map(|model| (model.name().to_owned(), summary(&model))).collect()
+    FileModel::all_built_in().iter().map(|model| (model.name().to_owned(), summary(model))).collect()
 }
 
 /// Describes a model: equations, contact laws, parameters, words, classes, statuses and source.

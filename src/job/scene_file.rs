@@ -1,20 +1,17 @@
 //! Loads scenes from files.
 
 use std::fs;
-use std::io;
 use std::path::Path;
 
-use crate::job::size::bytes;
 use crate::map::scene::{Along, FileBeside, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::store::finished_map::MOST_LIST_BYTES;
+use crate::store::plain_file::read_text;
 
 /// Largest size of a table of cells, in bytes.
 const MOST: u64 = 256_000_000;
 
 /// Largest size of a model's file, in bytes.
 const MOST_OF_MODEL: u64 = 1_000_000;
-
-/// Largest size of a folder's copy of a table of cells, in bytes. The copy spells out numbers: 1e15 has 18 characters there.
-pub(crate) const MOST_OF_COPY: u64 = 4 * MOST;
 
 /// The `--set` argument that lists the output files.
 const FILES: &str = "outputs.files=";
@@ -54,7 +51,7 @@ impl SceneFile<'_> {
                 return find_model(&path);
             }
             match self.list_copy.filter(|copy| !path.exists() && copy.exists()) {
-                Some(copy) => find_table(copy, MOST_OF_COPY),
+                Some(copy) => find_table(copy, MOST_LIST_BYTES),
                 None => find_table(&path, MOST),
             }
         };
@@ -96,36 +93,12 @@ pub(crate) fn find_model(path: &Path) -> Result<FileText, String> {
 
 fn find_table(path: &Path, most: u64) -> Result<FileText, String> {
     let name = path.display().to_string();
-    match read_table(path, most) {
+    match read_text(path, most, "list fewer cells") {
         Ok(text) => Ok(FileText { name, text }),
         Err(error) => Err(format!(
             "cannot be read at {name} ({error}); give the path of a CSV table, relative to the scene's folder"
         )),
     }
-}
-
-/// Reads a table of cells of at most `most` bytes.
-///
-/// # Errors
-/// As [`read_text`].
-pub(crate) fn read_table(path: &Path, most: u64) -> io::Result<String> {
-    read_text(path, most, "list fewer cells")
-}
-
-/// Reads a text of at most `most` bytes. Pipes and devices are refused: reading one can block or never end.
-///
-/// # Errors
-/// If the file is not regular, is larger, or cannot be read.
-fn read_text(path: &Path, most: u64, remedy: &str) -> io::Result<String> {
-    let data = fs::metadata(path)?;
-    if !data.is_file() {
-        return Err(io::Error::other("it is no regular file"));
-    }
-    if data.len() > most {
-        let (size, most) = (bytes(data.len()), bytes(most));
-        return Err(io::Error::other(format!("it has {size}, and at most {most} are read: {remedy}")));
-    }
-    fs::read_to_string(path)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
 use crate::record::Record;
 use crate::store::map;
+use crate::text::size::bytes;
 
 // Memory in bytes.
 /// Per run beside its record: its place in the order, and the rows of tables and figures.
@@ -232,13 +233,6 @@ pub fn check_merge(scene: &Scene, out: Option<&Path>) -> Result<(), JobError> {
 /// [`JobError::TooLarge`] with what the map needs and what is free.
 pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
     Size::of(scene, None).check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
-}
-
-/// Formats a number of bytes, such as `1.2 GB`.
-pub(crate) fn bytes(count: u64) -> String {
-    let (unit, name) =
-        [(1e9, "GB"), (1e6, "MB")].into_iter().find(|&(unit, _)| count as f64 >= unit).unwrap_or((1e3, "kB"));
-    format!("{:.1} {name}", count as f64 / unit)
 }
 
 /// Bytes per cell of an output file.

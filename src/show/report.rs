@@ -29,7 +29,7 @@ use crate::show::symbols::symbol;
 use crate::show::table::attractors_csv::named;
 use crate::show::words::{Spelled, Words};
 use crate::show::{caption, names, replay};
-use crate::store::map_manifest::RefinementObject;
+use crate::store::manifest::map::RefinementObject;
 use rattlemap_dynamics::orbit::Status;
 
 const PAGE: &str = include_str!("report/page.html");

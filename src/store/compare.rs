@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::findings::compare::{Comparison, Kind, Tally};
 use crate::map::scene::Format;
@@ -15,15 +16,15 @@ use crate::show::table::compare_csv;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
+use crate::store::manifest::map::Made;
 use crate::store::manifest::{Head, MANIFEST};
-use crate::store::map_manifest::Made;
 use rattlemap_dynamics::orbit::Class;
 
 const CSV: &str = "compare.csv";
-/// The figure, by format.
+/// Names of the figure, by format.
 static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("compare"));
 
-/// Every file that a comparison may write.
+/// Names of all files that a comparison may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
     [MANIFEST, CSV].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
@@ -126,7 +127,7 @@ struct TallyObject {
     differing: usize,
 }
 
-/// The largest difference of exponents and its cell; null where none was compared or it is infinite.
+/// The largest difference of exponents and its cell; null if none was compared or if it is infinite.
 #[derive(Serialize)]
 struct ExponentsObject {
     compared: usize,
@@ -135,7 +136,7 @@ struct ExponentsObject {
     j: Option<usize>,
 }
 
-/// What was compared, and what came out.
+/// Result of the comparison.
 #[derive(Serialize)]
 struct Object<'a> {
     a: SideObject<'a>,
@@ -143,14 +144,14 @@ struct Object<'a> {
     scene_differences: Vec<Difference>,
     cells: usize,
     differing: usize,
-    /// Of these, by kind.
+    /// Number of differing cells by kind.
     by_class: usize,
     by_period: usize,
-    /// Cells that agree in both and differ by pattern, or by word where a map has no patterns.
+    /// Cells that agree in class and period and differ by pattern, or by word if a map has no patterns.
     by_pattern: usize,
     by_word: usize,
     transitions: Vec<Transition>,
-    /// Of cells of one period; null where a map does not have it.
+    /// Counts over cells with one period; null if a map has no such values.
     symmetric: Option<TallyObject>,
     words: Option<TallyObject>,
     patterns: Option<TallyObject>,
@@ -159,7 +160,7 @@ struct Object<'a> {
 }
 
 #[derive(Serialize)]
-struct Manifest<'a> {
+struct CompareManifest<'a> {
     #[serde(flatten)]
     head: Head,
     #[serde(flatten)]
@@ -176,7 +177,7 @@ struct TimingsObject {
 
 #[derive(Serialize)]
 struct PrintedObject<'a> {
-    /// As it was named.
+    /// The folder as the user named it.
     folder: String,
     files: &'a [&'static str],
     #[serde(flatten)]
@@ -223,8 +224,8 @@ impl<'a> Object<'a> {
     }
 }
 
-/// Writes the table, the figure in these formats, and the manifest last: a folder that has one is complete. A list of
-/// cells has no figure. `reading` is how long it took to read the maps. Returns the files' names.
+/// Writes the table, the figure in these formats, and the manifest last. A list of cells has no figure. `reading` is the
+/// time it took to read the maps. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -244,7 +245,7 @@ pub fn write(
         files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;
-    let manifest = Manifest {
+    let manifest = CompareManifest {
         head: Head::of("compare"),
         object: Object::of(compared),
         timings: TimingsObject { read: reading.as_secs_f64(), write: clock.elapsed().as_secs_f64() },
@@ -255,12 +256,12 @@ pub fn write(
     Ok(files)
 }
 
-/// Prints to stdout what was found: one object, its fields a contract.
+/// Returns the object that `compare --json` prints. Scripts depend on its fields.
 ///
 /// # Errors
-/// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
-pub fn print(folder: &Path, files: &[&'static str], compared: &Compared<'_>) -> Result<(), OutputError> {
+/// [`OutputError`] if a result cannot be put into JSON.
+pub fn object(folder: &Path, files: &[&'static str], compared: &Compared<'_>) -> Result<Value, OutputError> {
     let folder = folder.to_string_lossy().into_owned();
     let object = PrintedObject { folder, files, object: Object::of(compared) };
-    crate::store::stdout::print(&serde_json::to_string_pretty(&object)?)
+    Ok(serde_json::to_value(object)?)
 }

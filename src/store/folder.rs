@@ -3,7 +3,6 @@
 
 mod lock;
 
-use std::borrow::Cow;
 use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,6 +12,7 @@ use thiserror::Error;
 
 use crate::show::error::WriteError;
 use crate::store::error::OutputError;
+use crate::store::plain_file::{partial, refuse_link};
 pub(crate) use lock::LOCK;
 use lock::Lock;
 
@@ -243,33 +243,6 @@ fn refuse_links_in<'n>(folder: &Path, names: impl IntoIterator<Item = &'n str>) 
 
 /// What a run that was killed at once may leave in a folder: nothing of value. Earlier versions left a probe.
 const LEFTOVERS: [&str; 4] = [LOCK, ".rattlemap-probe", "partial-records.bin", "partial-unfinished.json"];
-
-/// What the name begins with under which a file is written before it is whole.
-pub(crate) const PARTIAL: &str = "partial-";
-
-/// The name under which a file is written before it is whole.
-pub(crate) fn partial(path: &Path) -> PathBuf {
-    path.with_file_name(format!("{PARTIAL}{}", path.file_name().unwrap_or_default().to_string_lossy()))
-}
-
-/// Refuses to write to what is no plain file: a symbolic link leads anywhere.
-pub(crate) fn refuse_link(path: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(path) {
-        Ok(data) if data.is_symlink() => Err(io::Error::other(format!(
-            "{} is a symbolic link, and no file is written through one; remove it",
-            name_of(path)
-        ))),
-        // A pipe would be waited for until somebody reads it.
-        Ok(data) if !data.is_file() => {
-            Err(io::Error::other(format!("{} is no plain file; remove it", name_of(path))))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn name_of(path: &Path) -> Cow<'_, str> {
-    path.file_name().unwrap_or_default().to_string_lossy()
-}
 
 /// Whether a folder has nothing in it but its lock.
 fn is_empty(path: &Path) -> io::Result<bool> {

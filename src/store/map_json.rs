@@ -1,4 +1,4 @@
-//! `map --json`: what a map came to, as one object; its fields are a contract.
+//! The object that `map --json` prints. Scripts depend on its fields.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,24 +11,26 @@ use crate::map::plan::count_classes;
 use crate::show::cells::Cells;
 use crate::show::names;
 use crate::store::error::OutputError;
-use crate::store::map_manifest::{BasinObject, MadeObject, RefinementObject, Run, basins, statuses, tally};
+use crate::store::manifest::map::{
+    BasinObject, MadeObject, RefinementObject, ResumedObject, Run, attractor_counts, basins, statuses,
+};
 
 #[derive(Serialize)]
 struct MapObject<'a> {
-    /// As it was named.
+    /// The folder as the user named it.
     folder: String,
     files: &'a [String],
     #[serde(flatten)]
     made: MadeObject<'a>,
-    /// Of so many it was merged.
+    /// Number of shards of a merged map.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<u32>,
     cells: usize,
-    /// One per cell and start.
+    /// Number of runs: one per cell and start.
     runs: usize,
     classes: BTreeMap<&'static str, usize>,
     statuses: BTreeMap<&'static str, usize>,
-    /// Cells by the number of attractors that their starts found.
+    /// Number of cells by the number of attractors that their starts reach.
     #[serde(skip_serializing_if = "Option::is_none")]
     attractors: Option<BTreeMap<u8, usize>>,
     /// Attractors of a map of basins, by label.
@@ -43,14 +45,7 @@ struct MapObject<'a> {
     seconds: SecondsObject,
 }
 
-/// What an earlier run had done; zero where there was none.
-#[derive(Serialize)]
-struct ResumedObject {
-    runs: usize,
-    seconds: f64,
-}
-
-/// Of this run alone.
+/// Seconds that each phase of this run took.
 #[derive(Serialize)]
 struct SecondsObject {
     open: f64,
@@ -58,22 +53,11 @@ struct SecondsObject {
     write: f64,
 }
 
-/// Prints to stdout what `run` has made of a map in a folder: `files` by name, written in so long.
+/// Returns the object for a map whose files were written to a folder in `writing`.
 ///
 /// # Errors
-/// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
-pub fn print(
-    folder: &Path,
-    files: &[String],
-    cells: &Cells<'_>,
-    run: &Run<'_>,
-    writing: Duration,
-) -> Result<(), OutputError> {
-    crate::store::stdout::print(&serde_json::to_string_pretty(&object(folder, files, cells, run, writing)?)?)
-}
-
-/// The same as an object.
-pub(crate) fn object(
+/// [`OutputError`] if a result cannot be put into JSON.
+pub fn object(
     folder: &Path,
     files: &[String],
     cells: &Cells<'_>,
@@ -84,17 +68,17 @@ pub(crate) fn object(
         folder: folder.to_string_lossy().into_owned(),
         files,
         made: MadeObject::of(run),
-        shards: run.merged.map(|merged| merged.shards),
+        shards: run.shards.map(|shards| shards.count),
         cells: cells.counts().iter().product(),
         runs: cells.runs(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
-        attractors: cells.attractors().map(tally),
+        attractors: cells.attractors().map(attractor_counts),
         basins: basins(cells),
         refinement: cells.refinement().map(RefinementObject::from),
         periods: cells.periods(),
         without_effect: &run.without_effect,
-        resumed: ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() },
+        resumed: ResumedObject::of(run),
         seconds: SecondsObject {
             open: run.opening.as_secs_f64(),
             integrate: run.elapsed.as_secs_f64(),

@@ -1,4 +1,4 @@
-//! One orbit on the terminal and in its folder: `orbit.json`, tables and figures.
+//! The folder of an orbit: `orbit.json`, tables, figures and manifest.
 
 use std::fs;
 use std::time::{Duration, Instant as Clock};
@@ -9,7 +9,6 @@ use crate::map::scene::Format;
 use crate::show::figure;
 use crate::show::orbit_json::to_json;
 use crate::show::orbit_spectrum::Spectrum;
-use crate::show::orbit_summary::summary;
 use crate::show::parameters::Parameters;
 use crate::show::table::orbit_tables;
 pub use crate::show::table::orbit_tables::Moment;
@@ -20,8 +19,8 @@ use crate::store::manifest::{Head, MANIFEST, ModelObject, TimingsObject};
 use rattlemap_dynamics::model::{Model, ModelError, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
-/// Samples per forcing period that figures need: 400, or 20 to a turn of the relative motion
-/// in meshing where that is more.
+/// Returns the number of samples per forcing period that figures need: 400, or 20 per oscillation of the relative motion
+/// in contact, if that is more.
 pub(crate) fn samples_per_period(oscillator: &Oscillator) -> usize {
     let stiffness = Side::BOTH.map(|side| oscillator.added(side)[0]).into_iter().fold(0.0, f64::max);
     let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
@@ -32,13 +31,13 @@ const JSON: &str = "orbit.json";
 const TRAJECTORY: &str = "trajectory.csv";
 const SPECTRUM: &str = "spectrum.csv";
 
-/// Samples in the table of the motion, and in a forcing period at least.
+/// Number of samples in the table of the motion, and smallest number of samples per forcing period.
 const TABLED: usize = 2000;
 const LEAST_TABLED: usize = 50;
 
-/// What makes the folder again, and what is in it.
+/// The manifest of an orbit.
 #[derive(Serialize)]
-struct Manifest<'a> {
+struct OrbitManifest<'a> {
     #[serde(flatten)]
     head: Head,
     engine: &'static str,
@@ -52,16 +51,16 @@ struct Manifest<'a> {
     files: &'a [FileEntry],
 }
 
-/// How an orbit was asked for, and how long that took.
+/// Settings of an orbit, and the time of its computation.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked {
-    /// The state at phase 0 to start from.
+pub struct OrbitRequest {
+    /// Initial state, at phase 0.
     pub start: State,
-    /// How long to integrate.
+    /// Length of the integration.
     pub settings: Settings,
-    /// How long it took.
+    /// Time of the computation.
     pub elapsed: Duration,
-    /// Where the motion is at the time that was asked for.
+    /// State at a requested time.
     pub instant: Option<Instant>,
 }
 
@@ -74,24 +73,13 @@ pub struct Instant {
     pub state: State,
 }
 
-/// Every file that an orbit may write.
+/// Names of all files that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
     let figures = figure::orbit::NAMES.into_iter().chain(crate::show::figure::orbit::spectrum::NAMES);
     [MANIFEST, JSON, TRAJECTORY, SPECTRUM].into_iter().chain(figures)
 }
 
-/// Prints the orbit to stdout, as JSON or as a summary for the eye.
-///
-/// # Errors
-/// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
-pub fn print(model: &dyn Model, orbit: &Orbit, asked: &Asked, json: bool) -> Result<(), OutputError> {
-    let text =
-        if json { to_json(model, orbit, asked.instant)? } else { summary(model, orbit, asked.instant) };
-    crate::store::stdout::print(&text)
-}
-
-/// Writes the orbit and, unless it failed, its tables, and its figures in these formats; the manifest last. Returns their
-/// names.
+/// Writes the orbit, its tables and figures unless it failed, and the manifest last. Returns the names of the files.
 ///
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
@@ -99,13 +87,13 @@ pub fn write(
     folder: &Folder,
     model: &dyn Model,
     orbit: &Orbit,
-    asked: &Asked,
+    request: &OrbitRequest,
     formats: &[Format],
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Clock::now();
-    // Figures of an earlier orbit must not stand beside this one.
+    // The manifest does not list files of an earlier orbit.
     folder.remove(&names().collect::<Vec<_>>())?;
-    let json = to_json(model, orbit, asked.instant)?;
+    let json = to_json(model, orbit, request.instant)?;
     folder.replace(JSON, |path| Ok(fs::write(path, json + "\n")?))?;
     let mut files = vec![JSON];
     if orbit.class != Class::Failed {
@@ -127,18 +115,18 @@ pub fn write(
         }
     }
     let listed = inventory::entries(folder, &files)?;
-    let Settings { transient_periods, observed_periods, max_period } = asked.settings;
-    let manifest = Manifest {
+    let Settings { transient_periods, observed_periods, max_period } = request.settings;
+    let manifest = OrbitManifest {
         head: Head::of("orbit"),
         engine: "reference f64",
         model: ModelObject::of(model),
         parameters: Parameters::of(model),
-        start: asked.start[..model.state_names().len()].to_vec(),
+        start: request.start[..model.state_names().len()].to_vec(),
         transient_periods,
         observed_periods,
         max_period,
         timings: TimingsObject {
-            integrate: asked.elapsed.as_secs_f64(),
+            integrate: request.elapsed.as_secs_f64(),
             write: clock.elapsed().as_secs_f64(),
         },
         files: &listed,
@@ -154,7 +142,7 @@ fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result
     folder.replace(TRAJECTORY, |path| orbit_tables::write_trajectory(path, &model.state_names(), &moments))
 }
 
-/// An orbit's motion over the periods that its events span: so many samples in a forcing period, and every event.
+/// Samples the motion over the periods of the orbit's events, and adds every event.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.

@@ -1,10 +1,11 @@
-//! The folder of a shard: its records, and a manifest that says which part of which map they are.
+//! The folder of a shard: its records, and a manifest.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
@@ -15,26 +16,27 @@ use crate::show::names;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
+use crate::store::manifest::map::{
+    IntegrationObject, ListObject, MadeObject, MapTimings, ResumedObject, integration,
+};
 use crate::store::manifest::{AxisObject, Head, MANIFEST, ModelObject, StartObject, start};
 use crate::store::map::{self, Run};
-use crate::store::map_manifest::{IntegrationObject, ListObject, MadeObject, TimingsObject, integration};
-use crate::store::record_file::Identity;
-use crate::store::record_file::RECORDS;
+use crate::store::record_file::{Identity, RECORDS};
 use crate::store::unfinished;
 use rattlemap_dynamics::orbit::{Class, Status};
 
-/// What the records of a shard say, all together. Of a cell with several starts the first one is counted, as in a map.
+/// Counts over the records of a shard. As in a map, only the first of several starts of a cell is counted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Periodic, chaotic, undecided, failed.
+    /// Number of cells that are periodic, chaotic, undecided, failed.
     pub classes: [usize; 4],
     statuses: BTreeMap<u32, usize>,
-    /// Forcing periods integrated, over all runs.
+    /// Number of integrated forcing periods, over all runs.
     pub periods: u64,
 }
 
 impl Tally {
-    /// Counts these, too.
+    /// Adds the records of a batch.
     pub fn take(&mut self, plan: &Plan, batch: &[(u32, Record)]) {
         for (id, record) in batch {
             self.periods += u64::from(record.periods_run);
@@ -63,22 +65,22 @@ impl Tally {
 
 /// A finished shard.
 #[derive(Clone, Copy, Debug)]
-pub struct Finished<'a> {
-    /// Which it is.
+pub struct FinishedShard<'a> {
+    /// The shard.
     pub shard: Shard,
-    /// Its map.
+    /// The scene of the map.
     pub scene: &'a Scene,
-    /// The same as cells.
+    /// The cells of the map.
     pub plan: &'a Plan,
-    /// Who computed it, and in what time.
+    /// Engine and times.
     pub run: &'a Run<'a>,
-    /// What came of it.
+    /// Counts over its records.
     pub tally: &'a Tally,
 }
 
-/// What a map's manifest says, as far as a shard knows it.
+/// The manifest of a shard: the fields of a map's manifest that do not need the records of other shards.
 #[derive(Serialize)]
-struct Manifest<'a> {
+struct ShardManifest<'a> {
     #[serde(flatten)]
     head: Head,
     shard: Shard,
@@ -96,27 +98,26 @@ struct Manifest<'a> {
     list: Option<ListObject>,
     start: StartObject,
     integration: IntegrationObject,
-    /// Of the map.
+    /// Number of cells of the map.
     cells: usize,
-    /// Of the shard, as all that follows.
+    /// Number of runs of the shard. All fields below describe the shard.
     runs: usize,
     classes: BTreeMap<&'static str, usize>,
     statuses: BTreeMap<&'static str, usize>,
     periods: u64,
     elapsed_seconds: f64,
     resumed_cells: usize,
-    timings: TimingsObject,
+    timings: MapTimings,
     files: &'a [FileEntry],
 }
 
-/// Writes what belongs to the records of a finished shard, and the manifest last: a folder that has one is complete.
-/// Returns the files' names.
+/// Writes the files of a finished shard other than its records, and the manifest last. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write(folder: &Folder, finished: &Finished<'_>) -> Result<Vec<String>, OutputError> {
+pub fn write(folder: &Folder, finished: &FinishedShard<'_>) -> Result<Vec<String>, OutputError> {
     let clock = Instant::now();
-    let Finished { scene, .. } = finished;
+    let FinishedShard { scene, .. } = finished;
     let mut files = map::write_copies(folder, scene, &|_| true)?;
     let listed: Vec<&str> = files.iter().map(String::as_str).chain([RECORDS]).collect();
     let listed = inventory::entries(folder, &listed)?;
@@ -126,10 +127,13 @@ pub fn write(folder: &Folder, finished: &Finished<'_>) -> Result<Vec<String>, Ou
     Ok(files)
 }
 
-fn manifest<'a>(finished: &Finished<'a>, writing: Duration, files: &'a [FileEntry]) -> Manifest<'a> {
-    let Finished { shard, scene, plan, run, tally } = *finished;
-    let integrating = (run.elapsed_before + run.elapsed).as_secs_f64();
-    Manifest {
+fn manifest<'a>(
+    finished: &FinishedShard<'a>,
+    writing: Duration,
+    files: &'a [FileEntry],
+) -> ShardManifest<'a> {
+    let FinishedShard { shard, scene, plan, run, tally } = *finished;
+    ShardManifest {
         head: Head::of("map"),
         shard,
         made: MadeObject::of(run),
@@ -149,20 +153,16 @@ fn manifest<'a>(finished: &Finished<'a>, writing: Duration, files: &'a [FileEntr
         classes: tally.classes(),
         statuses: tally.statuses(),
         periods: tally.periods,
-        elapsed_seconds: integrating,
+        elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,
-        timings: TimingsObject {
-            open: run.opening.as_secs_f64(),
-            integrate: integrating,
-            write: writing.as_secs_f64(),
-        },
+        timings: MapTimings::of(run, writing),
         files,
     }
 }
 
-/// `map --shard --json`: what a shard came to; its fields are a contract.
+/// The object that `map --shard --json` prints. Scripts depend on its fields.
 #[derive(Serialize)]
-struct Object<'a> {
+struct ShardObject<'a> {
     folder: String,
     files: &'a [String],
     shard: Shard,
@@ -177,25 +177,20 @@ struct Object<'a> {
     seconds: SecondsObject,
 }
 
-#[derive(Serialize)]
-struct ResumedObject {
-    runs: usize,
-    seconds: f64,
-}
-
+/// Seconds that each phase of this run took.
 #[derive(Serialize)]
 struct SecondsObject {
     open: f64,
     integrate: f64,
 }
 
-/// Prints to stdout what became of a shard whose folder has these files.
+/// Returns the object for a shard whose files were written to a folder.
 ///
 /// # Errors
-/// [`OutputError`] if stdout cannot be written, unless its reader has closed it.
-pub fn print(folder: &Path, files: &[String], finished: &Finished<'_>) -> Result<(), OutputError> {
-    let Finished { shard, plan, run, tally, .. } = *finished;
-    let object = Object {
+/// [`OutputError`] if a result cannot be put into JSON.
+pub fn object(folder: &Path, files: &[String], finished: &FinishedShard<'_>) -> Result<Value, OutputError> {
+    let FinishedShard { shard, plan, run, tally, .. } = *finished;
+    let object = ShardObject {
         folder: folder.to_string_lossy().into_owned(),
         files,
         shard,
@@ -205,8 +200,8 @@ pub fn print(folder: &Path, files: &[String], finished: &Finished<'_>) -> Result
         classes: tally.classes(),
         statuses: tally.statuses(),
         periods: tally.periods,
-        resumed: ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() },
+        resumed: ResumedObject::of(run),
         seconds: SecondsObject { open: run.opening.as_secs_f64(), integrate: run.elapsed.as_secs_f64() },
     };
-    crate::store::stdout::print(&serde_json::to_string_pretty(&object)?)
+    Ok(serde_json::to_value(object)?)
 }

@@ -1,6 +1,4 @@
-//! `validation.json`: what the replay of a sample of a map's cells showed.
-//!
-//! The report shows the same object.
+//! `validation.json`: the result of validating a map. The report shows the same object.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +7,7 @@ use serde::Serialize;
 use crate::show::cells::Cells;
 use crate::show::replay;
 use crate::store::manifest::Head;
-use crate::store::map_manifest::Made;
+use crate::store::manifest::map::Made;
 use crate::validate::{
     ChaosTest, HORIZON, HalfMesh, Judge, Kind, Mismatch, Off, Rate, StateCheck, StratumResult, Validation,
     Value,
@@ -22,32 +20,32 @@ pub(crate) struct ValidationObject {
     engine: String,
     precision: String,
     device: String,
-    /// What ran lanes again, if anything did, and whether that is what made the map.
+    /// Device that ran lanes again, if any, and whether it computed the map.
     again_on: Option<String>,
     same_device: bool,
     judge: &'static str,
     seed: u64,
     cells: usize,
-    /// What all numbers but `cells` count: runs if cells have several starts.
+    /// Unit of all numbers but `cells`: cells, or runs if cells have several starts.
     counted: &'static str,
     runs: usize,
-    /// Only these are replayed: the others were filled from their neighbours.
+    /// Number of integrated runs. Only these are replayed.
     integrated: usize,
     filled: usize,
     samples: usize,
-    /// Why the map is not to be trusted; none if it is.
+    /// Reasons why the validation failed; empty if it passed.
     faults: Vec<String>,
     strata: Vec<StratumObject>,
     kinds: BTreeMap<&'static str, &'static str>,
     agreement: BTreeMap<&'static str, AgreementObject>,
-    /// Records that their engine gave again to the bit.
+    /// Number of records that the same engine reproduced bit for bit.
     identical: usize,
     computed_again: usize,
     chaos: Vec<ChaosObject>,
-    /// What changes where cells of the uniform stratum mesh at half the speed; null where none meshes.
+    /// Changes at half the meshing speed in the uniform stratum; null if no cell meshes.
     half_mesh_speed: Option<HalfMeshObject>,
     states: Option<StatesObject>,
-    /// Runs of the whole map whose record holds a number that is not finite.
+    /// Runs of the whole map whose record contains a number that is not finite.
     not_finite: Vec<u32>,
     mismatches: Vec<MismatchObject>,
 }
@@ -55,7 +53,7 @@ pub(crate) struct ValidationObject {
 #[derive(Serialize)]
 struct RateObject {
     count: usize,
-    /// Ends of the 95 % interval.
+    /// Limits of the 95 % interval.
     interval: [f64; 2],
     text: String,
 }
@@ -85,7 +83,7 @@ struct ChaosObject {
     fails: bool,
 }
 
-/// Periods, words and patterns of cycles, the latter two up to mirror image.
+/// Changes of class, and of the period, word and pattern of cycles. Mirror images count as equal.
 #[derive(Serialize)]
 struct HalfMeshObject {
     class: ChangedObject,
@@ -115,7 +113,7 @@ struct StatesObject {
 #[derive(Serialize)]
 struct OffObject {
     id: u32,
-    /// Not a number in JSON where it is infinite: null.
+    /// Null if it is infinite.
     distance: f64,
     bar: f64,
 }
@@ -139,7 +137,7 @@ struct DifferenceObject {
 }
 
 impl ValidationObject {
-    /// `again_on` is the device that ran lanes again, if one did.
+    /// Collects the result of a validation; `again_on` is the device that ran lanes again, if any.
     pub(crate) fn new(
         cells: &Cells<'_>,
         made: &Made<'_>,
@@ -265,7 +263,7 @@ impl From<&StateCheck> for StatesObject {
     }
 }
 
-/// A kind for a reader who has not read the code.
+/// Explains a kind of mismatch.
 fn meaning(kind: Kind) -> &'static str {
     match kind {
         Kind::Attractor => {

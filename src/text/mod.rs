@@ -8,3 +8,5 @@ pub mod expression;
 pub mod printable;
 pub(crate) mod section;
 pub mod shell;
+#[cfg(feature = "figures")]
+pub(crate) mod size;

@@ -12,8 +12,9 @@ use crate::cli::stdout::{print, print_json};
 use crate::job::dry_run::DryRun;
 use crate::job::map::MapJob;
 use crate::job::processor;
-use crate::job::size::{Free, bytes};
+use crate::job::size::Free;
 use crate::map::plan::Plan;
+use crate::text::size::bytes;
 
 /// Estimates what the map takes, and prints it.
 pub(super) fn run(

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use fs4::fs_std::FileExt;
 use same_file::Handle;
 
-use crate::store::folder::refuse_link;
+use crate::store::plain_file::refuse_link;
 
 /// Its name. It is there while a folder is written, and after a kill; then nobody holds it.
 pub(crate) const LOCK: &str = ".rattlemap.lock";

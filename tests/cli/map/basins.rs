@@ -98,7 +98,7 @@ fn basins_that_go_on_are_the_same_to_the_byte() {
     let path = whole.join("records.bin");
     let identity = Identity::read(&path).unwrap().unwrap();
     let mut all = Vec::new();
-    RecordFile::read(&path, &identity, Order::AsKept, |batch| {
+    RecordFile::read(&path, &identity, Order::Sequential, |batch| {
         all.extend_from_slice(batch);
         true
     })

@@ -1,4 +1,4 @@
-//! `manifest.json` of a bifurcation diagram: everything needed to make its folder again.
+//! `manifest.json` of a bifurcation diagram: everything that its folder can be made from.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -8,25 +8,33 @@ use serde::Serialize;
 use crate::findings::hysteresis::{self, Hysteresis};
 use crate::map::bifurcation::Column;
 use crate::map::plan::count_classes;
-use crate::map::scene::Scene;
+use crate::map::scene::{Along, Scene};
 use crate::show::names;
 use crate::show::parameters::Parameters;
-use crate::store::bifurcation::Asked;
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::{
     AxisObject, DerivedObject, Head, ModelObject, StartObject, TimingsObject, derived, start,
 };
 
-/// It names neither the machine nor where on it the run took place.
+/// Arguments of the command, apart from its scene.
+#[derive(Clone, Copy, Debug)]
+pub struct DiagramArguments<'a> {
+    /// The `--set` arguments.
+    pub sets: &'a [String],
+    /// The line through a scene of several axes.
+    pub along: Option<&'a Along>,
+}
+
+/// The manifest of a diagram. It contains neither paths nor names of machines.
 #[derive(Serialize)]
-pub(crate) struct Manifest<'a> {
+pub(crate) struct BifurcationManifest<'a> {
     #[serde(flatten)]
     head: Head,
     engine: &'static str,
     title: &'a str,
     scene: &'a str,
     set: &'a [String],
-    /// Of a line of a plane: the swept axis and where the other one stays, as the arguments say it.
+    /// Arguments of a line through a plane: the swept axis and the value of the other one.
     #[serde(skip_serializing_if = "Option::is_none")]
     along: Option<&'a str>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
@@ -38,7 +46,7 @@ pub(crate) struct Manifest<'a> {
     derived: BTreeMap<String, DerivedObject>,
     start: StartObject,
     integration: IntegrationObject,
-    /// Columns by class, of both passes together where there are two.
+    /// Number of columns by class; those of two passes are added.
     classes: BTreeMap<&'static str, usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     hysteresis: Option<HysteresisObject>,
@@ -47,14 +55,14 @@ pub(crate) struct Manifest<'a> {
     files: &'a [FileEntry],
 }
 
-/// Values at which class or period depend on the direction.
+/// Values at which class or period depend on the direction of the sweep.
 #[derive(Serialize)]
 struct HysteresisObject {
     columns: usize,
     differing: usize,
-    /// First and last value of each run of neighbours.
+    /// First and last value of each group of neighbours.
     ranges: Vec<[f64; 2]>,
-    /// Values at which patterns alone differ.
+    /// Number of values at which only patterns differ.
     by_pattern: usize,
     pattern_ranges: Vec<[f64; 2]>,
 }
@@ -73,25 +81,26 @@ struct IntegrationObject {
     max_period: u32,
 }
 
-impl<'a> Manifest<'a> {
+impl<'a> BifurcationManifest<'a> {
+    /// Returns the manifest of a diagram that was computed in `elapsed` and written in `writing`.
     pub(crate) fn new(
         scene: &'a Scene,
-        asked: Asked<'a>,
+        arguments: DiagramArguments<'a>,
         columns: &[Column],
         [elapsed, writing]: [Duration; 2],
         files: &'a [FileEntry],
-    ) -> Manifest<'a> {
+    ) -> BifurcationManifest<'a> {
         let axis = &scene.axes()[0];
         let settings = scene.orbit_settings();
         let classes = count_classes(columns.iter().map(|column| column.class));
-        Manifest {
+        BifurcationManifest {
             head: Head::of("bifurcation"),
             engine: "reference f64",
             title: scene.title(),
             scene: scene.text(),
-            set: asked.sets,
-            along: asked.along.map(|along| along.parameter.as_str()),
-            at: asked.along.map_or(&[], |along| &along.at),
+            set: arguments.sets,
+            along: arguments.along.map(|along| along.parameter.as_str()),
+            at: arguments.along.map_or(&[], |along| &along.at),
             model: ModelObject::of(scene.base()),
             axis: axis.into(),
             parameters: Parameters::of_scene(scene),

@@ -1,4 +1,4 @@
-//! `manifest.json` of a map: what makes its folder again, and what the codes mean.
+//! `manifest.json` of a map: everything that its folder can be made from, and the meaning of codes.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -15,54 +15,54 @@ use crate::show::cells::{Cells, SOURCES};
 use crate::show::names;
 use crate::show::parameters::Parameters;
 use crate::show::table::cell_columns::ABSENT;
+use crate::store::file_names::LIST;
 use crate::store::inventory::FileEntry;
 use crate::store::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
-use crate::store::map::LIST;
 use crate::store::record_file::Identity;
 use rattlemap_dynamics::orbit::Status;
 
-/// Who computed a map.
+/// The engine that computed a map.
 #[derive(Clone, Copy, Debug)]
 pub struct Made<'a> {
-    /// The engine's name.
+    /// Name of the engine.
     pub engine: &'a str,
-    /// Its precision.
+    /// Name of the precision.
     pub precision: &'a str,
-    /// What it ran on.
+    /// Description of the device.
     pub device: &'a str,
 }
 
-/// Who computed a map and in what time.
+/// Everything about the computation of a map that is not in its records.
 #[derive(Clone, Debug)]
 pub struct Run<'a> {
     /// The `--set` arguments.
     pub sets: &'a [String],
-    /// Who computed it.
+    /// The engine.
     pub made: Made<'a>,
-    /// The graphics adapter, where one was at work.
+    /// The graphics adapter, if there was one.
     pub adapter: Option<AdapterId>,
-    /// What each card did, where several were at work.
+    /// A report for each card, if there were several.
     pub cards: Vec<CardReport>,
-    /// The host's processor, in words.
+    /// Description of the host's processor.
     pub processor: &'a str,
     /// Time until the engine was ready.
     pub opening: Duration,
     /// Time spent integrating in this run.
     pub elapsed: Duration,
-    /// And in those that it went on from.
+    /// Time spent integrating in earlier runs that this one resumed.
     pub elapsed_before: Duration,
-    /// Cells of an earlier run that this one went on from.
+    /// Number of records of earlier runs.
     pub resumed_cells: usize,
-    /// The least and the most free steps that lanes take per forcing period; none where there is no grid.
+    /// The smallest and the largest number of free steps that lanes take per forcing period; none on the CPU.
     pub lane_grid: Option<[u32; 2]>,
-    /// Swept parameters that changed nothing that was measured.
+    /// Swept parameters without effect on any measured quantity.
     pub without_effect: Vec<String>,
-    /// Of what it was merged, if it was.
-    pub merged: Option<Merged<'a>>,
+    /// The shards from which the map was merged.
+    pub shards: Option<ShardOrigin<'a>>,
 }
 
 impl<'a> Run<'a> {
-    /// A run of which no more is known, in no time.
+    /// Returns a run with these properties; its times are zero.
     pub fn new(made: Made<'a>, sets: &'a [String], processor: &'a str) -> Run<'a> {
         Run {
             sets,
@@ -76,11 +76,11 @@ impl<'a> Run<'a> {
             resumed_cells: 0,
             lane_grid: None,
             without_effect: Vec::new(),
-            merged: None,
+            shards: None,
         }
     }
 
-    /// The same by an engine that is still there: on which adapters, by which grid.
+    /// Adds the adapters and the grid of an engine.
     #[must_use]
     pub fn on(self, engine: &Engine<'_>) -> Run<'a> {
         let (adapter, cards, lane_grid) = (engine.adapter(), engine.cards(), engine.steps_per_period());
@@ -88,30 +88,30 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Shards of which a map was merged, and what computed their records.
+/// The shards from which a map was merged, and the program that computed them.
 #[derive(Clone, Copy, Debug)]
-pub struct Merged<'a> {
-    /// How many.
-    pub shards: u32,
-    /// A hash of the sources that decide what records hold.
+pub struct ShardOrigin<'a> {
+    /// Number of shards.
+    pub count: u32,
+    /// Hash of the sources that decide the contents of records.
     pub sources: &'a str,
-    /// What these were compiled for.
+    /// Target of the compilation.
     pub target: &'a str,
 }
 
-/// It names neither the machine's paths nor its users.
+/// The manifest of a map. It contains neither paths nor user names.
 #[derive(Serialize)]
-pub(crate) struct Manifest<'a> {
+pub(crate) struct MapManifest<'a> {
     #[serde(flatten)]
     head: Head,
     #[serde(flatten)]
     made: MadeObject<'a>,
-    /// Of the host.
+    /// The host's processor.
     processor: &'a str,
-    /// A hash of the sources that decide what records hold, and what they were compiled for.
+    /// Hash of the sources that decide the contents of records, and target of their compilation.
     sources: &'a str,
     target: &'a str,
-    /// Of so many it was merged.
+    /// Number of shards of a merged map.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<u32>,
     title: &'a str,
@@ -119,7 +119,7 @@ pub(crate) struct Manifest<'a> {
     set: &'a [String],
     model: ModelObject,
     axes: Vec<AxisObject>,
-    /// The list in the place of axes.
+    /// The list of cells of a map without axes.
     #[serde(skip_serializing_if = "Option::is_none")]
     list: Option<ListObject>,
     parameters: Parameters,
@@ -131,25 +131,25 @@ pub(crate) struct Manifest<'a> {
     cells: usize,
     classes: BTreeMap<&'static str, usize>,
     statuses: BTreeMap<&'static str, usize>,
-    /// Cells by the number of attractors that their starts found.
+    /// Number of cells by the number of attractors that their starts reach.
     #[serde(skip_serializing_if = "Option::is_none")]
     attractors: Option<BTreeMap<u8, usize>>,
     /// Attractors of a map of basins, by label.
     #[serde(skip_serializing_if = "Option::is_none")]
     basins: Option<Vec<BasinObject>>,
     periods: u64,
-    /// Swept parameters that changed nothing that was measured.
+    /// Swept parameters without effect on any measured quantity.
     without_effect: &'a [String],
     codes: Codes,
-    /// Of all runs that the map took.
+    /// Sum over all runs that were resumed.
     elapsed_seconds: f64,
     resumed_cells: usize,
     refinement: Option<RefinementObject>,
-    timings: TimingsObject,
+    timings: MapTimings,
     files: &'a [FileEntry],
 }
 
-/// Who computed a map; on graphics adapters on which, one or several.
+/// The engine that computed a map, and its graphics adapters.
 #[derive(Serialize)]
 pub(crate) struct MadeObject<'a> {
     engine: &'a str,
@@ -174,7 +174,7 @@ impl<'a> MadeObject<'a> {
     }
 }
 
-/// Which of a machine's adapters: its number as `rattlemap devices` lists them, and its place on the bus where it has one.
+/// A graphics adapter: its number in `rattlemap devices` and its address on the PCI bus.
 #[derive(Serialize)]
 struct AdapterObject<'a> {
     number: usize,
@@ -187,7 +187,7 @@ impl<'a> From<&'a AdapterId> for AdapterObject<'a> {
     }
 }
 
-/// What one of several cards did: cells of this run alone, and why it was lost if it was.
+/// One of several cards: the number of cells that it computed in this run, and why it was lost.
 #[derive(Serialize)]
 struct CardObject<'a> {
     number: usize,
@@ -206,6 +206,19 @@ impl<'a> From<&'a CardReport> for CardObject<'a> {
     }
 }
 
+/// Records and time of earlier runs, in objects that commands print; zero without such runs.
+#[derive(Serialize)]
+pub(crate) struct ResumedObject {
+    runs: usize,
+    seconds: f64,
+}
+
+impl ResumedObject {
+    pub(crate) fn of(run: &Run<'_>) -> ResumedObject {
+        ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() }
+    }
+}
+
 /// An attractor and the size of its basin.
 #[derive(Serialize)]
 pub(crate) struct BasinObject {
@@ -215,7 +228,7 @@ pub(crate) struct BasinObject {
     share: f64,
 }
 
-/// The attractors of a map of basins, in the order of their labels.
+/// Returns the attractors of a map of basins, in the order of their labels.
 pub(crate) fn basins(cells: &Cells<'_>) -> Option<Vec<BasinObject>> {
     let basins = cells.basins()?;
     let total = basins.labels().len() as f64;
@@ -228,14 +241,14 @@ pub(crate) fn basins(cells: &Cells<'_>) -> Option<Vec<BasinObject>> {
     Some(basins.attractors().iter().map(object).collect())
 }
 
-/// Which cells there are, where they are listed.
+/// The list of cells of a map without axes.
 #[derive(Serialize)]
 pub(crate) struct ListObject {
-    /// The copy in the folder, which has the same values.
+    /// Name of the copy in the folder.
     file: &'static str,
     columns: Vec<String>,
     cells: usize,
-    /// SHA-256 of names and values.
+    /// SHA-256 over names and values.
     hash: String,
 }
 
@@ -250,19 +263,31 @@ impl From<&List> for ListObject {
     }
 }
 
-/// Seconds by phase; `integrate` of all runs that the map took, the others of the last. Validation adds its own.
+/// Seconds that each phase took. `integrate` is the sum over all resumed runs; `open` and `write` are those of the last run.
+/// Validation and repair add their own.
 #[derive(Serialize)]
-pub(crate) struct TimingsObject {
-    pub(crate) open: f64,
-    pub(crate) integrate: f64,
-    pub(crate) write: f64,
+pub(crate) struct MapTimings {
+    open: f64,
+    integrate: f64,
+    write: f64,
 }
 
+impl MapTimings {
+    pub(crate) fn of(run: &Run<'_>, writing: Duration) -> MapTimings {
+        MapTimings {
+            open: run.opening.as_secs_f64(),
+            integrate: (run.elapsed_before + run.elapsed).as_secs_f64(),
+            write: writing.as_secs_f64(),
+        }
+    }
+}
+
+/// Settings of the integration.
 #[derive(Serialize)]
 pub(crate) struct IntegrationObject {
-    /// As the scene asks; null for as many as the motion needs.
+    /// Number that the scene asks for; null for `auto`.
     steps_per_period: Option<u32>,
-    /// As lanes took them, over all flows; null on the CPU.
+    /// Numbers that lanes took, over all flows; null on the CPU.
     least_steps_used: Option<u32>,
     most_steps_used: Option<u32>,
     transient_periods: u32,
@@ -366,7 +391,7 @@ impl From<&Refined> for RefinementObject {
     }
 }
 
-/// What small integers in `cells.npy` stand for.
+/// Meaning of the small integers in `cells.npy`.
 #[derive(Serialize)]
 struct Codes {
     class: BTreeMap<&'static str, i8>,
@@ -375,21 +400,21 @@ struct Codes {
     symmetric: BTreeMap<&'static str, i8>,
 }
 
-/// The manifest of a map that `run` has made.
+/// Returns the manifest of a map.
 pub(crate) fn map<'a>(
     cells: &Cells<'a>,
     run: &'a Run<'a>,
     writing: Duration,
     files: &'a [FileEntry],
-) -> Manifest<'a> {
+) -> MapManifest<'a> {
     let scene = cells.scene();
-    Manifest {
+    MapManifest {
         head: Head::of("map"),
         made: MadeObject::of(run),
         processor: run.processor,
-        sources: run.merged.map_or(Identity::own_sources(), |merged| merged.sources),
-        target: run.merged.map_or(Identity::own_target(), |merged| merged.target),
-        shards: run.merged.map(|merged| merged.shards),
+        sources: run.shards.map_or(Identity::own_sources(), |shards| shards.sources),
+        target: run.shards.map_or(Identity::own_target(), |shards| shards.target),
+        shards: run.shards.map(|shards| shards.count),
         title: scene.title(),
         scene: scene.text(),
         set: run.sets,
@@ -404,7 +429,7 @@ pub(crate) fn map<'a>(
         cells: cells.counts().iter().product(),
         classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
         statuses: statuses(cells),
-        attractors: cells.attractors().map(tally),
+        attractors: cells.attractors().map(attractor_counts),
         basins: basins(cells),
         periods: cells.periods(),
         without_effect: &run.without_effect,
@@ -412,15 +437,12 @@ pub(crate) fn map<'a>(
         elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
         resumed_cells: run.resumed_cells,
         refinement: cells.refinement().map(RefinementObject::from),
-        timings: TimingsObject {
-            open: run.opening.as_secs_f64(),
-            integrate: (run.elapsed_before + run.elapsed).as_secs_f64(),
-            write: writing.as_secs_f64(),
-        },
+        timings: MapTimings::of(run, writing),
         files,
     }
 }
 
+/// Returns the settings of the integration of a scene.
 pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> IntegrationObject {
     let settings = scene.integration();
     IntegrationObject {
@@ -438,6 +460,7 @@ pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Integra
     }
 }
 
+/// Counts the cells by status.
 pub(crate) fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
     let mut counts: BTreeMap<_, _> = Status::ALL.iter().map(|&s| (names::status(s), 0)).collect();
     for status in cells.statuses() {
@@ -446,7 +469,8 @@ pub(crate) fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
     counts
 }
 
-pub(crate) fn tally(list: &[u8]) -> BTreeMap<u8, usize> {
+/// Counts the cells by their number of attractors.
+pub(crate) fn attractor_counts(list: &[u8]) -> BTreeMap<u8, usize> {
     let mut counts = BTreeMap::new();
     list.iter().for_each(|&count| *counts.entry(count).or_default() += 1);
     counts

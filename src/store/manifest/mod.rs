@@ -1,4 +1,7 @@
-//! `manifest.json`: what those of all commands have in common.
+//! `manifest.json`: the parts that the manifests of all commands share.
+
+pub mod bifurcation;
+pub mod map;
 
 use std::collections::BTreeMap;
 
@@ -8,25 +11,23 @@ use crate::map::scene::{Axis, Scale, Scene, Start};
 use crate::model_file::FileModel;
 use rattlemap_dynamics::model::Model;
 
-/// The manifest's name. It is the last file that a run writes: a folder that has one is complete.
-pub const MANIFEST: &str = "manifest.json";
+pub use crate::store::file_names::MANIFEST;
 
-/// Raised whenever a field changes its meaning.
-/// 2: `files` are objects of name, size and hash.
+/// Version of the manifest. It is raised when a field changes its meaning.
 pub const FORMAT: u32 = 2;
 
-/// What a run's JSON begins with: what it is, and which program wrote it.
+/// First fields of a manifest: its format, the command, and the program that wrote it.
 #[derive(Serialize)]
 pub struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
-    /// Of the program; `unknown` where it was built outside of its repository, or not for release.
+    /// Commit of the program; `unknown` if it was built outside of its repository or without release settings.
     commit: &'static str,
 }
 
 impl Head {
-    /// The head of what `command` writes.
+    /// Returns the first fields of a manifest that `command` writes.
     pub fn of(command: &'static str) -> Head {
         Head {
             format: FORMAT,
@@ -37,13 +38,13 @@ impl Head {
     }
 }
 
-/// What moves. With its text a folder is enough to make its files again.
+/// The model. Its text makes the folder independent of the model's file.
 #[derive(Serialize)]
 pub(crate) struct ModelObject {
     name: String,
     title: String,
     source: Option<String>,
-    /// The model's file; null where the model is none.
+    /// Text of the model's file; null for a model in code.
     text: Option<String>,
 }
 
@@ -58,19 +59,20 @@ impl ModelObject {
     }
 }
 
+/// An axis.
 #[derive(Serialize)]
 pub(crate) struct AxisObject {
-    /// Its name, and that of the columns in tables.
+    /// Name of the swept parameter, and of its column in tables.
     parameter: String,
-    /// What it sweeps is a component of the start.
+    /// Whether the axis sweeps a component of the initial state.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     is_start: bool,
     min: f64,
     max: f64,
     count: usize,
-    /// linear, log or values.
+    /// `linear`, `log` or `values`.
     scale: &'static str,
-    /// Where they are listed.
+    /// The values, if the scene lists them.
     #[serde(skip_serializing_if = "Option::is_none")]
     values: Option<Vec<f64>>,
 }
@@ -89,16 +91,16 @@ impl From<&Axis> for AxisObject {
     }
 }
 
-/// A parameter that follows others.
+/// A parameter that is computed from others.
 #[derive(Serialize)]
 pub(crate) struct DerivedObject {
     expression: String,
-    /// Its least and its greatest value over all cells.
+    /// Smallest and largest value over all cells.
     min: f64,
     max: f64,
 }
 
-/// The derived parameters of a scene, by name.
+/// Returns the derived parameters of a scene, by name.
 pub(crate) fn derived(scene: &Scene) -> BTreeMap<String, DerivedObject> {
     let points = scene.points();
     let rules = points.derived().rules();
@@ -110,7 +112,7 @@ pub(crate) fn derived(scene: &Scene) -> BTreeMap<String, DerivedObject> {
         })
         .collect();
     let [columns, rows] = points.counts();
-    // A scene without any has no cell looked at.
+    // Without derived parameters no cell needs a look.
     for cell in (0..columns * rows).take(if rules.is_empty() { 0 } else { usize::MAX }) {
         let model = points.model(cell);
         for (rule, object) in rules.iter().zip(&mut objects) {
@@ -121,6 +123,7 @@ pub(crate) fn derived(scene: &Scene) -> BTreeMap<String, DerivedObject> {
     rules.iter().map(|rule| rule.parameter().name.to_string()).zip(objects).collect()
 }
 
+/// The initial states.
 #[derive(Serialize)]
 pub(crate) struct StartObject {
     policy: &'static str,
@@ -131,6 +134,7 @@ pub(crate) struct StartObject {
     seed: Option<u32>,
 }
 
+/// Returns the initial states of a scene.
 pub(crate) fn start(scene: &Scene) -> StartObject {
     let (policy, state) = match scene.start() {
         Start::Rest => ("rest", None),
@@ -143,7 +147,7 @@ pub(crate) fn start(scene: &Scene) -> StartObject {
     StartObject { policy, state, count, seed }
 }
 
-/// Seconds by phase.
+/// Seconds that each phase took.
 #[derive(Serialize)]
 pub(crate) struct TimingsObject {
     pub(crate) integrate: f64,
