@@ -74,12 +74,7 @@ impl Scene {
     /// Reads a scene from a file.
     #[staticmethod]
     #[pyo3(signature = (path, sets=Vec::new(), purpose="map", along=None))]
-    fn load(
-        path: PathBuf,
-        sets: Vec<String>,
-        purpose: &str,
-        along: Option<Line>,
-    ) -> Result<Scene, Problem> {
+    fn load(path: PathBuf, sets: Vec<String>, purpose: &str, along: Option<Line>) -> Result<Scene, Problem> {
         let checked = Use::new(purpose, along)?;
         let along = checked.along.as_ref();
         let file = SceneFile { purpose: checked.purpose, along, ..SceneFile::map(&path) };

@@ -115,12 +115,14 @@ pub(crate) enum Bench {
 
 /// Compute one map on every engine: speed, and whether the answers agree
 #[derive(Debug, Args)]
-#[command(after_help = "Computes the map scenes/e_omega.toml with 10^3 to 10^7 cells, as far as time and memory allow, on the \
+#[command(
+    after_help = "Computes the map scenes/e_omega.toml with 10^3 to 10^7 cells, as far as time and memory allow, on the \
     processor and on every graphics adapter in every precision. The speed is forcing periods per second. The answers are \
     compared with each other, and a sample of them with the reference; the exit code is 1 if more cells differ without \
     an explanation than one in 10,000 allows.\n\n\
     Example, two minutes on the first adapter:\n  \
-    rattlemap bench engines --budget 120 --adapter 0")]
+    rattlemap bench engines --budget 120 --adapter 0"
+)]
 pub(crate) struct Engines {
     #[command(flatten)]
     pub(crate) run: BenchOptions,

@@ -14,7 +14,7 @@ use crate::cli::failure::Failure;
 use crate::cli::say;
 use crate::gpu::{self, AdapterReport};
 use crate::job::engine_choice::EngineKind;
-use crate::job::size;
+use crate::job::size::{self, Free};
 use crate::record::Record;
 use crate::store::folder::Folder;
 use crate::validate::{DEFAULT_SAMPLES, Kind};
@@ -107,7 +107,7 @@ fn measure(
         let needed = series.points.last().map_or(0.0, |point| {
             2.0 * point.spread(|run| run.prepare + run.integrate).median * lanes as f64 / point.lanes as f64
         });
-        let misfit = size::check_map(&scene, None, choice, Some(folder.path())).err();
+        let misfit = size::check_map(&scene, None, choice, &Free::for_output(Some(folder.path()))).err();
         if needed > left {
             series.skipped =
                 Some((lanes, format!("it would take about {needed:.0} s, {left:.0} s are left")));

@@ -51,8 +51,13 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
         )));
     };
     let elapsed = clock.elapsed();
-    let files =
-        store::bifurcation::write(&folder, &scene, DiagramArguments { sets: &sets, along }, &columns, elapsed)?;
+    let files = store::bifurcation::write(
+        &folder,
+        &scene,
+        DiagramArguments { sets: &sets, along },
+        &columns,
+        elapsed,
+    )?;
     let [periodic, chaotic, undecided, failed] =
         plan::count_classes(columns.iter().map(|column| column.class));
     let name = &scene.axes()[0].parameter().name;

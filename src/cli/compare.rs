@@ -28,8 +28,7 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     folder.refuse_links(store::compare::names())?;
     interrupt.wait_for(Some("the maps are read"));
     let result = pair.compare(interrupt.raised())?;
-    let stopped =
-        || interrupt.failure(format!("interrupted, and nothing was written to {}", out.display()));
+    let stopped = || interrupt.failure(format!("interrupted, and nothing was written to {}", out.display()));
     let Some(result) = result.filter(|_| interrupt.wait_for(None)) else { return Err(stopped()) };
     for warning in result.warnings() {
         say::note(format_args!("warning: {warning}"));

@@ -102,8 +102,11 @@ fn finish_map(
     let (writing, finishing) = (start.elapsed(), clock.elapsed());
     let (cells, run) = (map.cells(), map.description());
     let every = if cells.refinement().is_some() { "every integrated cell" } else { "every cell" };
-    let without_effect: String =
-        run.without_effect.iter().map(|name| format!("\n{name} has no effect: along it {every} is like the others")).collect();
+    let without_effect: String = run
+        .without_effect
+        .iter()
+        .map(|name| format!("\n{name} has no effect: along it {every} is like the others"))
+        .collect();
     console.finish(&format!(
         "{}{without_effect}\n{}: {}",
         summary::map(&cells, &run, map.lane_steps(), finishing.as_secs_f64()),
@@ -117,12 +120,7 @@ fn finish_map(
     fail_if(all_failed, "every cell failed; the status column says why")
 }
 
-fn finish_shard(
-    run: &MapRun<'_>,
-    folder: &Path,
-    arguments: &Map,
-    console: &Console,
-) -> Result<(), Failure> {
+fn finish_shard(run: &MapRun<'_>, folder: &Path, arguments: &Map, console: &Console) -> Result<(), Failure> {
     let (files, description) = (run.write_shard()?, run.description());
     let Some(finished) = run.finished_shard(&description) else { return Ok(()) };
     console.finish(&summary::shard(&finished, folder, &files));

@@ -153,7 +153,8 @@ mod tests {
     use super::*;
 
     fn text(total: Total, done: usize) -> String {
-        let lines = Lines { unit: "cells", total, from: 0, clock: Instant::now(), printed: AtomicUsize::new(0) };
+        let lines =
+            Lines { unit: "cells", total, from: 0, clock: Instant::now(), printed: AtomicUsize::new(0) };
         lines.text(done, 400, Duration::from_secs(10))
     }
 

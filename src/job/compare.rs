@@ -87,8 +87,7 @@ impl<'a> MapPair<'a> {
             has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
         });
         let comparison = compare::compare(a, b);
-        let surveys =
-            loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
+        let surveys = loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
         Ok(Some(MapComparison { pair: self, loaded, surveys, comparison }))
     }
 }

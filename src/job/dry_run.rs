@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
 use crate::job::forecast::Forecast;
 use crate::job::map::{MapJob, OpenMap};
 use crate::job::observer::Observer;
-use crate::job::engine_choice::EngineKind;
 use crate::job::size::{Free, Size};
 use crate::map::plan::Plan;
 use crate::map::sweep::SweepError;
@@ -77,7 +77,8 @@ impl DryRun {
             0
         };
         let runs = job.run_count(plan);
-        let forecast = Forecast::of(plan, &mut engine, runs.saturating_sub(stored)).map_err(SweepError::Engine)?;
+        let forecast =
+            Forecast::of(plan, &mut engine, runs.saturating_sub(stored)).map_err(SweepError::Engine)?;
         let size = Size::of(job.scene, job.shard);
         let kind = if engine.device_bytes().is_some() { EngineKind::Gpu } else { EngineKind::Cpu };
         Ok(DryRun {
@@ -87,7 +88,7 @@ impl DryRun {
             precision: engine.precision(),
             device: engine.device(),
             reason,
-            host_memory: size.host_memory(kind),
+            host_memory: size.memory(kind),
             device_memory: engine.device_bytes(),
             disk: size.disk,
             free,

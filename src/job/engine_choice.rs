@@ -73,9 +73,7 @@ pub enum ChoiceError {
         name: String,
     },
     /// The CPU engine has no f32.
-    #[error(
-        "--precision f32: the CPU engine computes in f64; leave out --precision, or give --engine gpu"
-    )]
+    #[error("--precision f32: the CPU engine computes in f64; leave out --precision, or give --engine gpu")]
     CpuInF32,
     /// `auto` uses hardware GPUs alone, and the CPU engine has no f32.
     #[error(

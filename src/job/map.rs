@@ -68,7 +68,8 @@ impl<'a> MapJob<'a> {
         }
         require_engine(self.shard, self.engine.kind)?;
         engine_choice::check(&self.engine)?;
-        size::check_map(self.scene, self.shard, self.engine.kind, out)
+        let free = Free::for_output(out);
+        size::check_map(self.scene, self.shard, self.engine.kind, &free).map(|()| free)
     }
 
     /// Numbers the cells and checks that each has a motion.
@@ -132,9 +133,7 @@ impl<'a> MapJob<'a> {
         warnings.iter().for_each(|warning| observer.warn(warning));
         let lost = Arc::clone(&observer);
         engine.listen(move |Loss { adapter, cells, reason }| {
-            lost.warn(&format!(
-                "adapter {adapter} was lost ({reason}); {cells} cells go back to the queue"
-            ));
+            lost.warn(&format!("adapter {adapter} was lost ({reason}); {cells} cells go back to the queue"));
         });
         Ok(OpenMap { job: self, plan, folder, observer, engine, reason, opening })
     }

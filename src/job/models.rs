@@ -9,9 +9,8 @@ use crate::model_file::{FileModel, Wall, WallLaw, factor};
 
 /// Returns the name and a summary of every built-in model.
 pub fn list() -> Vec<(String, String)> {
-    let summary = |model: &FileModel| {
-        model.definition().summary.clone().unwrap_or_else(|| model.title().to_owned())
-    };
+    let summary =
+        |model: &FileModel| model.definition().summary.clone().unwrap_or_else(|| model.title().to_owned());
     FileModel::all_built_in().iter().map(|model| (model.name().to_owned(), summary(model))).collect()
 }
 

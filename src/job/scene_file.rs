@@ -69,8 +69,7 @@ impl SceneFile<'_> {
         }
         let files = self.load(&sets)?.outputs().files.clone();
         let others = files.iter().filter(|format| !Format::FIGURES.contains(format));
-        let names: Vec<String> =
-            others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
+        let names: Vec<String> = others.chain(formats).map(|format| format!("{:?}", format.name())).collect();
         sets.retain(|set| !set.starts_with(FILES));
         sets.push(format!("{FILES}[{}]", names.join(",")));
         Ok(sets)

@@ -13,37 +13,14 @@ use crate::record::Record;
 use crate::store::map;
 use crate::text::size::bytes;
 
-// Memory in bytes.
-/// Per run beside its record: its place in the order, and the rows of tables and figures.
+/// Memory per run besides its record, in bytes: its place in the order, and the rows of tables and figures.
 const RUN: u64 = 64;
-/// Per run of the whole map in a shard: a flag.
-const FLAG: u64 = 1;
-/// Per run of a merged map: the fixed part of a [`RecordStore`](crate::record::RecordStore), its last state, the number of
-/// its word.
-const STORED_RUN: u64 = 8;
-const STORED_STATE: u64 = 32;
-const STORED_WORD: u64 = 4;
-/// Per cell of a list: values, their text, flow and law.
+/// Memory per cell of a list, in bytes: values, their text, flow and law.
 const LIST_ROW: u64 = 200;
-/// Per forcing period of a cell that is being computed: strobe state, growth of a tangent vector.
+/// Memory per forcing period of a cell that is being computed, in bytes: strobe state, growth of a tangent vector.
 const PERIOD: u64 = 40;
-/// Per flow that the CPU engine keeps.
+/// Memory per flow that the CPU engine keeps, in bytes: an upper bound of the built-in models'.
 const FLOW: u64 = 100_000;
-
-// Disk in bytes: upper ends of measured maps. Chaotic cells hardly compress.
-/// Per run: the columns that every record has, with exponent and error.
-const RECORD: u64 = 60;
-const NUMBER: u64 = 8;
-const WORD: u64 = 16;
-/// Per cell: a row of `cells.csv`, a row of `cells.npy` without its quantities, a word's row with its share of `words.csv`,
-/// `report.html`, one figure, and the starts that the report lists where cells follow their neighbours.
-const CSV: u64 = 190;
-const NPY: u64 = 33;
-const NPY_WORD: u64 = 12;
-const HTML: u64 = 24;
-const FIGURE: u64 = 4;
-const HTML_START: u64 = 44;
-
 /// Number of flows from which the size of all lane tables is estimated.
 const SAMPLED_FLOWS: u64 = 256;
 
@@ -54,77 +31,60 @@ pub struct Size {
     pub cells: u64,
     /// Number of runs: cells times starts per cell.
     pub runs: u64,
-    /// Memory for records and outputs, in bytes.
-    pub memory: u64,
-    /// Additional memory per thread of the CPU engine, in bytes.
-    pub memory_per_thread: u64,
-    /// Additional memory for the flows of the CPU engine, in bytes.
-    pub flows: u64,
-    /// Additional memory for the constants of the GPU engine's lanes, in bytes.
-    pub lane_tables: u64,
-    /// Disk space for records and outputs, in bytes.
+    /// Memory with the CPU engine, in bytes.
+    pub cpu_memory: u64,
+    /// Memory of the host with the GPU engine, in bytes.
+    pub gpu_memory: u64,
+    /// Disk space, in bytes.
     pub disk: u64,
 }
 
 impl Size {
-    /// Estimates the size of a map, or of a shard of it. A shard writes records alone, and keeps them in memory only where
-    /// cells follow their neighbours.
+    /// Estimates the size of a map, or of a shard of it. A shard writes records alone, and keeps in memory a byte per run of
+    /// the map, and all records where cells follow their neighbours.
     pub fn of(scene: &Scene, shard: Option<Shard>) -> Size {
         let (cells, runs) = (scene.cell_count(), scene.run_count());
-        let rows = scene.list().map_or(0, |list| list.len() as u64) * LIST_ROW;
-        let settings = scene.orbit_settings();
-        let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
-        let parts = Parts::flows(scene.points());
-        let flow_count = parts.count() as u64;
         let record = size_of::<Record>() as u64;
+        let [record_on_disk, files] = disk(scene);
         let (memory, disk) = match shard {
-            None => {
-                let files: u64 = scene.outputs().files.iter().map(|format| file(scene, *format)).sum();
-                let records = runs.saturating_mul(record_on_disk(scene));
-                (runs.saturating_mul(record + RUN), records.saturating_add(cells.saturating_mul(files)))
-            }
+            None => (runs.saturating_mul(record + RUN), runs.saturating_mul(record_on_disk) + cells * files),
             Some(shard) => {
                 let own = runs.div_ceil(u64::from(shard.count()));
-                let records = if scene.start().follows() { runs.saturating_mul(record) } else { 0 };
-                let memory = (runs * FLAG).saturating_add(records).saturating_add(own * RUN);
-                (memory, own.saturating_mul(record_on_disk(scene)))
+                let kept = if scene.start().follows() { 1 + record } else { 1 };
+                (runs.saturating_mul(kept) + own * RUN, own * record_on_disk)
             }
         };
+        let settings = scene.orbit_settings();
+        let periods = u64::from(settings.transient_periods) + u64::from(settings.observed_periods);
+        let flows = Parts::flows(scene.points());
+        let memory = memory + list_rows(scene);
         Size {
             cells,
             runs,
-            memory: memory.saturating_add(rows),
-            memory_per_thread: periods * PERIOD,
-            flows: if keeps_flows(flow_count, runs) { flow_count * FLOW } else { 0 },
-            lane_tables: lane_tables(scene, &parts, runs),
+            cpu_memory: memory + kept_flows(&flows, runs) + periods * PERIOD * processor::cores() as u64,
+            gpu_memory: memory + lane_tables(scene, &flows, runs),
             disk,
         }
     }
 
-    /// Estimates the size of a map that is merged from shards: nothing is integrated. Cycles are computed again where
-    /// attractors are counted.
+    /// Estimates the size of a map that is merged from shards. Nothing is integrated, but flows are needed to compare cycles
+    /// where attractors are counted.
     pub fn merged(scene: &Scene) -> Size {
         let whole = Size::of(scene, None);
-        let has_attractors = whole.runs > whole.cells || scene.is_basin();
-        let rows = scene.list().map_or(0, |list| list.len() as u64) * LIST_ROW;
-        Size {
-            memory: whole.runs.saturating_mul(stored_run(scene) + RUN).saturating_add(rows),
-            memory_per_thread: 0,
-            flows: if has_attractors { whole.flows } else { 0 },
-            lane_tables: 0,
-            ..whole
-        }
+        let flows = match whole.runs > whole.cells || scene.is_basin() {
+            true => kept_flows(&Parts::flows(scene.points()), whole.runs),
+            false => 0,
+        };
+        let memory = whole.runs.saturating_mul(stored_run(scene) + RUN) + list_rows(scene) + flows;
+        Size { cpu_memory: memory, gpu_memory: memory, ..whole }
     }
 
     /// Memory of the host that a kind of engine needs, in bytes; of `auto` the larger one.
-    pub fn host_memory(&self, kind: EngineKind) -> u64 {
-        let threads = self.memory_per_thread.saturating_mul(processor::cores() as u64);
-        let cpu = self.memory.saturating_add(self.flows).saturating_add(threads);
-        let gpu = self.memory.saturating_add(self.lane_tables);
+    pub fn memory(&self, kind: EngineKind) -> u64 {
         match kind {
-            EngineKind::Cpu => cpu,
-            EngineKind::Gpu => gpu,
-            EngineKind::Auto => cpu.max(gpu),
+            EngineKind::Cpu => self.cpu_memory,
+            EngineKind::Gpu => self.gpu_memory,
+            EngineKind::Auto => self.cpu_memory.max(self.gpu_memory),
         }
     }
 
@@ -136,35 +96,32 @@ impl Size {
             Some(_) => format!("a list of {} cells{starts}", self.cells),
             None => format!("a map of {} = {} cells{starts}", counts.join(" x "), self.cells),
         };
-        let refuse = |what: &str, needed: u64, free: u64, other: &str| {
-            Err(JobError::TooLarge(format!(
-                "{map} needs about {} of {what}, and {} are free; {remedy}{other}",
-                bytes(needed),
-                bytes(free)
-            )))
-        };
         if u32::try_from(self.runs).is_err() {
             let most = u32::MAX;
             return Err(JobError::TooLarge(format!(
                 "{map} is too large: a map has at most {most} runs; {remedy}"
             )));
         }
-        let memory = self.host_memory(kind);
-        match *free {
+        let memory = self.memory(kind);
+        let (what, needed, free, other) = match *free {
             Free { memory: Some(free), .. } if free < memory => {
-                let is_enough = self.host_memory(EngineKind::Cpu) < free;
+                let is_enough = self.cpu_memory < free;
                 let other = if is_enough { ", or give --engine cpu, which needs less" } else { "" };
-                refuse("memory", memory, free, other)
+                ("memory", memory, free, other)
             }
             Free { disk: Some(free), .. } if free < self.disk => {
-                refuse("disk", self.disk, free, ", or give a folder on another disk with --out")
+                ("disk", self.disk, free, ", or give a folder on another disk with --out")
             }
-            _ => Ok(()),
-        }
+            _ => return Ok(()),
+        };
+        let (needed, free) = (bytes(needed), bytes(free));
+        Err(JobError::TooLarge(format!(
+            "{map} needs about {needed} of {what}, and {free} are free; {remedy}{other}"
+        )))
     }
 }
 
-/// Free memory and disk space of the machine, in bytes. None where the system does not report it.
+/// Free memory and disk space, in bytes. None where the system does not report it; then it is taken to suffice.
 #[derive(Clone, Copy, Debug)]
 pub struct Free {
     /// Memory, within the limits of a container.
@@ -194,7 +151,7 @@ fn replaced(out: &Path) -> u64 {
     map::names().filter_map(|name| out.join(name).symlink_metadata().ok()).map(|data| data.len()).sum()
 }
 
-/// Checks that a map, or a shard of it, fits this machine. Returns what is free.
+/// Checks that a map, or a shard of it, fits into free memory and disk space.
 ///
 /// # Errors
 /// [`JobError::TooLarge`] with what the map needs and what is free.
@@ -202,13 +159,8 @@ pub fn check_map(
     scene: &Scene,
     shard: Option<Shard>,
     kind: EngineKind,
-    out: Option<&Path>,
-) -> Result<Free, JobError> {
-    let free = Free::for_output(out);
-    check_free(scene, shard, kind, &free).map(|()| free)
-}
-
-fn check_free(scene: &Scene, shard: Option<Shard>, kind: EngineKind, free: &Free) -> Result<(), JobError> {
+    free: &Free,
+) -> Result<(), JobError> {
     let remedy = match scene.list() {
         Some(_) => "shorten the list of cells",
         None => "lower axis.0.count or axis.1.count",
@@ -235,50 +187,55 @@ pub fn check_finished(scene: &Scene) -> Result<(), JobError> {
     Size::of(scene, None).check(scene, EngineKind::Cpu, &Free::for_output(None), LARGER_MACHINE)
 }
 
-/// Bytes per cell of an output file.
-fn file(scene: &Scene, format: Format) -> u64 {
+/// Bytes on disk: per run of a record, and per cell of all other files. They are the upper ends of measured maps.
+fn disk(scene: &Scene) -> [u64; 2] {
     let quantities = &scene.outputs().quantities;
-    let in_array = |quantity: &Quantity| match quantity {
-        Quantity::Class => 3,
-        Quantity::Lyapunov => 2 * NUMBER,
-        Quantity::Impacts | Quantity::Mesh => NUMBER,
-        Quantity::Symmetric => 1,
-        Quantity::Word | Quantity::Pattern => NPY_WORD,
+    let columns = |words: u64, exponent: u64, flag: u64| -> u64 {
+        let column = |quantity: &Quantity| match quantity {
+            Quantity::Word | Quantity::Pattern => words,
+            Quantity::Lyapunov => exponent,
+            Quantity::Impacts | Quantity::Mesh => 8,
+            Quantity::Class | Quantity::Symmetric => flag,
+        };
+        quantities.iter().map(column).sum()
     };
-    match format {
-        Format::Csv => CSV,
-        Format::Npy => NPY + quantities.iter().map(in_array).sum::<u64>(),
-        Format::Html if scene.start().follows() => HTML + HTML_START,
-        Format::Html => HTML,
+    let file = |format: &Format| match format {
+        Format::Csv => 190,
+        // A word has a row of words.csv, too.
+        Format::Npy => 33 + columns(12, 16, 3),
+        // The starts of cells that follow their neighbours.
+        Format::Html if scene.start().follows() => 68,
+        Format::Html => 24,
         // One figure per quantity, and one of attractors.
-        Format::Png | Format::Svg | Format::Pdf => FIGURE * (quantities.len() as u64 + 1),
-    }
-}
-
-/// Bytes per run of a record on disk.
-fn record_on_disk(scene: &Scene) -> u64 {
-    let quantity = |quantity: &Quantity| match quantity {
-        Quantity::Word | Quantity::Pattern => WORD,
-        Quantity::Lyapunov | Quantity::Impacts | Quantity::Mesh => NUMBER,
-        Quantity::Class | Quantity::Symmetric => 1,
+        Format::Png | Format::Svg | Format::Pdf => 4 * (quantities.len() as u64 + 1),
     };
-    RECORD + scene.outputs().quantities.iter().map(quantity).sum::<u64>()
+    // Every record has an exponent with its error: the class needs them.
+    [60 + columns(16, 8, 1), scene.outputs().files.iter().map(file).sum()]
 }
 
-/// Bytes per run of a record in a [`RecordStore`](crate::record::RecordStore), which has the requested columns alone.
+/// Bytes per run in a [`RecordStore`](crate::record::RecordStore), which has the requested columns alone.
 fn stored_run(scene: &Scene) -> u64 {
     let quantities = &scene.outputs().quantities;
     let column = |quantity: &Quantity| match quantity {
-        Quantity::Impacts | Quantity::Mesh => NUMBER,
-        Quantity::Word | Quantity::Pattern => STORED_WORD,
+        Quantity::Impacts | Quantity::Mesh => 8,
+        Quantity::Word | Quantity::Pattern => 4,
         Quantity::Class | Quantity::Lyapunov | Quantity::Symmetric => 0,
     };
-    let needs_exponent =
-        quantities.iter().any(|quantity| matches!(quantity, Quantity::Class | Quantity::Lyapunov));
-    let exponent = if needs_exponent || scene.is_basin() { 2 * NUMBER } else { 0 };
+    let is_exponent = |quantity: &Quantity| matches!(quantity, Quantity::Class | Quantity::Lyapunov);
+    let exponent = if quantities.iter().any(is_exponent) || scene.is_basin() { 16 } else { 0 };
     let has_starts = scene.run_count() > scene.cell_count();
-    let state = if has_starts || scene.is_basin() || scene.start().follows() { STORED_STATE } else { 0 };
-    STORED_RUN + exponent + state + quantities.iter().map(column).sum::<u64>()
+    let state = if has_starts || scene.is_basin() || scene.start().follows() { 32 } else { 0 };
+    8 + exponent + state + quantities.iter().map(column).sum::<u64>()
+}
+
+fn list_rows(scene: &Scene) -> u64 {
+    scene.list().map_or(0, |list| list.len() as u64 * LIST_ROW)
+}
+
+/// Bytes of the flows that the CPU engine keeps.
+fn kept_flows(flows: &Parts, runs: u64) -> u64 {
+    let count = flows.count() as u64;
+    if keeps_flows(count, runs) { count * FLOW } else { 0 }
 }
 
 /// Bytes of the constants that are in memory for lanes at a time, estimated from flows spread over the map. If the flows
@@ -290,17 +247,16 @@ fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
         Steps::PerPeriod(steps) => Some(steps),
     };
     let sampled = flows.min(SAMPLED_FLOWS);
-    let bytes = |nth: u64| {
+    let sizes = (0..sampled).map(|nth| {
         // From the first flow to the last.
         let flow = (flows - 1) * nth / (sampled - 1).max(1);
         let model = scene.points().model(parts.cell(flow as u32));
         model.oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
-    };
+    });
     if keeps_flows(flows, runs) {
-        let sum: u64 = (0..sampled).map(bytes).sum();
-        (sum as f64 / sampled as f64 * flows as f64) as u64
+        (sizes.sum::<u64>() as f64 / sampled as f64 * flows as f64) as u64
     } else {
-        let largest = (0..sampled).map(bytes).max().unwrap_or(0);
+        let largest = sizes.max().unwrap_or(0);
         (flows.min(gpu::MOST_FLOWS as u64) * largest).min(gpu::MOST_BYTES.max(largest))
     }
 }
@@ -310,7 +266,7 @@ mod tests {
     use super::*;
     use crate::gpu::Constants;
     use crate::map::plan::Plan;
-    use crate::map::scene::{FileText, Purpose};
+    use crate::map::scene::Purpose;
     use crate::record::RecordStore;
     use rattlemap_dynamics::flow::Flow;
 
@@ -324,55 +280,42 @@ mod tests {
         Scene::parse(&text, "s", &sets, Purpose::Map).unwrap()
     }
 
-    /// So slow a forcing that the constants of each flow have 650 kB.
-    fn slow(rows: usize) -> Scene {
-        scene("omega", 0.002, 0.003, [2, rows], &[])
-    }
-
     #[test]
     fn estimates_of_flows_and_constants_are_close_upper_bounds() {
         for (second, min, max) in
             [("omega", 1.0, 12.0), ("omega", 0.01, 0.02), ("k", 1e3, 1e7), ("r1", 0.0, 9.0)]
         {
             let scene = scene(second, min, max, [5, 400], &[]);
-            let (size, plan) = (Size::of(&scene, None), Plan::new(&scene));
+            let (plan, parts) = (Plan::new(&scene), Parts::flows(scene.points()));
             assert!(plan.keeps_flows());
             let oscillators: Vec<_> =
                 (0..plan.flow_count() as u32).map(|flow| plan.oscillator(flow)).collect();
             let flows: usize = oscillators.iter().map(|oscillator| Flow::new(oscillator).bytes()).sum();
-            let ratio = size.flows as f64 / flows as f64;
-            assert!((1.0..2.0).contains(&ratio), "{second}: {} estimated, {flows} used", size.flows);
+            let ratio = kept_flows(&parts, scene.run_count()) as f64 / flows as f64;
+            assert!((1.0..2.0).contains(&ratio), "{second}: {ratio}");
             let of = |constants: Constants| {
                 size_of::<Constants>() + size_of::<[f64; 2]>() * constants.phasors.capacity()
             };
             let one_copy: usize =
                 oscillators.iter().filter_map(|oscillator| Constants::new(oscillator, None)).map(of).sum();
-            let copies = size.lane_tables as f64 / one_copy as f64;
+            let copies = lane_tables(&scene, &parts, scene.run_count()) as f64 / one_copy as f64;
             assert!((4.5..5.5).contains(&copies), "{second}: {copies} copies");
         }
     }
 
     #[test]
     fn only_flows_in_memory_at_a_time_are_counted() {
+        let sizes = |scene: &Scene| {
+            let (parts, runs) = (Parts::flows(scene.points()), scene.run_count());
+            (lane_tables(scene, &parts, runs), kept_flows(&parts, runs))
+        };
         let one = |scene: &Scene| gpu::table_bytes(&scene.base().oscillator().unwrap(), None);
-        let size = |scene: &Scene| Size::of(scene, None);
         // One flow: e and mesh_speed belong to the contact law.
         let single = scene("mesh_speed", 0.001, 0.01, [300, 300], &[]);
-        assert_eq!((size(&single).lane_tables, size(&single).flows), (one(&single), FLOW));
-        // Too many flows to be kept.
-        let many = scene("k", 1e3, 1e4, [2, 100_000], &[]);
-        assert_eq!((size(&many).lane_tables, size(&many).flows), (gpu::MOST_FLOWS as u64 * one(&many), 0));
-        assert_eq!(size(&slow(10_000)).lane_tables, gpu::MOST_BYTES);
-        assert!(size(&slow(8_000)).host_memory(EngineKind::Gpu) > 650_000 * 8_000);
-    }
-
-    #[test]
-    fn rows_of_a_list_need_memory() {
-        let text = "e,omega\n".to_owned() + &"0.5,5.6\n".repeat(100);
-        let find = |_, _: &str| Ok(FileText { name: "l.csv".to_owned(), text: text.clone() });
-        let list = Scene::parse_beside("[cells]\nfile = 'l.csv'\n", "s", &[], Purpose::Map, &find).unwrap();
-        let memory = |scene: Scene| Size::of(&scene, None).memory;
-        assert_eq!(memory(list) - memory(scene("omega", 1.0, 12.0, [10, 10], &[])), 100 * LIST_ROW);
+        assert_eq!(sizes(&single), (one(&single), FLOW));
+        let too_many = scene("k", 1e3, 1e4, [2, 100_000], &[]);
+        assert_eq!(sizes(&too_many), (gpu::MOST_FLOWS as u64 * one(&too_many), 0));
+        assert_eq!(sizes(&scene("omega", 0.002, 0.003, [2, 10_000], &[])).0, gpu::MOST_BYTES);
     }
 
     #[test]
@@ -389,34 +332,36 @@ mod tests {
             let scene = scene("omega", 0.25, 0.75, [10, 10], &sets);
             let plan = Plan::new(&scene);
             let (needs, runs) = (plan.needs(), plan.run_count());
-            let number = |is_needed: bool, value: f64| if is_needed { value } else { 0.0 };
+            let number = |is_needed: bool| if is_needed { 0.5 } else { 0.0 };
             let mut record = Record {
-                lyapunov: number(needs.exponent, 0.1),
-                lyapunov_error: number(needs.exponent, 0.01),
-                impacts_per_period: number(needs.impacts, 1.0),
-                mesh_fraction: number(needs.mesh, 0.5),
+                lyapunov: number(needs.exponent),
+                lyapunov_error: number(needs.exponent),
+                impacts_per_period: number(needs.impacts),
+                mesh_fraction: number(needs.mesh),
                 strobe: [1.0; 4],
                 period: 1,
                 periods_run: 100,
                 ..Record::default()
             };
-            let word = rattlemap_dynamics::word::Word::cyclic(b"13");
             if needs.word {
+                let word = rattlemap_dynamics::word::Word::cyclic(b"13");
                 record.set_word(&word);
                 record.set_pattern(&word);
             }
             let mut store = RecordStore::new(runs, plan.reads_strobes());
             (0..runs).for_each(|id| store.put(id, &record));
-            assert_eq!(store.bytes(), per_run * runs, "{quantities} {more:?}");
-            assert_eq!(Size::merged(&scene).memory, (per_run as u64 + RUN) * runs as u64);
-            assert!(Size::merged(&scene).memory < Size::of(&scene, None).memory);
+            assert_eq!((store.bytes(), stored_run(&scene)), (per_run * runs, per_run as u64), "{more:?}");
         }
     }
 
     #[test]
     fn a_map_that_does_not_fit_is_refused_with_a_remedy() {
-        let scene = slow(8_000);
-        let check = |kind, memory, disk| check_free(&scene, None, kind, &Free { memory, disk });
+        // So slow a forcing that the constants of each flow have 650 kB.
+        let scene = |files: &str| {
+            scene("omega", 0.002, 0.003, [2, 8_000], &[&format!("outputs.files=[{files}]")])
+        };
+        let [png, all] = [scene("'png'"), scene("'csv','npy','png','html'")];
+        let check = |kind, memory, disk| check_map(&all, None, kind, &Free { memory, disk });
         assert!(check(EngineKind::Cpu, Some(2_000_000_000), None).is_ok());
         for kind in [EngineKind::Gpu, EngineKind::Auto] {
             let text = check(kind, Some(2_000_000_000), None).unwrap_err().to_string();
@@ -424,19 +369,11 @@ mod tests {
             assert!(text.contains("or give --engine cpu"), "{text}");
         }
         assert!(check(EngineKind::Gpu, None, None).is_ok(), "an unknown amount is enough");
-        let disk = |files: &str| {
-            let set = format!("outputs.files={files}");
-            Size::of(&self::scene("omega", 1.0, 2.0, [2, 8_000], &[&set]), None).disk
-        };
-        let [png, all] = [disk("['png']"), disk("['csv','npy','png','html']")];
-        assert!(all > 3 * png, "{all} {png}");
-        assert!(check(EngineKind::Cpu, None, Some(Size::of(&scene, None).disk)).is_ok());
+        let [png, disk] = [&png, &all].map(|scene| Size::of(scene, None).disk);
+        assert!(disk > 3 * png, "{disk} {png}");
+        assert!(check(EngineKind::Cpu, None, Some(disk)).is_ok());
         let text = check(EngineKind::Cpu, None, Some(png)).unwrap_err().to_string();
         assert!(text.contains("of disk, and") && text.contains("--out"), "{text}");
-    }
-
-    #[test]
-    fn files_that_a_map_replaces_count_as_free() {
         let out = tempfile::tempdir().unwrap();
         for name in ["records.bin", "cells.csv", "report.html", "notes.txt"] {
             std::fs::write(out.path().join(name), [0; 1000]).unwrap();

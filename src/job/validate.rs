@@ -103,9 +103,8 @@ impl ValidateJob {
     /// [`JobError::Failed`] if a device fails.
     pub fn run_lanes(&self, halt: &Arc<AtomicBool>) -> Result<SampleLanes, JobError> {
         let subject = self.subject();
-        let open = |precision: Precision, choice: &AdapterChoice| {
-            pollster::block_on(Gpu::open(precision, choice))
-        };
+        let open =
+            |precision: Precision, choice: &AdapterChoice| pollster::block_on(Gpu::open(precision, choice));
         let (own, any) = (AdapterChoice::named(&self.map.manifest().device), AdapterChoice::default());
         let (mut gpu, note) = match subject.is_lane.then(|| open(subject.precision, &own)) {
             None => (None, None),
@@ -113,8 +112,7 @@ impl ValidateJob {
             Some(Err(why)) => match open(subject.precision, &any) {
                 Ok(gpu) => {
                     let device = gpu::describe(gpu.adapter());
-                    let note =
-                        format!("lanes ran again on {device}, not on the map's own device: {why}");
+                    let note = format!("lanes ran again on {device}, not on the map's own device: {why}");
                     (Some(gpu), Some(note))
                 }
                 Err(_) => (None, Some(format!("lanes did not run again: {why}"))),
@@ -127,9 +125,8 @@ impl ValidateJob {
         };
         gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.heed(halt));
         let lanes = pollster::block_on(Lanes::run(&subject, &self.sample, gpu.as_mut(), double.as_mut()));
-        let lanes = lanes.map_err(|error| {
-            JobError::Failed(format!("cannot compute the sample's lanes again: {error}"))
-        })?;
+        let lanes = lanes
+            .map_err(|error| JobError::Failed(format!("cannot compute the sample's lanes again: {error}")))?;
         Ok(SampleLanes { lanes, note })
     }
 
@@ -232,6 +229,9 @@ mod tests {
         let sample = validate::sample(&plan, &records, 4, 1);
         let validation = validate::replay(&subject, &sample, &Lanes::default(), &|_| {});
         let error = verdict(Path::new("o"), &plan, &validation).unwrap_err();
-        assert!(!error.is_usage() && error.to_string().starts_with("none of 4 cells was replayed"), "{error}");
+        assert!(
+            !error.is_usage() && error.to_string().starts_with("none of 4 cells was replayed"),
+            "{error}"
+        );
     }
 }

@@ -53,7 +53,7 @@ fn a_diagram_that_is_stopped_leaves_no_folder() {
     for start in ["rest", "up"] {
         let start = format!("start.policy={start}");
         let says =
-                "error: interrupted after 0 of 5 columns; no column is stored, and nothing was written to out/s";
+            "error: interrupted after 0 of 5 columns; no column is stored, and nothing was written to out/s";
         stops(folder.path(), &["bifurcation", "s.toml", "--set", &start], says);
         assert!(!folder.path().join("out").exists());
     }

@@ -58,7 +58,8 @@ fn no_layer_names_a_layer_above_its_own() {
             for hidden in ["crate::{", "crate::*", "use crate as"] {
                 assert!(!code.contains(hidden), "{}: {hidden}", source.display());
             }
-            wrong.extend(upward(own, &code).iter().map(|above| format!("{} names {above}", source.display())));
+            wrong
+                .extend(upward(own, &code).iter().map(|above| format!("{} names {above}", source.display())));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -80,7 +80,8 @@ impl Restart<'_> {
         let Map { run: options, shard, json, .. } = self.arguments;
         let mut words = vec!["rattlemap map".to_owned(), quoted(&options.scene.display().to_string())];
         words.extend(options.out.as_ref().map(|out| format!("--out {}", quoted(&out.display().to_string()))));
-        if let Some(name) = engine.engine.to_possible_value().filter(|_| engine.engine != EngineChoice::Auto) {
+        if let Some(name) = engine.engine.to_possible_value().filter(|_| engine.engine != EngineChoice::Auto)
+        {
             words.push(format!("--engine {}", name.get_name()));
         }
         words.extend(engine.precision.map(|precision| format!("--precision {}", precision.name())));

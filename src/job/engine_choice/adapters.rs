@@ -62,7 +62,9 @@ pub enum AdapterError {
         list: String,
     },
     /// No adapter contains this text.
-    #[error("--adapter {name}: no adapter's name, driver or PCI address contains this text; the adapters are: {list}")]
+    #[error(
+        "--adapter {name}: no adapter's name, driver or PCI address contains this text; the adapters are: {list}"
+    )]
     NoneCalled {
         /// The text.
         name: String,
@@ -120,7 +122,9 @@ pub(crate) fn select(
         Some(AdapterRequest::Number(number)) => {
             with(precision, numbered(*number, all)?, all).map(|found| only(found.number))
         }
-        Some(AdapterRequest::Named(name)) => with(precision, called(name, all)?, all).map(|found| only(found.number)),
+        Some(AdapterRequest::Named(name)) => {
+            with(precision, called(name, all)?, all).map(|found| only(found.number))
+        }
     }
 }
 
@@ -296,7 +300,12 @@ mod tests {
         rows.iter().enumerate().map(report).collect()
     }
 
-    fn selected(rows: &[Row], request: &str, environment: &str, precision: Precision) -> Result<Selection, String> {
+    fn selected(
+        rows: &[Row],
+        request: &str,
+        environment: &str,
+        precision: Precision,
+    ) -> Result<Selection, String> {
         let request = (!request.is_empty()).then(|| request.parse().unwrap());
         let environment = match environment {
             "" => AdapterChoice::default(),
