@@ -1,5 +1,5 @@
-//! Tells the program what it is made of: which sources decide the bits of a record, for what processor, and, for
-//! releases, which commit.
+//! Sets three environment variables that the sources read at compile time: `RATTLEMAP_SOURCES`, a hash of what decides the
+//! bits of a record; `RATTLEMAP_TARGET`, the processor that the code is compiled for; and `RATTLEMAP_COMMIT`.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -8,13 +8,15 @@ use std::{env, fs};
 
 use sha2::{Digest, Sha256};
 
-/// What decides the bits of a record, or the order of work that records are replayed in.
-const DECIDING: [&str; 20] = [
+/// Files and folders that decide the bits of a record or the order in which a resumed run repeats its cells.
+const DECIDING: [&str; 23] = [
     "dynamics/src",
     "models/gear_pair.toml",
     "shaders",
     "src/gpu",
     "src/record",
+    "src/map/catalogue.rs",
+    "src/map/cycle.rs",
     "src/map/engine.rs",
     "src/map/engine",
     "src/map/plan.rs",
@@ -27,12 +29,13 @@ const DECIDING: [&str; 20] = [
     "src/map/schedule.rs",
     "src/map/schedule",
     "src/map/shard.rs",
+    "src/map/statistics.rs",
     "src/model_file",
     "src/text/expression.rs",
     "src/text/expression",
 ];
 
-/// Packages whose arithmetic, or whose code for a device, goes into a record.
+/// Packages whose arithmetic or code for a device decides the bits of a record.
 const PACKAGES: [&str; 13] = [
     "bytemuck",
     "libm",
@@ -49,7 +52,7 @@ const PACKAGES: [&str; 13] = [
     "wide",
 ];
 
-/// What the program is made of.
+/// Files and folders that the program is built from. A change in one of them makes the commit `-modified`.
 const SOURCES: [&str; 8] = [
     "src",
     "dynamics/src",
@@ -65,16 +68,13 @@ fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-env=RATTLEMAP_SOURCES={}", sources());
     println!("cargo::rustc-env=RATTLEMAP_TARGET={}", target());
-    // Elsewhere every commit would have the library compiled anew, and each of its tests.
-    let is_release = env::var("PROFILE").is_ok_and(|profile| profile == "release");
-    let commit = is_release.then(commit).flatten().unwrap_or_else(|| "unknown".to_owned());
-    println!("cargo::rustc-env=RATTLEMAP_COMMIT={commit}");
+    println!("cargo::rustc-env=RATTLEMAP_COMMIT={}", commit().unwrap_or_else(|| "unknown".to_owned()));
 }
 
-/// A hash of all that decides what a record holds: sources by name and text, packages by version.
+/// Returns a hash of everything that decides what a record holds: sources by name and text, packages by version.
 fn sources() -> String {
     let mut hasher = Sha256::new();
-    let mut tell = |name: &str, text: &[u8]| {
+    let mut add = |name: &str, text: &[u8]| {
         hasher.update(name.as_bytes());
         hasher.update((text.len() as u64).to_le_bytes());
         hasher.update(text);
@@ -83,17 +83,17 @@ fn sources() -> String {
         println!("cargo::rerun-if-changed={source}");
         for file in files(Path::new(source)) {
             let name = file.to_string_lossy().replace('\\', "/");
-            tell(&name, &fs::read(&file).unwrap_or_default());
+            add(&name, &fs::read(&file).unwrap_or_default());
         }
     }
     println!("cargo::rerun-if-changed=Cargo.lock");
     let lock = fs::read_to_string("Cargo.lock").unwrap_or_default();
     for package in lock.split("[[package]]") {
-        let of =
+        let field =
             |key: &str| package.lines().find_map(|line| line.strip_prefix(key)).unwrap_or_default().trim();
-        let name = of("name = ").trim_matches('"');
+        let name = field("name = ").trim_matches('"');
         if PACKAGES.contains(&name) {
-            tell(name, of("version = ").as_bytes());
+            add(name, field("version = ").as_bytes());
         }
     }
     hasher.finalize().iter().take(8).fold(String::new(), |mut text, byte| {
@@ -102,48 +102,60 @@ fn sources() -> String {
     })
 }
 
-/// A file, or all in a folder, by name; none where it is not.
+/// Returns a file, or all files in a folder sorted by name; nothing where the path does not exist.
 fn files(path: &Path) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(path) else {
         return if path.is_file() { vec![path.to_owned()] } else { Vec::new() };
     };
     let mut entries: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    // Tests decide nothing.
+    // Tests do not decide records.
     entries.retain(|entry| !entry.ends_with("tests.rs"));
     entries.sort();
     entries.iter().flat_map(|entry| files(entry)).collect()
 }
 
-/// The processor and system that code is made for, and the processor's extensions that it may use.
+/// Returns the target triple and the processor's extensions that the compiler may use, sorted.
 fn target() -> String {
-    let of = |name: &str| env::var(name).unwrap_or_default();
+    let variable = |name: &str| env::var(name).unwrap_or_default();
     let mut features: Vec<String> =
-        of("CARGO_CFG_TARGET_FEATURE").split(',').map(ToOwned::to_owned).collect();
+        variable("CARGO_CFG_TARGET_FEATURE").split(',').map(ToOwned::to_owned).collect();
     features.sort();
-    format!("{} {}", of("TARGET"), features.join(",")).trim().to_owned()
+    format!("{} {}", variable("TARGET"), features.join(",")).trim().to_owned()
 }
 
-/// The commit of this package's own repository; none in a copy without one, or without git.
+/// Returns the commit that the program is built from, with `-modified` added if its sources differ from it.
 fn commit() -> Option<String> {
-    // A copy inside some other repository must not take that one's commit for its own.
+    // A package from `cargo package` and an archive from `git archive` name their commit in a file.
+    if let Some(commit) = [".cargo_vcs_info.json", ".git_archival.txt"].into_iter().find_map(recorded) {
+        return Some(commit);
+    }
+    // Development builds do not ask git: each commit would recompile the library and every test.
+    if env::var("PROFILE").is_ok_and(|profile| profile == "release") { checked_out() } else { None }
+}
+
+/// Reads a commit from a file. In a checkout, `.git_archival.txt` has a placeholder in its place.
+fn recorded(file: &str) -> Option<String> {
+    let text = fs::read_to_string(file).ok()?;
+    println!("cargo::rerun-if-changed={file}");
+    let is_commit = |word: &&str| word.len() == 40 && word.bytes().all(|byte| byte.is_ascii_hexdigit());
+    text.split(|letter: char| !letter.is_ascii_alphanumeric()).find(is_commit).map(ToOwned::to_owned)
+}
+
+/// Asks git for the commit of this package's own repository.
+fn checked_out() -> Option<String> {
+    // A copy inside another repository must not take the commit of that repository.
     if !git(&["rev-parse", "--show-prefix"])?.is_empty() {
         return None;
     }
-    let branch = git(&["symbolic-ref", "--quiet", "HEAD"]);
-    for name in [Some("HEAD"), branch.as_deref(), Some("packed-refs")].into_iter().flatten() {
-        let path = git(&["rev-parse", "--git-path", name])?;
-        // Cargo builds every time for a file that is not there.
-        if Path::new(&path).exists() {
-            println!("cargo::rerun-if-changed={path}");
-        }
-    }
-    let commit = git(&["rev-parse", "HEAD"])?;
-    // What is built of other sources is not that commit's.
+    // Git adds a line to this file whenever HEAD changes.
+    println!("cargo::rerun-if-changed={}", git(&["rev-parse", "--git-path", "logs/HEAD"])?);
     SOURCES.iter().for_each(|source| println!("cargo::rerun-if-changed={source}"));
+    let commit = git(&["rev-parse", "HEAD"])?;
     let changes = git(&[&["status", "--porcelain", "--"], &SOURCES[..]].concat())?;
     Some(if changes.is_empty() { commit } else { format!("{commit}-modified") })
 }
 
+/// Runs git and returns what it prints, or `None` if it fails.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())

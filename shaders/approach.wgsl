@@ -1,22 +1,23 @@
-// Does motion near a cycle end on it? The reference's rule (dynamics/src/orbit/approach.rs), over the last strobes.
+// Whether motion near a cycle ends on it, by the rule of the reference (dynamics/src/orbit/approach.rs) on the last
+// strobes.
 //
-// Only what the motion itself has shown of the strobe map counts: a stable cycle need not attract it. While its cycles
-// had the cycle's events and their deviations from it followed one another as the monodromy matrix says, a deviation
-// within the convex hull of the earlier ones stays in the part of the branch that was seen.
+// Only the strobes of the motion itself count, because a stable cycle need not be the motion's limit. While the
+// motion has the events of the cycle, and each deviation from the cycle follows from the last by the monodromy
+// matrix, a deviation within the convex hull of the earlier ones stays in the visited part of the branch.
 
-// Departures from the linear map, as a share of the deviation, that are small; where the motion is as near as `BENT_WITHIN`,
-// it may be off by all of the deviation.
+// A departure from the linear map may be this share of the deviation (LINEAR). Within `BENT_WITHIN` of the cycle,
+// relative to the motion, it may be all of the deviation.
 const BENT_WITHIN: Real = 5e-4;
-// How far outside of the hull a deviation may lie, as a share of itself, or relative to the motion.
-const OUTSIDE: Real = 0.1;
-const HAIR: Real = 1e-4;
-// Steps towards the nearest point of a hull.
+// How far outside the hull a deviation may lie: as a share of itself, or relative to the motion.
+const OUTSIDE_OF_DEVIATION: Real = 0.1;
+const OUTSIDE_OF_MOTION: Real = 1e-4;
+// Most steps towards the nearest point of a hull.
 const HULL_STEPS: u32 = 32u;
 
-// Notes a strobe of the motion, and the events of the period before it.
-fn leave_trail(itinerary: u32) {
-    noted.passed += 1u;
-    let place = noted.passed % TRAIL;
+// Stores a strobe of the motion, and the events of the period before it.
+fn store_strobe(itinerary: u32) {
+    search.strobe_count += 1u;
+    let place = search.strobe_count % TRAIL;
     motions[lane].trail[place] = strobe_state();
     tallies[lane].itineraries[place] = itinerary;
 }
@@ -25,44 +26,44 @@ fn trail(strobe: u32) -> array<Real, 4> {
     return motions[lane].trail[strobe % TRAIL];
 }
 
-// Cycles of the candidate's period, at most, that the trail holds.
+// Returns the number of cycles of the candidate's period that the trail holds.
 fn cycles_on_trail() -> u32 {
-    return (min(noted.passed, TRAIL) - 1u) / tally.candidate;
+    return (min(search.strobe_count, TRAIL) - 1u) / tally.candidate;
 }
 
-// One more period of the cycle has been read, the `read`-th: for how many of its last cycles has the motion had the
-// same events in it?
+// Updates the number of the motion's last cycles with the same events, after the `read`-th period of the cycle has
+// been read.
 fn compare_itineraries(itinerary: u32, read: u32) {
-    let is_own = noted.refinements == 0u;
-    // What is read along the motion is its last cycle.
-    let most = min(noted.shown, cycles_on_trail());
+    let is_own = search.newton_steps == 0u;
+    // A cycle that is read along the motion is itself the motion's last cycle.
+    let most = min(search.matching_cycles, cycles_on_trail());
     var cycles = select(0u, 1u, is_own);
     while cycles < most {
         iterations += 1u;
         let back = (cycles + 1u) * tally.candidate;
-        let strobe = select(noted.passed - back + read, noted.passed - back + tally.candidate, is_own);
+        let strobe = select(search.strobe_count - back + read, search.strobe_count - back + tally.candidate, is_own);
         if tallies[lane].itineraries[strobe % TRAIL] != itinerary {
             break;
         }
         cycles += 1u;
     }
-    noted.shown = min(noted.shown, cycles);
+    search.matching_cycles = min(search.matching_cycles, cycles);
 }
 
-// Cycles of a period that the motion must have shown.
-fn cycles_to_show(period: u32) -> u32 {
-    return min(SHOWN_CYCLES, (TRAIL - 1u) / period);
+// Returns the cycles of a period that the motion must have completed.
+fn required_cycles(period: u32) -> u32 {
+    return min(REQUIRED_CYCLES, (TRAIL - 1u) / period);
 }
 
-// Whether the same events have followed one another for as long as a cycle must show, but for the one to be read.
+// Whether the same events have recurred for the cycles that are required, without the one to be read.
 fn repeats_itself(period: u32) -> bool {
     if !EXPONENT {
         return true;
     }
-    let compared = period * (max(cycles_to_show(period), 2u) - 2u);
+    let compared = period * (max(required_cycles(period), 2u) - 2u);
     for (var n = 0u; n < compared; n++) {
         iterations += 1u;
-        let strobe = noted.passed - n;
+        let strobe = search.strobe_count - n;
         if strobe < period + 1u || tallies[lane].itineraries[strobe % TRAIL] != tallies[lane].itineraries[(strobe - period) % TRAIL] {
             return false;
         }
@@ -70,33 +71,33 @@ fn repeats_itself(period: u32) -> bool {
     return true;
 }
 
-// Whether the motion, which is at the end of its trail, stays by the cycle that has been read.
-fn stays(to: array<Real, 4>) -> bool {
-    let present = difference(trail(noted.passed), to);
+// Whether the motion, which is at the end of its trail, stays near the cycle that has been read.
+fn stays_near_cycle(to: array<Real, 4>) -> bool {
+    let present = difference(trail(search.strobe_count), to);
     let bend = select(LINEAR, Real(1.0), size_of(present) < BENT_WITHIN);
     let blurred = Real(noise());
-    let most = min(noted.shown, cycles_on_trail());
+    let most = min(search.matching_cycles, cycles_on_trail());
     var after = present;
     var cycles = 0u;
     while cycles < most {
         iterations += 1u;
-        let before = difference(trail(noted.passed - (cycles + 1u) * tally.candidate), to);
+        let before = difference(trail(search.strobe_count - (cycles + 1u) * tally.candidate), to);
         if size_of(difference(after, image_of(before))) > bend * size_of(before) + blurred {
             break;
         }
         after = before;
         cycles += 1u;
     }
-    return cycles >= cycles_to_show(tally.candidate) && is_in_hull(present, cycles, to);
+    return cycles >= required_cycles(tally.candidate) && is_in_hull(present, cycles, to);
 }
 
-// Whether a deviation lies within the convex hull of the origin and of those before it, or nearly so.
+// Whether a deviation lies within the convex hull of the origin and the earlier deviations, or nearly so.
 //
-// E. G. Gilbert, SIAM J. Control 4 (1966) 61: from the nearest point so far to the corner that lies farthest beyond it;
-// how far that is bounds the distance from below.
+// E. G. Gilbert, SIAM J. Control 4 (1966) 61: each step leads from the nearest point so far towards the corner that
+// lies farthest beyond it. That corner also gives a lower bound of the distance.
 fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
     let target_point = in_units(point);
-    let allowed = max(OUTSIDE * sqrt(dot(target_point, target_point)), HAIR);
+    let allowed = max(OUTSIDE_OF_DEVIATION * sqrt(dot(target_point, target_point)), OUTSIDE_OF_MOTION);
     if corners > 0u && distance_from_last(target_point, to) <= allowed {
         return true;
     }
@@ -109,7 +110,7 @@ fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
         var farthest = -target_point;
         for (var back = 1u; back <= corners; back++) {
             iterations += 1u;
-            let corner = in_units(difference(trail(noted.passed - back * tally.candidate), to)) - target_point;
+            let corner = in_units(difference(trail(search.strobe_count - back * tally.candidate), to)) - target_point;
             farthest = select(farthest, corner, dot(corner, nearest) < dot(farthest, nearest));
         }
         let step = farthest - nearest;
@@ -122,15 +123,16 @@ fn is_in_hull(point: array<Real, 4>, corners: u32, to: array<Real, 4>) -> bool {
     return false;
 }
 
-// How far it is from the deviation before: slow motion hardly moves, and the steps of the search would be short.
+// Returns the distance from the deviation before. In slow motion this decides at once; the steps of the search would
+// be short.
 fn distance_from_last(point: vec4<Real>, to: array<Real, 4>) -> Real {
-    let off = in_units(difference(trail(noted.passed - tally.candidate), to)) - point;
+    let off = in_units(difference(trail(search.strobe_count - tally.candidate), to)) - point;
     return sqrt(dot(off, off));
 }
 
-// A deviation in units of the motion.
+// Returns a deviation in units of the motion.
 fn in_units(u: array<Real, 4>) -> vec4<Real> {
     let rate = unit_of_rates();
-    let position = max(seen.position_scale, Real(1e-30));
+    let position = max(measures.position_scale, Real(1e-30));
     return vec4<Real>(u[0] / position, u[1] / rate, u[2] / position, u[3] / rate);
 }

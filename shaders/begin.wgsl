@@ -1,8 +1,8 @@
-// Before its first dispatch: a lane at its start.
+// Puts a lane at its start, before its first dispatch.
 
 @compute @workgroup_size(WORKGROUP)
 fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = settings.fresh + id.y * settings.row + id.x;
+    let i = settings.first_new + id.y * settings.row + id.x;
     if i >= settings.active_lanes {
         return;
     }
@@ -15,25 +15,25 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     motion.phasor = array<Real, 2>(1.0, 0.0);
     let walls = flows[cell.flow_index].walls;
     if motion.q[0] > walls[0] {
-        begin_beyond(SIDE_RIGHT);
+        start_behind_wall(SIDE_RIGHT);
     } else if motion.q[0] < walls[1] {
-        begin_beyond(SIDE_LEFT);
+        start_behind_wall(SIDE_LEFT);
     }
-    // What is on the trail is told by `noted.passed`.
+    // The trail needs no initial value: `strobe_count` is its length.
     motions[lane].now = motion;
-    motions[lane].seen = seen;
+    motions[lane].measures = measures;
     motions[lane].tangents = array<Real, 16>();
-    motions[lane].vector = fresh();
+    motions[lane].vector = initial_tangent();
     tallies[lane].now = tally;
-    tallies[lane].noted = noted;
+    tallies[lane].search = search;
     tallies[lane].distances = array<u32, 16>();
     tallies[lane].last_distances = array<u32, 16>();
     tallies[lane].word = array<u32, 7>();
     begin_pattern();
 }
 
-// A start beyond a wall is meshing.
-fn begin_beyond(side: u32) {
+// A start beyond a wall is a sustained contact.
+fn start_behind_wall(side: u32) {
     motion.q[0] -= flows[cell.flow_index].walls[side];
     tally.mode = MODE_SUSTAINED + side;
     tally.origin = side;

@@ -1,19 +1,18 @@
-// Chatter: ever slower impacts while the load presses. Short flights are followed by a
-// recurrence, one by one; what has no end, without a meshing speed, is closed by its limit.
+// Chatter: slower and slower impacts while the load presses. Short flights are followed impact by impact, with a
+// short series. An infinite sequence of impacts, without a meshing speed, is closed by its limit.
 
-// Whether impacts that the load presses back have no end.
+// Whether a sequence of impacts that the load presses back is infinite.
 fn is_endless(side: u32) -> bool {
     return restitution(side) < 1.0 && mesh_speed(side) <= NO_THRESHOLD * speed;
 }
 
-// Closes an infinite series of impacts by its limit, once it is so short that what the
-// formula leaves out is nothing: the gap comes to rest on the wall and meshing starts.
+// Closes an infinite sequence of impacts by its limit, once it is so short that the terms that the formula omits are
+// negligible. The gap then rests on the wall, and meshing starts.
 //
-// `u` is the leaving speed, with G the pressing acceleration, J its rate of change while the
-// gap stays closed and gamma the damping of the gap: the series lasts
-// `T (1 - J T / (3 G) - gamma T / 6)`, `T = 2 u / (G (1 - e))`, up to the third order.
-// Meanwhile the other coordinate moves as it does with the gap closed. Tangents are those of these
-// formulas, up to the second order.
+// `u` is the leaving speed, G the pressing acceleration, J its rate of change while the gap stays closed, and gamma
+// the damping of the gap. With `T = 2 u / (G (1 - e))` the sequence lasts `T (1 - J T / (3 G) - gamma T / 6)`, up to
+// third order. Meanwhile the other coordinate moves as with the gap closed. Tangent vectors follow these formulas up
+// to second order.
 fn close_chatter(side: u32, u: Real) {
     if !is_endless(side) {
         return;
@@ -22,10 +21,10 @@ fn close_chatter(side: u32, u: Real) {
     let sign = sign_of(side);
     let rate = motion.q[3] + kick * motion.q[1];
     let closed = array<Real, 4>(motion.q[0], 0.0, motion.q[2], rate);
-    // The wall takes up the acceleration of the gap, and x its share of it.
-    let taken = acceleration(here.gap_row, here.share, closed);
-    let v_rate = acceleration(here.x_row, here.share, closed) + kick * taken;
-    let pressing = sign * taken;
+    // The wall takes up the acceleration of the gap; x receives its share of that force.
+    let wall_acceleration = acceleration(here.gap_row, here.share, closed);
+    let v_rate = acceleration(here.x_row, here.share, closed) + kick * wall_acceleration;
+    let pressing = sign * wall_acceleration;
     let whole = 2.0 * u / (pressing * (1.0 - e));
     if !(pressing > 0.0 && whole < closing) {
         return;
@@ -34,8 +33,8 @@ fn close_chatter(side: u32, u: Real) {
     let change = sign * (row[2] * rate + row[3] * v_rate - row[4] * here.angle * motion.phasor[1]);
     let damping = kick * row[3] - row[1];
     let lasts = whole * (1.0 - (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole);
-    // A series cut by the strobe goes on bouncing until it lies within one stretch.
-    if lasts <= 0.0 || lasts >= to_stop_phase(next_stop_phase()) {
+    // A sequence that a stop phase interrupts continues impact by impact, until it fits before the next one.
+    if lasts <= 0.0 || lasts >= steps_to_stop_phase(next_stop_phase()) {
         return;
     }
     let across = here.x_row;
@@ -43,12 +42,12 @@ fn close_chatter(side: u32, u: Real) {
     let v_by_v = across[3] + kick * row[3];
     let v_jerk = (v_by_x * rate + v_by_v * v_rate) - (across[4] + kick * row[4]) * here.angle * motion.phasor[1];
     if EXPONENT {
-        // A neighbour leaves at another time, and so at another speed and under another pressing acceleration: by
-        // `late_by` its series ends later.
+        // A neighbour leaves at another time, and so at another speed and under another pressing acceleration: its
+        // sequence ends later by `late_by`.
         let per_speed = (1.0 - 2.0 * (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole) * whole / u;
         let per_pressing = whole / pressing;
         crossing.lasts = lasts;
-        // What sticks to the wall at the end does so wherever it comes from.
+        // A gap that sticks at the end does so for all neighbours.
         crossing.pressing = select(sign * (pressing + lasts * change), Real(0.0), is_rigid(side));
         crossing.late_by = array<Real, 4>(
             sign * (1.0 - per_speed * (pressing + damping * u) - per_pressing * change) / u,
@@ -71,16 +70,16 @@ fn close_chatter(side: u32, u: Real) {
     tally.order = 2u;
     if is_rigid(side) {
         tally.mode = MODE_STUCK + side;
-        tally.order = held_order(side);
+        tally.order = stuck_order(side);
     }
     enter(domain_of(tally.mode));
 }
 
-// Whether the last event was an impact from which chatter is to be followed.
+// Whether the last event was an impact that begins a series of short flights.
 var<private> chatters: bool;
 
-// Whether the flight from wall `side` is short, by its parabola, and two more after it, leaving
-// at speed `u`.
+// Whether the flight from wall `side` at leaving speed `u` is short, judged by its parabola, and whether two more
+// flights follow.
 fn begins_chatter(side: u32, u: Real) -> bool {
     let e = restitution(side);
     let pressing = sign_of(side) * acceleration(here.gap_row, here.share, motion.q);
@@ -88,28 +87,27 @@ fn begins_chatter(side: u32, u: Real) -> bool {
     return mesh_speed(side) <= FOLLOWED_MESH_SPEED * speed && is_short && e * e * u > least_leaving(side, pressing);
 }
 
-// The leaving speed at which a series ends in meshing, or by its limit where it has no end.
+// Returns the leaving speed at which a sequence ends in meshing or, if it is infinite, is closed by its limit.
 fn least_leaving(side: u32, pressing: Real) -> Real {
-    // A hundredth more than `close_chatter` asks for, so that it is met before.
+    // 1 % more than `close_chatter` needs, so that this limit is reached first.
     return select(mesh_speed(side), 0.505 * closing * (1.0 - restitution(side)) * pressing, is_endless(side));
 }
 
-// Flights that are followed in one go.
+// Most flights that are followed in one call.
 const SHORT_FLIGHTS: u32 = 100u;
 
-// Follows the motion from an impact that the load presses back, impact by impact, for as long
-// as flights are short: fewer terms of the series then give the flight to rounding, its end
-// needs no search, and nothing else can happen on it.
+// Follows the motion from an impact that the load presses back, impact by impact, while flights are short. Fewer
+// terms of the series then give a flight to rounding, its end needs no search, and no other event is possible on it.
 //
-// With n = SHORT_TERMS - 1 terms of the gap beyond its start, G the pressing acceleration and B
-// a bound on the n-th derivative (the next one is at most 2 B: a step turns the fastest mode
-// by a radian), a flight of length t ends with a speed that is wrong by
-// `4 (B / G) t^(n-1) / n! (1 + 2 / (n + 1))` of itself: at most ULP where
-// `B (t / SHORT)^(n-1) <= G`. Each flight being e times as long as the last, a whole series
-// errs by `1 / (1 - e^(n-1))` times that of its first flight.
+// Let n = SHORT_TERMS - 1 be the number of the gap's terms beyond its start, G the pressing acceleration, and B a
+// bound on the n-th derivative. The next derivative is at most 2 B, because a step turns the fastest mode by at most
+// a radian. At the end of a flight of length t, the relative error of the speed is then at most
+// `4 (B / G) t^(n-1) / n! (1 + 2 / (n + 1))`. It is at most ULP where `B (t / SHORT)^(n-1) <= G`. Each flight is e
+// times as long as the one before, so that the error of a whole sequence is at most `1 / (1 - e^(n-1))` times that of
+// its first flight.
 //
-// The impact with which meshing or the limit of an infinite series begins, and whatever comes
-// after the load has ceased to press, is left to the careful step.
+// The careful step handles the impact with which meshing or the limit begins, and the motion after the load has
+// ceased to press.
 fn follow_chatter(side: u32) {
     let sign = sign_of(side);
     let e = restitution(side);
@@ -120,7 +118,7 @@ fn follow_chatter(side: u32) {
     for (var n = 0u; n < SHORT_FLIGHTS; n++) {
         expand_short();
         let t = short_flight();
-        if !(t > 0.0 && elapsed + t < 1.0 && t < to_stop_phase(next_stop_phase())) {
+        if !(t > 0.0 && elapsed + t < 1.0 && t < steps_to_stop_phase(next_stop_phase())) {
             break;
         }
         let end = short_end(t);
@@ -149,7 +147,7 @@ fn follow_chatter(side: u32) {
     renew_bound();
 }
 
-// As `expand`, for motion that starts on a wall and to fewer terms.
+// Expands motion that starts on a wall, like `expand` but with fewer terms.
 fn expand_short() {
     let q = motion.q;
     let g = here.gap_row;
@@ -166,11 +164,11 @@ fn expand_short() {
     //% again expand for k in 0..SHORT_TERMS-2
 }
 
-// How long the flight from the wall lasts, in steps; 0 if it is not short.
+// Returns the length of the flight from the wall, in steps; 0 if it is not short.
 fn short_flight() -> Real {
     let w = gap_terms[1];
     let half = gap_terms[2];
-    // The parabola's root, and two orders more.
+    // Root of the parabola, corrected by two orders.
     let inverse = 1.0 / half;
     let first = -w * inverse;
     let cubic = first * gap_terms[3] * inverse;
@@ -188,8 +186,8 @@ fn short_flight() -> Real {
         step = p / p1;
         t -= step;
     }
-    // All of the flight is pressed by half of G at least: it returns once, and from less than
-    // `w^2 / G` off the wall. The other wall must be farther away.
+    // The flight is pressed by at least half of G throughout: it returns once, and its height is below `w^2 / G`. The
+    // other wall must be farther away.
     let is_clear = w * w < abs(half) * (walls[0] - walls[1]);
     var change: Real = 0.0;
     //% for k in 3..SHORT_TERMS down
@@ -212,7 +210,7 @@ fn short_flight() -> Real {
     return select(Real(0.0), t, t > 0.0 && is_pressed && is_clear && is_exact);
 }
 
-// Where a short flight ends, before the impact.
+// State at the end of a short flight, before the impact.
 struct End {
     rate: Real,
     acceleration: Real,
@@ -258,6 +256,6 @@ fn carry_over_short(t: Real, end: End, removed: Real) {
         set_tangent(i, saltate(glide_short(tangent(i), t)));
     }
     if tally.tangent_count == 1u {
-        tame();
+        rescale_tangent();
     }
 }

@@ -1,22 +1,23 @@
-// The queue of lanes that a variant has work for, or whose records are to be read: the others cost nothing, and those
-// in it keep their order, for neighbours behave alike.
+// Compaction: lists the lanes that a variant has work for, or that have ended. Other lanes then cost nothing. The
+// list keeps the order of the active list, because neighbours behave alike.
 //
-// Three passes: blocks of the active list are counted, the counts summed up, and what is left of every block
-// put in its place in the queue.
+// Three passes: count the selected lanes of each block of the active list, sum the counts, and copy each block's
+// lanes to their place.
 
 var<workgroup> block_counts: array<u32, BLOCK>;
 
-// The lane at a place of the active list, and of the queue.
+// Returns the lane at a place of the active list.
 fn active_lane(i: u32) -> u32 {
     return queue.lanes[i];
 }
 
-fn queued(i: u32) -> u32 {
+// Returns the lane at a place of the list of selected lanes.
+fn selected_lane(i: u32) -> u32 {
     return queue.lanes[settings.slots + i];
 }
 
-// Whether place `i` of the active list holds a lane that this variant has work for, or one that has ended.
-fn is_left(i: u32) -> bool {
+// Whether place `i` of the active list holds a lane that is selected.
+fn is_selected(i: u32) -> bool {
     if i >= settings.active_lanes {
         return false;
     }
@@ -24,10 +25,10 @@ fn is_left(i: u32) -> bool {
     if settings.ended == 1u {
         return is_over();
     }
-    return running();
+    return has_work();
 }
 
-// Inclusive sums of a block's numbers.
+// Computes the inclusive sums of a block's numbers.
 fn sum_block(k: u32, own: u32) {
     block_counts[k] = own;
     workgroupBarrier();
@@ -42,35 +43,35 @@ fn sum_block(k: u32, own: u32) {
     }
 }
 
-// Each workgroup takes every `groups.x`-th block: there may be more of them than workgroups.
+// Each workgroup takes every `groups.x`-th block: there may be more blocks than workgroups.
 @compute @workgroup_size(BLOCK)
-fn count_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
+fn count_selected(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
     let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
     for (var b = group.x; b < blocks; b += groups.x) {
-        sum_block(k, select(0u, 1u, is_left(b * BLOCK + k)));
+        sum_block(k, select(0u, 1u, is_selected(b * BLOCK + k)));
         if k == BLOCK - 1u {
-            starts_of_blocks[b] = block_counts[k];
+            block_starts[b] = block_counts[k];
         }
         workgroupBarrier();
     }
 }
 
-// One workgroup: where each block's lanes go, and how many there are.
+// One workgroup computes the place of each block's lanes, and the total.
 @compute @workgroup_size(BLOCK)
-fn sum_left(@builtin(local_invocation_index) k: u32) {
+fn sum_selected(@builtin(local_invocation_index) k: u32) {
     let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
     let share = (blocks + BLOCK - 1u) / BLOCK;
     let begin_at = min(k * share, blocks);
     let end_at = min(begin_at + share, blocks);
     var own = 0u;
     for (var b = begin_at; b < end_at; b++) {
-        own += starts_of_blocks[b];
+        own += block_starts[b];
     }
     sum_block(k, own);
     var start = block_counts[k] - own;
     for (var b = begin_at; b < end_at; b++) {
-        let count = starts_of_blocks[b];
-        starts_of_blocks[b] = start;
+        let count = block_starts[b];
+        block_starts[b] = start;
         start += count;
     }
     if k == BLOCK - 1u {
@@ -80,15 +81,15 @@ fn sum_left(@builtin(local_invocation_index) k: u32) {
 }
 
 @compute @workgroup_size(BLOCK)
-fn move_left(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
+fn move_selected(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) k: u32) {
     let blocks = (settings.active_lanes + BLOCK - 1u) / BLOCK;
     for (var b = group.x; b < blocks; b += groups.x) {
         let i = b * BLOCK + k;
-        let stays = is_left(i);
+        let stays = is_selected(i);
         let own = select(0u, 1u, stays);
         sum_block(k, own);
         if stays {
-            let place = starts_of_blocks[b] + block_counts[k] - own;
+            let place = block_starts[b] + block_counts[k] - own;
             queue.lanes[settings.slots + place] = active_lane(i);
         }
         workgroupBarrier();

@@ -1,4 +1,4 @@
-// The model: domains, the contact law, and what it takes to mesh.
+// The contact law: domains, impacts, and the conditions of meshing.
 
 fn domain_of(mode: u32) -> u32 {
     if mode == MODE_FREE {
@@ -15,13 +15,13 @@ fn sign_of(side: u32) -> Real {
     return select(Real(-1.0), Real(1.0), side == SIDE_RIGHT);
 }
 
-// An acceleration from its row, in units of the domain's step. `q` in lane units.
+// Returns an acceleration from its row, in units of the domain's step. `q` is in lane units.
 fn acceleration(row: array<Real, 6>, share: Real, q: array<Real, 4>) -> Real {
     return (row[0] * q[0] + row[2] * q[2]) + share * (row[1] * q[1] + row[3] * q[3])
         + (row[4] * motion.phasor[0] + row[5]);
 }
 
-// The first derivative of the gap from the second on that is not zero points into the wall.
+// Whether the gap is pressed into the wall: the first nonzero derivative, from the second on, points into it.
 fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
     var first = acceleration(pull.gap_row, pull.share, q);
     if first == 0.0 || (q[1] == 0.0 && abs(first) <= balance(pull.gap_row, pull.share, q)) {
@@ -30,20 +30,20 @@ fn presses(pull: Pull, side: u32, q: array<Real, 4>) -> bool {
     return sign_of(side) * first > 0.0;
 }
 
-// Accelerations of a gap at rest that are no larger are rounding of what balances: summed up in another
-// order, or in another domain, they have the other sign. A gap that leaves its wall by one and is pressed back
-// by the other would do so for ever, each time for less than its place can tell.
+// Returns the size up to which an acceleration of a gap at rest counts as zero. Where its terms cancel, its sign is
+// rounding, and depends on the order of summation and on the domain. If two domains disagreed, the gap would leave its
+// wall and be pressed back for ever.
 fn balance(row: array<Real, 6>, share: Real, q: array<Real, 4>) -> Real {
     return 4.0 * ULP * ((abs(row[0] * q[0]) + abs(row[2] * q[2])) + share * abs(row[3] * q[3])
         + (abs(row[4] * motion.phasor[0]) + abs(row[5])));
 }
 
-// The first of the derivatives of the gap from the third to the fifth that is not zero.
+// Returns the first nonzero derivative of the gap from the third to the fifth.
 fn later_derivative(pull: Pull, q: array<Real, 4>) -> Real {
     let g = pull.gap_row;
     let r = pull.x_row;
     var first: Real = 0.0;
-    // Derivatives of order k and k + 1, that of the gap of order 2 being zero.
+    // Derivatives of order k and k + 1. The gap's derivative of order 2 is zero.
     var z = pull.share * q[1];
     var w: Real = 0.0;
     var x = pull.share * q[3];
@@ -67,25 +67,26 @@ fn later_derivative(pull: Pull, q: array<Real, 4>) -> Real {
     return first;
 }
 
-// What an event does to the motion.
+// Effect of an event on the motion.
 struct Jump {
-    // Whether it is one; what governs the motion next.
+    // Whether there is an event, and the mode after it.
     event: bool,
     mode: u32,
-    // The event function: its gradient and its rate, per free step.
+    // Event function: its gradient and its rate, per free step.
     normal: array<Real, 4>,
     rate: Real,
-    // Factor of the gap's rate, and what the rate of x takes of the gap's.
-    kept: Real,
+    // Factor of the gap's rate, and change of the rate of x per unit of the gap's rate.
+    rate_factor: Real,
     kick: Real,
-    // Leaving speed of an impact that the load presses back.
+    // Leaving speed of an impact after which the load presses the gap back.
     pressed_back: Real,
 }
 
 // The gradient of the gap.
 const ALONG_GAP = array<Real, 4>(1.0, 0.0, 0.0, 0.0);
 
-// Free motion reaches a wall: the impact law, then meshing or not. The gap is on the wall.
+// Applies the contact law where free motion reaches a wall: an impact, or the start of meshing. The gap is on the
+// wall.
 fn contact(side: u32, settling: bool) -> Jump {
     if is_elastic(side) {
         return enter_elastic(side);
@@ -100,7 +101,7 @@ fn contact(side: u32, settling: bool) -> Jump {
     after[3] += kick * (sign * (1.0 + e) * approach);
     let pressed = presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, after);
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], -e, kick * (1.0 + e), 0.0);
-    // On or beyond the wall by rounding, or by its start: a contact only if it closes.
+    // A start on or beyond the wall (within rounding, too) is a contact only if the gap closes.
     if settling && (closing < 0.0 || (closing == 0.0 && !pressed)) {
         return jump;
     }
@@ -128,7 +129,7 @@ fn contact(side: u32, settling: bool) -> Jump {
     return jump;
 }
 
-// The gap falls back through the wall, `tau` after the expansion.
+// Ends sustained contact: the gap falls back through the wall, `tau` after the expansion point.
 fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
     let sign = sign_of(side);
     var jump = Jump(false, tally.mode, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
@@ -145,15 +146,15 @@ fn end_meshing(side: u32, settling: bool, tau: Real) -> Jump {
     jump.event = true;
     jump.mode = MODE_FREE;
     motion.q[0] = walls[side];
-    // One that was at rest, its load balanced, is let go at rest: by the rate that it has by then, which is
-    // rounding, free motion would go by the sign of an acceleration that is rounding, too, and press it back.
+    // A gap that was at rest under a balanced load leaves at rest. Its computed rate is rounding. With that
+    // rate, the next acceleration, which is rounding, too, could press it back.
     let leaving = max(-sign * motion.q[1], Real(0.0));
     motion.q[1] = select(-sign * leaving, Real(0.0), leaving <= here.substeps * balanced * tau);
     return jump;
 }
 
-// Pressing ceases inside the contact onset, `tau` after the expansion: the event function is the
-// acceleration itself.
+// Ends the contact onset because the load no longer presses, `tau` after the expansion point. The event function is
+// the acceleration.
 fn end_onset(side: u32, tau: Real) -> Jump {
     let row = here.gap_row;
     let normal = array<Real, 4>(row[0], here.share * row[1], row[2], here.share * row[3]);
@@ -161,7 +162,7 @@ fn end_onset(side: u32, tau: Real) -> Jump {
     return Jump(true, MODE_FREE, normal, here.substeps * pressing_jet(tau).y, 1.0, 0.0, 0.0);
 }
 
-// The contact onset is over; no event.
+// Ends the contact onset in sustained contact. That is no event.
 fn onset_ends(side: u32) -> Jump {
     let sign = sign_of(side);
     motion.q[1] = sign * max(sign * motion.q[1], Real(0.0));
@@ -169,9 +170,9 @@ fn onset_ends(side: u32) -> Jump {
 }
 
 fn count_event(side: u32) {
-    note_symbol(side);
-    note_strobe();
-    // Meshing that ends before the wall is reached is another branch: modes tell.
+    add_symbol(side);
+    count_on_strobe();
+    // Meshing that ends before the wall is reached belongs to another branch: its mode differs.
     tally.itinerary = mix_bits(tally.itinerary + 2u * tally.mode + side + 1u);
     tally.origin = side;
     tally.events += 1u;

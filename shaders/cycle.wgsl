@@ -1,10 +1,10 @@
-// The cycle that was read: is it stable, and has the lane come near it?
+// Judges the cycle that was read: whether it is stable, and whether the lane has come near it.
 
-// A lane that rests on an unstable cycle is moved by so many times what counts as rest.
-const KICK: f32 = 8.0;
+// Size of the perturbation that moves a lane off an unstable cycle, in multiples of the distance that counts as rest.
+const PERTURBATION: f32 = 8.0;
 
-// The binary logarithm of a number near 1e-30 to 1e30, to the precision of its type: f64 has no
-// logarithm of its own. `ln m = 2 artanh((m - 1) / (m + 1))`, m within a factor of sqrt 2 of 1.
+// Returns the binary logarithm of a number between about 1e-30 and 1e30, to the precision of its type: f64 has no
+// logarithm. `ln m = 2 artanh((m - 1) / (m + 1))`, with m within a factor of sqrt 2 of 1.
 fn octaves_of(x: Real) -> Real {
     let whole = round(log2(f32(x)));
     let m = x * Real(ldexp(1.0, -i32(whole)));
@@ -15,8 +15,8 @@ fn octaves_of(x: Real) -> Real {
     return Real(whole) + (2.0 / LN_2) * s * series;
 }
 
-// The growth of what has lost all of its neighbours: a gap that has stuck to a wall, with nothing beside it.
-const SUPERSTABLE: Real = -1e9;
+// Growth in octaves if all neighbours end in the same motion: a gap that has stuck to a wall, with one displacement.
+const SUPERSTABLE_GROWTH: Real = -1e9;
 
 fn largest_entry(m: array<Real, 16>) -> Real {
     var size: Real = 0.0;
@@ -26,9 +26,9 @@ fn largest_entry(m: array<Real, 16>) -> Real {
     return size;
 }
 
-// A matrix with the eigenvalues of `m / size`: one step of the QR iteration, by rotations. What makes `m`
-// large beside its eigenvalues comes to lie above the diagonal. Squares of `m` itself would lose them:
-// where 46 beside 0.15 was the largest entry, a fifth of the radius in f32.
+// Returns a matrix with the eigenvalues of `m / size`, by one step of the QR iteration with rotations. Entries of `m`
+// that are large beside its eigenvalues move above the diagonal. Squaring `m` itself would lose the eigenvalues: with
+// 46 as the largest entry beside 0.15, the radius in f32 was wrong by a fifth.
 fn nearly_triangular(m: array<Real, 16>, inverse: Real) -> array<Real, 16> {
     var r = m;
     for (var k = 0u; k < 16u; k++) {
@@ -64,19 +64,18 @@ fn nearly_triangular(m: array<Real, 16>, inverse: Real) -> array<Real, 16> {
     return r;
 }
 
-// The binary logarithm of the spectral radius of the monodromy matrix, whose columns the
-// tangent vectors are: they started as the unit vectors. With `n = 2^SQUARINGS` the modulus of
-// the largest multiplier is `|M^n|^(1/n)` up to a factor of `kappa^(1/n)`, kappa the condition
-// of its eigenvectors.
+// Returns the binary logarithm of the spectral radius of the monodromy matrix. Its columns are the tangent vectors,
+// which started as unit vectors. With `n = 2^SQUARINGS`, the modulus of the largest multiplier is `|M^n|^(1/n)` up to
+// a factor of `kappa^(1/n)`, where kappa is the condition of the eigenvectors.
 fn spectral_growth() -> Real {
     var m = motions[lane].tangents;
     let whole = largest_entry(m);
     if !(whole < 1e30) {
-        // Beyond what can be told, and no number any more.
+        // Too large, or not a number.
         return 100.0;
     }
     if KINDS && whole == 0.0 {
-        return SUPERSTABLE;
+        return SUPERSTABLE_GROWTH;
     }
     if !(whole > 1e-30) {
         return -100.0;
@@ -87,7 +86,7 @@ fn spectral_growth() -> Real {
     for (var n = 0u; n <= SQUARINGS; n++) {
         let size = largest_entry(m);
         if !(size > 1e-30) {
-            // Superstable, as far as can be told.
+            // Superstable within rounding.
             return -100.0;
         }
         growth += weight * octaves_of(size);
@@ -105,148 +104,149 @@ fn spectral_growth() -> Real {
     return growth;
 }
 
-// Without exponents recurrence alone must do. A lane that has read a cycle which does not
-// attract, or which it has not come close to as its multiplier tells now, goes on while it has
-// periods left: chaos stays near unstable cycles, and where a pair of cycles has just vanished.
+// Decides what follows when a cycle has been read. Without exponents, recurrence alone decides. If the cycle
+// is unstable, or if its multiplier shows that the lane is still too far from it, the lane goes on while it has periods
+// left: chaos stays near unstable cycles, and near places where a pair of cycles has just vanished.
 fn judge_cycle() {
     tally.stage = STAGE_DONE;
     let is_last = tally.period >= settings.longest;
     if !EXPONENT {
-        // As near its start as at the end: a multiple of the period has been read.
-        if noted.divisor > 0u && noted.divisor_apart + 8u >= noted.apart && reads_divisor() {
+        // The divisor's distance is as small as the cycle's: a multiple of the period has been read.
+        if search.divisor > 0u && search.divisor_distance + 8u >= search.return_distance && reads_divisor() {
             return;
         }
-        noted.cycle = tally.candidate;
+        search.cycle = tally.candidate;
         return;
     }
     carry_vector();
-    seen.cycle_growth = spectral_growth();
-    note_branch();
+    measures.cycle_growth = spectral_growth();
+    store_branch();
     let to = fixed_point();
-    noted.off = octaves(distance_between(strobe_state(), to));
-    let is_stable = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
-    // Beside a graze the map has no derivative that tells where the cycle is.
-    let is_smooth = tally.grazes == 0u || noted.refinements > 0u;
-    // And where rounding is amplified it throws the lane off: such cycles are waited for.
-    let helps = is_smooth && noted.failed_searches < MOST_FAILED_SEARCHES;
-    if is_stable && helps && settings.early_stop == 1u && !is_last && away() > REFINED && refine(to) {
+    search.linear_distance = octaves(distance_between(strobe_state(), to));
+    let is_stable = measures.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    // Near a graze the strobe map has no derivative that locates the cycle.
+    let is_smooth = tally.grazes == 0u || search.newton_steps > 0u;
+    // Where rounding is amplified, it moves the lane away from the fixed point: such cycles are only waited for.
+    let helps = is_smooth && search.failed_searches < MOST_FAILED_SEARCHES;
+    if is_stable && helps && settings.early_stop == 1u && !is_last && distance_to_cycle() > NEWTON_CONVERGED && refine(to) {
         tally.stage = STAGE_READING;
         return;
     }
-    let is_found = is_stable && is_own() && is_on_cycle(to, is_last);
-    let is_cycle = is_found && (is_held(to, is_last) || stays(to));
+    let is_found = is_stable && is_on_branch() && is_on_cycle(to, is_last);
+    let is_cycle = is_found && (rests_on_cycle(to, is_last) || stays_near_cycle(to));
     if is_found && !is_cycle {
-        // Newton's method has led somewhere.
-        noted.failed_searches = 0u;
-        give_up();
+        // Newton's method has found a cycle.
+        search.failed_searches = 0u;
+        return_to_start();
         if !is_last {
-            check_again();
-            noted.asked = 0u;
+            continue_search();
+            search.checks_divisor = 0u;
         }
         return;
     }
     if is_cycle && (!is_multiple() || is_rejected()) {
-        noted.cycle = tally.candidate;
+        search.cycle = tally.candidate;
         return;
     }
     if is_cycle && reads_divisor() {
         return;
     }
-    // Where Newton's method has left the branch of the motion, a lane that goes back to where it set out
-    // would set out once more, for ever.
-    let is_lost = noted.refinements > 0u && !is_own();
-    if is_stable && !is_lost && noted.refinements > 0u {
-        noted.failed_searches += 1u;
+    // Newton's method has left the branch of the motion. A lane that returned to its start would search in the same
+    // way again.
+    let is_lost = search.newton_steps > 0u && !is_on_branch();
+    if is_stable && !is_lost && search.newton_steps > 0u {
+        search.failed_searches += 1u;
     }
-    give_up();
+    return_to_start();
     if is_last {
         return;
     }
     if is_stable && !is_lost {
-        check_again();
+        continue_search();
     } else {
-        search_on();
+        restart_search();
     }
-    noted.asked = 0u;
+    search.checks_divisor = 0u;
 }
 
-// Reads the divisor of the period, if there is time left.
+// Starts to read the divisor of the period. Returns false if too few periods are left.
 fn reads_divisor() -> bool {
-    if tally.period + noted.divisor > settings.longest {
+    if tally.period + search.divisor > settings.longest {
         return false;
     }
-    tally.candidate = noted.divisor;
-    noted.asked = 1u;
-    noted.settled = 0u;
+    tally.candidate = search.divisor;
+    search.checks_divisor = 1u;
+    search.is_settled = 0u;
     begin_reading();
     return true;
 }
 
-// The cycle is stable, but too far off: its recurrences count on.
-fn check_again() {
+// Continues the search: the cycle is stable, but too far away. Its recurrences still count.
+fn continue_search() {
     tally.stage = STAGE_RUNNING;
-    noted.has_read = 0u;
-    noted.rejected_divisor = 0u;
+    search.has_read = 0u;
+    search.rejected_divisor = 0u;
     begin_counting();
     resume_growth();
-    begin_window(strobe_state(), noted.window);
+    begin_window(strobe_state(), search.window);
 }
 
-// The exponent goes on; recurrence from scratch.
-fn search_on() {
-    // Rounding may hold a lane on an unstable cycle for ever.
-    let is_unstable = seen.cycle_growth > NEUTRAL * Real(tally.candidate);
-    if is_unstable && noted.apart >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
-        motion.q[1] += Real(KICK * exp2(-f32(AT_REST) / OCTAVE)) * seen.rate_scale;
+// Restarts the search for recurrences. The average of the exponent continues.
+fn restart_search() {
+    // Rounding can hold a lane on an unstable cycle for ever.
+    let is_unstable = measures.cycle_growth > NEUTRAL * Real(tally.candidate);
+    if is_unstable && search.return_distance >= AT_REST && tally.mode == MODE_FREE && tally.order == 0u {
+        motion.q[1] += Real(PERTURBATION * exp2(-f32(AT_REST) / PARTS_PER_OCTAVE)) * measures.rate_scale;
         motion.bound = 0.0;
-        noted.passed = 0u;
-        // What grew there was no chaos.
-        noted.blocks = 0u;
-        noted.block_periods = 0u;
+        search.strobe_count = 0u;
+        // Growth there was that of the unstable cycle, not of chaos.
+        search.blocks = 0u;
+        search.block_periods = 0u;
         motion.block_growth = 0.0;
-        seen.growth_sum = 0.0;
-        seen.growth_squares = 0.0;
+        measures.growth_sum = 0.0;
+        measures.growth_squares = 0.0;
     }
     tally.stage = STAGE_RUNNING;
-    noted.has_read = 0u;
-    noted.tries += 1u;
-    // A stable one, which was not come near to, may be the cycle all the same.
-    let is_stable = seen.cycle_growth < -NEUTRAL * Real(tally.candidate);
-    noted.rejected_divisor = select(0u, tally.candidate, noted.asked == 1u && !is_stable);
+    search.has_read = 0u;
+    search.failed_readings += 1u;
+    // A stable divisor that the lane has not come near to may still be the cycle.
+    let is_stable = measures.cycle_growth < -NEUTRAL * Real(tally.candidate);
+    search.rejected_divisor = select(0u, tally.candidate, search.checks_divisor == 1u && !is_stable);
     begin_counting();
     resume_growth();
-    noted.window = 0u;
+    search.window = 0u;
     tally.candidate = 0u;
-    noted.streak = 0u;
-    noted.known_lags = 0u;
-    noted.settled = 0u;
+    search.streak = 0u;
+    search.known_lags = 0u;
+    search.is_settled = 0u;
     tallies[lane].last_distances = array<u32, 16>();
 }
 
-// Whether the cycle closes earlier, as far as rounding and the lane's distance from it let one tell.
+// Whether the cycle closes earlier, within rounding and the lane's distance from it.
 fn is_multiple() -> bool {
-    let is_closed = noted.divisor_apart >= AT_REST || exp2(-f32(noted.divisor_apart) / OCTAVE) < 4.0 * away();
-    return noted.divisor > 0u && is_closed;
+    let is_closed = search.divisor_distance >= AT_REST || exp2(-f32(search.divisor_distance) / PARTS_PER_OCTAVE) < 4.0 * distance_to_cycle();
+    return search.divisor > 0u && is_closed;
 }
 
-// Quarter octaves by which the points of a multiple are farther apart than the lane is from it.
-const ASUNDER: u32 = 12u;
+// Least ratio, in quarter octaves, of the distance between the cycle's points to the lane's distance from the cycle, at
+// which the divisor is certainly another cycle.
+const SEPARATION: u32 = 12u;
 
-// Whether the divisor was read for this multiple, is unstable, and surely is another cycle: it may have
-// been read elsewhere. A lane that comes to the divisor's own cycle from either side in turn is half as far
-// from it as its points seem to be apart.
+// Whether the divisor was read for this multiple, is unstable, and is certainly another cycle: it may have been read
+// elsewhere. A lane that approaches the divisor's own cycle from alternating sides is half as far from it as its
+// points seem to be apart.
 fn is_rejected() -> bool {
-    let is_asunder = noted.divisor_apart + ASUNDER <= noted.off;
-    return noted.rejected_divisor == noted.divisor && noted.divisor_apart < AT_REST && is_asunder;
+    let is_separate = search.divisor_distance + SEPARATION <= search.linear_distance;
+    return search.rejected_divisor == search.divisor && search.divisor_distance < AT_REST && is_separate;
 }
 
-// Whether the cycle closes earlier by no more than rounding may do in a cycle: its period may be that divisor, and
-// the rest a pattern of rounding.
+// Whether the cycle closes earlier within the rounding error of a cycle. Its period may then be that divisor, and the
+// longer one an effect of rounding.
 fn hides_period() -> bool {
-    return noted.divisor > 0u && exp2(-f32(noted.divisor_apart) / OCTAVE) < max(noise(), NOISE);
+    return search.divisor > 0u && exp2(-f32(search.divisor_distance) / PARTS_PER_OCTAVE) < max(noise(), NOISE);
 }
 
-// What rounding moves the state by over a cycle at most, relative to the motion: every event rounds, and
+// Returns the largest change of the state over a cycle by rounding, relative to the motion: every event rounds, and
 // the cycle amplifies it.
 fn noise() -> f32 {
     if !EXPONENT {
@@ -255,9 +255,9 @@ fn noise() -> f32 {
     return f32(ULP * gain()) * f32(16u + 2u * tally.events);
 }
 
-// What the cycle that was read amplifies, at most, relative to the motion.
+// Returns the largest amplification by the cycle that was read, relative to the motion.
 fn gain() -> Real {
-    let scales = array<Real, 4>(seen.position_scale, seen.rate_scale, seen.position_scale, seen.rate_scale);
+    let scales = array<Real, 4>(measures.position_scale, measures.rate_scale, measures.position_scale, measures.rate_scale);
     var most: Real = 1.0;
     for (var k = 0u; k < 16u; k++) {
         iterations += 1u;
@@ -267,73 +267,74 @@ fn gain() -> Real {
     return most;
 }
 
-// How far the lane is from its cycle at most, relative to the motion: by how it recurs, and by the
-// derivative. A spiral comes near its last strobe before it comes near its cycle.
-fn away() -> f32 {
-    // Rounding may hold a lane still before it is there.
-    let by_recurrence = limit_of(max(exp2(-f32(noted.apart) / OCTAVE), NOISE));
-    return select(by_recurrence, max(by_recurrence, exp2(-f32(noted.off) / OCTAVE)), EXPONENT);
+// Returns a bound on the lane's distance from its cycle, relative to the motion: by recurrence and by the linearised
+// map. A spiral comes near its last strobe before it comes near its cycle.
+fn distance_to_cycle() -> f32 {
+    // Rounding can stop a lane before it reaches the cycle.
+    let by_recurrence = limit_of(max(exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE), NOISE));
+    return select(by_recurrence, max(by_recurrence, exp2(-f32(search.linear_distance) / PARTS_PER_OCTAVE)), EXPONENT);
 }
 
-// And if rounding is taken at its worst.
-fn blur() -> f32 {
-    return max(away(), limit_of(noise()));
+// Returns a bound on that distance that includes the largest rounding error.
+fn blurred_distance_to_cycle() -> f32 {
+    return max(distance_to_cycle(), limit_of(noise()));
 }
 
-// Strobes `d` apart that shrink by `mu` per cycle are `d / (1 - mu)` away from their limit.
+// Returns the distance from the limit of strobes at a distance `d` that shrinks by `mu` per cycle: `d / (1 - mu)`.
 fn limit_of(d: f32) -> f32 {
-    let mu = select(0.0, exp2(f32(seen.cycle_growth)), EXPONENT);
+    let mu = select(0.0, exp2(f32(measures.cycle_growth)), EXPONENT);
     return d / max(1.0 - mu, 1e-6);
 }
 
-// Whether the lane has come so near to its cycle that its symmetry shows.
+// Whether the lane is so near to its cycle that the cycle's symmetry shows.
 fn is_near_cycle() -> bool {
-    return away() < ON_CYCLE;
+    return distance_to_cycle() < ON_CYCLE;
 }
 
-// Whether the cycle is farther from its mirror image than the lane can be from the cycle: twice
-// that far for the state, and for the image it is compared with what the cycle makes of that.
+// Whether the cycle is farther from its mirror image than the lane's distance from the cycle explains: twice that
+// distance for the state, and twice the amplified distance for the image.
 fn is_surely_unsymmetric() -> bool {
     let amplified = select(1.0, f32(gain()), EXPONENT);
-    return exp2(-f32(noted.mirror) / OCTAVE) > 2.0 * (1.0 + amplified) * max(blur(), ON_CYCLE);
+    return exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) > 2.0 * (1.0 + amplified) * max(blurred_distance_to_cycle(), ON_CYCLE);
 }
 
-// Whether it is nearer to it than lanes resolve, wherever about it the state and its image are.
+// Whether the cycle is nearer to its mirror image than lanes resolve.
 fn is_surely_symmetric() -> bool {
-    return is_near_cycle() && exp2(-f32(noted.mirror) / OCTAVE) + 2.0 * away() < MIRROR;
+    return is_near_cycle() && exp2(-f32(search.mirror) / PARTS_PER_OCTAVE) + 2.0 * distance_to_cycle() < MIRROR_DISTANCE;
 }
 
-// Whether it moves no more, and not because it moves too slowly to show.
+// Whether the lane rests. A slow lane far from the cycle does not count.
 fn is_at_rest() -> bool {
-    let is_there = !EXPONENT || exp2(-f32(noted.off) / OCTAVE) < max(ON_CYCLE, limit_of(noise()));
-    return noted.apart >= AT_REST && is_there;
+    let is_there = !EXPONENT || exp2(-f32(search.linear_distance) / PARTS_PER_OCTAVE) < max(ON_CYCLE, limit_of(noise()));
+    return search.return_distance >= AT_REST && is_there;
 }
 
-// Roundings of the motion by which a fixed point may be misplaced, before it is amplified.
+// Error of a computed fixed point in rounding errors of the motion, before amplification.
 const MISPLACED: Real = 8.0;
 
-// Whether a motion without events has its limit beyond the wall: it creeps out, by more than roundings in a period.
-fn leaves(to: array<Real, 4>) -> bool {
-    let unsure = MISPLACED * ULP * seen.position_scale * Real(limit_of(1.0));
+// Whether a motion without events has its limit beyond the wall, by more than the rounding error of a period.
+fn leaves_domain(to: array<Real, 4>) -> bool {
+    let unsure = MISPLACED * ULP * measures.position_scale * Real(limit_of(1.0));
     let may_leave = tally.events == 0u && tally.order == 0u && tally.mode < MODE_ONSET;
     return may_leave && beyond(to) > unsure;
 }
 
-// Near, or as near as rounding lets it. What lies in another domain than the lane, as its derivative has
-// it, is no cycle that it comes to; and beside a graze only rest will do.
+// Whether the lane is near its cycle, or as near as rounding allows. A fixed point in another domain than the lane's
+// is not its cycle. Near a graze only rest counts.
 fn is_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
-    // Whether it goes on with the same events is seen where Newton's method leads it, if there is time.
-    let is_confirmed = !is_last || settings.early_stop == 0u || noted.refinements > 0u || away() <= REFINED;
+    // Newton's method shows whether the motion continues with the same events, if there is time for it.
+    let is_confirmed = !is_last || settings.early_stop == 0u || search.newton_steps > 0u || distance_to_cycle() <= NEWTON_CONVERGED;
     let is_near = is_near_cycle() && keeps_domain(to) && tally.grazes == 0u && is_confirmed;
     return is_near || moves_no_more(to, is_last);
 }
 
-// Whether the motion itself has come to rest on its cycle, or as near to it as rounding lets it.
-fn is_held(to: array<Real, 4>, is_last: bool) -> bool {
-    return noted.refinements == 0u && moves_no_more(to, is_last);
+// Whether the motion itself has come to rest on its cycle, or as near to it as rounding allows.
+fn rests_on_cycle(to: array<Real, 4>, is_last: bool) -> bool {
+    return search.newton_steps == 0u && moves_no_more(to, is_last);
 }
 
+// Whether the lane rests, or moves by less than rounding, and does not leave its domain.
 fn moves_no_more(to: array<Real, 4>, is_last: bool) -> bool {
-    let is_blurred = (noted.failed_searches >= MOST_FAILED_SEARCHES || is_last) && noted.settled != 0u && exp2(-f32(noted.apart) / OCTAVE) < min(noise(), ON_CYCLE);
-    return (is_at_rest() || is_blurred) && !leaves(to);
+    let is_blurred = (search.failed_searches >= MOST_FAILED_SEARCHES || is_last) && search.is_settled != 0u && exp2(-f32(search.return_distance) / PARTS_PER_OCTAVE) < min(noise(), ON_CYCLE);
+    return (is_at_rest() || is_blurred) && !leaves_domain(to);
 }

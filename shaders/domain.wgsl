@@ -1,5 +1,5 @@
-// Constants in reach of a lane. Storage is far away, so what every pass needs lies in
-// registers; which domain governs the motion changes at events alone.
+// Constants of a lane in registers. Storage is slow, so a lane copies the constants that every pass uses. The domain
+// that governs the motion changes at events alone.
 
 // The domain that governs the motion.
 var<private> here: Domain;
@@ -11,9 +11,9 @@ var<private> closing: Real;
 var<private> law: Law;
 var<private> shape: FlowShape;
 
-// All three, where the variant keeps copies: software drivers gather from storage lane by
-// lane, which costs them more than the arithmetic. On a graphics device lanes of one flow
-// read the same address at once, and the copies would spill.
+// All three domains, in variants that keep copies (KEEP). A software driver gathers from storage lane by lane, which
+// costs more than the arithmetic. On a graphics device lanes of one flow read the same address at once, and copies
+// would not fit into registers.
 var<private> free: Domain;
 var<private> on_right: Domain;
 var<private> on_left: Domain;
@@ -35,17 +35,17 @@ fn fetch_constants() {
     enter(domain_of(tally.mode));
 }
 
-// The law at a wall. Arrays that are indexed would not stay in registers.
+// Restitution at a wall. The arrays of the law are not indexed: an indexed array would not stay in registers.
 fn restitution(side: u32) -> Real {
     return select(law.restitution[1], law.restitution[0], side == SIDE_RIGHT);
 }
 
-// Leaving speed per free step at or below which a pressed contact lasts.
+// Largest leaving speed, per free step, at which a pressed contact lasts.
 fn mesh_speed(side: u32) -> Real {
     return select(law.mesh_speed[1], law.mesh_speed[0], side == SIDE_RIGHT) * h;
 }
 
-// Domain `d` governs from here on.
+// Makes domain `d` the one that governs the motion.
 fn enter(d: u32) {
     if !KEEP {
         here = flows[cell.flow_index].domains[d];
@@ -58,7 +58,7 @@ fn enter(d: u32) {
     }
 }
 
-// The propagator of one step in the domain that governs. Careful passes do without it.
+// Propagator of one step in the domain that governs the motion. Careful passes do not use it.
 fn propagator() -> array<Real, 28> {
     if !KEEP {
         return flows[cell.flow_index].domains[domain_of(tally.mode)].step;
@@ -66,7 +66,7 @@ fn propagator() -> array<Real, 28> {
     return here.step;
 }
 
-// What accelerations take.
+// Constants of the accelerations in a domain.
 struct Pull {
     gap_row: array<Real, 6>,
     x_row: array<Real, 6>,
@@ -74,7 +74,7 @@ struct Pull {
     angle: Real,
 }
 
-// Those of meshing on a side.
+// Accelerations while meshing on a side.
 fn meshing_pull(side: u32) -> Pull {
     if !KEEP {
         let f = cell.flow_index;

@@ -1,6 +1,6 @@
-// Elastic walls: no impact, the motion goes on behind the wall at once.
+// Elastic walls: there is no impact, and the motion continues behind the wall.
 
-// What the wall of a side is.
+// Returns the kind of the wall on a side.
 fn contact_at(side: u32) -> u32 {
     return select(shape.contacts[1], shape.contacts[0], side == SIDE_RIGHT);
 }
@@ -9,8 +9,8 @@ fn is_elastic(side: u32) -> bool {
     return KINDS && contact_at(side) == CONTACT_ELASTIC;
 }
 
-// Free motion reaches an elastic wall. From rest on it the first derivative that is not zero decides on which side the
-// motion goes on: both fields agree there, but for the damper, whose force begins with the rate.
+// Free motion reaches an elastic wall. If it is at rest there, the first nonzero derivative decides on which side it
+// continues: the fields of both sides agree but for the damper, whose force is proportional to the rate.
 fn enter_elastic(side: u32) -> Jump {
     let closing = sign_of(side) * motion.q[1];
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
@@ -24,7 +24,7 @@ fn enter_elastic(side: u32) -> Jump {
     return jump;
 }
 
-// Whether a gap that has come back to its elastic wall is at rest there and pressed on: it stays behind the wall.
+// Whether a gap that has returned to its elastic wall is at rest and pressed there. If so, it stays behind the wall.
 fn stays_behind(side: u32) -> bool {
     if sign_of(side) * motion.q[1] < 0.0 {
         return false;
@@ -33,8 +33,9 @@ fn stays_behind(side: u32) -> bool {
     return presses(Pull(here.gap_row, here.x_row, here.share, here.angle), side, rest);
 }
 
-// Neighbours pass a wall with a damper, inwards (1) or outwards (-1). The fields on both sides differ by the damper's
-// force alone, in proportion to the rate, which cancels: no quotient, and no grazing.
+// Sets the change of tangent vectors across a wall with a damper, inwards (`way` = 1) or outwards (-1). The fields of
+// both sides differ by the damper's force alone, which is proportional to the rate. The rate cancels, so that grazing
+// is no special case.
 fn pass_damper(side: u32, way: Real) {
     if EXPONENT {
         let damper = flows[cell.flow_index].damper[side];

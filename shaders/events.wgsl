@@ -1,12 +1,13 @@
-// The careful step: what happens first on the next step, and acting on it.
+// The careful step: finds the first event on the next step and acts on it.
 
+// Verdicts on a distance over a stretch of motion: it stays positive, it falls through zero once, or neither is certain.
 const CLEAR: u32 = 0u;
 const CROSSING: u32 = 1u;
 const UNCLEAR: u32 = 2u;
 
-// Judges a distance (positive inside) on a stretch of length `dt`, from its jets at both
-// ends. `order` is the order of its root at the start: dividing it out drops as many
-// Bernstein coefficients. `eps` is the remainder.
+// Judges a distance (positive inside) over a stretch of length `dt`, from value, slope and curvature at both ends.
+// `order` is the order of its root at the start: dividing the root out drops as many Bernstein coefficients. `eps`
+// bounds the remainder.
 fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -> u32 {
     let f0 = select(left.x, Real(0.0), order > 0u);
     let s0 = dt * left.y;
@@ -22,13 +23,13 @@ fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -
     plus |= select(0u, 16u, f1 - (s1 * (1.0 / 3.0) - a1 * (1.0 / 30.0)) > 0.0);
     plus |= select(0u, 32u, f1 - s1 * (1.0 / 6.0) > 0.0);
     plus |= select(0u, 64u, f1 > 0.0);
-    // The two polynomials that enclose the function.
+    // Signs of the two polynomials that enclose the function.
     let lower = (plus | select(0u, 8u, c3 > eps)) >> order;
     let upper = (plus | select(0u, 8u, c3 > -eps)) >> order;
     if lower == (127u >> order) {
         return CLEAR;
     }
-    // A run of + from the start, then - to the end: one change of sign each.
+    // Positive coefficients from the start, then negative ones to the end: one change of sign in each polynomial.
     let single = (lower & (lower + 1u)) == 0u && (upper & (upper + 1u)) == 0u && lower > 0u;
     if single && upper != (127u >> order) {
         return CROSSING;
@@ -36,7 +37,7 @@ fn judge(left: vec3<Real>, right: vec3<Real>, dt: Real, order: u32, eps: Real) -
     return UNCLEAR;
 }
 
-// The two distances that may end a flight, as jets.
+// The two distances whose zeros may end a flight, each with slope and curvature.
 struct Watch {
     first: vec3<Real>,
     second: vec3<Real>,
@@ -72,20 +73,18 @@ fn set_offsets() {
     }
 }
 
-// A crossing must be this much steeper than its remainder; the derivative of a step's
-// remainder is at most 1.08 times the remainder itself.
+// A crossing must be this much steeper than its remainder. The derivative of a step's remainder is at most 1.08 times
+// the remainder.
 const STEEP: Real = 4.0;
 
-// Newton's cap; bisection finishes what it leaves.
+// Iterations of the root search by Newton's method, and in all; bisection does the rest.
 const NEWTON_CAP: u32 = 10u;
 const ROOT_CAP: u32 = 120u;
-// Stretches that one careful step may be cut into.
+// Stretches into which one careful step may be cut.
 const CHECK_CAP: u32 = 200u;
 
-// The root of one distance in (lo, hi], where it falls from + to -; on the exact flow, with
-// the root at the start divided out.
-//
-// Returns the root and the slope there.
+// Returns the root of one distance in (lo, hi], where it falls from + to -, on the exact flow, and the slope there. A
+// root at the start is divided out.
 fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<Real> {
     var lo = start;
     var hi = end;
@@ -99,7 +98,7 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<R
         } else {
             hi = t;
         }
-        // What a Newton step leaves over is of second order in it.
+        // The error that a Newton step leaves is of second order in it.
         let step = f.x / (f.y - Real(order) * f.x / t);
         var next = t - step;
         let converged = abs(f.z) * (step * step) <= ULP * t * abs(f.y) || abs(step) <= 4.0 * ULP * t;
@@ -118,23 +117,23 @@ fn root(second: bool, start: Real, end: Real, order: u32, guess: Real) -> vec2<R
     return vec2<Real>(t, 0.0);
 }
 
-// What a careful step finds.
+// Result of a careful step.
 struct Find {
-    // Whether there is an event, and of which distance.
+    // Whether there is an event, and of which of the two distances.
     event: bool,
     second: bool,
-    // Where; the end of the step if there is none.
+    // Its time; the end of the step if there is no event.
     tau: Real,
 }
 
-// The first event within `len` of the present step.
+// Returns the first event within `len` of the present step.
 fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
     var orders = order;
     var a: Real = 0.0;
     var width = len;
     var left = watch(0.0);
     var checks = 0u;
-    // A start that rounding has put on or beyond its boundary.
+    // Rounding has put the start on or beyond its boundary.
     if orders.x == 0u && left.first.x <= 0.0 {
         return Find(true, false, 0.0);
     }
@@ -156,7 +155,8 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
         let right = watch(b);
         let cube = dt * dt * dt;
         let rest = cube * cube * (1.0 / 14400.0);
-        // In the contact onset the second distance is an acceleration: two derivatives further on.
+        // In the contact onset the second distance is an acceleration, so that its remainder holds two more
+        // derivatives.
         let eps = vec2<Real>((motion.bound + growth) * rest, (pressing_bound + growth) * rest)
             + 8.0 * ULP * abs(offsets);
         let first = judge(left.first, right.first, dt, orders.x, eps.x);
@@ -171,8 +171,8 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 2.0 * dt;
             continue;
         }
-        // Between the ends of a stretch either may cross by an eighth of its bend: as long as that shows, it may
-        // be an event, however short.
+        // Within a stretch the distance may be an eighth of its bend less than at the ends. While the bend exceeds the
+        // remainder, a crossing is possible, however short the stretch.
         var is_shortest = dt <= SHORTEST;
         if is_shortest && dt > SHORTEST_STEP {
             let bend = dt * dt * vec2<Real>(
@@ -181,7 +181,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             );
             is_shortest = !((first != CLEAR && bend.x > 8.0 * eps.x) || (second != CLEAR && bend.y > 8.0 * eps.y));
         }
-        // Two that come as close together as steps are halved: the one before the other.
+        // Two crossings on the shortest stretch: the linear estimate decides which is earlier.
         let both = first == CROSSING && second == CROSSING && is_shortest && orders.x + orders.y == 0u;
         if first + second == CROSSING || both {
             let falls = vec2<Real>(left.first.x - right.first.x, left.second.x - right.second.x);
@@ -192,13 +192,13 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             let order = select(orders.x, orders.y, which);
             var guess = a + clamp(at_start / (at_start - at_end), Real(0.01), Real(0.99)) * dt;
             if order > 0u {
-                // Leaving and pressed back: the parabola of a short flight.
+                // Leaving a wall and pressed back: the parabola of a short flight.
                 let leaving = select(left.first, left.second, which);
                 let short = -2.0 * leaving.y / leaving.z;
                 guess = select(Real(0.5) * b, short, short > 0.0 && short < 0.5 * b);
             }
             let found = root(which, a, b, order, guess);
-            // Where the slope drowns in the remainder there may be three roots for one.
+            // Where the slope is below the remainder there may be three roots instead of one.
             if dt * abs(found.y) > STEEP * select(eps.x, eps.y, which) || is_shortest {
                 return Find(true, which, found.x);
             }
@@ -209,7 +209,7 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
             width = 0.5 * dt;
             continue;
         }
-        // The shortest stretch is still undecided: what touches here does so within rounding. Elastic walls do not mind.
+        // The shortest stretch is still unclear: a touch within rounding. At elastic walls it does not matter.
         let touched = select(side_of(tally.mode), select(SIDE_LEFT, SIDE_RIGHT, first != CLEAR), tally.mode == MODE_FREE);
         if !is_elastic(touched) {
             tally.grazes += 1u;
@@ -231,18 +231,19 @@ fn first_event(len: Real, growth: Real, order: vec2<u32>) -> Find {
     return Find(false, false, len);
 }
 
-// What the acceleration of a gap may have been that began this step at rest and was taken for none, else 0.
+// Largest acceleration that the gap may have had where it began this step at rest and its acceleration was set to
+// zero; else 0.
 var<private> balanced: Real;
 
-// Bound on the eighth derivative of the gap where the contact onset asks for it.
+// Bound on the eighth derivative of the gap, which the contact onset needs.
 var<private> pressing_bound: Real;
 
-// Bisections of the time at which the dip is deepest.
+// Bisections of the time at which the contact onset is deepest.
 const DEEPEST_CAP: u32 = 30u;
 
-// Whether the gap meets the other wall in the contact onset, at most `tau` after the expansion: the model has no rule for
-// a contact there. The depth is concave while the spring presses, so that its first tangent bounds it; where that does
-// not exclude the wall, the deepest place is looked for.
+// Whether the gap meets the other wall in the contact onset, at most `tau` after the expansion point; the model has
+// no rule for that. The depth is concave while the spring presses, so that its first tangent bounds it. Where the
+// tangent does not exclude the wall, the deepest point is searched.
 fn crosses_backlash(tau: Real) -> bool {
     let backlash = walls[0] - walls[1];
     let rate = abs(gap_terms[1]);
@@ -267,7 +268,7 @@ fn crosses_backlash(tau: Real) -> bool {
     return watch(tau).first.x >= backlash;
 }
 
-// Moves on to the first event of the next step, or to its end, and acts on it; true at a stop phase.
+// Moves to the first event of the next step, or to its end, and acts on the event. Returns true at a stop phase.
 fn careful() -> bool {
     let d = domain_of(tally.mode);
     let substeps = here.substeps;
@@ -276,10 +277,10 @@ fn careful() -> bool {
     iterations += 1u;
     expand();
     if sticks() {
-        expand_held();
+        expand_stuck();
     }
     if KINDS && tally.order == 3u {
-        // Let go.
+        // The gap has just been released.
         gap_terms[2] = 0.0;
     }
     set_offsets();
@@ -287,7 +288,7 @@ fn careful() -> bool {
         derivative_bound(120.0 * gap_terms[5], 720.0 * gap_terms[6], 120.0 * x_terms[5], 720.0 * x_terms[6]);
     pressing_bound = motion.bound;
     if sticks() {
-        motion.bound = held_bound();
+        motion.bound = stuck_bound();
     }
     if is_onset() {
         pressing_bound =
@@ -303,7 +304,7 @@ fn careful() -> bool {
         }
     }
     let stop = next_stop_phase();
-    let part = to_stop_phase(stop) * substeps;
+    let part = steps_to_stop_phase(stop) * substeps;
     let lands = part <= 1.0 && tally.step + 1u == stop;
     let len = min(part, Real(1.0));
     let on_second = tally.mode == MODE_FREE && tally.origin == SIDE_LEFT;
@@ -332,17 +333,17 @@ fn careful() -> bool {
     check_finite();
     turn_phasor(found.tau);
     crossing = Crossing();
-    let flown = Pull(here.gap_row, here.x_row, here.share, here.angle);
+    let flight_pull = Pull(here.gap_row, here.x_row, here.share, here.angle);
     if found.event {
         act(found.second, found.tau);
     }
     if EXPONENT {
-        carry_tangents(flown, found.tau, held);
+        carry_tangents(flight_pull, found.tau, held);
     }
     return tally.step >= stop;
 }
 
-// Acts on what ends the flight at the present state, `tau` after the expansion.
+// Acts on the event that ends the flight at the present state, `tau` after the expansion point.
 fn act(second: bool, tau: Real) {
     let settling = tau == 0.0;
     let mode = tally.mode;
@@ -372,7 +373,7 @@ fn act(second: bool, tau: Real) {
         count_event(side);
     }
     tally.origin = side;
-    // Where pressing has ceased inside the contact onset, the gap is off the wall.
+    // If pressing has ceased inside the contact onset, the gap is off the wall.
     if !(mode >= MODE_ONSET && second) {
         tally.order = select(1u, 2u, motion.q[1] == 0.0);
     }
@@ -384,7 +385,7 @@ fn act(second: bool, tau: Real) {
         enter(domain_of(jump.mode));
     }
     if sticks() {
-        tally.order = held_order(side);
+        tally.order = stuck_order(side);
     }
     if EXPONENT && jump.event {
         crossing.jump = jump;

@@ -1,11 +1,10 @@
-// Scanning: full steps of the exact propagator, as long as they are certainly free of events.
+// Scanning: full steps of the exact propagator, as long as a bound shows them free of events.
 
-// Certificate of a step for one pair of ends: how far the function certainly stays within
-// [low, high], from value, slope and curvature at both ends, in units of the step.
-// Quintic Hermite interpolation in Bernstein form of degree 6; its remainder is at most
-// `eps` times the middle basis polynomial. A start on the wall (`leaves`) is a root that is
-// divided out: its coefficient drops.
-fn room(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
+// Returns by how much a function stays within [low, high] over a step, from value, slope and curvature at both ends,
+// in units of the step. It is negative if the bound cannot show that. Quintic Hermite interpolation in Bernstein form
+// of degree 6; the remainder is at most `eps` times the middle basis polynomial. If the step starts on the wall
+// (`leaves`), that root is divided out, and its coefficient is dropped.
+fn clearance(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real, eps: Real, low: Real, high: Real) -> Real {
     let c1 = f0 + s0 * (1.0 / 6.0);
     let c2 = f0 + (s0 * (1.0 / 3.0) + a0 * (1.0 / 30.0));
     let c3 = 0.5 * ((f0 + 0.4 * s0 + 0.05 * a0) + (f1 - 0.4 * s1 + 0.05 * a1));
@@ -17,12 +16,12 @@ fn room(leaves: bool, f0: Real, s0: Real, a0: Real, f1: Real, s1: Real, a1: Real
     return min(high - top, bottom - low) - 8.0 * ULP * (abs(f0) + abs(f1));
 }
 
-// Why a scan ended.
+// Reasons for the end of a scan.
 const SCAN_CAREFUL: u32 = 0u; // the next step needs a careful pass
-const SCAN_BUDGET: u32 = 1u; // this dispatch has done its share
+const SCAN_BUDGET: u32 = 1u; // the iterations of this dispatch are used up
 
 fn scan() -> u32 {
-    // From rest on a wall, and through the contact onset, every step is a careful one.
+    // From rest on a wall, and in the contact onset, every step is a careful one.
     if tally.order > 1u || tally.mode >= MODE_ONSET {
         return SCAN_CAREFUL;
     }
@@ -35,7 +34,7 @@ fn scan() -> u32 {
     let share = here.share;
     let substeps = here.substeps;
     let stop = next_stop_phase();
-    // Meshing measures from its wall and has but one.
+    // Meshing measures the gap from its wall and has only that wall.
     var low = walls[1];
     var high = walls[0];
     if d == 1u {
@@ -55,12 +54,12 @@ fn scan() -> u32 {
     var n = tally.step;
     var bound = motion.bound;
     var a = ((row[0] * z + row[1] * w) + (row[2] * x + row[3] * v)) + (row[4] * c + row[5]);
-    if tally.cut == 1u {
+    if tally.is_scan_interrupted == 1u {
         a = motion.bend;
     }
-    var taken = 0u;
+    var step_count = 0u;
     var leaves = tally.order > 0u;
-    // The tangent vector goes along; where a cycle is read, four follow.
+    // The tangent vector is carried along. While a cycle is read, four vectors are (step_columns).
     var tz = tangent_now[0];
     var tw = tangent_now[1] * share;
     var tx = tangent_now[2];
@@ -72,7 +71,7 @@ fn scan() -> u32 {
             verdict = SCAN_BUDGET;
             break;
         }
-        // The stop phase must not be stepped over.
+        // The scan must not step over the stop phase.
         let next_theta = theta + share;
         let wraps = next_theta >= 1.0;
         let next_n = n + select(0u, 1u, wraps);
@@ -84,15 +83,14 @@ fn scan() -> u32 {
         let w1 = w + (((m[7] * z + m[8] * w) + (m[9] * x + m[10] * v)) + ((m[11] * c + m[12] * s) + m[13]));
         let x1 = x + (((m[14] * z + m[15] * w) + (m[16] * x + m[17] * v)) + ((m[18] * c + m[19] * s) + m[20]));
         let v1 = v + (((m[21] * z + m[22] * w) + (m[23] * x + m[24] * v)) + ((m[25] * c + m[26] * s) + m[27]));
-        // The turn as three shears. Its two sums of products, `c + ((cos - 1) c - sin s)`, drivers
-        // put together anew, and `c + (cos - 1) c` loses what is below rounding, the same way at
-        // every step.
+        // The phasor turns by three shears. The usual form is `c + ((cos - 1) c - sin s)`. Drivers reorder it, and then
+        // `c + (cos - 1) c` loses digits below rounding, in the same direction at every step.
         let sheared = c - half * s;
         let s1 = s + sine * sheared;
         let c1 = sheared - half * s1;
         let a1 = ((row[0] * z1 + row[1] * w1) + (row[2] * x1 + row[3] * v1)) + (row[4] * c1 + row[5]);
         let bound1 = bound + growth;
-        if !(room(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
+        if !(clearance(leaves, z, w, a, z1, w1, a1, bound1 * (1.0 / 14400.0), low, high) > 0.0) {
             break;
         }
         if GROWTH {
@@ -116,7 +114,7 @@ fn scan() -> u32 {
         bound = bound1;
         theta = select(next_theta, next_theta - 1.0, wraps);
         n = next_n;
-        taken += 1u;
+        step_count += 1u;
     }
     motion.q[0] = z;
     motion.q[1] = w * substeps;
@@ -126,22 +124,23 @@ fn scan() -> u32 {
     motion.phasor[1] = s;
     motion.theta = theta;
     motion.bound = bound;
-    // Computed anew it might be rounded in another way, and where a dispatch ends must not matter.
+    // The next dispatch must continue with the same bits, wherever this one ends; computed anew, the value might
+    // round differently.
     motion.bend = a;
-    tally.cut = select(0u, 1u, verdict == SCAN_BUDGET);
+    tally.is_scan_interrupted = select(0u, 1u, verdict == SCAN_BUDGET);
     tally.step = n;
-    tally.passes_in_period += taken;
+    tally.passes_in_period += step_count;
     tally.order = select(0u, 1u, leaves);
     if GROWTH {
         tangent_now = array<Real, 4>(tz, tw * substeps, tx, tv * substeps);
     }
     if EXPONENT {
-        step_columns(taken);
+        step_columns(step_count);
     }
-    // Whole numbers, so that it does not matter where a dispatch ends.
+    // Whole numbers do not depend on where a dispatch ends.
     if MESH {
-        tally.mesh_right += select(0u, taken, d == 1u);
-        tally.mesh_left += select(0u, taken, d == 2u);
+        tally.mesh_right += select(0u, step_count, d == 1u);
+        tally.mesh_left += select(0u, step_count, d == 2u);
     }
     return verdict;
 }

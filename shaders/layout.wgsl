@@ -1,21 +1,21 @@
-// Everything that lies in buffers. The host's side is in src/gpu/layout.rs; a test
-// compares the offsets. A struct holds either Reals or u32s alone, so that both precisions
-// have the same shape. Constants that no shader declares come from src/gpu/rules.rs and shader.rs.
+// Structs in the buffers, and the buffers' bindings. src/gpu/layout.rs declares the same structs for the host; a test
+// compares names, offsets and sizes. A struct holds either Reals or 32-bit numbers alone, so that it has the same
+// shape in both precisions. src/gpu/shader.rs puts the constants that no shader declares in front of the source.
 
-// One linear domain in units of its own step: time tau = t / h, velocities per step.
+// A linear domain in units of its own step: time tau = t / h, rates per step.
 struct Domain {
-    // The propagator of one step less the identity: rows gap, its rate, x, its rate;
-    // columns the same four, cos, sin, 1.
+    // Propagator of one step minus the identity. Rows: gap, its rate, x, its rate. Columns: these four, then cos,
+    // sin, 1.
     step: array<Real, 28>,
-    // Accelerations of the gap and of x: on gap, rate, x, rate, cos, 1.
+    // Accelerations of the gap and of x: factors of gap, rate, x, rate, cos, 1.
     gap_row: array<Real, 6>,
     x_row: array<Real, 6>,
-    // |(n+1)-th derivative of the gap|^2 <= this form of the n-th derivatives: on rate^2,
-    // rate * x_rate, x_rate^2, gap^2, gap * x, x^2.
+    // Quadratic form of the n-th derivatives that bounds |(n+1)-th derivative of the gap|^2: factors of rate^2, rate
+    // * x_rate, x_rate^2, gap^2, gap * x, x^2.
     energy: array<Real, 6>,
-    // Growth per step of that bound for n = 5.
+    // Growth of that bound per step, for n = 5.
     growth: Real,
-    // Forcing angle of one step, tan of half of it and sin of it.
+    // Forcing angle of one step; tan of half of it; sin of it.
     angle: Real,
     turn_half: Real,
     turn_sin: Real,
@@ -25,255 +25,267 @@ struct Domain {
     substeps: Real,
 }
 
-// All that is common to the lanes that differ in the contact law alone.
+// Constants that lanes share if they differ in the contact law alone.
 struct Flow {
-    // Free motion, meshing on the right, on the left. Meshing measures the gap from its wall.
+    // Free motion, meshing on the right, meshing on the left. Meshing domains measure the gap from their wall.
     domains: array<Domain, 3>,
-    // Right and left wall.
+    // Positions of the right and of the left wall.
     walls: array<Real, 2>,
-    // Change of v per unit of gap rate that the contact impulse removes.
+    // Change of the rate of x per unit of gap rate that the contact impulse removes.
     kick: Real,
-    // Length of a free step.
+    // Length of a free step in time units.
     h: Real,
-    // What speeds are measured by: half the walls' distance times the rate of free motion, per free step.
+    // Unit of speeds: half the walls' distance times the rate of free motion, per free step.
     speed: Real,
-    // Infinite series of impacts are closed once they last less than this, in free steps.
+    // Longest infinite series of impacts that is closed by its limit, in free steps.
     closing: Real,
-    // Contact-free motion: its steady state at phase 0 in lane units, the size of transients
-    // (by the free domain's energy form) below which no event will come, negative where there
-    // is none, and its growth per period in octaves.
+    // Contact-free motion. `steady`: steady state at phase 0, in lane units. `contact_free_size`: size of the transient (by the
+    // free domain's energy form) below which no contact will follow; negative if there is no such size. `transient_growth`:
+    // growth of the transient per period, in octaves.
     steady: array<Real, 4>,
-    reach: Real,
-    decay: Real,
-    // Acceleration of a gap that is held at the right and at the left wall, as a domain's `gap_row` measured from there.
+    contact_free_size: Real,
+    transient_growth: Real,
+    // Acceleration of a gap that rests on the right and on the left wall: a `gap_row` that measures the gap from that
+    // wall.
     pressing: array<array<Real, 6>, 2>,
-    // What the rates of the gap and of x change by, per displacement of the gap, where an elastic wall is reached.
+    // Change of the rates of the gap and of x per displacement of the gap, where the motion enters an elastic wall.
     damper: array<array<Real, 2>, 2>,
 }
 
+// Whole numbers of a flow.
 struct FlowShape {
     // Free steps per forcing period.
     steps: u32,
-    // Where its phasors start.
+    // Index of its first phasor.
     phasors: u32,
-    // How many displacements there are: of one, the second rests at 0.
+    // Number of displacements. With one, the second rests at 0.
     degrees: u32,
     // CONTACT_* of the right and of the left wall.
     contacts: array<u32, 2>,
 }
 
-// At the right and at the left wall.
+// Contact law of the right and of the left wall: restitution, and the largest leaving speed at which a pressed
+// contact lasts.
 struct Law {
     restitution: array<Real, 2>,
     mesh_speed: array<Real, 2>,
 }
 
+// Flow, law and start conditions of one lane.
 struct Cell {
     flow_index: u32,
     law_index: u32,
-    // Status of a lane that is refused before it starts, else 0.
+    // STATUS_* of a lane that the host refuses, else 0.
     refused: u32,
-    // 1 if the mirror image of a motion is a motion.
+    // 1 if the mirror image of a motion is a motion of the same lane.
     mirror: u32,
 }
 
+// Settings of one dispatch.
 struct Settings {
-    // Lanes that the buffers have room for, lanes under way, and where those of them begin that are
-    // at their starts.
+    // Lanes that the buffers have room for.
     slots: u32,
+    // Length of the active list, and the place in it from which lanes have yet to begin.
     active_lanes: u32,
-    fresh: u32,
-    // Forcing periods to integrate, and the most that undecided lanes get.
+    first_new: u32,
+    // Forcing periods to integrate, and the number that undecided lanes get.
     periods: u32,
     longest: u32,
-    // The first period at which chaos may be called early.
+    // First period at which a lane may stop as chaotic.
     chaos_from: u32,
-    // Standard errors by which the exponent must exceed zero then.
+    // Standard errors by which its exponent must then exceed zero.
     chaos_errors: f32,
     // Loop iterations that one dispatch may spend on a lane.
     iterations: u32,
     // Passes (scan steps and careful steps) allowed in one period.
     passes_per_period: u32,
-    // Events allowed in one period, and in all.
+    // Events allowed in one period, and in all periods together.
     events_per_period: u32,
     most_events: u32,
-    // Invocations along the first dimension of a dispatch.
+    // Invocations in one row of the dispatch grid.
     row: u32,
-    // Periods before averages are taken.
+    // Periods before averages begin.
     transient_periods: u32,
-    // Lanes without a tangent vector wait here for the variant that carries it.
+    // Period at which lanes without a tangent vector wait for the variant that carries it.
     growth_from: u32,
-    // Periods before the exponent is accumulated, and periods per block of it.
+    // Periods before the exponent is accumulated, and periods per block of its average.
     exponent_from: u32,
     exponent_block: u32,
-    // Longest period searched for; 0 searches for none.
+    // Longest period that is searched for; 0 searches for none.
     max_period: u32,
     // 1: lanes end once they are decided.
     early_stop: u32,
-    // 1: lanes that have ended are queued, not those that there is work for.
+    // 1: compaction selects the lanes that have ended. 0: it selects those that this variant has work for.
     ended: u32,
 }
 
-// What a lane carries between dispatches. While it runs, `now` lies in registers: every step and event takes it. What
-// strobes have seen and noted is taken up at strobes alone, or it would be in the way of every step
-// (sweep.wgsl). Arrays that are indexed stay in the buffer, or they would drag the rest along.
+// State that a lane carries between dispatches. `MotionNow` and `TallyNow` are used by every step and event; a lane
+// keeps them in registers. `Measures` and `Search` are used at strobes alone and are loaded there (sweep.wgsl), so
+// that they take no registers from the steps. Arrays that are indexed stay in the buffer: an indexed array would move
+// its whole struct out of registers.
 
-// The motion itself.
+// The motion.
 struct MotionNow {
     // Gap (from the wall while meshing), its rate, x, its rate; rates per free step.
     q: array<Real, 4>,
     // cos and sin of the forcing phase.
     phasor: array<Real, 2>,
-    // Fraction of the free step that has passed.
+    // Fraction of the present free step that has passed.
     theta: Real,
     // Bound on the sixth derivative of the gap, in steps of the present domain.
     bound: Real,
-    // Second derivative of the gap where a scan was cut.
+    // Second derivative of the gap where the end of a dispatch interrupted a scan.
     bend: Real,
-    // Time spent meshing in parts of steps, in free steps, less the whole ones.
+    // Fractional part of the time spent meshing in partial steps, in free steps.
     mesh_part: Real,
-    // Growth of the tangent vector in this block, binary logarithms.
+    // Growth of the tangent vector in the present block, in octaves.
     block_growth: Real,
 }
 
-// What strobes have seen of the motion.
-struct Seen {
-    // Growth of the tangent vector: the sum of the whole blocks, and of the squares of their
-    // deviations from the mean.
+// Averages and scales of the motion, updated at strobes.
+struct Measures {
+    // Growth of the tangent vector over whole blocks: its sum, and the sum of squared deviations from its mean.
     growth_sum: Real,
     growth_squares: Real,
-    // Strobe state that later ones are compared with; where the cycle is read, its start.
+    // Strobe state that later strobes are compared with. While a cycle is read, the cycle's start.
     anchor: array<Real, 4>,
-    // Largest position and rate at strobes: the unit of distances.
+    // Largest position and largest rate at strobes: the units of distances.
     position_scale: Real,
     rate_scale: Real,
-    // Largest multiplier of the cycle that was read, binary logarithm of its modulus.
+    // Largest multiplier of the cycle that was read: binary logarithm of its modulus.
     cycle_growth: Real,
 }
 
 struct Motion {
     now: MotionNow,
-    seen: Seen,
-    // Tangent vectors, in lane units: one for the exponent, four for the monodromy matrix.
+        measures: Measures,
+    // Tangent vectors in lane units: one for the exponent, or the four columns of the monodromy matrix.
     tangents: array<Real, 16>,
-    // The one for the exponent while the matrix takes its place.
+    // The exponent's tangent vector while the matrix takes its place.
     vector: array<Real, 4>,
-    // The motion's last strobes (approach.wgsl).
+    // The last strobe states of the motion (approach.wgsl).
     trail: array<array<Real, 4>, TRAIL>,
 }
 
-// The counting.
+// Counters and flags.
 struct TallyNow {
     // Free steps since phase 0.
     step: u32,
-    // 1 where a scan was cut by the end of a dispatch.
-    cut: u32,
+    // 1 if the end of a dispatch interrupted a scan.
+    is_scan_interrupted: u32,
     // MODE_*.
     mode: u32,
     // Wall of the last event: SIDE_*.
     origin: u32,
-    // Order of the root of the distance from that wall at the start; 0 away from it.
+    // Order of the root, at the present state, of the distance from that wall; 0 away from it.
     order: u32,
     // Forcing periods completed.
     period: u32,
     // STATUS_*.
     status: u32,
+    // Passes and events of the present period.
     passes_in_period: u32,
     events_in_period: u32,
+    // Impacts and events since counting began.
     impacts: u32,
     events: u32,
-    // Time spent meshing: whole steps of the two domains, and whole free steps made of parts.
+    // Time spent meshing: whole steps of the right and of the left meshing domain, and whole free steps summed from
+    // partial ones.
     mesh_right: u32,
     mesh_left: u32,
     mesh_whole: u32,
-    // Events too near to grazing for the linearisation to mean much.
+    // Events so near to grazing that the linearisation means little.
     grazes: u32,
     // STAGE_*.
     stage: u32,
-    // The smallest lag that recurs and contracts, and periods of its cycle that are still to be read.
+    // Smallest lag that recurs and contracts, and periods of its cycle still to be read.
     candidate: u32,
-    to_read: u32,
-    // How many tangent vectors there are, and 1 for lanes of the variant that carries one for the exponent.
+    periods_to_read: u32,
+    // Number of tangent vectors; and 1 once the lane belongs to the variant that carries one for the exponent.
     tangent_count: u32,
-    grows: u32,
-    // The word: how many symbols, and a rotation-invariant hash.
+    carries_growth: u32,
+    // The word: number of symbols, halves of its rotation-invariant hash, and the eight latest symbols, three bits
+    // each.
     word_length: u32,
     hash_low: u32,
     hash_high: u32,
     recent: u32,
     // Events on the strobe phase.
     on_strobe: u32,
-    // The events of this period, hashed.
+    // Hash of the present period's events.
     itinerary: u32,
 }
 
-// What strobes have noted of it.
-struct Noted {
-    // 1 once a cycle is being read or has been, and its period if it is stable.
+// Search for a cycle, updated at strobes.
+struct Search {
+    // 1 once a cycle is being read or has been read; and the period of the cycle that was read, if it is stable.
     has_read: u32,
     cycle: u32,
     // Cycles that were read without success.
-    tries: u32,
+    failed_readings: u32,
     // Period at which counting began.
-    counted_from: u32,
-    // Blocks of the exponent, and periods in the present one.
+    counting_start: u32,
+    // Blocks of the exponent's average, and periods in the present one.
     blocks: u32,
     block_periods: u32,
-    // Recurrence: when the anchor was taken, lags of this window, for how many windows the candidate
-    // has contracted, and lags that the last window held.
+    // Recurrence: period of the anchor, lags of the present window, number of windows for which the candidate has
+    // contracted, and lags of the last window.
     anchor_period: u32,
     window: u32,
     streak: u32,
     known_lags: u32,
     // 1 if the candidate's limit is near.
-    settled: u32,
-    // In quarter octaves below 1: distance of the cycle from its mirror image; how far the
-    // cycle that was read last took the lane, and the one before a Newton step.
+    is_settled: u32,
+    // Distances in quarter octaves below 1. `mirror`: of the cycle from its mirror image. `return_distance`: of the
+    // lane from the cycle's start after the cycle was read last. `earlier_return_distance`: the latter before a
+    // Newton step.
     mirror: u32,
-    apart: u32,
-    apart_before: u32,
-    // Newton steps towards the cycle, and the events on it before the first.
-    refinements: u32,
+    return_distance: u32,
+    earlier_return_distance: u32,
+    // Newton steps towards the cycle; hash of the events on it before the first step, and the period of that cycle.
+    newton_steps: u32,
     branch: u32,
-    // The period for which that was, and what governed the motion where Newton set out.
     branch_period: u32,
-    home_mode: u32,
-    home_origin: u32,
-    // The divisor of its period after which it came nearest to its start, and how near.
+    // MODE_* and SIDE_* of the motion where Newton's method started.
+    newton_start_mode: u32,
+    newton_start_origin: u32,
+    // Divisor of the cycle's period after which the motion came nearest to its start, and that distance in quarter
+    // octaves below 1.
     divisor: u32,
-    divisor_apart: u32,
-    // Times that Newton's method led nowhere; 1 while a divisor is read because its multiple might be it, and the divisor
-    // whose cycle then was found not to attract.
+    divisor_distance: u32,
+    // Failed Newton searches. `checks_divisor`: 1 while a divisor is read to find out whether it is the period.
+    // `rejected_divisor`: a divisor whose cycle was then found unstable.
     failed_searches: u32,
-    asked: u32,
+    checks_divisor: u32,
     rejected_divisor: u32,
-    // How far its cycle is from the lane by the derivative, in quarter octaves below 1.
-    off: u32,
-    // Strobes of the motion so far, and for how many cycles it has had the events of the cycle that is read.
-    passed: u32,
-    shown: u32,
-    // Events of whole periods, whatever they were counted for.
+    // Distance of the lane from the fixed point of the linearised strobe map, in quarter octaves below 1.
+    linear_distance: u32,
+    // Strobes of the motion so far, and its latest cycles that have the same events as the cycle that is read.
+    strobe_count: u32,
+    matching_cycles: u32,
+    // Events of all whole periods.
     all_events: u32,
 }
 
+// All counters of a lane.
 struct Tally {
     now: TallyNow,
-    noted: Noted,
-    // Distances per lag, of this window and the last: quarter octaves below 1, in bytes.
+    search: Search,
+    // Distance at each lag of the present and of the last window, in quarter octaves below 1, one byte each.
     distances: array<u32, 16>,
     last_distances: array<u32, 16>,
-    // The events of the trail's periods, hashed.
+    // Hashes of the events of the trail's periods.
     itineraries: array<u32, TRAIL>,
-    // The word's symbols, ten to a number.
+    // Symbols of the word, ten to a number.
     word: array<u32, 7>,
-    // The pattern so far, a symbol for every run of one; hashed as the word is.
+    // The pattern: one symbol for every run of equal symbols. Stored and hashed like the word.
     pattern: array<u32, 7>,
     pattern_length: u32,
     pattern_hash: array<u32, 2>,
     pattern_recent: u32,
 }
 
-// What travels back of a lane: the numbers.
+// Results of a lane: real numbers.
 struct Reading {
     // Gap, its rate per free step, x, its rate.
     strobe: array<Real, 4>,
@@ -283,14 +295,14 @@ struct Reading {
     mesh_fraction: Real,
 }
 
-// What travels back of a lane: the counting.
+// Results of a lane: whole numbers.
 struct Finding {
-    // VALID_* bits; what is not valid is zero.
+    // VALID_* bits; a field whose bit is missing is zero.
     valid: u32,
-    // The lane's slot.
+    // Slot of the lane.
     slot: u32,
     status: u32,
-    // 0 for none.
+    // 0 if there is none.
     period: u32,
     periods_run: u32,
     impacts: u32,
@@ -298,28 +310,29 @@ struct Finding {
     counted: u32,
     symmetric: u32,
     word_length: u32,
-    // Hash of a word that is too long to be spelled out.
+    // Halves of the hash of a word that is too long to be stored.
     hash_low: u32,
     hash_high: u32,
     word: array<u32, 7>,
-    // The same of its pattern.
+    // Length, hash and symbols of the pattern.
     pattern_length: u32,
     pattern_hash: array<u32, 2>,
     pattern: array<u32, 7>,
 }
 
-// Slots of lanes: first the active list, those under way in the order in which they were begun; from `slots` on those of
-// them that a variant has work for, or that have ended.
+// Lists of slots. The first `slots` entries are the active list: lanes under way, in the order in which they began.
+// The next entries are the lanes that compaction selected.
 struct Queue {
-    // How many the latter are, and how often they have been counted: a device that stands still does not.
+    // Number of selected lanes; and a counter of compactions, by which the host notices a device that no longer
+    // works.
     count: u32,
     beat: u32,
     lanes: array<u32>,
 }
 
 const STAGE_RUNNING: u32 = 0u;
-const STAGE_READING: u32 = 1u; // the period is decided, its cycle is being read
-const STAGE_READ: u32 = 2u; // its cycle has been read and is to be judged
+const STAGE_READING: u32 = 1u; // a period was found, and its cycle is being read
+const STAGE_READ: u32 = 2u; // the cycle has been read and must be judged
 const STAGE_DONE: u32 = 3u;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -334,12 +347,13 @@ const STAGE_DONE: u32 = 3u;
 @group(0) @binding(9) var<storage, read> starts: array<array<Real, 4>>;
 @group(0) @binding(10) var<storage, read_write> readings: array<Reading>;
 @group(0) @binding(11) var<storage, read_write> findings: array<Finding>;
-@group(0) @binding(12) var<storage, read_write> starts_of_blocks: array<u32>;
+@group(0) @binding(12) var<storage, read_write> block_starts: array<u32>;
 
+// What governs the motion. All modes but the first are followed by the side: mode + SIDE_*.
 const MODE_FREE: u32 = 0u;
-const MODE_SUSTAINED: u32 = 1u; // + side
-const MODE_ONSET: u32 = 3u; // + side
-const MODE_STUCK: u32 = 5u; // + side
+const MODE_SUSTAINED: u32 = 1u;
+const MODE_ONSET: u32 = 3u;
+const MODE_STUCK: u32 = 5u;
 
 const SIDE_RIGHT: u32 = 0u;
 const SIDE_LEFT: u32 = 1u;

@@ -1,37 +1,37 @@
-// What a lane does at phase 0: what it checks, counts and reads.
+// Work of a lane at phase 0: what it checks, counts and reads.
 
-// Phase 0: a forcing period is complete.
+// Completes a forcing period at phase 0.
 fn begin_period() {
     tally.step = 0u;
     motion.theta = 0.0;
     motion.phasor = array<Real, 2>(1.0, 0.0);
     tally.period += 1u;
     tally.passes_in_period = 0u;
-    noted.all_events += tally.events_in_period;
+    search.all_events += tally.events_in_period;
     tally.events_in_period = 0u;
-    if noted.all_events > settings.most_events {
+    if search.all_events > settings.most_events {
         tally.status = STATUS_CAP_EVENTS;
         return;
     }
     let itinerary = tally.itinerary;
     tally.itinerary = 0u;
-    if EXPONENT && noted.refinements == 0u {
-        leave_trail(itinerary);
+    if EXPONENT && search.newton_steps == 0u {
+        store_strobe(itinerary);
     }
     if tally.stage == STAGE_READING {
-        tally.to_read -= 1u;
+        tally.periods_to_read -= 1u;
         widen_scales(strobe_state());
-        let read = tally.candidate - tally.to_read;
+        let read = tally.candidate - tally.periods_to_read;
         if EXPONENT {
             compare_itineraries(itinerary, read);
         }
-        let apart = octaves(distance_between(strobe_state(), seen.anchor));
-        if tally.to_read == 0u {
-            noted.apart = apart;
+        let distance = octaves(distance_between(strobe_state(), measures.anchor));
+        if tally.periods_to_read == 0u {
+            search.return_distance = distance;
             tally.stage = STAGE_READ;
-        } else if tally.candidate % read == 0u && apart > noted.divisor_apart {
-            noted.divisor = read;
-            noted.divisor_apart = apart;
+        } else if tally.candidate % read == 0u && distance > search.divisor_distance {
+            search.divisor = read;
+            search.divisor_distance = distance;
         }
         return;
     }
@@ -40,11 +40,11 @@ fn begin_period() {
         begin_counting();
     }
     let decided = settings.max_period > 0u && recurs();
-    // Reading the cycle belongs to the budget.
+    // The budget includes the periods in which the cycle is read.
     let read_by = tally.period + tally.candidate;
     let is_last = read_by == settings.periods || read_by == settings.longest;
-    // What contracts by chance in the midst of growth has not settled.
-    let is_due = is_last && noted.streak >= STREAK && (noted.settled == 1u || !grows(DOUBT));
+    // A chance contraction in growing motion has not settled.
+    let is_due = is_last && search.streak >= STREAK && (search.is_settled == 1u || !grows(DOUBT));
     let early = settings.early_stop == 1u;
     if read_by <= settings.longest && (is_due || (decided && early)) {
         begin_reading();
@@ -55,25 +55,25 @@ fn begin_period() {
     }
 }
 
-// The energy of the transient keeps the gap off the walls for good.
+// Whether the energy of the transient keeps the gap off the walls from now on.
 fn is_non_impacting() -> bool {
     if tally.mode != MODE_FREE || settings.max_period == 0u {
         return false;
     }
     let s = flows[cell.flow_index].steady;
     let q = motion.q;
-    return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].reach;
+    return derivative_bound(q[0] - s[0], q[1] - s[1], q[2] - s[2], q[3] - s[3]) < flows[cell.flow_index].contact_free_size;
 }
 
-// Contact-free motion of period 1, with nothing left to read.
+// Ends contact-free motion: period 1, and no cycle to read.
 fn end_non_impacting() {
     begin_counting();
-    noted.cycle = 1u;
-    seen.cycle_growth = flows[cell.flow_index].decay;
+    search.cycle = 1u;
+    measures.cycle_growth = flows[cell.flow_index].transient_growth;
     tally.stage = STAGE_DONE;
 }
 
-// Averages start here.
+// Resets the averages and counts.
 fn begin_counting() {
     tally.impacts = 0u;
     tally.events = 0u;
@@ -93,32 +93,32 @@ fn begin_counting() {
     if PATTERN {
         begin_pattern();
     }
-    noted.counted_from = tally.period;
+    search.counting_start = tally.period;
 }
 
-// The period is decided: one cycle is read from here on.
+// Starts to read one cycle of the period that was found.
 fn begin_reading() {
     begin_counting();
     tally.stage = STAGE_READING;
-    tally.to_read = tally.candidate;
-    noted.has_read = 1u;
-    // A cycle of even period is never compared: it cannot be symmetric.
-    noted.mirror = 0u;
-    noted.divisor = 0u;
-    noted.divisor_apart = 0u;
-    noted.shown = TRAIL;
-    seen.anchor = strobe_state();
-    narrow_scales(seen.anchor);
+    tally.periods_to_read = tally.candidate;
+    search.has_read = 1u;
+    // Cycles of even period cannot be their own mirror image and are not compared.
+    search.mirror = 0u;
+    search.divisor = 0u;
+    search.divisor_distance = 0u;
+    search.matching_cycles = TRAIL;
+    measures.anchor = strobe_state();
+    narrow_scales(measures.anchor);
     if EXPONENT {
-        set_vector_aside();
+        save_vector();
         tally.tangent_count = 4u;
-        // A displacement that there is not has no neighbours.
+        // With one displacement, x has no neighbours.
         let x = select(Real(0.0), Real(1.0), shapes[cell.flow_index].degrees > 1u);
         motions[lane].tangents = array<Real, 16>(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, x, 0.0, 0.0, 0.0, 0.0, x);
     }
 }
 
-// The present state with the gap measured from its middle, whatever the domain.
+// Returns the present state with the gap measured from the middle, in every domain.
 fn strobe_state() -> array<Real, 4> {
     var q = motion.q;
     if tally.mode != MODE_FREE {

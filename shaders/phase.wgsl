@@ -1,6 +1,6 @@
-// The forcing phase: an integer step and a fraction, never a time.
+// The forcing phase, stored as a whole step and a fraction, never as a time.
 
-// Phasor at `theta` of a free step after step `n`: table and angle addition.
+// Computes the phasor at `theta` of a free step after step `n`, from the table and by angle addition.
 fn sync_phasor() {
     motion.phasor = phasors[shape.phasors + tally.step];
     turn_phasor(motion.theta * here.substeps);
@@ -15,7 +15,7 @@ fn turn_phasor(part: Real) {
     motion.phasor[1] = s + (turn.y * c + turn.x * s);
 }
 
-// cos - 1 and sin of an angle of little more than a radian at most.
+// Returns cos - 1 and sin of an angle of at most little more than a radian.
 fn small_turn(angle: Real) -> vec2<Real> {
     let s = angle * angle;
     let c = s * (-1.0 / 2.0 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40320.0
@@ -34,18 +34,18 @@ fn advance_phase(part: Real) {
     }
 }
 
-// Free steps to the next stop phase, as far as one step can see: 1 stands for "one or more".
-fn to_stop_phase(stop: u32) -> Real {
+// Returns the free steps to the next stop phase; 1 stands for "one or more".
+fn steps_to_stop_phase(stop: u32) -> Real {
     if tally.step + 1u < stop {
         return 1.0;
     }
     return 1.0 - motion.theta;
 }
 
-// The step at which the lane must land: phase 0, or half a period where a cycle is read that
-// may be its own mirror image and stands halfway.
+// Returns the step at which the lane must stop: phase 0, or half a period in the middle period of a cycle that is
+// read and may be its own mirror image.
 fn next_stop_phase() -> u32 {
     let steps = shape.steps;
-    let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.to_read == tally.candidate + 1u;
+    let halfway = SYMMETRY && tally.stage == STAGE_READING && 2u * tally.periods_to_read == tally.candidate + 1u;
     return select(steps, steps / 2u, halfway && tally.step < steps / 2u);
 }

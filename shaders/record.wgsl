@@ -1,4 +1,4 @@
-// What travels back: a lane's last state, read as a record.
+// Turns a lane's last state into its results.
 
 @compute @workgroup_size(WORKGROUP)
 fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -6,8 +6,8 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
     if i >= queue.count {
         return;
     }
-    take_up(queued(i));
-    recall();
+    load_lane(selected_lane(i));
+    load_strobe_state();
     var reading: Reading;
     var finding: Finding;
     finding.slot = lane;
@@ -20,18 +20,18 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
     if tally.status == STATUS_OK {
         finding.valid |= VALID_IMPACTS;
         finding.impacts = tally.impacts;
-        finding.counted = max(tally.period - noted.counted_from, 1u);
+        finding.counted = max(tally.period - search.counting_start, 1u);
         if MESH {
             finding.valid |= VALID_MESH;
             reading.mesh_fraction = mesh_fraction(finding.counted);
         }
         if settings.max_period > 0u {
             finding.valid |= VALID_PERIOD;
-            finding.period = noted.cycle;
+            finding.period = search.cycle;
         }
-        if noted.cycle > 0u {
+        if search.cycle > 0u {
             read_cycle(&reading, &finding);
-        } else if EXPONENT && noted.blocks > 1u {
+        } else if EXPONENT && search.blocks > 1u {
             finding.valid |= VALID_LYAPUNOV;
             let growth = mean_growth();
             reading.growth = growth.x;
@@ -46,8 +46,8 @@ fn last_status() -> u32 {
     if tally.status != STATUS_OK || tally.stage != STAGE_DONE {
         return tally.status;
     }
-    if noted.has_read == 0u || noted.cycle == 0u {
-        let is_open = settings.max_period > 0u && noted.cycle == 0u && EXPONENT && noted.blocks > 1u;
+    if search.has_read == 0u || search.cycle == 0u {
+        let is_open = settings.max_period > 0u && search.cycle == 0u && EXPONENT && search.blocks > 1u;
         return select(STATUS_OK, STATUS_SLOW, is_open && (escapes(CHAOS_ERRORS) || !outgrows(CHAOS_ERRORS)));
     }
     if tally.grazes > 0u {
@@ -71,12 +71,11 @@ fn mesh_fraction(periods: u32) -> Real {
 }
 
 fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) {
-    // Contact-free motion has not been read. On a slow approach, or where rounding is amplified, a lost
-    // symmetry cannot be told from one not reached, unless it is lost by far. Every impact has an image on a
-    // cycle that is its own mirror image.
+    // Contact-free motion has not been read, and is symmetric. On a slow approach, or where rounding is amplified,
+    // the symmetry is known only if it is broken by far. On a symmetric cycle every impact has a mirror image.
     if SYMMETRY && cell.mirror == 1u {
         let has_conjugate = tally.impacts % 2u == 0u;
-        let is_symmetric = noted.has_read == 0u || (is_surely_symmetric() && has_conjugate);
+        let is_symmetric = search.has_read == 0u || (is_surely_symmetric() && has_conjugate);
         if is_symmetric || !has_conjugate || is_surely_unsymmetric() {
             (*finding).valid |= VALID_SYMMETRIC;
             (*finding).symmetric = select(0u, 1u, is_symmetric);
@@ -84,7 +83,7 @@ fn read_cycle(reading: ptr<function, Reading>, finding: ptr<function, Finding>) 
     }
     if EXPONENT {
         (*finding).valid |= VALID_LYAPUNOV;
-        (*reading).growth = LN_2 * seen.cycle_growth / Real(noted.cycle);
+        (*reading).growth = LN_2 * measures.cycle_growth / Real(search.cycle);
     }
     if PATTERN {
         read_pattern(finding);
@@ -107,10 +106,10 @@ fn read_pattern(finding: ptr<function, Finding>) {
     var recent = tallies[lane].pattern_recent;
     var hash = vec2<u32>(tallies[lane].pattern_hash[0], tallies[lane].pattern_hash[1]);
     let first = tallies[lane].pattern[0];
-    // The last run goes on as the first: one of them is counted.
+    // The last run continues as the first: both count as one.
     if length > 1u && (recent & 7u) == (first & 7u) {
         if length > 7u {
-            hash -= stretch(recent);
+            hash -= hash_window(recent);
         }
         recent = recent >> 3u;
         length -= 1u;
@@ -120,17 +119,17 @@ fn read_pattern(finding: ptr<function, Finding>) {
     (*finding).pattern = tallies[lane].pattern;
     if length > WORD_SYMBOLS {
         for (var n = 0u; n < 7u; n++) {
-            recent = followed_by(recent, (first >> (3u * n)) & 7u);
-            hash += stretch(recent);
+            recent = append_symbol(recent, (first >> (3u * n)) & 7u);
+            hash += hash_window(recent);
         }
         (*finding).pattern_hash = array<u32, 2>(hash.x, hash.y);
     }
 }
 
-// The hash so far holds all stretches of symbols but those across the word's end.
+// Adds the hash windows that span the end of the word; all others have been added.
 fn close_hash() {
     for (var n = 0u; n < 7u; n++) {
-        take_symbol((tallies[lane].word[0] >> (3u * n)) & 7u);
-        add_stretch();
+        push_symbol((tallies[lane].word[0] >> (3u * n)) & 7u);
+        add_hash_window();
     }
 }

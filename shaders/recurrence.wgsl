@@ -1,81 +1,81 @@
-// Recurrence: does the lane come back to where it was, and ever nearer?
+// Recurrence: whether the lane returns to earlier strobe states, nearer each time.
 
-// A lane has settled once its limit is estimated to lie within 2^-14 of the motion: weak chaos
-// comes within 2^-12 of a cycle by chance.
+// A lane has settled once its limit is estimated to lie within 2^-14 of the motion. Weak chaos comes within 2^-12 of
+// a cycle by chance.
 const SETTLED: f32 = 56.0;
-// 2^-4 where Newton's method shows what the limit is; `REACH` judges what it finds.
+// Distance of the limit, 2^-4 of the motion, from which Newton's method may search it. `LONGEST_NEWTON_STEP` limits
+// the result.
 const REFINABLE: f32 = 16.0;
-// Slower approaches than this, per period, are not waited for, only for a recurrence as close as
-// if they were as fast.
+// Approach per period that `is_refinable` also assumes for slower motion, which need not recur more closely.
 const SLOWEST: f32 = 0.008;
-// Recurrences this close, 2^-12 of the motion, need not shrink, only not grow.
+// Recurrences this close, 2^-12 of the motion, need not shrink; they must not grow.
 const SLOW: u32 = 48u;
-// A distance must have shrunk by this much (a factor of 0.7) since the last window.
+// Least shrinkage since the last window: a factor of 0.7.
 const SHRUNK: u32 = 2u;
 // Windows over which a candidate must have contracted.
 const STREAK: u32 = 2u;
-// Lags of any window, at least: they are a share of the time that has passed, or a few cycles.
+// Fewest lags of a window.
 const LEAST_WINDOW: u32 = 2u;
-// Windows need not be longer than so many cycles that contract.
+// A window need not be longer than this many contracting cycles.
 const LAGS_PER_CYCLE: u32 = 4u;
 
-// Checks a strobe; true once a period is confirmed.
+// Checks a strobe. Returns true once a period is confirmed.
 fn recurs() -> bool {
     let q = strobe_state();
     widen_scales(q);
-    if noted.window == 0u {
+    if search.window == 0u {
         begin_window(q, widest());
         return false;
     }
-    let lag = tally.period - noted.anchor_period;
-    let apart = octaves(distance_between(q, seen.anchor));
-    tallies[lane].distances[(lag - 1u) / 4u] |= apart << (8u * ((lag - 1u) % 4u));
-    if lag < noted.window {
+    let lag = tally.period - search.anchor_period;
+    let distance = octaves(distance_between(q, measures.anchor));
+    tallies[lane].distances[(lag - 1u) / 4u] |= distance << (8u * ((lag - 1u) % 4u));
+    if lag < search.window {
         return false;
     }
     let found = contracting_lag();
     let is_fast = found > 0u && shrinks(found);
     let settled = judge_lag(found);
-    noted.known_lags = noted.window;
+    search.known_lags = search.window;
     tallies[lane].last_distances = tallies[lane].distances;
-    // The next anchor lies at the same place of the cycle: only there do distances compare. The
-    // points of a cycle may be so close that a shorter lag seems to recur.
+    // The next anchor lies at the same point of the cycle, because distances compare only there. The points of a
+    // cycle may be so close together that a shorter lag seems to recur.
     let cycle = max(closest_lag(), 1u);
-    // A short lag that contracts is seen as well in short windows.
+    // A short lag that contracts is found in short windows, too.
     let enough = max(LAGS_PER_CYCLE * cycle, LEAST_WINDOW);
-    let lags = select(widest(), min(enough, widest()), is_fast && noted.tries == 0u);
+    let lags = select(widest(), min(enough, widest()), is_fast && search.failed_readings == 0u);
     begin_window(q, max(lags - lags % cycle, 1u));
     return settled;
 }
 
-// Units of distances: the largest strobe.
+// Raises the units of distances to the largest strobe.
 fn widen_scales(q: array<Real, 4>) {
-    seen.position_scale = max(seen.position_scale, max(abs(q[0]), abs(q[2])));
-    seen.rate_scale = max(seen.rate_scale, max(abs(q[1]), abs(q[3])));
+    measures.position_scale = max(measures.position_scale, max(abs(q[0]), abs(q[2])));
+    measures.rate_scale = max(measures.rate_scale, max(abs(q[1]), abs(q[3])));
 }
 
-// What a motion was before it came to its cycle is no unit of the cycle. A strobe may catch it at its
-// turning point, or midway between two.
+// Lowers the units of distances where a cycle is read, so that the motion before it does not count. A strobe may lie
+// at a turning point or midway between two.
 fn narrow_scales(q: array<Real, 4>) {
     let angle = flows[cell.flow_index].domains[0].angle;
     let position = max(abs(q[0]), abs(q[2]));
     let rate = max(abs(q[1]), abs(q[3]));
-    seen.position_scale = min(seen.position_scale, max(position, rate / angle));
-    seen.rate_scale = min(seen.rate_scale, max(rate, angle * position));
+    measures.position_scale = min(measures.position_scale, max(position, rate / angle));
+    measures.rate_scale = min(measures.rate_scale, max(rate, angle * position));
 }
 
 fn widest() -> u32 {
     return clamp(tally.period / WINDOW_SHARE, LEAST_WINDOW, settings.max_period);
 }
 
-// The lag that recurs best; a longer one must be better by a factor of four.
+// Returns the lag that recurs best. A longer lag must be better by a factor of four.
 fn closest_lag() -> u32 {
-    return closest_of(noted.known_lags);
+    return closest_of(search.known_lags);
 }
 
 fn closest_of(lags: u32) -> u32 {
     var best = 0u;
-    var distance = NEAR;
+    var distance = RECURRENCE_LIMIT;
     for (var lag = 1u; lag <= lags; lag++) {
         iterations += 1u;
         if distance_at(lag) >= distance {
@@ -86,33 +86,33 @@ fn closest_of(lags: u32) -> u32 {
     return best;
 }
 
-// The distance of two strobes, relative to the motion. Where strobes catch it at its turning point, their
-// rates are all rounding.
+// Returns the distance of two strobe states, relative to the motion. The unit of rates has a lower bound, because at
+// a turning point rates are rounding error.
 fn distance_between(a: array<Real, 4>, b: array<Real, 4>) -> Real {
-    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(seen.position_scale, Real(1e-30));
+    let p = max(abs(a[0] - b[0]), abs(a[2] - b[2])) / max(measures.position_scale, Real(1e-30));
     let r = max(abs(a[1] - b[1]), abs(a[3] - b[3])) / unit_of_rates();
     return max(p, r);
 }
 
 fn unit_of_rates() -> Real {
-    let least = flows[cell.flow_index].domains[0].angle * seen.position_scale;
-    return max(max(seen.rate_scale, least), Real(1e-30));
+    let least = flows[cell.flow_index].domains[0].angle * measures.position_scale;
+    return max(max(measures.rate_scale, least), Real(1e-30));
 }
 
 fn begin_window(q: array<Real, 4>, lags: u32) {
-    seen.anchor = q;
-    noted.anchor_period = tally.period;
-    noted.window = min(lags, settings.max_period);
+    measures.anchor = q;
+    search.anchor_period = tally.period;
+    search.window = min(lags, settings.max_period);
     tallies[lane].distances = array<u32, 16>();
 }
 
-// A distance in quarter octaves below 1, at most 255.
+// Returns a distance in quarter octaves below 1, at most 255.
 fn octaves(distance: Real) -> u32 {
     let d = f32(distance);
     if d <= 1e-19 {
         return 255u;
     }
-    return u32(clamp(-OCTAVE * log2(d), 0.0, 255.0));
+    return u32(clamp(-PARTS_PER_OCTAVE * log2(d), 0.0, 255.0));
 }
 
 fn distance_at(lag: u32) -> u32 {
@@ -123,25 +123,25 @@ fn last_distance_at(lag: u32) -> u32 {
     return (tallies[lane].last_distances[(lag - 1u) / 4u] >> (8u * ((lag - 1u) % 4u))) & 255u;
 }
 
-// The smallest lag that recurs at all its multiples and contracts, or has reached rounding.
-// Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
+// Returns the smallest lag that recurs at all its multiples and contracts or has reached rounding; 0 if there is
+// none. Decaying spirals come close at longer lags first, but their lag 1 shrinks as well.
 fn contracting_lag() -> u32 {
     // Points of a cycle that are close together neither shrink nor grow: a longer lag is better.
-    let best = closest_of(noted.window);
-    for (var lag = 1u; lag <= min(noted.window, noted.known_lags); lag++) {
+    let best = closest_of(search.window);
+    for (var lag = 1u; lag <= min(search.window, search.known_lags); lag++) {
         iterations += 1u;
         let now = distance_at(lag);
         let before = last_distance_at(lag);
         let contracts = shrinks(lag) || (now >= SLOW && now >= before && lag == best);
-        if now < NEAR || !contracts {
+        if now < RECURRENCE_LIMIT || !contracts {
             continue;
         }
-        var kept = true;
-        for (var multiple = 2u * lag; multiple <= noted.window; multiple += lag) {
+        var recurs_always = true;
+        for (var multiple = 2u * lag; multiple <= search.window; multiple += lag) {
             iterations += 1u;
-            kept = kept && distance_at(multiple) >= NEAR;
+            recurs_always = recurs_always && distance_at(multiple) >= RECURRENCE_LIMIT;
         }
-        if kept {
+        if recurs_always {
             return lag;
         }
     }
@@ -151,56 +151,57 @@ fn contracting_lag() -> u32 {
 // Whether the distance at a lag has shrunk since the last window, or is rounding.
 fn shrinks(lag: u32) -> bool {
     let now = distance_at(lag);
-    return now >= RESOLVED || now >= last_distance_at(lag) + SHRUNK;
+    return now >= WITHIN_ROUNDING || now >= last_distance_at(lag) + SHRUNK;
 }
 
-// Whether the limit is near enough: strobes `d` apart that shrink by `mu` per period are
-// `d / (1 - mu)` away from it. A slow approach must come closer.
+// Whether the limit is near enough. Strobes at a distance `d` that shrinks by `mu` per period are `d / (1 - mu)` away
+// from it, so that a slow approach must come closer.
 fn has_settled(lag: u32) -> bool {
     let now = distance_at(lag);
     let shrunk = f32(now) - f32(last_distance_at(lag));
-    if now >= RESOLVED {
+    if now >= WITHIN_ROUNDING {
         return true;
     }
-    // 1 - mu from the factor since the last anchor, `known_lags` periods ago.
-    let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), 1e-6, 1.0);
-    return f32(now) >= SETTLED - OCTAVE * log2(away);
+    // 1 - mu, from the factor since the last anchor, `known_lags` periods ago.
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(search.known_lags), 1e-6, 1.0);
+    return f32(now) >= SETTLED - PARTS_PER_OCTAVE * log2(away);
 }
 
-// Whether Newton's method may show what the limit is.
+// Whether Newton's method may search the limit.
 fn is_refinable(lag: u32) -> bool {
-    if !EXPONENT || settings.early_stop == 0u || noted.failed_searches >= MOST_FAILED_SEARCHES {
+    if !EXPONENT || settings.early_stop == 0u || search.failed_searches >= MOST_FAILED_SEARCHES {
         return false;
     }
     let now = f32(distance_at(lag));
     let shrunk = now - f32(last_distance_at(lag));
-    let away = clamp(shrunk * QUARTER_OCTAVE / f32(noted.known_lags), SLOWEST, 1.0);
-    return now >= REFINABLE - OCTAVE * log2(away) && repeats_itself(lag);
+    let away = clamp(shrunk * QUARTER_OCTAVE / f32(search.known_lags), SLOWEST, 1.0);
+    return now >= REFINABLE - PARTS_PER_OCTAVE * log2(away) && repeats_itself(lag);
 }
 
 // Natural logarithm of a quarter octave.
 const QUARTER_OCTAVE: f32 = 0.1733;
 
-// Keeps the books on the candidate; true once it is settled.
+// Updates the candidate. Returns true once it has settled.
 fn judge_lag(found: u32) -> bool {
-    noted.settled = 0u;
+    search.is_settled = 0u;
     if found == 0u {
         tally.candidate = 0u;
-        noted.streak = 0u;
+        search.streak = 0u;
         return false;
     }
-    noted.streak = select(1u, noted.streak + 1u, found == tally.candidate);
+    search.streak = select(1u, search.streak + 1u, found == tally.candidate);
     tally.candidate = found;
-    // Weak chaos contracts by chance, the oftener it is checked: ask for more of it.
-    let windows = STREAK + noted.tries + select(0u, 2u, grows(CHAOS_ERRORS));
-    let has_contracted = noted.streak >= windows;
-    noted.settled = select(0u, 1u, has_contracted && has_settled(found));
-    return has_contracted && (noted.settled != 0u || is_refinable(found));
+    // Weak chaos contracts by chance, more often the more it is checked. After each failed reading, one more window
+    // must contract.
+    let windows = STREAK + search.failed_readings + select(0u, 2u, grows(CHAOS_ERRORS));
+    let has_contracted = search.streak >= windows;
+    search.is_settled = select(0u, 1u, has_contracted && has_settled(found));
+    return has_contracted && (search.is_settled != 0u || is_refinable(found));
 }
 
-// Half a period after the middle of a cycle of odd period: how far is the state from the mirror
-// image of the cycle's start?
+// Compares the state half a period after the middle of a cycle of odd period with the mirror image of the cycle's
+// start.
 fn compare_mirror() {
-    let a = seen.anchor;
-    noted.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
+    let a = measures.anchor;
+    search.mirror = octaves(distance_between(strobe_state(), array<Real, 4>(-a[0], -a[1], -a[2], -a[3])));
 }

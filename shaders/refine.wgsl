@@ -1,19 +1,19 @@
-// Newton's method on the strobe map: from a motion that approaches a cycle to the cycle.
+// Newton's method on the strobe map: leads a motion that approaches a cycle to the cycle.
 
-// The monodromy matrix has been read along one candidate cycle from the anchor to the present
-// strobe. Moves the lane `to` where the linearised strobe map has its fixed point, to read on from
-// there; false where that brings it no closer or is no part of the motion.
+// Moves the lane to `to`, the fixed point of the linearised strobe map, and reads on from there. The monodromy matrix
+// has been read along one candidate cycle, from the anchor to the present strobe. Returns false if the step brings
+// the lane no closer or leaves the domain.
 fn refine(to: array<Real, 4>) -> bool {
-    if noted.refinements == 0u {
-        noted.home_mode = tally.mode;
-        noted.home_origin = tally.origin;
+    if search.newton_steps == 0u {
+        search.newton_start_mode = tally.mode;
+        search.newton_start_origin = tally.origin;
     }
-    let stalls = noted.refinements > 0u && noted.apart < noted.apart_before + SHRUNK;
-    let is_over = noted.refinements >= REFINEMENTS || tally.period + tally.candidate > settings.longest;
+    let stalls = search.newton_steps > 0u && search.return_distance < search.earlier_return_distance + SHRUNK;
+    let is_over = search.newton_steps >= MOST_NEWTON_STEPS || tally.period + tally.candidate > settings.longest;
     if stalls || is_over || is_onset() || tally.order > 0u {
         return false;
     }
-    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(noted.passed)) < Real(REACH)) {
+    if !is_bounded(sum_of_sizes(to)) || !(keeps_domain(to) && distance_between(to, trail(search.strobe_count)) < Real(LONGEST_NEWTON_STEP)) {
         return false;
     }
     motion.q = to;
@@ -25,31 +25,30 @@ fn refine(to: array<Real, 4>) -> bool {
         motion.q[1] = 0.0;
     }
     motion.bound = 0.0;
-    noted.refinements += 1u;
-    noted.apart_before = noted.apart;
+    search.newton_steps += 1u;
+    search.earlier_return_distance = search.return_distance;
     begin_reading();
     return true;
 }
 
-// The events of the cycle that has been read: along one branch of the strobe map they are the
-// same.
+// Returns the hash of the events of the cycle that has been read. It is constant along one branch of the strobe map.
 fn branch() -> u32 {
     return mix_bits(mix_bits(tally.hash_low + tally.events) + tally.recent);
 }
 
-// Notes the events of the first reading with the present period.
-fn note_branch() {
-    if noted.refinements == 0u || noted.branch_period != tally.candidate {
-        noted.branch = branch();
-        noted.branch_period = tally.candidate;
-        noted.apart_before = 0u;
+// Stores the events of the first reading with the present period.
+fn store_branch() {
+    if search.newton_steps == 0u || search.branch_period != tally.candidate {
+        search.branch = branch();
+        search.branch_period = tally.candidate;
+        search.earlier_return_distance = 0u;
     }
 }
 
-// Whether the cycle lies on the branch on which the motion approaches it. Beyond a fold it may
-// be another motion's.
-fn is_own() -> bool {
-    return branch() == noted.branch && (tally.grazes == 0u || noted.refinements == 0u);
+// Whether the cycle lies on the branch on which the motion approaches it. A cycle beyond a fold may belong to another
+// motion.
+fn is_on_branch() -> bool {
+    return branch() == search.branch && (tally.grazes == 0u || search.newton_steps == 0u);
 }
 
 fn difference(a: array<Real, 4>, b: array<Real, 4>) -> array<Real, 4> {
@@ -60,7 +59,7 @@ fn size_of(u: array<Real, 4>) -> Real {
     return distance_between(u, array<Real, 4>(0.0, 0.0, 0.0, 0.0));
 }
 
-// What the monodromy matrix makes of a deviation.
+// Applies the monodromy matrix to a deviation.
 fn image_of(u: array<Real, 4>) -> array<Real, 4> {
     var image: array<Real, 4>;
     for (var i = 0u; i < 4u; i++) {
@@ -70,12 +69,12 @@ fn image_of(u: array<Real, 4>) -> array<Real, 4> {
     return image;
 }
 
-// Whether the gap may be there in the present domain, at a phase that is no event's. A contact onset has no bounds.
+// Whether the gap may be at `to` in the present domain, at a phase without event. The contact onset has no bounds.
 fn keeps_domain(to: array<Real, 4>) -> bool {
     return tally.mode >= MODE_ONSET || beyond(to) < 0.0;
 }
 
-// How far beyond the nearest end of the present domain the gap is there.
+// Returns how far `to` lies beyond the nearest end of the present domain; negative inside.
 fn beyond(to: array<Real, 4>) -> Real {
     if tally.mode == MODE_FREE {
         return max(to[0] - walls[0], walls[1] - to[0]);
@@ -84,15 +83,15 @@ fn beyond(to: array<Real, 4>) -> Real {
     return sign_of(side) * (walls[side] - to[0]);
 }
 
-// Back to where the lane came from.
-fn give_up() {
-    if noted.refinements == 0u {
+// Moves the lane back to where Newton's method started.
+fn return_to_start() {
+    if search.newton_steps == 0u {
         return;
     }
-    motion.q = trail(noted.passed);
-    tally.mode = noted.home_mode;
-    tally.origin = noted.home_origin;
-    // Newton's method does not set out from a wall.
+    motion.q = trail(search.strobe_count);
+    tally.mode = search.newton_start_mode;
+    tally.origin = search.newton_start_origin;
+    // Newton's method does not start on a wall.
     tally.order = 0u;
     if tally.mode != MODE_FREE {
         motion.q[0] -= walls[side_of(tally.mode)];
@@ -101,19 +100,19 @@ fn give_up() {
         motion.q[0] = 0.0;
     }
     motion.bound = 0.0;
-    noted.refinements = 0u;
+    search.newton_steps = 0u;
 }
 
-// `a + (1 - M)^-1 (P(a) - a)` for the anchor `a`, by elimination with row pivots.
+// Returns `a + (1 - M)^-1 (P(a) - a)` for the anchor `a`, by elimination with row pivots.
 fn fixed_point() -> array<Real, 4> {
     let present = strobe_state();
-    // Row by row, the right side last.
+    // Row by row, the right-hand side last.
     var m: array<Real, 20>;
     for (var i = 0u; i < 4u; i++) {
         for (var j = 0u; j < 4u; j++) {
             m[5u * i + j] = select(Real(0.0), Real(1.0), i == j) - motions[lane].tangents[4u * j + i];
         }
-        m[5u * i + 4u] = present[i] - seen.anchor[i];
+        m[5u * i + 4u] = present[i] - measures.anchor[i];
     }
     for (var k = 0u; k < 4u; k++) {
         var pivot = k;
@@ -135,7 +134,7 @@ fn fixed_point() -> array<Real, 4> {
             }
         }
     }
-    var to = seen.anchor;
+    var to = measures.anchor;
     for (var i = 0u; i < 4u; i++) {
         to[i] += m[5u * i + 4u] / m[6u * i];
     }

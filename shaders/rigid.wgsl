@@ -1,8 +1,8 @@
 // Rigid walls: a pressed contact that has come to rest sticks until the load pulls it off.
 //
-// A gap that sticks is the wall's position, at rest; the other displacement moves on by the domain of that side, in
-// which the wall has taken up the gap's acceleration. What is watched is the acceleration that the wall takes up: its
-// series takes the place of the gap's.
+// While a gap sticks, it stays on the wall, and the other displacement moves in the domain of that side, in which the
+// wall takes up the gap's acceleration. Contact ends when that acceleration changes sign; its series takes the place
+// of the gap's series.
 
 fn is_rigid(side: u32) -> bool {
     return KINDS && contact_at(side) == CONTACT_RIGID;
@@ -12,24 +12,24 @@ fn sticks() -> bool {
     return KINDS && tally.mode >= MODE_STUCK;
 }
 
-// Contact onset: the gap leaves its wall slowly, and is pressed back.
+// Whether the motion is in the contact onset: the gap leaves its wall slowly, and is pressed back.
 fn is_onset() -> bool {
     return tally.mode >= MODE_ONSET && !sticks();
 }
 
-// The acceleration of a gap that is held at its wall, and the motion beside it.
-fn held_pull(side: u32) -> Pull {
+// Returns the constants of the accelerations of x and of a gap that rests on its wall.
+fn stuck_pull(side: u32) -> Pull {
     let behind = meshing_pull(side);
     return Pull(flows[cell.flow_index].pressing[side], behind.x_row, behind.share, behind.angle);
 }
 
-// Sticks to the wall if the load presses a gap that has come to rest there; the wall takes all of its rate. Else no
-// event.
+// Makes a gap that has come to rest stick, if the load presses it: the wall takes all of its rate. Returns no event
+// if it is not pressed.
 fn stick(side: u32) -> Jump {
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 0.0, kick, 0.0);
-    let taken = sign_of(side) * max(sign_of(side) * motion.q[1], Real(0.0));
-    let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3] + kick * taken);
-    if presses(held_pull(side), side, rest) {
+    let removed = sign_of(side) * max(sign_of(side) * motion.q[1], Real(0.0));
+    let rest = array<Real, 4>(0.0, 0.0, motion.q[2], motion.q[3] + kick * removed);
+    if presses(stuck_pull(side), side, rest) {
         jump.event = true;
         jump.mode = MODE_STUCK + side;
         motion.q = rest;
@@ -37,7 +37,7 @@ fn stick(side: u32) -> Jump {
     return jump;
 }
 
-// The load pulls the gap off the wall: it leaves from rest, and without an acceleration.
+// Releases the gap where the load pulls it off the wall: it leaves without rate and acceleration.
 fn let_go(side: u32) -> Jump {
     motion.q[0] = walls[side];
     motion.q[1] = 0.0;
@@ -47,21 +47,21 @@ fn let_go(side: u32) -> Jump {
     return Jump(true, MODE_FREE, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
 }
 
-// Order of the root of the pressing acceleration where sticking begins: it may be balanced, and about to press.
-fn held_order(side: u32) -> u32 {
-    let pull = held_pull(side);
+// Returns the order of the root of the pressing acceleration where sticking begins: 1 if the load is balanced.
+fn stuck_order(side: u32) -> u32 {
+    let pull = stuck_pull(side);
     let pressing = acceleration(pull.gap_row, pull.share, motion.q);
     return select(0u, 1u, abs(pressing) <= balance(pull.gap_row, pull.share, motion.q));
 }
 
-// Expands the motion beside a gap that sticks, and in place of the gap the acceleration that the wall takes up.
-fn expand_held() {
+// Expands the motion of x while the gap sticks. The acceleration that the wall takes up replaces the gap's series.
+fn expand_stuck() {
     let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
     let r = here.x_row;
     let angle = here.angle;
     var c = motion.phasor[0];
     var s = motion.phasor[1];
-    // Term k of x, and of its rate.
+    // Term k of x and of its rate.
     var x = motion.q[2];
     var v = here.share * motion.q[3];
     var load_gap = p[5];
@@ -86,9 +86,9 @@ fn expand_held() {
     }
 }
 
-// Bound on the sixth derivative of that acceleration over the step: it is made of x, its rate and the forcing, and the
-// energy of the differentiated motion bounds the derivatives of these.
-fn held_bound() -> Real {
+// Returns a bound on the sixth derivative of that acceleration over the step. It is a sum of x, its rate and the
+// forcing, whose derivatives are bounded by the energy of the differentiated motion.
+fn stuck_bound() -> Real {
     let p = flows[cell.flow_index].pressing[side_of(tally.mode)];
     let square = here.angle * here.angle;
     let fifth = square * square * here.angle;

@@ -1,18 +1,18 @@
-// One invocation is one lane.
+// The main loop of a lane. One invocation is one lane.
 
 var<private> cell: Cell;
-// What steps and events take.
+// State that steps and events use.
 var<private> motion: MotionNow;
 var<private> tally: TallyNow;
-// What strobes take.
-var<private> seen: Seen;
-var<private> noted: Noted;
+// State that strobes use.
+var<private> measures: Measures;
+var<private> search: Search;
 // Index of this lane.
 var<private> lane: u32;
-// Loop iterations of this dispatch.
+// Loop iterations spent in this dispatch.
 var<private> iterations: u32;
 
-// The sum of sizes: a NaN among them makes it one.
+// Returns the sum of the sizes. It is a NaN if one of them is.
 fn sum_of_sizes(q: array<Real, 4>) -> Real {
     return (abs(q[0]) + abs(q[1])) + (abs(q[2]) + abs(q[3]));
 }
@@ -28,59 +28,59 @@ fn is_over() -> bool {
     return tally.status != STATUS_OK || tally.stage >= STAGE_READ;
 }
 
-// Whether there is work for this variant. Without the tangent vector for the exponent lanes go
-// on until they need it, and who reads a cycle reads it to its end; then they are the other variant's for good.
-// Which one has a lane must not depend on when a dispatch ends: they round differently.
-fn running() -> bool {
+// Whether this variant has work for the lane. The variant without the exponent's tangent vector carries a lane until
+// it needs the vector, and finishes a cycle that is being read; the other variant then has the lane for good. The
+// choice must not depend on where a dispatch ends, because the variants round differently.
+fn has_work() -> bool {
     if is_over() || !EXPONENT {
         return !is_over();
     }
-    let grows = tally.grows == 1u || (tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from);
+    let grows = tally.carries_growth == 1u || (tally.stage == STAGE_RUNNING && tally.period >= settings.growth_from);
     return grows == GROWTH;
 }
 
-// Takes lane `i` into registers.
-fn take_up(i: u32) {
+// Loads lane `i` into registers.
+fn load_lane(i: u32) {
     lane = i;
     cell = cells[i];
     motion = motions[i].now;
     tally = tallies[i].now;
     iterations = 0u;
     if KEEP {
-        seen = motions[i].seen;
-        noted = tallies[i].noted;
+        measures = motions[i].measures;
+        search = tallies[i].search;
     }
 }
 
-fn put_down() {
+fn store_lane() {
     motions[lane].now = motion;
     tallies[lane].now = tally;
     if KEEP {
-        motions[lane].seen = seen;
-        tallies[lane].noted = noted;
+        motions[lane].measures = measures;
+        tallies[lane].search = search;
     }
 }
 
-// Before a strobe is checked, and after: from one to the next, registers are for steps.
-fn recall() {
+// Loads the state that strobes use. Between strobes, the steps need its registers.
+fn load_strobe_state() {
     if !KEEP {
-        seen = motions[lane].seen;
-        noted = tallies[lane].noted;
+        measures = motions[lane].measures;
+        search = tallies[lane].search;
     }
 }
 
-fn remember() {
+fn store_strobe_state() {
     if !KEEP {
-        motions[lane].seen = seen;
-        tallies[lane].noted = noted;
+        motions[lane].measures = measures;
+        tallies[lane].search = search;
     }
 }
 
-// From event to event to the next stop phase; false if the lane or its share of this dispatch ends
-// before. Lanes wait for each other where chatter begins, too.
+// Follows the motion to the next stop phase. Returns false if the lane or its iterations in this dispatch end before.
+// Lanes wait for each other where chatter begins, too.
 fn fly_to_stop_phase() -> bool {
     if CHATTER {
-        while running() && iterations < settings.iterations {
+        while has_work() && iterations < settings.iterations {
             if flight_to_chatter() {
                 return true;
             }
@@ -94,10 +94,10 @@ fn fly_to_stop_phase() -> bool {
     return false;
 }
 
-// From event to event to the next stop phase, or to an impact from which chatter is to be followed.
+// Follows the motion to the next stop phase, or to an impact that begins a series of short flights.
 fn flight_to_chatter() -> bool {
     chatters = false;
-    while running() && !chatters && iterations < settings.iterations {
+    while has_work() && !chatters && iterations < settings.iterations {
         if scan() == SCAN_BUDGET {
             break;
         }
@@ -117,31 +117,30 @@ fn sweep(@builtin(global_invocation_id) id: vec3<u32>) {
     if i >= queue.count {
         return;
     }
-    take_up(queued(i));
+    load_lane(selected_lane(i));
     fetch_constants();
-    fetch_tangent();
+    load_tangent();
     if motion.bound == 0.0 {
-        // A start: no pass has bounded it yet.
+        // A start: no pass has computed the bound yet.
         renew_bound();
     }
-    // Scanning, acting and checking strobes are separate, so that lanes scan together, act
-    // together and check together.
-    while running() && iterations < settings.iterations {
+    // Scans, events and strobes are in separate loops, so that lanes do the same work at the same time.
+    while has_work() && iterations < settings.iterations {
         if fly_to_stop_phase() {
-            recall();
+            load_strobe_state();
             if tally.step >= shape.steps {
                 begin_period();
             } else {
                 compare_mirror();
             }
-            remember();
+            store_strobe_state();
         }
     }
     if tally.stage == STAGE_READ {
-        recall();
+        load_strobe_state();
         judge_cycle();
-        remember();
+        store_strobe_state();
     }
-    keep_tangent();
-    put_down();
+    store_tangent_now();
+    store_lane();
 }

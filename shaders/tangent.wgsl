@@ -1,8 +1,7 @@
-// Tangent vectors: the propagator along a flight, saltation at events. Only in variants that
-// are asked for an exponent.
+// Tangent vectors: propagation along a flight and saltation at events. Only variants with an exponent contain them.
 
-// The one vector that is carried for the exponent. The four columns of the monodromy matrix,
-// carried while a cycle is read, stay in the buffer.
+// The one vector for the exponent. The four columns of the monodromy matrix, which are carried while a cycle is read,
+// stay in the buffer.
 var<private> tangent_now: array<Real, 4>;
 
 fn tangent(i: u32) -> array<Real, 4> {
@@ -29,36 +28,37 @@ fn store_tangent(i: u32, u: array<Real, 4>) {
     motions[lane].tangents[k + 3u] = u[3];
 }
 
-// At the start and the end of a dispatch. The first one with the vector begins it.
-fn fetch_tangent() {
+// Loads the tangent vector at the start of a dispatch. The first dispatch with the vector initialises it.
+fn load_tangent() {
     if GROWTH {
-        tally.grows = 1u;
+        tally.carries_growth = 1u;
         if tally.tangent_count == 0u {
             resume_growth();
-            keep_tangent();
+            store_tangent_now();
         }
         let t = motions[lane].tangents;
         tangent_now = array<Real, 4>(t[0], t[1], t[2], t[3]);
     }
 }
 
-// A vector in no direction in particular.
-fn fresh() -> array<Real, 4> {
+// Returns a vector with a part in every direction.
+fn initial_tangent() -> array<Real, 4> {
     let x = select(Real(0.0), Real(0.5), shapes[cell.flow_index].degrees > 1u);
     return array<Real, 4>(0.5, 0.5, x, x);
 }
 
-// While a cycle is read the vector is not carried along.
-fn set_vector_aside() {
+// Saves the vector while a cycle is read.
+fn save_vector() {
     if tally.tangent_count == 1u {
         motions[lane].vector = tangent_now;
     }
 }
 
-// It turns and grows as the matrix has it that was read along the motion. A fresh one instead would grow once more until
-// it has its direction: where cycles are read again and again, by 0.2 in a period of motion whose exponent is zero.
+// Multiplies the saved vector by the monodromy matrix of the cycle that was read along the motion. A new vector would
+// first have to turn into its direction, which adds growth: where cycles are read again and again, 0.2 per period of
+// motion whose exponent is zero.
 fn carry_vector() {
-    if noted.refinements > 0u {
+    if search.newton_steps > 0u {
         return;
     }
     let u = motions[lane].vector;
@@ -69,7 +69,7 @@ fn carry_vector() {
     }
     let size = largest(image);
     if !(size > 1e-30 && size < 1e30) {
-        motions[lane].vector = fresh();
+        motions[lane].vector = initial_tangent();
         return;
     }
     let length = unit(&image, size);
@@ -79,9 +79,9 @@ fn carry_vector() {
     }
 }
 
-// Gives a vector unit length, whose largest entry is `size`; what is left of its length without that factor.
+// Scales a vector, whose largest entry is `size`, to unit length. Returns its former length divided by `size`.
 fn unit(u: ptr<function, array<Real, 4>>, size: Real) -> Real {
-    // Squares would leave the range.
+    // Squares would leave the range of numbers.
     let scale = 1.0 / size;
     let v = array<Real, 4>(scale * (*u)[0], scale * (*u)[1], scale * (*u)[2], scale * (*u)[3]);
     let length = sqrt((v[0] * v[0] + v[1] * v[1]) + (v[2] * v[2] + v[3] * v[3]));
@@ -90,19 +90,19 @@ fn unit(u: ptr<function, array<Real, 4>>, size: Real) -> Real {
     return length;
 }
 
-// The vector from where it was left.
+// Continues with the saved vector.
 fn resume_growth() {
     tally.tangent_count = select(0u, 1u, GROWTH);
     tangent_now = motions[lane].vector;
 }
 
-fn keep_tangent() {
+fn store_tangent_now() {
     if GROWTH && tally.tangent_count == 1u {
         store_tangent(0u, tangent_now);
     }
 }
 
-// Carries the monodromy's columns over full steps; each costs an iteration per vector.
+// Carries the columns of the monodromy matrix over full steps; each vector costs one iteration.
 fn step_columns(count: u32) {
     if tally.tangent_count <= 1u {
         return;
@@ -126,29 +126,31 @@ fn step_columns(count: u32) {
     }
 }
 
-// What the tangent vectors pass through at the end of a careful step.
+// Changes of the tangent vectors at the end of a careful step.
 struct Crossing {
-    // The event, and the vector fields around it.
+    // The event, and the vector fields before and after it.
     jump: Jump,
     before: array<Real, 4>,
     after: array<Real, 4>,
-    // The closed series after it: how long it lasts, 0 if there is none; the pressing acceleration at its
-    // end, signed into the wall; by how much it ends later per (z, w, x, v) of a neighbour, the latter
-    // two with the gap closed; and what the acceleration of x then changes by with w, x, v.
+    // The infinite sequence of impacts after it. `lasts`: its length, 0 if there is none. `pressing`: the
+    // acceleration into the wall at its end. `late_by`: by how much a neighbour's sequence ends later, per (z, w, x,
+    // v), x and v with the gap closed. `v_by`: change of the acceleration of x per w, x, v.
     lasts: Real,
     pressing: Real,
     late_by: array<Real, 4>,
     v_by: array<Real, 3>,
-    // The state and the field go on, but for this change of the rates of gap and x per displacement of the gap.
+    // Whether state and field are continuous but for a change of the rates of gap and x per displacement of the gap
+    // (`jolt`).
     is_smooth: bool,
     jolt: array<Real, 2>,
 }
 
 var<private> crossing: Crossing;
 
-// Carries every vector over a part of a step and what follows it. A gap that was held has had no neighbours.
-fn carry_tangents(flown: Pull, tau: Real, held: bool) {
-    let back = 1.0 / flown.share;
+// Carries every vector over a part of a step and the event after it. A gap that was stuck has no neighbouring
+// motions.
+fn carry_tangents(flight_pull: Pull, tau: Real, held: bool) {
+    let back = 1.0 / flight_pull.share;
     for (var i = 0u; i < tally.tangent_count; i++) {
         iterations += 1u;
         var u = tangent(i);
@@ -156,9 +158,9 @@ fn carry_tangents(flown: Pull, tau: Real, held: bool) {
             u[0] = 0.0;
             u[1] = 0.0;
         }
-        u[1] *= flown.share;
-        u[3] *= flown.share;
-        u = glide(flown, u, tau);
+        u[1] *= flight_pull.share;
+        u[3] *= flight_pull.share;
+        u = glide(flight_pull, u, tau);
         u[1] *= back;
         u[3] *= back;
         if crossing.jump.event {
@@ -170,16 +172,16 @@ fn carry_tangents(flown: Pull, tau: Real, held: bool) {
         set_tangent(i, u);
     }
     if tally.tangent_count == 1u {
-        tame();
+        rescale_tangent();
     }
 }
 
-// A period of many events may take the vector out of single precision's range: what is taken
-// out of it counts as growth of the period under way.
+// Many events in one period may take the vector out of the range of single precision. Factors that are taken out of
+// it count as growth of the present period.
 const LARGE: Real = 1099511627776.0;
 const LARGE_OCTAVES: Real = 40.0;
 
-fn tame() {
+fn rescale_tangent() {
     let u = tangent_now;
     if !(largest(u) > LARGE) {
         return;
@@ -195,16 +197,16 @@ fn largest(u: array<Real, 4>) -> Real {
     return max(max(abs(u[0]), abs(u[1])), max(abs(u[2]), abs(u[3])));
 }
 
-// A part `tau` of a step: the series of the unforced motion.
-fn glide(flown: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
-    let g = flown.gap_row;
-    let r = flown.x_row;
+// Carries a vector over a part `tau` of a step: the series of the unforced motion.
+fn glide(flight_pull: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
+    let g = flight_pull.gap_row;
+    let r = flight_pull.x_row;
     var z = u[0];
     var w = u[1];
     var x = u[2];
     var v = u[3];
     var sum = u;
-    // (z, w, x, v) are the derivatives of order k, k + 1 times tau^k / k!.
+    // (z, w, x, v): derivatives of order k and k + 1, times tau^k / k!.
     //% for k in 1..TERMS: glide
     {
         let step = tau * (1.0 / $k.0);
@@ -223,7 +225,7 @@ fn glide(flown: Pull, u: array<Real, 4>, tau: Real) -> array<Real, 4> {
     return sum;
 }
 
-// As `glide`, for short flights of free motion.
+// Carries a vector over a short flight of free motion.
 fn glide_short(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
     let g = here.gap_row;
     let r = here.x_row;
@@ -236,7 +238,7 @@ fn glide_short(u: array<Real, 4>, tau: Real) -> array<Real, 4> {
     return sum;
 }
 
-// The present vector field, per free step.
+// Returns the present vector field, per free step.
 fn field() -> array<Real, 4> {
     let square = here.substeps * here.substeps;
     let a = acceleration(here.gap_row, here.share, motion.q);
@@ -244,8 +246,8 @@ fn field() -> array<Real, 4> {
     return array<Real, 4>(motion.q[1], square * a, motion.q[3], square * b);
 }
 
-// `S u = R u + (f+ - R f-) (n . u) / (n . f-)`, with R the jump of rates by `kept` (-e at a
-// contact, 1 elsewhere) and `kick`.
+// Applies the saltation matrix: `S u = R u + (f+ - R f-) (n . u) / (n . f-)`. R is the jump of rates by `rate_factor`
+// (-e at an impact, 1 elsewhere) and `kick`.
 fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     if KINDS && crossing.is_smooth {
         return array<Real, 4>(u[0], u[1] + crossing.jolt[0] * u[0], u[2], u[3] + crossing.jolt[1] * u[0]);
@@ -255,17 +257,17 @@ fn saltate(u: array<Real, 4>) -> array<Real, 4> {
     let after = crossing.after;
     let inverse = select(1.0 / jump.rate, Real(0.0), abs(jump.rate) < NO_SPEED * speed);
     let along = inverse * ((jump.normal[0] * u[0] + jump.normal[1] * u[1]) + (jump.normal[2] * u[2] + jump.normal[3] * u[3]));
-    // The first row is the quotient of the gap's rates; as a sum it would lose what a small `e` keeps.
+    // The first row is the quotient of the gap's rates; written as a sum it would lose digits where `e` is small.
     return array<Real, 4>(
-        jump.kept * u[0],
-        jump.kept * u[1] + (after[1] - jump.kept * before[1]) * along,
+        jump.rate_factor * u[0],
+        jump.rate_factor * u[1] + (after[1] - jump.rate_factor * before[1]) * along,
         u[2] + (after[2] - before[2]) * along,
         u[3] + jump.kick * u[1] + (after[3] - before[3] - jump.kick * before[1]) * along,
     );
 }
 
-// Through an infinite series of impacts: a neighbour's ends `late`; until then it misses the pressing
-// acceleration. The centre of mass moves as it does with the gap closed, and feels the way of the gap.
+// Carries a vector through an infinite sequence of impacts. A neighbour's sequence ends `late`; until then it lacks
+// the pressing acceleration. x moves as with the gap closed.
 fn close(u: array<Real, 4>) -> array<Real, 4> {
     let x = u[2] + kick * u[0];
     let v = u[3] + kick * u[1];
@@ -276,18 +278,18 @@ fn close(u: array<Real, 4>) -> array<Real, 4> {
     return array<Real, 4>(0.0, behind, x + crossing.lasts * v, v + (gained - kick * behind));
 }
 
-// Growth of the one vector since the last strobe, in octaves; it is given unit length.
+// Returns the growth of the one vector since the last strobe, in octaves, and scales the vector to unit length.
 fn renormalise() -> Real {
     var u = tangent(0u);
     let size = largest(u);
     if !(size > 1e-30) {
-        // Superstable: as large a loss as can be told. Start anew.
-        set_tangent(0u, fresh());
+        // Superstable: returns a large loss, and starts with a new vector.
+        set_tangent(0u, initial_tangent());
         return -100.0;
     }
     let length = unit(&u, size);
     set_tangent(0u, u);
-    // Averages alone are made of it: single precision will do, and f64 has no logarithm.
+    // Single precision is enough for averages, and f64 has no logarithm.
     return Real(log2(f32(size)) + log2(f32(length)));
 }
 
@@ -302,29 +304,29 @@ fn accumulate_growth() {
     count_growth(growth, 1u);
 }
 
-// Growth over so many periods. A block that a cycle makes longer than the others counts like them.
+// Adds growth over a number of periods. A block that a cycle makes longer has the same weight as the others.
 fn count_growth(growth: Real, periods: u32) {
     motion.block_growth += growth;
-    noted.block_periods += periods;
-    if noted.block_periods >= settings.exponent_block {
-        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(noted.block_periods));
-        // Squares of deviations, by Welford's update: sums of squares would cancel where blocks are nearly alike.
-        let blocks = Real(noted.blocks);
-        let deviation = whole - seen.growth_sum / max(blocks, 1.0);
-        seen.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
-        seen.growth_sum += whole;
+    search.block_periods += periods;
+    if search.block_periods >= settings.exponent_block {
+        let whole = motion.block_growth * (Real(settings.exponent_block) / Real(search.block_periods));
+        // Squared deviations by Welford's update: sums of squares would cancel where blocks are nearly equal.
+        let blocks = Real(search.blocks);
+        let deviation = whole - measures.growth_sum / max(blocks, 1.0);
+        measures.growth_squares += deviation * deviation * (blocks / (blocks + 1.0));
+        measures.growth_sum += whole;
         motion.block_growth = 0.0;
-        noted.block_periods = 0u;
-        noted.blocks += 1u;
+        search.block_periods = 0u;
+        search.blocks += 1u;
     }
 }
 
 const LN_2: Real = 0.6931471805599453;
 
-// Mean growth per period of the tangent vector, natural logarithms, and its standard error
-// from the means of blocks.
+// Returns the mean growth of the tangent vector per period, natural logarithms, and its standard error from the means
+// of blocks.
 fn mean_growth() -> vec2<Real> {
-    let blocks = Real(noted.blocks);
-    let variance = seen.growth_squares / (blocks * (blocks - 1.0));
-    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(seen.growth_sum / blocks, sqrt(variance));
+    let blocks = Real(search.blocks);
+    let variance = measures.growth_squares / (blocks * (blocks - 1.0));
+    return (LN_2 / Real(settings.exponent_block)) * vec2<Real>(measures.growth_sum / blocks, sqrt(variance));
 }

@@ -1,7 +1,7 @@
-// The exact flow over part of a step: its Taylor series, in units of the domain's step.
+// Taylor series of the exact flow over a part of a step, in units of the domain's step.
 //
-// Loops over terms are marked with //% and copied out before compilation (src/gpu/unroll.rs):
-// only then do drivers keep the terms in registers.
+// Loops over terms are marked with //% and copied out before compilation (src/gpu/unroll.rs), because drivers keep
+// the terms in registers only then.
 
 var<private> gap_terms: array<Real, TERMS>;
 var<private> x_terms: array<Real, TERMS>;
@@ -40,19 +40,19 @@ fn expand() {
     //% end
 }
 
-// Bound on the derivative of order n + 1 of the gap, from the derivatives of order n and
-// n + 1 of gap and x: the energy of the differentiated motion.
+// Returns a bound on the gap's derivative of order n + 1 from the derivatives of order n and n + 1 of gap and x: the
+// energy of the differentiated motion.
 fn derivative_bound(z: Real, w: Real, x: Real, v: Real) -> Real {
     let e = here.energy;
     let square = (e[0] * w * w + e[1] * w * v + e[2] * v * v) + (e[3] * z * z + e[4] * z * x + e[5] * x * x);
     return 1.0001 * sqrt(max(square, Real(0.0)));
 }
 
-// Bound on the sixth derivative of the gap at the present state, from five derivatives.
+// Bounds the sixth derivative of the gap at the present state, from five derivatives.
 fn renew_bound() {
     let g = here.gap_row;
     let r = here.x_row;
-    // Derivatives of order k and k + 1; of the forcing, of order k.
+    // Derivatives of order k and k + 1; of the forcing, order k.
     var z = motion.q[0];
     var w = here.share * motion.q[1];
     var x = motion.q[2];
@@ -79,7 +79,7 @@ fn renew_bound() {
     motion.bound = derivative_bound(z, w, x, v);
 }
 
-// Displacement of the gap from the expansion point, slope and curvature at `tau`.
+// Returns the displacement of the gap from the expansion point at `tau`, its slope and its curvature.
 fn gap_jet(tau: Real) -> vec3<Real> {
     var p = gap_terms[TERMS - 1u];
     var p1: Real = 0.0;
@@ -89,13 +89,13 @@ fn gap_jet(tau: Real) -> vec3<Real> {
     p1 = p1 * tau + p;
     p = p * tau + gap_terms[$k];
     //% end
-    // The constant term is left out: a flight from the wall keeps its relative accuracy.
+    // The constant term is left out, so that a flight from the wall keeps its relative accuracy.
     p2 = p2 * tau + p1;
     p1 = p1 * tau + p;
     return vec3<Real>(p * tau, p1, 2.0 * p2);
 }
 
-// Acceleration of the gap, its slope and curvature at `tau`.
+// Returns the acceleration of the gap at `tau`, its slope and its curvature.
 fn pressing_jet(tau: Real) -> vec3<Real> {
     var p: Real = 0.0;
     var p1: Real = 0.0;
@@ -108,7 +108,7 @@ fn pressing_jet(tau: Real) -> vec3<Real> {
     return vec3<Real>(p, p1, 2.0 * p2);
 }
 
-// State at `tau` of the expansion, in lane units, as gap, rate, x, rate.
+// Returns the state at `tau` of the expansion in lane units: gap, rate, x, rate.
 fn state_at(tau: Real, substeps: Real) -> array<Real, 4> {
     var z = gap_terms[TERMS - 1u];
     var w: Real = 0.0;

@@ -1,7 +1,7 @@
-// The word: a symbol for every flight, spelled and hashed. Its pattern: a symbol for every run of one.
+// The word: one symbol for every flight, stored and hashed. The pattern: one symbol for every run of equal symbols.
 
-// One flight ends on `side`: its symbol. The first flight of all comes from no wall.
-fn note_symbol(side: u32) {
+// Adds the symbol of a flight that ends on `side`. The first flight comes from no wall and has no symbol.
+fn add_symbol(side: u32) {
     var symbol: u32;
     if tally.mode != MODE_FREE {
         symbol = select(4u, 1u, side == SIDE_RIGHT);
@@ -17,13 +17,13 @@ fn note_symbol(side: u32) {
         tallies[lane].word[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
     }
     tally.word_length = n + 1u;
-    // Before the first symbol there is none.
+    // Before the first symbol, `recent` is zero.
     if PATTERN && symbol != (tally.recent & 7u) {
-        note_run(symbol);
+        add_run(symbol);
     }
-    take_symbol(symbol);
+    push_symbol(symbol);
     if n >= 7u {
-        add_stretch();
+        add_hash_window();
     }
 }
 
@@ -34,43 +34,43 @@ fn begin_pattern() {
     tallies[lane].pattern_recent = 0u;
 }
 
-// Runs are fewer than flights: what they take stays in the buffer.
-fn note_run(symbol: u32) {
+// Adds a symbol to the pattern. Runs are rarer than flights, so that the pattern stays in the buffer.
+fn add_run(symbol: u32) {
     let n = tallies[lane].pattern_length;
     if n < 7u * SYMBOLS_PER_NUMBER {
         tallies[lane].pattern[n / SYMBOLS_PER_NUMBER] |= symbol << (3u * (n % SYMBOLS_PER_NUMBER));
     }
-    let recent = followed_by(tallies[lane].pattern_recent, symbol);
+    let recent = append_symbol(tallies[lane].pattern_recent, symbol);
     tallies[lane].pattern_length = n + 1u;
     tallies[lane].pattern_recent = recent;
     if n >= 7u {
-        let hash = stretch(recent);
+        let hash = hash_window(recent);
         tallies[lane].pattern_hash[0] += hash.x;
         tallies[lane].pattern_hash[1] += hash.y;
     }
 }
 
-fn take_symbol(symbol: u32) {
-    tally.recent = followed_by(tally.recent, symbol);
+fn push_symbol(symbol: u32) {
+    tally.recent = append_symbol(tally.recent, symbol);
 }
 
-// The eight latest symbols, and one more.
-fn followed_by(recent: u32, symbol: u32) -> u32 {
+// Appends a symbol to the latest ones and keeps eight.
+fn append_symbol(recent: u32, symbol: u32) -> u32 {
     return ((recent << 3u) | symbol) & 0xffffffu;
 }
 
-// Stretches of eight symbols, hashed and summed: no matter where the cycle starts.
-fn add_stretch() {
-    let hash = stretch(tally.recent);
+// Adds the hash of the eight latest symbols. The sum over all windows does not depend on where the cycle starts.
+fn add_hash_window() {
+    let hash = hash_window(tally.recent);
     tally.hash_low += hash.x;
     tally.hash_high += hash.y;
 }
 
-fn stretch(recent: u32) -> vec2<u32> {
+fn hash_window(recent: u32) -> vec2<u32> {
     return vec2<u32>(mix_bits(recent), mix_bits(recent ^ 0x5bd1e995u));
 }
 
-// A bijection of 32-bit numbers that scatters them.
+// Mixes the bits of a number: a bijection of 32-bit numbers.
 fn mix_bits(x: u32) -> u32 {
     var h = x;
     h = (h ^ (h >> 16u)) * 0x7feb352du;
@@ -78,8 +78,8 @@ fn mix_bits(x: u32) -> u32 {
     return h ^ (h >> 16u);
 }
 
-// Events this close to phase 0, in turns, lie on the strobe.
-fn note_strobe() {
+// Counts an event that is so close to phase 0, in turns, that it lies on the strobe.
+fn count_on_strobe() {
     let turns = (Real(tally.step) + motion.theta) / Real(shapes[cell.flow_index].steps);
     if turns < ON_STROBE || 1.0 - turns < ON_STROBE {
         tally.on_strobe += 1u;

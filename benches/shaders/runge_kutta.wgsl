@@ -286,7 +286,7 @@ fn careful_step() {
 // pays for events on every step otherwise.
 fn fly_to_stop_phase() -> bool {
     fetch_pull();
-    while running() && iterations < settings.iterations {
+    while has_work() && iterations < settings.iterations {
         let verdict = scan_steps();
         if verdict == SCAN_BUDGET {
             break;

@@ -1,12 +1,16 @@
 //! One motion of a piecewise-linear vibro-impact oscillator, exactly.
 //!
-//! Pure f64: no files, clock, threads or graphics. In the order in which data flows: an
-//! oscillator and its law of contact ([`model`]), its flow in closed form ([`flow`]), steps shown to be
-//! free of events ([`certificate`]), the trajectory from event to event ([`mod@reference`]),
-//! tangents, cycles and their multipliers ([`stability`]), what a motion is ([`orbit`]), and what
-//! its cycle is called ([`word`]).
+//! Pure f64: no files, clock, threads or graphics. The modules, in the order in which data flows:
+//!
+//! - [`model`]: the oscillator and its contact law;
+//! - [`flow`]: its motion in closed form;
+//! - [`certificate`]: proof that a step contains no event;
+//! - [`mod@reference`]: the trajectory from event to event;
+//! - [`stability`]: cycles, Floquet multipliers and Lyapunov exponents;
+//! - [`orbit`]: the class of a motion;
+//! - [`word`]: the symbols of a cycle.
 
-#![warn(clippy::print_stderr, clippy::print_stdout, reason = "output goes where the caller says")]
+#![warn(clippy::print_stderr, clippy::print_stdout, reason = "a library writes nothing to the terminal")]
 
 pub mod fused;
 

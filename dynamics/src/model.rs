@@ -1,24 +1,23 @@
-//! What is integrated: piecewise-linear oscillators between two walls.
+//! Models of piecewise-linear oscillators between two walls.
 //!
-//! A [`Model`] (today [`GearPair`], and [`Stops`], which can be solved by hand) has parameters by
-//! name and hands on an [`Oscillator`]: a mass matrix, three linear domains with harmonic forcing, a gap
-//! that is linear in the displacements, its walls and what they are, and the contact law. Flow, reference,
-//! stability and words know nothing but that description; scenes, maps and files nothing but the
-//! trait.
+//! A [`Model`] has named parameters. Two models are built in: [`GearPair`], and [`Stops`], which can be solved by
+//! hand. From its parameters a model derives an [`Oscillator`] and a contact [`Law`]. An oscillator is a mass matrix,
+//! three linear domains with harmonic forcing, a gap that is linear in the displacements, and two walls. Flow,
+//! reference and stability use only the oscillator and the law; scenes, maps and files use only the trait.
 
 mod gear_pair;
 mod non_impacting;
 mod oscillator;
 mod parameter;
-mod seam;
 mod stops;
+mod traits;
 
 pub use gear_pair::GearPair;
 pub use non_impacting::NonImpacting;
 pub use oscillator::{Contact, Domain, Law, Oscillator, OscillatorError};
 pub use parameter::{Parameter, ParameterError, Range, Shapes};
-pub use seam::{Boxed, Model, ModelError};
 pub use stops::Stops;
+pub use traits::{CloneModel, Model, ModelError};
 
 /// State of an oscillator of two degrees of freedom: `(x1, v1, x2, v2)`, dimensionless.
 pub type State = [f64; 4];
@@ -39,7 +38,7 @@ impl Side {
     /// Both walls.
     pub const BOTH: [Side; 2] = [Side::Right, Side::Left];
 
-    /// The direction of the wall seen from the gap: `+1` right, `-1` left.
+    /// Returns the direction from the gap to the wall: `+1` right, `-1` left.
     #[inline]
     pub fn sign(self) -> f64 {
         match self {
@@ -48,7 +47,7 @@ impl Side {
         }
     }
 
-    /// Its place in arrays over both walls: 0 right, 1 left.
+    /// Returns the index in arrays over both walls: 0 right, 1 left.
     #[inline]
     pub fn index(self) -> usize {
         match self {
@@ -57,7 +56,7 @@ impl Side {
         }
     }
 
-    /// The opposite wall.
+    /// Returns the opposite wall.
     #[inline]
     pub fn mirrored(self) -> Side {
         match self {

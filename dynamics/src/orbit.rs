@@ -1,10 +1,9 @@
-//! One trajectory, read: its class, its cycle and the events on it.
+//! The class of a motion, its cycle and its events.
 //!
-//! [`analyse`] lets a transient pass, watches the strobe states for a recurrence, and has
-//! every candidate confirmed twice: Newton must find a stable cycle of that period close
-//! by, and the trajectory must be seen to approach it. Recurrence alone proves nothing,
-//! since decaying spirals come close to themselves at lags that are no period; on the
-//! refined cycle the period is simply its smallest divisor that closes.
+//! [`analyse`] integrates a transient and then searches the strobe states for recurrences. Each candidate period is
+//! confirmed in two ways: Newton's method must find a stable cycle nearby, and the trajectory must approach that
+//! cycle. Recurrence alone is no proof, because a decaying spiral comes close to itself at lags that are not its
+//! period. The period of a confirmed cycle is its smallest divisor after which the cycle closes.
 
 mod analysis;
 mod approach;
@@ -12,19 +11,19 @@ mod budget;
 mod cell;
 mod instant;
 mod itinerary;
-mod prospects;
-#[cfg(test)]
-mod reached;
 mod reading;
 mod recurrence;
+mod search_filter;
+#[cfg(test)]
+mod tests;
 mod trace;
 
 pub use analysis::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, SHOWN_PERIODS, analyse, analyse_flow, analyse_over, analyse_until, status_of,
+    CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, analyse, analyse_flow, analyse_until, status_of,
 };
-pub use approach::{LINEAR, SHOWN_CYCLES};
+pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
-pub use cell::{Measured, NEUTRAL_ORDER, measure, measure_until};
+pub use cell::{Measurement, NEUTRAL_ORDER, measure, measure_until};
 pub use instant::{LONGEST_TIME, state_at};
 pub use reading::ON_STROBE_TURNS;
 pub use trace::trace;
@@ -39,19 +38,19 @@ pub use crate::reference::EventKind;
 pub struct Event {
     /// What happened.
     pub kind: EventKind,
-    /// At which wall.
+    /// The wall at which it happened.
     pub side: Side,
-    /// Time since phase 0 of the cycle (of the first period observed).
+    /// Time since phase 0 of the first period of the cycle or window.
     pub t: f64,
     /// Time since the last phase 0, in `[0, T)`.
     pub t_mod_period: f64,
-    /// State just before.
+    /// State just before the event.
     pub before: State,
-    /// State just after; equal to `before` where meshing ends.
+    /// State just after the event; equal to `before` where meshing ends.
     pub after: State,
 }
 
-/// What kind of motion a cell settles on.
+/// The class of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Class {
     /// A stable periodic orbit of `period` forcing periods.
@@ -59,19 +58,19 @@ pub enum Class {
         /// Forcing periods per cycle, at least 1.
         period: u32,
     },
-    /// A motion that is not periodic, with a positive Lyapunov exponent over the periods integrated.
+    /// A motion that is not periodic and has a positive Lyapunov exponent.
     Chaotic,
-    /// Neither was shown within the periods allowed.
+    /// Neither periodic nor chaotic could be shown within the allowed periods.
     Undecided,
-    /// The integration ended early; the status says why.
+    /// The integration ended early; the status gives the reason.
     Failed,
 }
 
 impl Class {
-    /// The names of all classes, in the order in which they are counted and numbered.
+    /// Names of all classes, in the order of their indices.
     pub const NAMES: [&'static str; 4] = ["periodic", "chaotic", "undecided", "failed"];
 
-    /// Its place among [`Class::NAMES`], whatever its period.
+    /// Returns the index of the class in [`Class::NAMES`].
     pub fn index(self) -> usize {
         match self {
             Class::Periodic { .. } => 0,
@@ -81,20 +80,20 @@ impl Class {
         }
     }
 
-    /// Its name in tables.
+    /// Returns the name in tables.
     pub fn name(self) -> &'static str {
         Class::NAMES[self.index()]
     }
 }
 
-/// How a cell's integration ended. Those of `Failed` cells are [failures](Status::is_failure).
+/// How the integration of a cell ended. `Failed` cells have a status that is a [failure](Status::is_failure).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
-    /// Nothing to remark.
+    /// No remarks.
     Ok,
-    /// Convergence so slow that the class rests on Newton, or was not reached at all.
+    /// The motion converges so slowly that its class rests on Newton's method, or it is undecided.
     Slow,
-    /// An event so near to grazing that the linearisation loses its meaning.
+    /// An event is so near to grazing that the linearisation is not reliable.
     NearGrazing,
     /// An event lies on the strobe phase.
     StrobeOnEvent,
@@ -104,14 +103,14 @@ pub enum Status {
     CapRoot,
     /// Too stiff for this engine.
     TooStiff,
-    /// The state left the range of finite numbers.
+    /// The state is not finite.
     NonFinite,
-    /// Points of the cycle lie closer together than the engine can tell apart: its period may be a divisor.
+    /// Points of the cycle lie closer together than the engine resolves: the true period may be a divisor.
     BelowResolution,
 }
 
 impl Status {
-    /// Every status; its position is its code in records and tables.
+    /// Every status, in the order of its code in records and tables.
     pub const ALL: [Status; 9] = [
         Status::Ok,
         Status::Slow,
@@ -124,7 +123,7 @@ impl Status {
         Status::BelowResolution,
     ];
 
-    /// The name in tables and on the command line.
+    /// Returns the name in tables and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Status::Ok => "ok",
@@ -144,33 +143,33 @@ impl Status {
         matches!(self, Status::CapEvents | Status::CapRoot | Status::TooStiff | Status::NonFinite)
     }
 
-    /// The number that stands for it in records and tables.
+    /// Returns the code in records and tables.
     pub fn code(self) -> u32 {
         self as u32
     }
 
-    /// The status that a number stands for.
+    /// Returns the status with this code.
     pub fn from_code(code: u32) -> Option<Status> {
         Status::ALL.get(code as usize).copied()
     }
 }
 
-/// A trajectory's long-time behaviour.
+/// The long-time behaviour of a motion.
 #[derive(Clone, Debug)]
 pub struct Orbit {
-    /// What it is.
+    /// Class of the motion.
     pub class: Class,
     /// How the integration ended.
     pub status: Status,
     /// Largest Lyapunov exponent per unit time.
     pub lyapunov: f64,
-    /// Its standard error where it is an average; none for periodic orbits.
+    /// Standard error of the exponent if it is an average; none for periodic orbits.
     pub lyapunov_error: Option<f64>,
     /// Floquet multipliers `(re, im)` of a periodic orbit, largest modulus first.
     pub floquet: Option<Vec<[f64; 2]>>,
     /// Whether a periodic orbit is its own mirror image.
     pub symmetric: Option<bool>,
-    /// The cyclic word of a periodic orbit; of the last periods observed otherwise.
+    /// Cyclic word of a periodic orbit; for other motion, the word of its last periods.
     pub word: Word,
     /// Impacts per forcing period; starts of meshing are not counted.
     pub impacts_per_period: f64,
@@ -178,16 +177,15 @@ pub struct Orbit {
     pub mesh_fraction: f64,
     /// State at the phase 0 that precedes the first of `events`.
     pub strobe: State,
-    /// The wall the teeth mesh on at that instant, if they do.
+    /// The wall of the contact that lasts at that instant, if one does.
     pub strobe_meshing: Option<Side>,
-    /// The events of one cycle, or of the last periods observed, in order of time.
+    /// Events of one cycle, or of the last periods, in order of time.
     pub events: Vec<Event>,
     /// Forcing periods that `events` and `word` span.
     pub cycle_periods: u32,
     /// The forcing period `T`.
     pub forcing_period: f64,
-    /// Forcing periods that the motion was followed for, from its start through all checks of it; searches
-    /// beside it are not among them.
+    /// Forcing periods that the motion itself was integrated, without Newton searches.
     pub periods_run: u64,
 }
 
@@ -198,37 +196,23 @@ pub struct Sample {
     pub t: f64,
     /// State.
     pub state: State,
-    /// The wall the teeth mesh on, if they do.
+    /// The wall of the contact that lasts, if one does.
     pub meshing: Option<Side>,
 }
 
-/// How long to integrate and what to search for.
+/// Numbers of forcing periods to integrate, and the longest period to search for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Forcing periods to let pass before anything is observed.
+    /// Forcing periods of the transient, which is not observed.
     pub transient_periods: u32,
     /// Forcing periods to observe.
     pub observed_periods: u32,
-    /// Longest period, in forcing periods, that is searched for.
+    /// Longest period to search for, in forcing periods.
     pub max_period: u32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
         Settings { transient_periods: 400, observed_periods: 128, max_period: 64 }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn status_codes_go_both_ways() {
-        for (code, status) in Status::ALL.into_iter().enumerate() {
-            assert_eq!(status.code(), code as u32);
-            assert_eq!(Status::from_code(code as u32), Some(status));
-        }
-        assert_eq!(Status::from_code(9), None);
     }
 }

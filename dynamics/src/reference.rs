@@ -1,19 +1,18 @@
 //! The reference: an event-driven f64 integrator on the exact flow.
 //!
-//! A [`Trajectory`] jumps along one oscillator. Between events it takes the longest steps
-//! that [`crate::certificate`] can show to be free of events, whatever the forcing does;
-//! a step that crosses is cut at the event, converged to rounding on the exact flow. There
-//! is no time-stepping error and no event is missed.
+//! A [`Trajectory`] is the motion of one oscillator. Between events it takes the longest steps that
+//! [`crate::certificate`] can prove to be free of events. A step with an event ends at the event, which is located to
+//! rounding on the exact flow. There is no time-stepping error and no event is missed.
 //!
-//! # What it costs
+//! # Cost
 //!
-//! A clear step is four 4 x 7 products: its end, its bound and its certificate; an event adds
-//! ten, a search on one short polynomial, and the contact law. A flight pressed back to its wall
-//! before it has gone far is six in all, and its own series is its certificate.
+//! A clear step costs four 4 x 7 products: for its end, its bound and its certificate. An event adds ten, a root
+//! search on one short polynomial, and the contact law. A short flight from a wall and back (`short_flight.rs`) costs
+//! six in total, and its series is its certificate.
 //!
-//! # How it can end
+//! # Ends
 //!
-//! Every loop has a cap and every ending a name: see [`Stop`].
+//! Every loop has a cap. [`Stop`] lists the reasons why a trajectory can end.
 
 mod allowance;
 mod chatter;
@@ -32,28 +31,28 @@ pub use allowance::Allowance;
 pub use chatter::{CLOSING_ANGLE, NO_THRESHOLD};
 use clock::Clock;
 pub use contact::GRAZING_SPEED;
-pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, Happening, Observer, STEPS_PER_PERIOD_CAP, Stop, Work};
+pub use event::{EVENTS_PER_PERIOD_CAP, EventKind, GapEvent, Observer, STEPS_PER_PERIOD_CAP, Stop, Work};
 use step_verdict::{Crossing, StepVerdict};
 pub use tangent::NO_SPEED;
 
 use crate::flow::{DomainKind, Expansion, Flow, Gap, LinearFlow, Phasor, Step};
 use crate::model::{Law, Side, State};
 
-/// Steps between checks of the tangents' size: a step changes it by less than `e^13`.
+/// Number of steps between checks of the tangents' size. One step changes it by a factor of less than `e^13`.
 const RESCALE_STEPS: u64 = 16;
 
-/// States beyond this are taken for a loss of finiteness.
+/// Largest entry of a state that counts as finite.
 const HUGE: f64 = 1e150;
 
-/// What governs the motion at present.
+/// The present phase of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Free,
-    /// Meshing has begun with a leaving speed: the gap is still short of the wall.
+    /// Contact onset: meshing has begun with a leaving speed, and the gap is still in front of the wall.
     Onset(Side),
-    /// Meshing, pressed beyond the wall; motion behind an elastic one.
+    /// Sustained contact: meshing with the gap behind the wall; also motion behind an elastic wall.
     Sustained(Side),
-    /// At rest on a rigid wall, pressed.
+    /// At rest on a rigid wall and pressed against it.
     Stuck(Side),
 }
 
@@ -76,45 +75,43 @@ impl Mode {
     }
 }
 
-/// One oscillator on its way, with `N` tangent vectors (0, 1 for an exponent, 4 for a
-/// monodromy matrix).
+/// The motion of one oscillator, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'f, const N: usize = 0> {
     flow: &'f Flow,
     law: Law,
     mode: Mode,
-    /// The wall of the last event: the first half of the next flight's symbol.
+    /// The wall of the last event, which determines the next symbol together with the wall of the next event.
     origin: Option<Side>,
-    /// The wall the gap starts from, and the order of that root of the distance.
+    /// If the gap is just leaving a wall: the wall, and the order of the root of the distance at this instant.
     from_wall: Option<(Side, usize)>,
-    /// Whether the flight that begins here promises to be short.
+    /// Whether the flight that begins here may be a short flight.
     short_flight: bool,
-    /// A contact to act on before anything else: a start on a wall.
+    /// A contact that must be processed first: the motion starts on this wall.
     pending: Option<Side>,
     q: Gap,
     phasor: Phasor,
     clock: Clock,
-    /// Where the present call ends; no jump may lead beyond.
+    /// Time since the last phase 0 at which the present call ends.
     goal: f64,
     period: u64,
+    /// Index of the next step's length: in free motion, and in contact.
     level: [usize; 2],
     tangents: [Gap; N],
-    /// Logarithm of the factor that was taken out of the tangents to keep them in range.
+    /// Logarithm of the factor that the tangents were divided by to keep them in range.
     log_scale: f64,
     events_in_period: u64,
     steps_in_period: u64,
     meshing_time: f64,
     near_grazing: bool,
     work: Work,
-    /// Of all that `work` counts.
     allowance: Allowance<'f>,
 }
 
 impl<'f, const N: usize> Trajectory<'f, N> {
-    /// Multiplies the state by `1 + shares`, as rounding would in the coordinates of a lane: the
-    /// gap, from its wall while the teeth mesh, its rate, and `x2`, `v2`. A gap that is just leaving
-    /// a wall stays on it.
-    pub fn shake(&mut self, shares: [f64; 4]) {
+    /// Multiplies the gap coordinates by `1 + shares`, to simulate the rounding of a less precise engine. While
+    /// meshing, the first one is the distance from the wall. A gap that is just leaving a wall is not changed.
+    pub fn perturb(&mut self, shares: [f64; 4]) {
         let wall = self.meshing().map_or(0.0, |side| self.flow.wall(side));
         if self.from_wall.is_none() {
             self.q[0] += shares[0] * (self.q[0] - wall);
@@ -122,24 +119,23 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         (1..4).for_each(|i| self.q[i] += shares[i] * self.q[i]);
     }
 
-    /// The flow it follows.
+    /// Returns the flow.
     pub fn flow(&self) -> &'f Flow {
         self.flow
     }
 
-    /// The present state.
+    /// Returns the present state.
     pub fn state(&self) -> State {
         self.flow.to_state(self.q)
     }
 
-    /// The tangent vectors, in the coordinates of [`State`], to be multiplied by the
-    /// exponential of [`log_scale`](Self::log_scale).
+    /// Returns the tangent vectors in the coordinates of [`State`], divided by the exponential of
+    /// [`log_scale`](Self::log_scale).
     pub fn tangents(&self) -> [State; N] {
         self.tangents.map(|u| self.flow.to_state(u))
     }
 
-    /// Logarithm of a common factor of all tangent vectors: over a long period they leave the
-    /// range of f64, so it is taken out on the way.
+    /// Returns the logarithm of the common factor of all tangent vectors, which keeps them in the range of f64.
     pub fn log_scale(&self) -> f64 {
         self.log_scale
     }
@@ -150,7 +146,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.tangents = tangents.map(|u| self.flow.tangent_to_gap(u));
     }
 
-    /// The wall of the contact that lasts, if one does.
+    /// Returns the wall of the contact that lasts, if one does.
     pub fn meshing(&self) -> Option<Side> {
         match self.mode {
             Mode::Free => None,
@@ -158,37 +154,37 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Forcing periods completed.
+    /// Returns the number of completed forcing periods.
     pub fn period(&self) -> u64 {
         self.period
     }
 
-    /// Time since the last phase 0.
+    /// Returns the time since the last phase 0.
     pub fn time_in_period(&self) -> f64 {
         self.clock.time()
     }
 
-    /// Time spent meshing so far.
+    /// Returns the total time spent meshing.
     pub fn meshing_time(&self) -> f64 {
         self.meshing_time
     }
 
-    /// Whether any event so far was too near to grazing for the linearisation to mean much.
+    /// Whether any event was so near to grazing that the linearisation is not reliable.
     pub fn near_grazing(&self) -> bool {
         self.near_grazing
     }
 
-    /// Forgets earlier near-grazing events.
+    /// Clears the flag of earlier near-grazing events.
     pub fn clear_near_grazing(&mut self) {
         self.near_grazing = false;
     }
 
-    /// Work done so far.
+    /// Returns the counters of work.
     pub fn work(&self) -> Work {
         self.work
     }
 
-    /// The same trajectory with so much work allowed from here on.
+    /// Sets the work that the trajectory may take from here on.
     pub fn allowing(mut self, allowance: Allowance<'f>) -> Self {
         self.allowance = Allowance {
             steps: allowance.steps.saturating_add(self.work.steps),
@@ -198,7 +194,6 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self
     }
 
-    /// Work that it is still allowed.
     pub(crate) fn allowance(&self) -> Allowance<'f> {
         self.allowance.after(self.work)
     }
@@ -218,7 +213,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         Ok(())
     }
 
-    /// Integrates to the time `until` since the last phase 0, at most the forcing period.
+    /// Integrates to the time `until`, which is measured from the last phase 0 and at most the forcing period.
     ///
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
@@ -247,7 +242,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if is_over { Err(Stop::CapEvents) } else { Ok(()) }
     }
 
-    /// Rates whose powers leave the range of f64 leave nothing that bounds a step.
+    /// Fails if the bound on a step overflows, as it does for extreme rates.
     fn check_bounds(&self, linear: &LinearFlow) -> Result<(), Stop> {
         let bound = match self.mode {
             Mode::Free | Mode::Sustained(_) => &linear.gap_bound,
@@ -257,7 +252,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if finite { Ok(()) } else { Err(Stop::NonFinite) }
     }
 
-    /// One step: as far as it is clear, or to its event, or to `until`.
+    /// Takes one step: a clear step, or up to an event, or up to `until`.
     #[inline(always)]
     fn step(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
         let flow = self.flow;
@@ -273,12 +268,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
             if self.steps_in_period > STEPS_PER_PERIOD_CAP || self.work.steps > self.allowance.steps {
                 return Err(self.too_many_steps());
             }
-            let made;
+            let computed;
             let step = match linear.step(level) {
                 Some(step) => step,
                 None => {
-                    made = linear.new_step(level);
-                    &made
+                    computed = linear.new_step(level);
+                    &computed
                 }
             };
             match self.step_verdict(linear, step) {
@@ -290,10 +285,10 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                     self.clear_step(linear, step, until);
                     return Ok(());
                 }
-                StepVerdict::Rests | StepVerdict::Unclear if matches!(self.mode, Mode::Stuck(_)) => {
+                StepVerdict::OnWall | StepVerdict::Unclear if matches!(self.mode, Mode::Stuck(_)) => {
                     return self.step_at_rest(until, observer);
                 }
-                StepVerdict::Rests => {
+                StepVerdict::OnWall => {
                     self.note_grazing();
                     self.clear_step(linear, step, until);
                     return Ok(());
@@ -304,7 +299,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
                 }
                 StepVerdict::Unclear if self.settle_start(observer) => return self.check_events(),
                 StepVerdict::Unclear if level + 1 == linear.levels => {
-                    // What is not a number is never clear.
+                    // A step with NaN is never clear.
                     self.check_finite()?;
                     self.check_bounds(linear)?;
                     self.settle_graze(linear, step.h, until, observer);
@@ -324,15 +319,14 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         if self.work.steps > self.allowance.steps { Stop::TooStiff } else { Stop::CapRoot }
     }
 
-    /// Takes a longer step next time. Out of line, so that the next step need not wait for the
-    /// arithmetic of this one's certificate.
+    /// Doubles the next step. Out of line, so that the next step does not wait for this one's certificate.
     #[cold]
     #[inline(never)]
     fn lengthen(&mut self, slot: usize) {
         self.level[slot] -= 1;
     }
 
-    /// Takes a step that is clear, cut at `until`.
+    /// Takes a clear step, up to `until` at most.
     #[inline(always)]
     fn clear_step(&mut self, linear: &LinearFlow, step: &Step, until: f64) {
         let remaining = self.clock.remaining(until);
@@ -352,7 +346,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Moves everything to `until`, the rest `s` of a step away that is clear so far.
+    /// Moves everything to `until`, a time `s` away, within a clear step.
     #[inline(always)]
     fn move_to(&mut self, linear: &LinearFlow, s: f64, until: f64) {
         self.move_within(linear, s);
@@ -360,18 +354,18 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.clock.set(until);
     }
 
-    /// Moves everything by a time of at most the longest step.
+    /// Moves everything by a time `s` of at most the longest step.
     #[inline(always)]
     fn move_within(&mut self, linear: &LinearFlow, s: f64) {
         let u = s * linear.per_unit;
         let expansion = linear.grid.expansion(&self.q, &self.phasor, u);
-        self.arrive(linear, &expansion, u);
+        self.move_along(linear, &expansion, u);
         self.count_meshing(s);
     }
 
-    /// Moves everything along an expansion, to `u` Taylor steps from here.
+    /// Moves everything by `u` Taylor steps, near the grid point of the expansion.
     #[inline(always)]
-    fn arrive(&mut self, linear: &LinearFlow, expansion: &Expansion, u: f64) {
+    fn move_along(&mut self, linear: &LinearFlow, expansion: &Expansion, u: f64) {
         let v = u - expansion.start;
         self.q = expansion.state(v);
         self.phasor = expansion.phasor(linear.turn * v);

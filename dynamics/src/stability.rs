@@ -1,19 +1,18 @@
-//! Stability of periodic orbits: monodromy, Floquet multipliers, Newton on the strobe map,
-//! and Lyapunov exponents.
+//! Stability of periodic orbits: monodromy matrix, Floquet multipliers, Newton's method on the strobe map, and
+//! Lyapunov exponents.
 //!
-//! The strobe map `P` takes the state at one phase 0 to the next. Its derivative is the
-//! product of flow and saltation matrices, carried along as four tangent vectors. For
-//! orbits that may be their own mirror image the half-period map `Q(y) = -P_{T/2}(y)` is
-//! used instead: `P = Q^2`, so at a pitchfork, where a multiplier of `P` is `+1`, that of
-//! `Q` is `-1` and `Q' - I` stays regular.
+//! The strobe map `P` maps the state at one phase 0 to the state at the next. Its derivative is the product of flow
+//! and saltation matrices, and is integrated as four tangent vectors. For orbits that may be their own mirror image
+//! the half-period map `Q(y) = -P_{T/2}(y)` is used instead. Since `P = Q^2`, at a pitchfork, where a multiplier of
+//! `P` is `+1`, that of `Q` is `-1`, and `Q' - I` stays regular.
 
 mod exponent;
 mod newton;
 mod unit_circle;
 
 pub use exponent::{Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
+pub use newton::refine;
 pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
-pub use newton::{pitchfork, refine};
 
 use nalgebra::linalg::Schur;
 use nalgebra::{Matrix4, Vector4};
@@ -21,49 +20,49 @@ use nalgebra::{Matrix4, Vector4};
 use crate::model::State;
 use crate::reference::{Stop, Trajectory, Work};
 
-/// The unit vectors: tangents that become the columns of a derivative.
+/// The unit vectors. As initial tangent vectors they become the columns of the derivative.
 pub const UNIT: [State; 4] =
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
-/// Which map an orbit is a fixed point of.
+/// A map on states at phase 0, whose fixed points are cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StrobeMap {
     /// `P^p`: `p` forcing periods.
     Periods(u32),
-    /// `Q^p`, `Q(y) = -P_{T/2}(y)`: `p` half periods, `p` odd, each followed by the mirror.
+    /// `Q^p`, `Q(y) = -P_{T/2}(y)`: `p` half periods, `p` odd, each followed by a reflection.
     MirroredHalves(u32),
 }
 
-/// Image of a state and the derivative of the map there.
+/// The image of a state and the derivative of the map there.
 #[derive(Clone, Copy, Debug)]
 pub struct Image {
     /// The image.
     pub state: State,
-    /// The derivative, but for the factor `exp(log_scale)`.
+    /// The derivative divided by `exp(log_scale)`.
     pub scaled: Matrix4<f64>,
     /// Logarithm of the factor: over a long cycle derivatives leave the range of f64.
     pub log_scale: f64,
-    /// Whether an event on the way was too near to grazing for the derivative to mean much.
+    /// Whether an event was so near to grazing that the derivative is not reliable.
     pub near_grazing: bool,
-    /// The flow's unit of rates.
+    /// [`Flow::rate`](crate::flow::Flow).
     rate: f64,
 }
 
 impl Image {
-    /// The derivative with velocities in units of displacements: its norm and its pivots do not depend
-    /// on the unit of time.
+    /// Returns the derivative on states whose velocities are divided by `rate`, so that its norm and pivots do not
+    /// depend on the unit of time.
     pub(crate) fn balanced(&self) -> Matrix4<f64> {
         balanced(&self.derivative(), self.rate)
     }
 
-    /// The derivative of the map, zero or infinite where f64 cannot hold it.
+    /// Returns the derivative of the map; entries out of the range of f64 are zero or infinite.
     pub fn derivative(&self) -> Matrix4<f64> {
         self.scaled * self.log_scale.exp()
     }
 }
 
 impl StrobeMap {
-    /// Applies the map to a state at phase 0 in the domain that `seed` is in.
+    /// Applies the map to a state at phase 0 in the domain of `seed`.
     ///
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
@@ -71,7 +70,7 @@ impl StrobeMap {
         self.apply_counting(seed, y, &mut Work::default())
     }
 
-    /// The same, adding the work that it takes to `work`, also where it ends before.
+    /// Applies the map and adds the work to `work`, also if it fails.
     pub(crate) fn apply_counting(
         self,
         seed: &Trajectory<'_>,
@@ -87,10 +86,10 @@ impl StrobeMap {
                 let ended = (0..p).try_for_each(|_| trajectory.advance_period(&mut ()));
                 *work += trajectory.work();
                 ended?;
-                image = read(&trajectory, 1.0);
+                image = image_at(&trajectory, 1.0);
             }
             StrobeMap::MirroredHalves(p) => {
-                // The points of the cycle need not lie in one domain.
+                // The points of the cycle may lie in different domains.
                 let mut half = seed.at(y, UNIT);
                 for turn in 0..p {
                     if turn > 0 {
@@ -99,7 +98,7 @@ impl StrobeMap {
                     let ended = half.advance_to(0.5 * seed.flow().period, &mut ());
                     *work += half.work();
                     ended?;
-                    let step = read(&half, -1.0);
+                    let step = image_at(&half, -1.0);
                     let (scaled, log_scale) =
                         unit_size(step.scaled * image.scaled, step.log_scale + image.log_scale);
                     image = Image {
@@ -115,8 +114,8 @@ impl StrobeMap {
         Ok(image)
     }
 
-    /// The monodromy matrix over the whole cycle and the logarithm of its factor, from the
-    /// derivative of this map.
+    /// Returns the monodromy matrix of the whole cycle and the logarithm of its factor, from the derivative of this
+    /// map.
     fn monodromy(self, image: &Image) -> (Matrix4<f64>, f64) {
         match self {
             StrobeMap::Periods(_) => (image.scaled, image.log_scale),
@@ -124,7 +123,7 @@ impl StrobeMap {
         }
     }
 
-    /// Half forcing periods that one application integrates.
+    /// Returns the number of half forcing periods in one application.
     fn half_periods(self) -> u32 {
         match self {
             StrobeMap::Periods(p) => 2 * p,
@@ -132,13 +131,12 @@ impl StrobeMap {
         }
     }
 
-    /// Whether every fixed point of `other` is one of this map: all are powers of the mirrored half
-    /// period.
+    /// Whether this map is a power of `other`, so that every fixed point of `other` is one of this map.
     pub(crate) fn iterates(self, other: StrobeMap) -> bool {
         self.half_periods().is_multiple_of(other.half_periods())
     }
 
-    /// Forcing periods in a cycle.
+    /// Returns the number of forcing periods in a cycle.
     fn cycle_periods(self) -> u32 {
         match self {
             StrobeMap::Periods(p) | StrobeMap::MirroredHalves(p) => p,
@@ -146,20 +144,19 @@ impl StrobeMap {
     }
 }
 
-/// Takes the size of a matrix out of it, so that products and eigenvalues, which square its
-/// entries, stay in range.
+/// Divides a matrix by its largest entry, so that products and eigenvalues stay in the range of f64.
 fn unit_size(matrix: Matrix4<f64>, log_scale: f64) -> (Matrix4<f64>, f64) {
     let size = matrix.amax();
     if size > 0.0 && size.is_finite() { (matrix / size, log_scale + size.ln()) } else { (matrix, log_scale) }
 }
 
-/// A matrix on states as one on states whose velocities are divided by `rate`, a power of two.
+/// Transforms a matrix on states to one on states whose velocities are divided by `rate`, a power of two.
 fn balanced(matrix: &Matrix4<f64>, rate: f64) -> Matrix4<f64> {
     let unit = |i: usize| if i % 2 == 1 { rate } else { 1.0 };
     Matrix4::from_fn(|i, j| matrix[(i, j)] * (unit(j) / unit(i)))
 }
 
-fn read(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
+fn image_at(trajectory: &Trajectory<'_, 4>, sign: f64) -> Image {
     let columns = trajectory.tangents().map(|u| sign * Vector4::from(u));
     let (scaled, log_scale) = unit_size(Matrix4::from_columns(&columns), trajectory.log_scale());
     Image {
@@ -180,33 +177,33 @@ pub struct Cycle {
     pub period: u32,
     /// Whether the orbit is its own mirror image.
     pub symmetric: bool,
-    /// The monodromy matrix: derivative of the strobe map over one cycle. In one degree of freedom the second
-    /// displacement has nothing in it.
+    /// The monodromy matrix, the derivative of the strobe map over one cycle. In one degree of freedom the rows and
+    /// columns of the second displacement are 0.
     pub monodromy: Matrix4<f64>,
     /// Floquet multipliers `[re, im]`, largest modulus first; two for each degree of freedom.
     pub multipliers: Vec<[f64; 2]>,
-    /// `ln |mu1|`, also where `mu1` itself is below the range of f64; minus infinity where
-    /// the orbit is superstable.
+    /// `ln |mu1|` of the largest multiplier, also if `mu1` is below the range of f64; minus infinity for a
+    /// superstable orbit.
     pub log_radius: f64,
-    /// Whether an event on it is too near to grazing for these to mean much.
+    /// Whether an event is so near to grazing that the multipliers are not reliable.
     pub near_grazing: bool,
 }
 
 impl Cycle {
-    /// Modulus of the largest multiplier: below 1 the orbit is stable.
+    /// Returns the modulus of the largest multiplier. Below 1 the orbit is stable.
     pub fn spectral_radius(&self) -> f64 {
         self.log_radius.exp()
     }
 
-    /// Whether it is stable for all that f64 can tell: a multiplier of 1, as a pair without supports has
-    /// (both gears moved alike), is found on either side of it.
+    /// Whether the orbit is stable beyond rounding. Rounding may put a multiplier of 1 on either side of 1; a gear
+    /// pair without supports has one.
     pub fn is_stable(&self) -> bool {
         self.log_radius < -NEUTRAL * f64::from(self.period)
     }
 
-    /// The same with the multipliers of the other degree of freedom alone: those of one that keeps at rest, whatever
-    /// the other does, say nothing of the motion.
-    pub(crate) fn beside_rest(&self, resting: usize) -> Option<Cycle> {
+    /// Returns the cycle without the multipliers of the degree of freedom `resting`, which is at rest and does not
+    /// affect the other.
+    pub(crate) fn without_resting(&self, resting: usize) -> Option<Cycle> {
         let mut monodromy = self.monodromy;
         for i in [2 * resting, 2 * resting + 1] {
             monodromy.row_mut(i).fill(0.0);
@@ -218,7 +215,7 @@ impl Cycle {
         Some(Cycle { multipliers, log_radius, ..self.clone() })
     }
 
-    /// `ln |mu1| / (p T)`, the largest Lyapunov exponent.
+    /// Returns the largest Lyapunov exponent, `ln |mu1| / (p T)`.
     pub fn exponent(&self, forcing_period: f64) -> f64 {
         self.log_radius / (f64::from(self.period) * forcing_period)
     }
@@ -228,15 +225,15 @@ fn modulus([re, im]: [f64; 2]) -> f64 {
     re.hypot(im)
 }
 
-/// Multipliers this near to 1 are 1 as far as one can tell, as a logarithm per forcing period: a double
-/// one scatters by the square root of rounding.
+/// Numerical error of `ln |mu|` per forcing period for a multiplier `mu` of 1: the square root of rounding, for a
+/// double eigenvalue.
 const NEUTRAL: f64 = 1e-7;
 
-/// Sweeps of the QR iteration allowed.
+/// Largest number of sweeps of the QR iteration.
 const EIGEN_CAP: usize = 1000;
 
-/// Eigenvalues `[re, im]`, largest modulus first, a conjugate pair with positive imaginary
-/// part first; none if the matrix is not finite or the iteration does not converge.
+/// Returns the eigenvalues `[re, im]`, largest modulus first; of a conjugate pair, positive imaginary part first.
+/// Returns none if the matrix is not finite or the iteration does not converge.
 pub fn multipliers(monodromy: &Matrix4<f64>) -> Option<Vec<[f64; 2]>> {
     if !monodromy.iter().all(|x| x.is_finite()) {
         return None;

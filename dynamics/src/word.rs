@@ -1,62 +1,69 @@
 //! Mapping words: the cyclic sequence of flights, equations (18) to (23) of the paper.
 //!
-//! One symbol per flight, named when it ends: free right to right `2`, left to left `5`,
-//! right to left `3`, left to right `6`, meshing on the right `1`, on the left `4`.
+//! Each flight has one symbol:
+//!
+//! | flight | symbol |
+//! | --- | --- |
+//! | free, right to right | `2` |
+//! | free, right to left | `3` |
+//! | free, left to left | `5` |
+//! | free, left to right | `6` |
+//! | meshing on the right | `1` |
+//! | meshing on the left | `4` |
 
 use std::fmt;
 
-/// A cyclic word in canonical rotation: the smallest one in lexicographic order.
+/// A cyclic word, stored in its lexicographically smallest rotation.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Default)]
 pub struct Word(Vec<u8>);
 
 impl Word {
-    /// The cyclic word of a sequence of symbols `b'1'..=b'6'` in time order.
+    /// Builds the cyclic word of a sequence of symbols `b'1'..=b'6'` in time order.
     pub fn cyclic(symbols: &[u8]) -> Word {
         let mut canonical = symbols.to_vec();
         canonical.rotate_left(smallest_rotation(symbols));
         Word(canonical)
     }
 
-    /// Symbols in time order, canonical rotation.
+    /// Returns the symbols in time order, in the smallest rotation.
     pub fn symbols(&self) -> &[u8] {
         &self.0
     }
 
-    /// Number of flights in the cycle.
+    /// Returns the number of flights in the cycle.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there is no event in the cycle.
+    /// Whether the cycle has no event.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The word of the mirror image `(y, t) -> (-y, t + T/2)`: swaps 1-4, 2-5, 3-6.
+    /// Returns the word of the mirror image `(y, t) -> (-y, t + T/2)`, which swaps 1-4, 2-5 and 3-6.
     pub fn mirrored(&self) -> Word {
         Word::cyclic(&self.0.iter().map(|s| (s - b'1' + 3) % 6 + b'1').collect::<Vec<_>>())
     }
 
-    /// The same cycle with each run of one symbol counted once: `13554622` gives `135462`.
+    /// Returns the word with each run of one symbol reduced to one: `13554622` gives `135462`.
     ///
-    /// How often a contact bounces before it meshes depends on the leaving speed at which it may; the order of what
-    /// happens, hardly.
+    /// The number of impacts before meshing depends on the parameter `mesh_speed`. The pattern hardly does.
     pub fn pattern(&self) -> Word {
         let mut symbols = self.0.clone();
-        // In the smallest rotation no run goes on across the end, unless it is all there is.
+        // In the smallest rotation no run continues from the end to the start, unless the word is one run.
         symbols.dedup();
         Word::cyclic(&symbols)
     }
 
-    /// The symbols in time order, such as `2356`.
+    /// Returns the symbols in time order, such as `2356`.
     pub fn time_order(&self) -> String {
         self.0.iter().map(|&s| char::from(s)).collect()
     }
 
-    /// The composition of maps as the paper prints it, last flight first and repeated ones
-    /// as powers: `2356` is `P_{6532}`, `13554622` is `P_{1 2^2 6 4 5^2 3}`.
+    /// Returns the composition of maps as the paper prints it: last flight first, repeated ones as powers. `2356` is
+    /// `P_{6532}`, and `13554622` is `P_{1 2^2 6 4 5^2 3}`.
     ///
-    /// Where there is meshing on the right, the cycle ends with it, as in the paper.
+    /// A cycle with meshing on the right ends with it, as in the paper.
     pub fn paper_notation(&self) -> String {
         let mut order = self.0.clone();
         if order.first() == Some(&b'1') {
@@ -80,7 +87,7 @@ impl fmt::Display for Word {
     }
 }
 
-/// Start of the lexicographically smallest rotation (Booth's two-candidate comparison).
+/// Returns the start of the lexicographically smallest rotation, by comparing two candidates.
 fn smallest_rotation(s: &[u8]) -> usize {
     let n = s.len();
     let (mut i, mut j, mut k) = (0, 1, 0);
@@ -109,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_papers_words() {
+    fn paper_notation_is_that_of_the_paper() {
         assert_eq!(Word::cyclic(b"35546221").paper_notation(), "P_{1 2^2 6 4 5^2 3}");
         assert_eq!(Word::cyclic(b"5623").paper_notation(), "P_{6532}");
         assert_eq!(Word::cyclic(b"63").paper_notation(), "P_{63}");
@@ -118,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn rotation_is_the_smallest_of_all() {
+    fn words_are_stored_in_their_smallest_rotation() {
         for word in [&b"2356"[..], b"61213454", b"3636", b"222222", b"5", b"61213455", b"121121112"] {
             let rotations = (0..word.len()).map(|r| {
                 let mut w = word.to_vec();
@@ -132,22 +139,21 @@ mod tests {
         }
     }
 
-    /// However the cycle is cut, and wherever runs lie.
     #[test]
-    fn a_pattern_has_each_run_once_around_the_cycle() {
+    fn a_pattern_does_not_depend_on_where_the_cycle_starts() {
         let cases =
             [("13554622", "135462"), ("11312", "1213"), ("12", "12"), ("222222", "2"), ("5", "5"), ("", "")];
         for (symbols, pattern) in cases {
-            for cut in 0..symbols.len().max(1) {
+            for start in 0..symbols.len().max(1) {
                 let mut rotated = symbols.as_bytes().to_vec();
-                rotated.rotate_left(cut);
-                assert_eq!(Word::cyclic(&rotated).pattern().time_order(), pattern, "{symbols} from {cut} on");
+                rotated.rotate_left(start);
+                assert_eq!(Word::cyclic(&rotated).pattern().time_order(), pattern, "{symbols} from {start}");
             }
         }
     }
 
     #[test]
-    fn the_mirror_swaps_walls() {
+    fn the_mirror_image_swaps_walls() {
         assert_eq!(Word::cyclic(b"12345").mirrored(), Word::cyclic(b"45612"));
         assert_eq!(Word::cyclic(b"36").mirrored(), Word::cyclic(b"36"));
     }

@@ -100,7 +100,7 @@ pub(crate) fn orbit(
     };
     let own = Arc::clone(&model);
     let orbit = waiting::run(py, None, move |watch| {
-        Ok(analysis::analyse_until(&*own, state, &settings, analysis::SHOWN_PERIODS, watch.halt())?)
+        Ok(analysis::analyse_until(&*own, state, &settings, analysis::EVENT_PERIODS, watch.halt())?)
     })?;
     Ok(Orbit { model, orbit: Arc::new(orbit) })
 }

@@ -11,6 +11,7 @@ use rattlemap::map::scene::SceneError;
 use rattlemap::map::sweep::SweepError;
 use rattlemap::model::ModelError;
 use rattlemap::store::error::OutputError;
+use rattlemap::store::finished_map::FinishedMapError;
 use rattlemap::store::folder::FolderError;
 use rattlemap::store::merge::MergeError;
 use rattlemap::store::record_file::RecordFileError;
@@ -62,6 +63,7 @@ problems! {
     NoMotion => model,
     ChoiceError => engine,
     SweepError => engine,
+    FinishedMapError => folder,
     FolderError => folder,
     OutputError => folder,
     RecordFileError => folder,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use rattlemap::job::scene_file::SceneFile;
-use rattlemap::map::scene::{Along, FileBeside, FileText, Purpose, Scene as LibraryScene};
+use rattlemap::map::scene::{Along, CompanionFile, FileText, Purpose, Scene as LibraryScene};
 use rattlemap::model::Model as _;
 use rattlemap::model_file::FileModel;
 
@@ -58,16 +58,16 @@ impl Scene {
         along: Option<Line>,
     ) -> Result<Scene, Problem> {
         let checked = Use::new(purpose, along)?;
-        let find = |what: FileBeside, _: &str| match (what, &model, &cells) {
-            (FileBeside::Model, Some((name, text)), _) => {
+        let find = |what: CompanionFile, _: &str| match (what, &model, &cells) {
+            (CompanionFile::Model, Some((name, text)), _) => {
                 Ok(FileText { name: name.clone(), text: text.clone() })
             }
-            (FileBeside::Cells, _, Some(text)) => {
+            (CompanionFile::Cells, _, Some(text)) => {
                 Ok(FileText { name: "cells".to_owned(), text: text.clone() })
             }
             _ => Err("names a file, and there is none".to_owned()),
         };
-        let scene = LibraryScene::parse_written(text, &sets, checked.purpose, checked.along.as_ref(), &find)?;
+        let scene = LibraryScene::parse_generated(text, &sets, checked.purpose, checked.along.as_ref(), &find)?;
         Ok(Scene { scene: Arc::new(scene), sets, purpose: checked })
     }
 

@@ -119,7 +119,7 @@ def test_what_cannot_be_split_is_refused_before_anything_is_computed(client: Any
     model, axes = rm.gear_pair(), {"e": (0, 1, 4), "omega": (1, 12, 4)}
     with pytest.raises(rm.EngineError, match="auto may choose otherwise on another machine"):
         rm.map(model, **axes, client=client)
-    with pytest.raises(rm.SceneError, match="ask for 16 shards at most"):
+    with pytest.raises(rm.SceneError, match="use at most 16 shards"):
         rm.map(model, **axes, engine="cpu", client=client, shards=17)
     with pytest.raises(rm.SceneError, match="adaptive"):
         rm.map(model, **axes, engine="cpu", client=client, settings={"refine.minimum_grid": 8})

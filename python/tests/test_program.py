@@ -15,7 +15,7 @@ from conftest import SCENES, Program
 
 
 def test_the_program_is_inside(program: Program, tmp_path: Path) -> None:
-    assert program("--version").stdout == f"rattlemap {rm.__version__}\n"
+    assert program("--version").stdout.startswith(f"rattlemap {rm.__version__} (")
     assert "Usage: rattlemap map" in program("help", "map").stdout
     assert json.loads(program("orbit", "--json").stdout)["class"] == "periodic"
     wrong = program("orbit", "--set", "e=2", fails=True)

@@ -19,6 +19,9 @@ use clap_complete::Shell;
 use rattlemap_dynamics::model::{REST, State};
 use rattlemap_dynamics::orbit::Settings;
 
+/// Version and commit, as `--version` prints them.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_COMMIT"), ")");
+
 /// Computes maps of vibro-impact oscillators: period, chaos and sequence of impacts over two parameters.
 ///
 /// Between contacts the motion follows the exact solution, and every contact is located to rounding error. Each motion is
@@ -29,7 +32,7 @@ use rattlemap_dynamics::orbit::Settings;
 /// Exit codes: 0 done; 1 the run or a validation failed; 2 wrong usage or scene, nothing was computed; 130 interrupted by
 /// Ctrl-C; 143 by SIGTERM.
 #[derive(Debug, Parser)]
-#[command(version, bin_name = "rattlemap", arg_required_else_help = true)]
+#[command(version = VERSION, bin_name = "rattlemap", arg_required_else_help = true)]
 #[command(after_help = "Examples:\n  \
     rattlemap map scenes/e_omega.toml                a map over restitution and frequency\n  \
     rattlemap orbit --set e=0.06                     one motion of the gear pair\n  \

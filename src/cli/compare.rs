@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
         say::notes(format_args!("{}\n{files}", summary(&compared, pair.scene())));
     }
     if arguments.json {
-        print_json(&store::compare::object(folder.path(), &files, &compared)?)?;
+        print_json(&store::compare::object(folder.path(), &files, &compared))?;
     }
     let (differing, count) = (result.comparison.differing(), result.comparison.kinds.len());
     match arguments.fail && differing > 0 {

@@ -114,7 +114,7 @@ fn finish_map(
         files.join(", ")
     ));
     if arguments.json {
-        print_json(&store::map_json::object(folder, &files, &cells, &run, writing)?)?;
+        print_json(&store::map_json::object(folder, &files, &cells, &run, writing))?;
     }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")
@@ -125,7 +125,7 @@ fn finish_shard(run: &MapRun<'_>, folder: &Path, arguments: &Map, console: &Cons
     let Some(finished) = run.finished_shard(&description) else { return Ok(()) };
     console.finish(&summary::shard(&finished, folder, &files));
     if arguments.json {
-        print_json(&shard::object(folder, &files, &finished)?)?;
+        print_json(&shard::object(folder, &files, &finished))?;
     }
     if finished.tally.all_failed() {
         console.warn(

@@ -1,21 +1,21 @@
-//! To which attractor does each start lead? The basins of a map whose axes sweep the start.
+//! Basins of attraction: the attractor to which each start of a map leads.
 //!
-//! All chaotic starts share one attractor: nothing in a record tells two chaotic attractors apart. Contact-free motion
-//! is one, however far it still is from it. Periodic starts are told apart by their cycles, which Newton's method finds
-//! on the reference (`catalogue`); symmetry-conjugate orbits are different attractors here. Undecided and failed starts
-//! belong to none.
+//! Contact-free motion is one attractor, even if a run has not reached it yet. Periodic starts are distinguished by their
+//! cycles, which Newton's method finds on the reference ([`catalogue`]); symmetry-conjugate orbits are different
+//! attractors. All chaotic starts share one attractor, because records do not distinguish chaotic attractors. Undecided and
+//! failed starts have none.
 //!
-//! Attractors are numbered by share; equal shares by period, then by strobe state. What is found depends on the records
-//! alone: not on the order in which they came.
+//! Attractors are numbered by decreasing share; equal shares are ordered by period, then by strobe state. The result depends
+//! only on the records, not on their order.
 //!
-//! Where one axis sweeps a parameter, every value of it has attractors of its own. An attractor goes on at the next value
-//! as the nearest cycle of the same period, if that lies within [`FOLLOWED`] of the motion's size; else it ends there, and
-//! what is left at the next value begins.
+//! If one axis sweeps a parameter, each of its values has attractors of its own. An attractor continues at the next value as
+//! the nearest cycle of the same period within a relative distance of [`CONTINUATION`]. Otherwise it ends there, and the
+//! remaining cycles of the next value are new attractors.
 
 use rayon::prelude::*;
 
-use crate::map::catalogue::{self, Catalogue, Found};
-use crate::map::cycle::{Seen, distance};
+use crate::map::catalogue::{self, Catalogue, Outcome};
+use crate::map::cycle::{StrobeCycle, distance};
 use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
@@ -26,30 +26,31 @@ use rattlemap_dynamics::model::{Law, State};
 use rattlemap_dynamics::orbit::{self, Class, Settings};
 use rattlemap_dynamics::word::Word;
 
-/// The label of a start that belongs to no basin.
+/// Label of a start without an attractor.
 pub const NONE: u16 = u16::MAX;
 
-/// How far a cycle may move from one value of a parameter to the next and still be followed.
-pub const FOLLOWED: f64 = 0.25;
+/// Largest relative distance of a cycle from its continuation at the next value of a parameter.
+pub const CONTINUATION: f64 = 0.25;
 
-/// What starts lead to.
+/// An attractor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attractor {
     /// Periodic or chaotic.
     pub class: Class,
-    /// The least of its strobe states; none of chaos.
+    /// The lexicographically smallest strobe state; none for chaos.
     pub strobe: Option<State>,
-    /// The name of its cycle, where it was read.
+    /// Word of the cycle, if the reference confirmed it.
     pub word: Option<Word>,
-    /// The largest Lyapunov exponent: of chaos the mean over its cells.
+    /// Largest Lyapunov exponent; for chaos the mean over its cells.
     pub exponent: Option<f64>,
-    /// Modulus of the largest Floquet multiplier of a cycle.
+    /// Modulus of the largest Floquet multiplier of the cycle.
     pub multiplier: Option<f64>,
-    /// Whether a cycle is its own mirror image.
+    /// Whether the cycle is its own mirror image.
     pub symmetric: Option<bool>,
-    /// Cells of its basin.
+    /// Number of cells in the basin.
     pub cells: usize,
-    /// A cell of it: where a parameter is swept, strobe state, word, exponent, multiplier and symmetry are those there.
+    /// A cell of the basin. If a parameter is swept, strobe state, word, exponent, multiplier and symmetry are those at this
+    /// cell.
     pub cell: usize,
 }
 
@@ -58,31 +59,31 @@ pub struct Attractor {
 pub struct Basins {
     labels: Vec<u16>,
     list: Vec<Attractor>,
-    /// By value of a swept parameter; one where there is none.
+    /// Cycles at each value of the swept parameter; one entry without one.
     groups: Vec<Group>,
     chaos: Option<u16>,
-    cut: Cut,
+    grouping: Grouping,
 }
 
-/// The cycles at one value of the parameter.
+/// Cycles at one value of the parameter, with their labels.
 #[derive(Clone, Debug)]
 struct Group {
     catalogue: Catalogue,
     labels: Vec<u16>,
 }
 
-/// How cells are grouped by the value of a swept parameter.
+/// Grouping of cells by the value of the swept parameter.
 #[derive(Clone, Copy, Debug)]
-struct Cut {
+struct Grouping {
     counts: [usize; 2],
-    /// The axis of the parameter.
+    /// Axis of the parameter, if there is one.
     along: Option<usize>,
 }
 
-impl Cut {
-    fn of(plan: &Plan) -> Cut {
+impl Grouping {
+    fn of(plan: &Plan) -> Grouping {
         let along = plan.axes().iter().position(|axis| !axis.target().is_start());
-        Cut { counts: plan.counts(), along }
+        Grouping { counts: plan.counts(), along }
     }
 
     fn groups(&self) -> usize {
@@ -93,7 +94,7 @@ impl Cut {
         self.along.map_or(0, |axis| [id % self.counts[0], id / self.counts[0]][axis])
     }
 
-    /// Its cells, by id.
+    /// Returns the ids of the cells of a group.
     fn cells(&self, group: usize) -> Vec<usize> {
         let [columns, rows] = self.counts;
         match self.along {
@@ -104,30 +105,30 @@ impl Cut {
     }
 }
 
-/// Labels the cells of a map of basins; none of other maps. `filled_from` has for every cell the one whose record it
-/// was filled with, itself where it was integrated; empty where all were.
+/// Labels the cells of a map of basins; returns none for other maps. `filled_from` has for every cell the cell from which it
+/// was filled, itself if it was integrated; empty if all were integrated.
 ///
 /// # Panics
-/// If there are not as many records as cells.
+/// If the number of records is not that of the cells.
 pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32]) -> Option<Basins> {
     if !plan.is_basin() {
         return None;
     }
     assert_eq!(plan.cell_count(), records.count(), "one record per cell");
-    let cut = Cut::of(plan);
+    let grouping = Grouping::of(plan);
     let is_own = |id: usize| filled_from.get(id).is_none_or(|&from| from as usize == id);
     let flows = Flows::new(plan);
-    let groups: Vec<(Catalogue, Vec<(usize, Found)>)> = (0..cut.groups())
+    let groups: Vec<(Catalogue, Vec<(usize, Outcome)>)> = (0..grouping.groups())
         .into_par_iter()
         .map(|group| {
-            let ids: Vec<usize> = cut.cells(group).into_iter().filter(|&id| is_own(id)).collect();
-            let cell = plan.cell(cut.cells(group)[0] as u32);
+            let ids: Vec<usize> = grouping.cells(group).into_iter().filter(|&id| is_own(id)).collect();
+            let cell = plan.cell(grouping.cells(group)[0] as u32);
             let learn = |flow: &Flow| catalogue::learn(flow, plan.law(cell.law), records, &ids);
             let (catalogue, found) = flows.with(cell.flow, learn);
             (catalogue, ids.into_iter().zip(found).collect())
         })
         .collect();
-    // One number for every cycle, the same where it is followed.
+    // A cycle and its continuations have one number.
     let numbers = follow(groups.iter().map(|(catalogue, _)| catalogue));
     let cycles = numbers.iter().flatten().map(|&n| n + 1).max().unwrap_or(0);
     let chaos = cycles;
@@ -135,9 +136,9 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
     for (group, (_, found)) in groups.iter().enumerate() {
         for &(id, found) in found {
             own[id] = match found {
-                Found::Cycle(nth) => Some(numbers[group][nth as usize]),
-                Found::Chaos => Some(chaos),
-                Found::Unresolved(_) | Found::Undecided | Found::Failed => None,
+                Outcome::Cycle(nth) => Some(numbers[group][nth as usize]),
+                Outcome::Chaos => Some(chaos),
+                Outcome::Unresolved(_) | Outcome::Undecided | Outcome::Failed => None,
             };
         }
     }
@@ -146,11 +147,12 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
     let mut counts = vec![0usize; cycles + 1];
     cells.iter().flatten().for_each(|&n| counts[n] += 1);
     let catalogues: Vec<&Catalogue> = groups.iter().map(|(catalogue, _)| catalogue).collect();
-    let shown = Shown { plan, records, cut, flows: &flows, catalogues: &catalogues, numbers: &numbers };
+    let sources =
+        Sources { plan, records, grouping, flows: &flows, catalogues: &catalogues, numbers: &numbers };
     let mut list: Vec<(usize, Attractor)> = (0..=cycles)
         .into_par_iter()
         .filter(|&n| counts[n] > 0)
-        .map(|n| (n, if n == chaos { shown.chaos(&own, n) } else { shown.cycle(&cells, n) }))
+        .map(|n| (n, if n == chaos { sources.chaos(&own, n) } else { sources.cycle(&cells, n) }))
         .collect();
     list.iter_mut().for_each(|(n, attractor)| attractor.cells = counts[*n]);
     list.sort_by(|(_, a), (_, b)| {
@@ -176,25 +178,25 @@ pub fn basins(plan: &Plan, records: &(impl Records + ?Sized), filled_from: &[u32
         list: list.into_iter().map(|(_, attractor)| attractor).collect(),
         groups: groups.collect(),
         chaos: Some(label_of[chaos]).filter(|&label| label != NONE),
-        cut,
+        grouping,
     })
 }
 
 impl Basins {
-    /// The attractor of every cell, by id: its place in the list, or [`NONE`].
+    /// Returns the label of every cell, by id: the index of its attractor, or [`NONE`].
     pub fn labels(&self) -> &[u16] {
         &self.labels
     }
 
-    /// The attractors, the one with the largest basin first.
+    /// Returns the attractors, the one with the largest basin first.
     pub fn attractors(&self) -> &[Attractor] {
         &self.list
     }
 
-    /// The label of the attractor that another record of the cell `id` shows. None if the record decides nothing, or
-    /// shows none of the map's attractors.
+    /// Returns the label of the attractor that another record of the cell `id` shows; none if the record is undecided or shows
+    /// none of the map's attractors.
     pub fn label(&self, id: usize, record: &Record) -> Option<u16> {
-        let group = &self.groups[self.cut.group(id)];
+        let group = &self.groups[self.grouping.group(id)];
         match classify(record) {
             Class::Chaotic => self.chaos,
             Class::Periodic { period } => {
@@ -206,7 +208,7 @@ impl Basins {
     }
 }
 
-/// Numbers for the cycles of each group, the same where one is followed from group to group.
+/// Numbers the cycles of each group. A cycle and its continuations in the next groups have one number.
 fn follow<'c>(catalogues: impl Iterator<Item = &'c Catalogue>) -> Vec<Vec<usize>> {
     let mut numbers: Vec<Vec<usize>> = Vec::new();
     let mut before: Option<&Catalogue> = None;
@@ -217,10 +219,11 @@ fn follow<'c>(catalogues: impl Iterator<Item = &'c Catalogue>) -> Vec<Vec<usize>
             let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
             for (i, a) in before.cycles().iter().enumerate() {
                 for (j, b) in catalogue.cycles().iter().enumerate() {
-                    let is_alike =
-                        a.seen.period == b.seen.period && a.seen.is_non_impacting == b.seen.is_non_impacting;
-                    let distance = if is_alike { between(&a.seen, &b.seen, b.units) } else { f64::INFINITY };
-                    if distance < FOLLOWED {
+                    let is_alike = a.cycle.period == b.cycle.period
+                        && a.cycle.is_non_impacting == b.cycle.is_non_impacting;
+                    let distance =
+                        if is_alike { between(&a.cycle, &b.cycle, b.units) } else { f64::INFINITY };
+                    if distance < CONTINUATION {
                         pairs.push((distance, i, j));
                     }
                 }
@@ -246,8 +249,8 @@ fn follow<'c>(catalogues: impl Iterator<Item = &'c Catalogue>) -> Vec<Vec<usize>
     numbers
 }
 
-/// How far two cycles of one period are apart, by the turn that brings them nearest.
-fn between(a: &Seen, b: &Seen, units: [f64; 2]) -> f64 {
+/// Returns the smallest distance of two cycles of one period over all shifts by whole periods.
+fn between(a: &StrobeCycle, b: &StrobeCycle, units: [f64; 2]) -> f64 {
     let period = a.period as usize;
     if a.points.len() < period || b.points.len() < period {
         return f64::INFINITY;
@@ -264,33 +267,33 @@ fn lexicographic(a: &State, b: &State) -> std::cmp::Ordering {
     pairs.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
 }
 
-/// What attractors are read from.
-struct Shown<'a, R: ?Sized> {
+/// Data from which attractors are computed.
+struct Sources<'a, R: ?Sized> {
     plan: &'a Plan,
     records: &'a R,
-    cut: Cut,
+    grouping: Grouping,
     flows: &'a Flows<'a>,
     catalogues: &'a [&'a Catalogue],
     numbers: &'a [Vec<usize>],
 }
 
-impl<R: Records + ?Sized> Shown<'_, R> {
-    /// A cycle by its number, read where its basin is largest.
+impl<R: Records + ?Sized> Sources<'_, R> {
+    /// Computes a periodic attractor at the value of the parameter at which its basin is largest.
     fn cycle(&self, cells: &[Option<usize>], number: usize) -> Attractor {
-        let mut counts = vec![0usize; self.cut.groups()];
+        let mut counts = vec![0usize; self.grouping.groups()];
         let of = || (0..cells.len()).filter(|&id| cells[id] == Some(number));
-        of().for_each(|id| counts[self.cut.group(id)] += 1);
+        of().for_each(|id| counts[self.grouping.group(id)] += 1);
         let largest = counts.iter().copied().max().unwrap_or(0);
         let group = counts.iter().position(|&count| count == largest).unwrap_or(0);
-        let cell = of().find(|&id| self.cut.group(id) == group).unwrap_or(0);
+        let cell = of().find(|&id| self.grouping.group(id) == group).unwrap_or(0);
         let nth = self.numbers[group].iter().position(|&n| n == number).unwrap_or(0);
-        let seen = &self.catalogues[group].cycles()[nth].seen;
-        let least = seen.points.iter().copied().min_by(lexicographic).unwrap_or(seen.last);
+        let cycle = &self.catalogues[group].cycles()[nth].cycle;
+        let least = cycle.points.iter().copied().min_by(lexicographic).unwrap_or(cycle.last);
         let of_cell = self.plan.cell(cell as u32);
         let (law, settings) = (self.plan.law(of_cell.law), self.plan.budget().settings);
-        let orbit = self.flows.with(of_cell.flow, |flow| read(flow, law, least, seen.period, &settings));
+        let orbit = self.flows.with(of_cell.flow, |flow| read(flow, law, least, cycle.period, &settings));
         Attractor {
-            class: Class::Periodic { period: seen.period },
+            class: Class::Periodic { period: cycle.period },
             strobe: Some(least),
             exponent: orbit.as_ref().map(|orbit| orbit.lyapunov),
             multiplier: orbit.as_ref().and_then(|orbit| {
@@ -320,7 +323,7 @@ impl<R: Records + ?Sized> Shown<'_, R> {
     }
 }
 
-/// The orbit through a state of a cycle, if it is read as what it is known to be.
+/// Analyses the orbit through a state of a cycle; none if the analysis finds another class or period.
 fn read(flow: &Flow, law: Law, state: State, period: u32, settings: &Settings) -> Option<orbit::Orbit> {
     let orbit = orbit::analyse_flow(flow, law, state, settings, 0);
     (orbit.class == Class::Periodic { period }).then_some(orbit)

@@ -1,20 +1,18 @@
-//! On how many attractors do the starts of a cell end?
+//! Coexistence: the number of attractors that the starts of a cell reach.
 //!
-//! Runs that end in chaos count as one attractor together: nothing in a record tells two chaotic
-//! attractors apart. Runs that end on a cycle are compared on the reference: two cycles are the
-//! same if the last strobe state of one lies on the other, within [`SAME`] of the motion's size,
-//! and one period divides the other (at a flip, noise makes a multiple of a period). Newton's method
-//! shows where the cycle is that a run was still on its way to. Symmetry-conjugate
-//! orbits count as one: where a symmetric cycle has split they always coexist, and that says nothing.
-//! Contact-free motion is one attractor however far it still is from it. Runs that are undecided
-//! or failed count for nothing.
+//! Two periodic runs have one attractor if the last strobe state of one is on the cycle of the other, within a relative
+//! distance of [`CYCLE_TOLERANCE`](crate::map::cycle::CYCLE_TOLERANCE), and if one period divides the other. Near a period
+//! doubling, rounding can turn a period into a multiple. Newton's method finds the cycle that an unsettled run approaches.
+//! Symmetry-conjugate orbits count as one attractor, because they always coexist after a symmetric cycle has split.
+//! Contact-free motion is one attractor, even if a run has not reached it yet. All chaotic runs share one attractor, because
+//! records do not distinguish chaotic attractors. Undecided and failed runs are ignored.
 //!
-//! So the number is a lower bound, with one exception: a chaotic transient that outlives the
-//! budget is called chaos, and counts beside the cycle that it ends on.
+//! The number is a lower bound, with one exception: a chaotic transient longer than the budget counts as chaos, in addition
+//! to the cycle that it reaches later.
 
 use rayon::prelude::*;
 
-use crate::map::cycle::Seen;
+use crate::map::cycle::StrobeCycle;
 use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
@@ -23,12 +21,10 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::Law;
 use rattlemap_dynamics::orbit::Class;
 
-pub use crate::map::cycle::SAME;
-
-/// Attractors found per cell, by id; none if every cell has one start.
+/// Counts the attractors of each cell, by id; returns none if every cell has one start.
 ///
 /// # Panics
-/// If there are not as many records as runs.
+/// If the number of records is not that of the runs.
 pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<u8>> {
     assert_eq!(plan.run_count(), records.count(), "one record per run");
     if plan.start_count() == 1 {
@@ -39,23 +35,23 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     let count = |id: usize| {
         let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
-        let mut found = Found::new(plan.law(cell.law));
+        let mut found = CellAttractors::new(plan.law(cell.law));
         flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
         found.count()
     };
     Some((0..cells).into_par_iter().map(count).collect())
 }
 
-/// The attractors of one cell.
-struct Found {
+/// Attractors of one cell.
+struct CellAttractors {
     law: Law,
     chaos: bool,
-    cycles: Vec<Seen>,
+    cycles: Vec<StrobeCycle>,
 }
 
-impl Found {
-    fn new(law: Law) -> Found {
-        Found { law, chaos: false, cycles: Vec::new() }
+impl CellAttractors {
+    fn new(law: Law) -> CellAttractors {
+        CellAttractors { law, chaos: false, cycles: Vec::new() }
     }
 
     fn count(&self) -> u8 {
@@ -69,8 +65,8 @@ impl Found {
                 if self.cycles.iter().any(|cycle| cycle.passes(flow, &record.strobe, period)) {
                     return;
                 }
-                let other = Seen::from(flow, self.law, record.strobe, period);
-                let is_known = |cycle: &Seen| {
+                let other = StrobeCycle::from(flow, self.law, record.strobe, period);
+                let is_known = |cycle: &StrobeCycle| {
                     cycle.is_non_impacting && other.is_non_impacting
                         || cycle.passes(flow, &other.last, period)
                 };

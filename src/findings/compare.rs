@@ -1,8 +1,8 @@
-//! In which cells do two maps of one grid differ? Pure.
+//! Comparison of two maps of one grid, cell by cell. Pure.
 //!
-//! For up against down (hysteresis), engine against engine, version against version. Cells differ by class or by
-//! period; those that agree in both may still differ by pattern. What else cycles of one period have is counted beside:
-//! symmetry, words, exponents.
+//! It shows hysteresis between maps with policies up and down, and differences between engines or versions. Cells differ by
+//! class or period; cells that agree in both can still differ by pattern. Symmetry, words and exponents of cycles of one
+//! period are counted separately.
 
 use crate::record::classify::classify;
 use crate::record::distance::apart;
@@ -10,24 +10,24 @@ use crate::record::{Record, Spelling, valid};
 use rattlemap_dynamics::orbit::Class;
 use rattlemap_dynamics::word::Word;
 
-/// How two motions differ.
+/// Kinds of differences between two motions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Their classes do.
+    /// Different classes.
     Class,
-    /// Both are periodic, with other periods.
+    /// Different periods.
     Period,
-    /// Both are cycles of one period, with other patterns.
+    /// Cycles of one period with different patterns.
     Pattern,
-    /// The same with other words, where patterns are not known.
+    /// Cycles of one period with different words, if patterns are unknown.
     Word,
 }
 
 impl Kind {
-    /// Every kind, in the order in which they are counted.
+    /// All kinds, in the order of tables.
     pub const ALL: [Kind; 4] = [Kind::Class, Kind::Period, Kind::Pattern, Kind::Word];
 
-    /// How motions of these classes differ; none if they do not.
+    /// Returns the difference between two classes; none if they are equal.
     pub fn of(a: Class, b: Class) -> Option<Kind> {
         match (a, b) {
             _ if a == b => None,
@@ -36,12 +36,12 @@ impl Kind {
         }
     }
 
-    /// Whether class or period differ: cells of other kinds count apart.
+    /// Whether class or period differ. Other kinds are counted separately.
     pub fn is_decisive(self) -> bool {
         matches!(self, Kind::Class | Kind::Period)
     }
 
-    /// The name in tables.
+    /// Returns the name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Class => "class",
@@ -52,12 +52,12 @@ impl Kind {
     }
 }
 
-/// Cells that have a property in both maps, and in how many of them it differs.
+/// Number of cells with a property in both maps, and number of those in which it differs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Cells in which it can be compared.
+    /// Number of cells in which the property can be compared.
     pub compared: usize,
-    /// Those in which it differs.
+    /// Number of cells in which it differs.
     pub differing: usize,
 }
 
@@ -68,42 +68,42 @@ impl Tally {
     }
 }
 
-/// The largest difference of the exponents of cells that are periodic in both maps, with one period.
+/// Largest difference of the exponents of cycles of one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Largest {
-    /// The difference, 0 or more; infinite where an exponent is not finite.
+    /// The difference, 0 or more; infinite if only one exponent is finite.
     pub difference: f64,
-    /// The cell, by id.
+    /// Id of the cell.
     pub id: usize,
 }
 
-/// What became of two maps side by side.
+/// Result of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
-    /// How each cell differs, by id.
+    /// Difference in each cell, by id.
     pub kinds: Vec<Option<Kind>>,
-    /// Symmetry of cells of one period.
+    /// Symmetry of cycles of one period.
     pub symmetric: Tally,
-    /// Words of cells of one period. Those of an orbit and its mirror image are one: which of the two a start reaches
-    /// says nothing.
+    /// Words of cycles of one period. The words of an orbit and of its mirror image count as equal, because small changes of
+    /// the start decide between the two.
     pub words: Tally,
-    /// Patterns likewise.
+    /// Patterns of cycles of one period, compared like words.
     pub patterns: Tally,
-    /// Exponents of integrated cells of one period that were compared; none unless both scenes ask for them.
+    /// Number of compared exponents: those of integrated cycles of one period, if both scenes request exponents.
     pub exponents: usize,
-    /// The largest of their differences; none where nothing was compared.
+    /// Largest difference of exponents; none if no exponents were compared.
     pub exponent: Option<Largest>,
-    /// Attractors, where both maps counted them.
+    /// Numbers of attractors, if both maps count them.
     pub attractors: Tally,
 }
 
 impl Comparison {
-    /// Cells that differ in this way.
+    /// Counts the cells with this kind of difference.
     pub fn count(&self, kind: Kind) -> usize {
         self.kinds.iter().filter(|of| **of == Some(kind)).count()
     }
 
-    /// Cells that differ by class or period.
+    /// Counts the cells that differ by class or period.
     pub fn differing(&self) -> usize {
         self.kinds.iter().flatten().filter(|kind| kind.is_decisive()).count()
     }
@@ -112,18 +112,18 @@ impl Comparison {
 /// One of two maps.
 #[derive(Clone, Copy, Debug)]
 pub struct Side<'a> {
-    /// The first run of every cell, by id.
+    /// Record of the first run of each cell, by id.
     pub records: &'a [Record],
-    /// Attractors per cell, if they were counted.
+    /// Number of attractors of each cell, if counted.
     pub attractors: Option<&'a [u8]>,
-    /// Whether its scene asks for exponents.
+    /// Whether the scene requests exponents.
     pub has_exponents: bool,
 }
 
-/// Compares two maps cell by cell. Filled cells count as any other, but for their exponents, which nobody measured.
+/// Compares two maps cell by cell. Filled cells are compared, too, except for their exponents, which are interpolated.
 ///
 /// # Panics
-/// If the maps have not as many cells.
+/// If the maps have different numbers of cells.
 pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
     assert_eq!(a.records.len(), b.records.len(), "maps of one grid");
     let mut found = Comparison {
@@ -154,7 +154,7 @@ pub fn compare(a: Side<'_>, b: Side<'_>) -> Comparison {
 }
 
 impl Comparison {
-    /// Compares what two cycles of one period have beside it.
+    /// Compares symmetry, words and patterns of two cycles of one period.
     fn take_cycles(&mut self, a: &Record, b: &Record) -> Option<Kind> {
         let have = |bit| a.valid & b.valid & bit != 0;
         self.symmetric.take(have(valid::SYMMETRIC).then_some(a.symmetric != b.symmetric));
@@ -162,7 +162,7 @@ impl Comparison {
         let [word, pattern] = [has_other(a.spelling(), b.spelling()), has_other(a.pattern(), b.pattern())];
         self.words.take(word);
         self.patterns.take(pattern);
-        // Words count bounces before meshing, patterns do not.
+        // Patterns come first: words also count the bounces before meshing.
         match (pattern, word) {
             (Some(differs), _) => differs.then_some(Kind::Pattern),
             (None, word) => (word == Some(true)).then_some(Kind::Word),
@@ -173,7 +173,7 @@ impl Comparison {
     fn take_exponents(&mut self, id: usize, a: &Record, b: &Record) {
         if a.valid & b.valid & valid::LYAPUNOV != 0 && (a.valid | b.valid) & valid::FILLED == 0 {
             self.exponents += 1;
-            // Minus infinity both, where multipliers are zero.
+            // Both exponents are minus infinity if a multiplier is zero.
             let difference = if a.lyapunov == b.lyapunov { 0.0 } else { apart(a.lyapunov, b.lyapunov) };
             if self.exponent.is_none_or(|largest| difference > largest.difference) {
                 self.exponent = Some(Largest { difference, id });
@@ -182,12 +182,12 @@ impl Comparison {
     }
 }
 
-/// Whether two words are neither one another nor the other's mirror image.
+/// Whether two words differ, and one is not the mirror image of the other.
 pub(crate) fn words_differ(a: &Word, b: &Word) -> bool {
     a != b && *a != b.mirrored()
 }
 
-/// The same of words as records have them; none where hashes do not tell.
+/// Whether two words of records differ; none if their hashes do not decide it.
 fn differ(a: &Spelling, b: &Spelling) -> Option<bool> {
     match (a, b) {
         (Spelling::Whole(a), Spelling::Whole(b)) => Some(words_differ(a, b)),
@@ -223,21 +223,21 @@ mod tests {
     }
 
     #[test]
-    fn class_comes_before_period_and_undecided_is_a_class() {
+    fn class_is_compared_before_period_and_undecided_is_a_class() {
         let undecided = Record { valid: valid::PERIOD, ..Record::default() };
         let a = [cycle(1, -0.1, b"36"), cycle(2, -0.1, b"36"), chaos(), undecided];
         let b = [cycle(1, -0.1, b"36"), cycle(4, -0.1, b"36"), cycle(1, -0.1, b"36"), chaos()];
         let found = of(&a, &b);
         assert_eq!(found.kinds, [None, Some(Kind::Period), Some(Kind::Class), Some(Kind::Class)]);
         assert_eq!((found.differing(), Kind::ALL.map(|kind| found.count(kind))), (3, [2, 1, 0, 0]));
-        // What is said of cycles is said of those of one period.
+        // Only cycles of one period are compared further.
         assert_eq!((found.exponents, found.symmetric.compared, found.words.compared), (1, 1, 1));
         let filled = b.map(|record| Record { valid: record.valid | valid::FILLED, ..record });
-        assert_eq!(of(&a, &filled).kinds, found.kinds, "filled cells are cells");
+        assert_eq!(of(&a, &filled).kinds, found.kinds, "filled cells are compared");
     }
 
     #[test]
-    fn cycles_of_one_period_are_compared_by_what_both_have() {
+    fn cycles_of_one_period_are_compared_by_common_quantities() {
         let a =
             [cycle(1, -0.1, b"1355"), cycle(1, -0.1, b"36"), cycle(1, -0.25, b"36"), cycle(1, -0.1, b"36")];
         let mut b =
@@ -251,17 +251,17 @@ mod tests {
         assert_eq!(found.kinds, [None, Some(Kind::Word), None, None]);
         assert_eq!(found.symmetric, Tally { compared: 3, differing: 1 });
         assert_eq!((found.exponents, found.exponent), (3, Some(Largest { difference: 0.5, id: 2 })));
-        // Classes are told by exponents: records have them whether a scene asks or not.
+        // Records contain exponents even if the scene does not request them, because classes need them.
         let [a, b] = [(&a, true), (&b, false)].map(|(records, has_exponents)| Side {
             records,
             attractors: None,
             has_exponents,
         });
-        let unasked = compare(a, b);
-        assert_eq!((unasked.exponents, unasked.exponent), (0, None));
+        let unrequested = compare(a, b);
+        assert_eq!((unrequested.exponents, unrequested.exponent), (0, None));
     }
 
-    /// As many bounces more or less make no other pattern.
+    /// Words with different numbers of bounces have one pattern.
     #[test]
     fn patterns_decide_where_both_maps_have_them() {
         let with = |word: &[u8], pattern: &[u8]| {
@@ -275,12 +275,12 @@ mod tests {
         assert_eq!(found.words, Tally { compared: 3, differing: 3 });
         assert_eq!(found.patterns, Tally { compared: 2, differing: 1 });
         let expected = [None, Some(Kind::Pattern), Some(Kind::Word)];
-        assert_eq!(found.kinds, expected, "a word tells where there is no pattern");
+        assert_eq!(found.kinds, expected, "words decide without patterns");
         assert_eq!(found.differing(), 0, "class and period are the same");
     }
 
     #[test]
-    fn long_words_are_compared_as_far_as_hashes_tell() {
+    fn long_words_are_compared_by_their_hashes() {
         let hashed = |hash, length| Spelling::Hashed { hash, length };
         assert_eq!(differ(&hashed(1, 80), &hashed(1, 80)), Some(false));
         assert_eq!(differ(&hashed(1, 80), &hashed(2, 80)), None, "it may be the mirror image");

@@ -1,32 +1,32 @@
-//! Which swept parameters changed nothing? Pure.
+//! Swept parameters without effect, such as the stiffness behind a wall that no motion reaches. Pure.
 //!
-//! A stiffness behind a wall that no motion reaches, say. What is compared is what tables show: class, period,
-//! exponent, impacts, meshing, symmetry, word and pattern, as far as they were measured.
+//! All quantities of tables are compared, as far as they were computed: class, period, exponent, impacts, meshing,
+//! symmetry, word and pattern.
 
 use crate::map::plan::Plan;
 use crate::record::classify::classify;
 use crate::record::{Record, Records, valid};
-use rattlemap_dynamics::model::Parameter;
 
-/// Relative differences that rounding makes of a number, in an engine of single precision and of double.
-pub const ROUNDING: [f64; 2] = [1e-3, 1e-6];
+/// Relative tolerance for rounding errors of engines in single precision.
+const SINGLE_TOLERANCE: f64 = 1e-3;
 
-/// Parameters of the axes along which every cell that was integrated is as the others, within `rounding`.
+/// Relative tolerance for rounding errors of engines in double precision.
+const DOUBLE_TOLERANCE: f64 = 1e-6;
+
+/// Returns the names of the swept parameters along whose axis all integrated cells are equal within rounding errors. The
+/// tolerance depends on `precision`: `f64`, else single.
 ///
-/// Cells that were filled say nothing. None is named where cells start from their neighbours, since then more than
-/// the parameter changes along an axis, nor in a list, which has no lines along one parameter.
+/// Filled cells are ignored. The result is empty if cells start from their neighbours, because then more than the parameter
+/// changes along an axis, and for a list, which has no axes.
 ///
 /// # Panics
-/// If there are not as many records as runs.
-pub fn without_effect<'p>(
-    plan: &'p Plan,
-    records: &(impl Records + ?Sized),
-    rounding: f64,
-) -> Vec<&'p Parameter> {
+/// If the number of records is not that of the runs.
+pub fn names(plan: &Plan, records: &(impl Records + ?Sized), precision: &str) -> Vec<String> {
     assert_eq!(plan.run_count(), records.count(), "one record per run");
     if plan.policy().follows() {
         return Vec::new();
     }
+    let tolerance = if precision == "f64" { DOUBLE_TOLERANCE } else { SINGLE_TOLERANCE };
     let counts = plan.counts();
     let changes_nothing = |axis: usize| {
         let mut compared = 0;
@@ -37,7 +37,7 @@ pub fn without_effect<'p>(
                 let mut integrated = cells.filter(|record| record.valid & valid::FILLED == 0);
                 let Some(first) = integrated.next() else { continue };
                 for record in integrated {
-                    if !is_same(&first, &record, rounding) {
+                    if !is_same(&first, &record, tolerance) {
                         return false;
                     }
                     compared += 1;
@@ -46,23 +46,14 @@ pub fn without_effect<'p>(
         }
         compared > 0
     };
-    // A start may change nothing and is no parameter.
+    // Components of the start are not parameters.
     let axes = plan.axes().iter().enumerate().filter(|(_, axis)| !axis.target().is_start());
-    axes.filter(|&(i, _)| changes_nothing(i)).map(|(_, axis)| axis.parameter()).collect()
+    let found = axes.filter(|&(i, _)| changes_nothing(i));
+    found.map(|(_, axis)| axis.parameter().name.to_string()).collect()
 }
 
-/// Their names, within the rounding of records of this precision: `f64`, else single.
-///
-/// # Panics
-/// As [`without_effect`].
-pub fn names(plan: &Plan, records: &(impl Records + ?Sized), precision: &str) -> Vec<String> {
-    let rounding = ROUNDING[usize::from(precision == "f64")];
-    let found = without_effect(plan, records, rounding);
-    found.into_iter().map(|parameter| parameter.name.to_string()).collect()
-}
-
-fn is_same(a: &Record, b: &Record, rounding: f64) -> bool {
-    let near = |a: f64, b: f64| a == b || (a - b).abs() <= rounding * a.abs().max(b.abs());
+fn is_same(a: &Record, b: &Record, tolerance: f64) -> bool {
+    let near = |a: f64, b: f64| a == b || (a - b).abs() <= tolerance * a.abs().max(b.abs());
     let both = |bit: u32, same: bool| a.valid & bit == b.valid & bit && (a.valid & bit == 0 || same);
     classify(a) == classify(b)
         && both(valid::LYAPUNOV, near(a.lyapunov, b.lyapunov))
@@ -76,14 +67,10 @@ fn is_same(a: &Record, b: &Record, rounding: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::scene::{Purpose, Scene};
+    use crate::map::plan::test_plan;
 
     fn plan(more: &str) -> Plan {
-        let axis = |name: &str, count| {
-            format!("[[axis]]\nparameter = '{name}'\nmin = 0.25\nmax = 0.75\ncount = {count}\n")
-        };
-        let text = axis("e", 3) + &axis("k", 2) + more;
-        Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+        test_plan([("e", 3), ("k", 2)], more)
     }
 
     fn record(period: u32, lyapunov: f64) -> Record {
@@ -91,7 +78,7 @@ mod tests {
     }
 
     fn named(plan: &Plan, records: &[Record]) -> Vec<String> {
-        without_effect(plan, records, 1e-6).iter().map(|parameter| parameter.name.to_string()).collect()
+        names(plan, records, "f64")
     }
 
     #[test]
@@ -104,10 +91,10 @@ mod tests {
         assert_eq!(named(&plan, &by(|_, j| record(1 + j as u32, -1.0))), ["e"]);
         assert_eq!(named(&plan, &by(|_, _| record(1, -1.0))), ["e", "k"]);
         assert!(named(&plan, &by(|i, j| record(1, -(((1 + i) * (1 + j)) as f64)))).is_empty());
-        // Rounding is no effect.
+        // Differences within the tolerance are ignored.
         let rounded = by(|i, j| record(1, -1.0 - i as f64 - 1e-8 * j as f64));
         assert_eq!(named(&plan, &rounded), ["k"]);
-        // One cell suffices, whatever of it differs.
+        // A difference of any quantity in one cell is an effect.
         for change in [
             |record: &mut Record| record.period = 2,
             |record: &mut Record| record.lyapunov *= 1.001,
@@ -121,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_filled_or_follows_says_nothing() {
+    fn filled_cells_and_cells_that_follow_are_ignored() {
         let same = vec![record(1, -1.0); 6];
         let filled = Record { valid: valid::FILLED | record(1, -1.0).valid, ..record(1, -1.0) };
         assert!(named(&plan("[refine]\n"), &[filled; 6]).is_empty());

@@ -1,25 +1,25 @@
-//! Where do the two passes of a diagram disagree?
+//! Hysteresis: values at which the two passes of a diagram differ.
 
 use crate::findings::compare::{Kind, words_differ};
 use crate::map::bifurcation::{Column, Direction};
 
-/// Columns in which the motion depends on the way that the attractor was followed.
+/// Values of the axis at which the motion depends on the direction in which the attractor was followed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hysteresis {
-    /// Values of the axis.
+    /// Number of values of the axis.
     pub columns: usize,
-    /// Those at which class or period differ.
+    /// Number of values at which class or period differ.
     pub differing: usize,
-    /// Runs of neighbouring values at which they do: the first and the last value of each.
+    /// First and last value of each range of neighbouring values at which class or period differ.
     pub ranges: Vec<[f64; 2]>,
-    /// Values at which class and period are the same and the patterns alone differ, as where one way leads to motion
-    /// without contact and the other one to rattling. Those of an orbit and its mirror image are one.
+    /// Number of values at which only the patterns differ, for example if one direction leads to contact-free motion and the
+    /// other to rattling. The patterns of an orbit and of its mirror image count as equal.
     pub by_pattern: usize,
-    /// Runs of neighbouring ones, as above.
+    /// First and last value of each range of neighbouring values at which only the patterns differ.
     pub pattern_ranges: Vec<[f64; 2]>,
 }
 
-/// Compares the two passes of a diagram by class and period; none if it shows one alone.
+/// Compares the two passes of a diagram; none if it has one pass.
 pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     let pass = |direction| columns.iter().filter(move |column| column.direction == Some(direction));
     let [up, down] = Direction::BOTH.map(pass);
@@ -27,12 +27,12 @@ pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     for (up, down) in up.zip(down) {
         let differs = Kind::of(up.class, down.class).is_some();
         differing.take(up.value, differs);
-        // Words count bounces before meshing, patterns do not.
+        // Patterns are compared, because words also count the bounces before meshing.
         let patterns = up.pattern().zip(down.pattern());
         by_pattern.take(up.value, !differs && patterns.is_some_and(|(up, down)| words_differ(&up, &down)));
     }
-    (differing.seen > 0).then_some(Hysteresis {
-        columns: differing.seen,
+    (differing.total > 0).then_some(Hysteresis {
+        columns: differing.total,
         differing: differing.count,
         ranges: differing.ranges,
         by_pattern: by_pattern.count,
@@ -40,13 +40,13 @@ pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
     })
 }
 
-/// Values at which something holds, as runs of neighbours.
+/// Values at which a condition holds, as ranges of neighbours.
 #[derive(Default)]
 struct Runs {
-    seen: usize,
+    total: usize,
     count: usize,
     ranges: Vec<[f64; 2]>,
-    /// Whether it held at the value before.
+    /// Whether the condition holds at the preceding value.
     is_within: bool,
 }
 
@@ -57,7 +57,7 @@ impl Runs {
             _ if holds => self.ranges.push([value; 2]),
             _ => {}
         }
-        self.seen += 1;
+        self.total += 1;
         self.count += usize::from(holds);
         self.is_within = holds;
     }
@@ -84,7 +84,7 @@ mod tests {
         };
         let mut both = [pass(Direction::Up, up), pass(Direction::Down, down)].concat();
         let mut spell = |i: usize, word: &[u8]| both[i].word = Some(Word::cyclic(word));
-        // An impact on either side against meshing; an orbit against its mirror image; as many bounces less.
+        // Impacts on both sides against meshing; an orbit against its mirror image; words that differ in bounces only.
         let cycles: [(usize, &[u8]); 4] = [(0, b"36"), (7, b"14"), (4, b"1355546"), (11, b"462213")];
         for (i, word) in cycles {
             spell(i, word);

@@ -1,37 +1,37 @@
-//! Adapters: which there are, in which order, and what they are called.
+//! Adapters: a list of them, their order, and their names.
 
 use std::fmt;
 
-use super::caught::caught;
 use super::layout::{Motion, Tally};
+use super::panics::catch_panic;
 use super::{GpuError, Precision};
 
-/// What narrows the adapters down in the environment: the first is wgpu's own.
+/// Environment variables that select adapters. wgpu reads the first one.
 const BACKEND: &str = "WGPU_BACKEND";
 const ADAPTER_NAME: &str = "WGPU_ADAPTER_NAME";
 
-/// Which adapter to take.
+/// Selection of an adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AdapterChoice {
-    /// Part of the adapter's name, or of what [`describe`] says of it, in any case of letters;
-    /// none takes the best.
+    /// Part of the adapter's name or of its description ([`describe`]), in upper or lower case; `None` selects the
+    /// best adapter.
     pub name: Option<String>,
-    /// The one with this number ([`AdapterReport::number`]) and no other.
+    /// Number of the adapter ([`AdapterReport::number`]).
     pub number: Option<usize>,
 }
 
 impl AdapterChoice {
-    /// The adapter with this number.
+    /// Selects the adapter with this number.
     pub fn numbered(number: usize) -> AdapterChoice {
         AdapterChoice { number: Some(number), name: None }
     }
 
-    /// The best of the adapters in whose name, or in what [`describe`] says of them, this is a part.
+    /// Selects the best adapter with this text in its name or its description ([`describe`]).
     pub fn named(name: impl Into<String>) -> AdapterChoice {
         AdapterChoice { name: Some(name.into()), number: None }
     }
 
-    /// Whether an adapter may be taken.
+    /// Whether the choice admits an adapter.
     pub fn allows(&self, adapter: &AdapterReport) -> bool {
         let AdapterReport { number, info, .. } = adapter;
         let name = describe(info).to_lowercase();
@@ -39,7 +39,7 @@ impl AdapterChoice {
             && self.name.as_ref().is_none_or(|wanted| name.contains(&wanted.to_lowercase()))
     }
 
-    /// The adapter that the environment names by `WGPU_ADAPTER_NAME`, else the best.
+    /// Selects the adapter that the environment variable `WGPU_ADAPTER_NAME` names, else the best.
     pub fn from_environment() -> AdapterChoice {
         AdapterChoice { name: std::env::var(ADAPTER_NAME).ok().filter(|name| !name.is_empty()), number: None }
     }
@@ -49,19 +49,19 @@ fn instance() -> wgpu::Instance {
     wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
 }
 
-/// What an adapter offers.
+/// Properties of an adapter.
 #[derive(Clone, Debug)]
 pub struct AdapterReport {
-    /// Its place in [`adapters`], from 0: the same in every run on one machine and under one `WGPU_BACKEND`, as long
-    /// as no adapter comes or goes.
+    /// Place in [`adapters`], from 0. It is the same in every run on one machine with the same `WGPU_BACKEND`, until
+    /// an adapter is added or removed.
     pub number: usize,
-    /// Name, kind, driver.
+    /// Name, kind and driver.
     pub info: wgpu::AdapterInfo,
-    /// Precisions that lanes can have on it.
+    /// Precisions in which it can run lanes.
     pub precisions: Vec<Precision>,
-    /// Largest storage buffer that a shader sees, in bytes.
+    /// Largest storage buffer in a shader, in bytes.
     pub largest_binding: u64,
-    /// Lanes that may be under way at a time.
+    /// Most lanes under way at a time.
     pub most_lanes: usize,
 }
 
@@ -76,21 +76,20 @@ impl AdapterReport {
         }
     }
 
-    /// Which one it is.
+    /// Returns its identity on this machine.
     pub fn id(&self) -> AdapterId {
         AdapterId::of(self.number, &self.info)
     }
 }
 
-/// What tells an adapter from others of its name.
+/// Identity of an adapter among others with the same name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AdapterId {
-    /// See [`AdapterReport::number`].
+    /// Number of the adapter ([`AdapterReport::number`]).
     pub number: usize,
-    /// As its driver calls it.
+    /// Name from its driver.
     pub name: String,
-    /// Where it sits on the bus (`domain:bus:device.function`); none where there is no such place, or no driver that
-    /// tells.
+    /// Place on the bus (`domain:bus:device.function`); `None` if the driver does not report it.
     pub pci: Option<String>,
 }
 
@@ -108,15 +107,15 @@ impl fmt::Display for AdapterId {
     }
 }
 
-/// All adapters of this machine, the best first: by kind, then by interface, then by PCI address, which is what tells
-/// equal cards apart; those without one as the driver lists them.
+/// Lists all adapters of this machine, the best first: by kind, then by interface, then by PCI address, which
+/// distinguishes equal cards. Adapters without an address are in the driver's order.
 pub async fn adapters() -> Vec<AdapterReport> {
     listed().await.unwrap_or_default().into_iter().map(|(report, _)| report).collect()
 }
 
-/// The same, with what they are opened by.
+/// Lists all adapters with the handles that open them.
 pub(super) async fn listed() -> Result<Vec<(AdapterReport, wgpu::Adapter)>, GpuError> {
-    let list = caught(|| instance().enumerate_adapters(wgpu::Backends::all()));
+    let list = catch_panic(|| instance().enumerate_adapters(wgpu::Backends::all()));
     let mut all = list.map_err(|message| GpuError::Refused { what: "to list its adapters", message })?.await;
     all.sort_by_cached_key(|adapter| place(&adapter.get_info()));
     Ok(all.into_iter().enumerate().map(|(n, adapter)| (AdapterReport::of(n, &adapter), adapter)).collect())
@@ -126,21 +125,21 @@ fn place(info: &wgpu::AdapterInfo) -> ((u32, u32), String) {
     (rank(info), info.device_pci_bus_id.clone())
 }
 
-/// An adapter in words: name, interface and driver, as manifests have it.
+/// Describes an adapter by name, interface and driver, as in manifests.
 pub fn describe(info: &wgpu::AdapterInfo) -> String {
     let driver = [info.driver.as_str(), info.driver_info.as_str()].join(" ");
     format!("{} ({:?}; {})", info.name, info.backend, driver.trim())
 }
 
-/// Whether an adapter is more than a program on the processor.
+/// Whether an adapter is hardware, not a program on the processor.
 pub fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
     info.device_type != wgpu::DeviceType::Cpu
 }
 
-/// Slots that a pool has at most: below 1 GB on the device.
+/// Most slots of a pool: less than 1 GB on the device.
 const MOST_SLOTS: usize = 1 << 19;
 
-/// Slots that an adapter's limits allow.
+/// Returns the most slots that an adapter's limits allow.
 pub(super) fn most_slots(limits: &wgpu::Limits) -> usize {
     let largest = size_of::<Motion>().max(size_of::<Tally>()) as u64;
     let by_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / largest;
@@ -159,8 +158,8 @@ pub(super) fn features(precision: Precision) -> wgpu::Features {
     }
 }
 
-/// Hardware before software, dedicated before integrated; of the interfaces to one adapter the
-/// one that offers most.
+/// Ranks an adapter: hardware before software, dedicated before integrated; among the interfaces to one adapter, the
+/// most capable first.
 fn rank(info: &wgpu::AdapterInfo) -> (u32, u32) {
     let kind = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -179,7 +178,7 @@ fn rank(info: &wgpu::AdapterInfo) -> (u32, u32) {
     (kind, interface)
 }
 
-/// Why an adapter comes before or after itself by another interface.
+/// Explains the rank of an adapter's interface.
 pub fn interface_rank(info: &wgpu::AdapterInfo) -> &'static str {
     match info.backend {
         wgpu::Backend::Vulkan => "first choice: the only interface with f64",
@@ -190,8 +189,8 @@ pub fn interface_rank(info: &wgpu::AdapterInfo) -> &'static str {
     }
 }
 
-/// What in the environment narrows the adapters down, as far as `choice` heeds it, and what to do about it; none
-/// if nothing does.
+/// Describes the environment variables that restrict the adapters of `choice`, with a remedy; `None` if there are
+/// none.
 pub fn narrowed_by(choice: &AdapterChoice) -> Option<String> {
     let value = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
     let backend = value(BACKEND).map(|value| (BACKEND, value, "give vulkan, metal or dx12"));
@@ -204,7 +203,7 @@ pub fn narrowed_by(choice: &AdapterChoice) -> Option<String> {
     (!list.is_empty()).then(|| list.join("; "))
 }
 
-/// That no adapter fits, in words.
+/// Builds the error of an adapter that was not found.
 pub(crate) fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[AdapterReport]) -> GpuError {
     let mut wanted = match precision {
         Precision::F32 => String::from("at all"),
@@ -214,7 +213,7 @@ pub(crate) fn no_adapter(precision: Precision, choice: &AdapterChoice, all: &[Ad
         wanted = format!("called {name} {wanted}");
     }
     if let Some(number) = choice.number {
-        wanted = format!("of number {number} {wanted}");
+        wanted = format!("with number {number} {wanted}");
     }
     let list: Vec<String> = all
         .iter()
@@ -263,7 +262,7 @@ mod tests {
         all.sort_by_cached_key(place);
         let addresses = all.each_ref().map(|info| info.device_pci_bus_id.as_str());
         assert_eq!(addresses, ["0000:17:00.0", "0000:65:00.0", "0000:00:02.0", ""]);
-        let told = [&all[1], &all[3]].map(|info| AdapterId::of(1, info).to_string());
-        assert_eq!(told, ["1 (, PCI 0000:65:00.0)", "1 ()"]);
+        let names = [&all[1], &all[3]].map(|info| AdapterId::of(1, info).to_string());
+        assert_eq!(names, ["1 (, PCI 0000:65:00.0)", "1 ()"]);
     }
 }

@@ -1,4 +1,4 @@
-//! How lanes average the growth of their tangent vector.
+//! Periods over which lanes average the growth of their tangent vector.
 
 /// Periods in which the tangent vector turns into the direction of fastest growth.
 const ALIGNMENT: u32 = 50;
@@ -6,23 +6,23 @@ const ALIGNMENT: u32 = 50;
 /// Blocks whose means give the exponent's standard error.
 const EXPONENT_BLOCKS: u32 = 32;
 
-/// Periods of a block at least: neighbouring periods are alike, and a standard error made of them
-/// is too small.
+/// Least periods of a block. Neighbouring periods are correlated, so that shorter blocks give too small a standard
+/// error.
 const SHORTEST_BLOCK: u32 = 4;
 
-/// Which periods count, and in what blocks.
+/// Periods that count, and their blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Averaging {
-    /// The vector is carried from this period on,
+    /// Period from which the tangent vector is carried.
     pub(crate) growth_from: u32,
-    /// and its growth counts from this one on,
+    /// Period from which its growth counts.
     pub(crate) exponent_from: u32,
-    /// in blocks of so many periods.
+    /// Periods per block.
     pub(crate) block: u32,
 }
 
 impl Averaging {
-    /// That of lanes that run for `periods` and whose exponent accumulates from `exponent_from` on.
+    /// Returns the averaging of lanes that run for `periods`, with an exponent from `exponent_from` on.
     pub(crate) fn new(periods: u32, exponent_from: u32) -> Averaging {
         Averaging {
             growth_from: exponent_from.saturating_sub(ALIGNMENT.min(exponent_from / 2)),

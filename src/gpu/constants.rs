@@ -1,4 +1,4 @@
-//! Constants of a lane, derived in f64 from the model's description.
+//! Constants of a lane, derived in f64 from the description of the model.
 
 use bytemuck::Zeroable;
 use nalgebra::SMatrix;
@@ -9,51 +9,52 @@ use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::{self, Contact};
 use rattlemap_dynamics::reference::CLOSING_ANGLE;
 
-/// Largest angle, in radians, that the fastest mode may turn in one step: Taylor series and
-/// certificate of the shaders are laid out for it.
-pub const STEP_ANGLE: f64 = 1.0;
+/// Largest angle, in radians, by which the fastest mode turns in one step. The shaders' Taylor series and bounds are
+/// designed for it.
+const STEP_ANGLE: f64 = 1.0;
 
-/// Where a wall stands that there is not, in scales of length: shaders have no infinity, and square distances.
+/// Position of a missing wall, in units of length. WGSL has no infinity, and the shaders square distances.
 const NOWHERE: f64 = 1e12;
 
-/// Terms of the matrix exponential over one step; rates times steps are below 1.
+/// Terms of the matrix exponential over one step, in which the fastest mode turns by at most a radian.
 const EXPONENTIAL_TERMS: u32 = 30;
 
 type Generator = SMatrix<f64, 7, 7>;
 
-/// The constants of one oscillator and the phasors of its steps.
+/// Constants of one oscillator, and the phasors of its steps.
 #[derive(Clone, Debug)]
 pub struct Constants {
-    /// What the shader reads.
+    /// Constants that the shader reads.
     pub flow: Flow,
     /// Free steps per forcing period.
     pub steps: u32,
-    /// `(cos, sin)` at every step, the end included.
+    /// `(cos, sin)` of the phase at every step, the end included.
     pub phasors: Vec<[f64; 2]>,
     /// Whether the mirror image of a motion is a motion.
     pub mirror_symmetric: bool,
-    /// How many displacements there are.
+    /// Number of displacements.
     pub degrees: u32,
-    /// What the right and the left wall are.
+    /// Kinds of the right and of the left wall.
     pub contacts: [Contact; 2],
-    walls: [f64; 2],
+    /// Whether a wall exists and is elastic or rigid.
+    pub(super) has_elastic_or_rigid_wall: bool,
     coordinates: Coordinates,
 }
 
 impl Constants {
-    /// Free steps per forcing period: `asked` or as many as the motion needs. None if a lane
-    /// would be refused for their number.
-    pub fn steps(oscillator: &model::Oscillator, asked: Option<u32>) -> Option<u32> {
+    /// Returns the free steps per forcing period: `requested`, or as many as the motion needs. Returns `None` if
+    /// there are too many for a lane.
+    pub fn steps(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<u32> {
         let angle = oscillator.period() * rate(oscillator, &oscillator.free);
         let needed = (angle / STEP_ANGLE).ceil().max(8.0);
-        // Even, so that half a period is a step, too.
-        let steps = 2.0 * (0.5 * f64::from(asked.unwrap_or(0)).max(needed)).ceil();
+        // An even number, so that half a period is a whole number of steps.
+        let steps = 2.0 * (0.5 * f64::from(requested.unwrap_or(0)).max(needed)).ceil();
         (steps <= f64::from(MOST_STEPS)).then_some(steps as u32)
     }
 
-    /// Derives the constants for as many steps as [`Constants::steps`] says; none if it has none.
-    pub fn new(oscillator: &model::Oscillator, asked: Option<u32>) -> Option<Constants> {
-        let steps = Constants::steps(oscillator, asked)?;
+    /// Derives the constants for the number of steps that [`Constants::steps`] returns.
+    pub fn new(oscillator: &model::Oscillator, requested: Option<u32>) -> Option<Constants> {
+        let steps = Constants::steps(oscillator, requested)?;
         let period = oscillator.period();
         let h = period / f64::from(steps);
         let walls = walls(oscillator);
@@ -69,7 +70,7 @@ impl Constants {
             mirror_symmetric: oscillator.mirror_symmetric(),
             degrees: oscillator.degrees as u32,
             contacts: oscillator.contacts,
-            walls: oscillator.walls,
+            has_elastic_or_rigid_wall: has_elastic_or_rigid_wall(oscillator),
             coordinates,
         };
         constants.flow = Flow {
@@ -80,26 +81,26 @@ impl Constants {
             speed: speed(oscillator) * h,
             closing: CLOSING_ANGLE / free_rate(oscillator) / h,
             steady: [0.0; 4],
-            reach: -1.0,
-            decay: 0.0,
+            contact_free_size: -1.0,
+            transient_growth: 0.0,
             pressing: walls.map(held),
             damper: oscillator.meshing.each_ref().map(damper),
         };
         if let Some(motion) = non_impacting(oscillator) {
             constants.flow.steady = constants.to_lane(motion.steady());
             // In units of the free domain's energy form.
-            constants.flow.reach = h * (coordinates.compliance() * motion.reach()).sqrt();
-            constants.flow.decay = motion.exponent() * period / std::f64::consts::LN_2;
+            constants.flow.contact_free_size = h * (coordinates.compliance() * motion.reach()).sqrt();
+            constants.flow.transient_growth = motion.exponent() * period / std::f64::consts::LN_2;
         }
         Some(constants)
     }
 
-    /// Lane units `(z, z', x, x')` of a state, `x` the displacement beside the gap.
+    /// Returns a state in lane units `(z, z', x, x')`, where `x` is the displacement that lanes use beside the gap.
     pub fn to_lane(&self, y: model::State) -> [f64; 4] {
         self.coordinates.to_lane(y, self.flow.h)
     }
 
-    /// Where a lane begins: a gap beyond a rigid wall lies on it.
+    /// Returns a start in lane units. A gap beyond a rigid wall is moved onto it.
     pub(super) fn start(&self, y: model::State) -> [f64; 4] {
         let mut q = self.to_lane(y);
         let [right, left] = self.flow.walls;
@@ -113,27 +114,23 @@ impl Constants {
         q
     }
 
-    /// Whether a wall is there that is elastic or rigid.
-    pub(super) fn has_elastic_or_rigid_wall(&self) -> bool {
-        has_elastic_or_rigid_wall(self.contacts, self.walls)
-    }
-
-    /// The state of lane units.
+    /// Returns the state from lane units.
     pub fn to_state(&self, q: [f64; 4]) -> model::State {
         self.coordinates.to_state(q, self.flow.h)
     }
 }
 
-/// Whether a wall is there that is elastic or rigid.
-pub(super) fn has_elastic_or_rigid_wall(contacts: [Contact; 2], walls: [f64; 2]) -> bool {
-    contacts.iter().zip(walls).any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite())
+/// Whether a wall exists and is elastic or rigid.
+pub fn has_elastic_or_rigid_wall(oscillator: &model::Oscillator) -> bool {
+    let mut walls = oscillator.contacts.iter().zip(oscillator.walls);
+    walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite())
 }
 
-/// Motion that never touches a wall again; of a displacement that there is not nothing is asked but its rest.
+/// Returns the motion without contacts. With one displacement it may be known only by its rest position.
 fn non_impacting(oscillator: &model::Oscillator) -> Option<model::NonImpacting> {
     let beside_rest = || {
         let is_alone = oscillator.degrees == 1;
-        is_alone.then(|| model::NonImpacting::beside_rest(oscillator)).flatten()
+        is_alone.then(|| model::NonImpacting::with_one_at_rest(oscillator)).flatten()
     };
     model::NonImpacting::new(oscillator).or_else(beside_rest)
 }
@@ -147,32 +144,34 @@ fn phasors(steps: u32) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// A bound on all rates of a domain: the forcing, and the spectral norms of the mass-scaled
-/// system. A mode that is damped until it no longer swings may decay as fast as all of the damping:
-/// half of it would leave 9e-6 of such a mode to the terms that single precision leaves out.
+/// Returns a bound on all rates of a domain: the forcing, and the spectral norms of the mass-scaled system. An
+/// overdamped mode can decay as fast as all of the damping. With half of the damping, the terms that single precision
+/// omits would keep 9e-6 of such a mode.
 fn rate(oscillator: &model::Oscillator, domain: &model::Domain) -> f64 {
     let (damping, frequency) = Coordinates::new(oscillator).norms(domain);
     (0.5 * damping + frequency.max(0.5 * damping)).max(oscillator.omega)
 }
 
-/// What speeds are measured by: the scale of length times the rate of free motion.
+/// Returns the unit of speeds: the scale of length times the rate of free motion.
 pub(super) fn speed(oscillator: &model::Oscillator) -> f64 {
     oscillator.length_scale() * free_rate(oscillator)
 }
 
-/// The walls, out of reach where there is none.
+/// Returns the positions of the walls; a missing wall is out of reach.
 fn walls(oscillator: &model::Oscillator) -> [f64; 2] {
     let far = NOWHERE * oscillator.length_scale();
     oscillator.walls.map(|wall| wall.clamp(-far, far))
 }
 
-/// The rate of free motion that thresholds are measured by; the reference's, so that both mean the same.
+/// Returns the rate of free motion that thresholds refer to. It is the reference's rate, so that thresholds mean the
+/// same.
 fn free_rate(oscillator: &model::Oscillator) -> f64 {
     let (damping, frequency) = Coordinates::new(oscillator).norms(&oscillator.free);
     (damping + frequency).max(oscillator.omega)
 }
 
-/// Accelerations of the gap and of the other displacement, in units of a step `h`, the gap measured from `wall`.
+/// Returns the accelerations of the gap and of the other displacement in units of a step `h`, with the gap measured
+/// from `wall`.
 fn rows(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64, h: f64) -> [[f64; 6]; 2] {
     let equations = Coordinates::new(oscillator).equations(domain, oscillator.force, wall);
     [0, 1].map(|i| {
@@ -188,7 +187,7 @@ fn rows(oscillator: &model::Oscillator, domain: &model::Domain, wall: f64, h: f6
     })
 }
 
-/// What governs the motion in lasting contact; of a wall that there is not nobody asks.
+/// Returns the domain of lasting contact. Constants of a missing wall are never read.
 fn behind_wall(oscillator: &model::Oscillator, side: usize, wall: f64, free_step: f64) -> Domain {
     if oscillator.walls[side].is_infinite() {
         return Domain::zeroed();
@@ -226,8 +225,9 @@ fn domain(
     }
 }
 
-/// The motion of the other displacement while a rigid wall holds the gap: it takes up the gap's acceleration, and the
-/// other displacement has its share of that. No rate of it is above those of free motion, so the step is the same.
+/// Returns the domain of the other displacement while the gap sticks to a rigid wall. The wall takes up the gap's
+/// acceleration, of which the other displacement has its share. No rate exceeds those of free motion, so that the
+/// step is the same.
 fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
     let kick = Coordinates::new(oscillator).kick();
     let [gap, other] = rows(oscillator, &oscillator.free, wall, h);
@@ -238,7 +238,7 @@ fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
         step: step(&[0.0; 6], &x_row, angle),
         gap_row: [0.0; 6],
         x_row,
-        // Twice the energy of a derivative of x per mass: on its rate and on itself.
+        // Twice the energy of a derivative of x per mass: factors of its rate squared and of itself squared.
         energy: [0.0, 0.0, 1.0, 0.0, 0.0, (-shared[2]).max(0.0)],
         growth: 0.0,
         angle,
@@ -249,7 +249,7 @@ fn held(oscillator: &model::Oscillator, wall: f64, h: f64) -> Domain {
     }
 }
 
-/// `exp(G) - 1` of the generator on `(z, z', x, x', cos, sin, 1)`, its first four rows.
+/// Returns the first four rows of `exp(G) - 1` for the generator G on `(z, z', x, x', cos, sin, 1)`.
 pub(crate) fn step(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> [f64; 28] {
     let propagator = propagator(gap_row, x_row, angle);
     std::array::from_fn(|i| propagator[(i / 7, i % 7)])
@@ -267,7 +267,7 @@ fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
     }
     g[(4, 5)] = -angle;
     g[(5, 4)] = angle;
-    // Horner, so that small terms are added first.
+    // Horner's scheme adds small terms first.
     let mut sum = Generator::zeros();
     for n in (1..=EXPONENTIAL_TERMS).rev() {
         sum = g * (Generator::identity() + sum) / f64::from(n);
@@ -275,17 +275,17 @@ fn propagator(gap_row: &[f64; 6], x_row: &[f64; 6], angle: f64) -> Generator {
     sum
 }
 
-/// The energy bound on derivatives of the gap, in units of the step.
+/// Returns the energy bound on derivatives of the gap, in units of the step.
 ///
-/// `y^(n)` obeys the same equations with the force times `omega^n` and no load, and its
-/// energy `2 E = v M v + x K x` grows by the force alone. So with `c^2 = g M^-1 g`
+/// `y^(n)` obeys the equations of motion with the force times `omega^n` and no load. Its energy `2 E = v M v + x K x`
+/// grows by the force alone. With `c^2 = g M^-1 g`:
 ///
 /// ```text
 /// |z^(n+1)| <= c sqrt(2 E_n),   d sqrt(2 E_n) / dt <= omega^n sqrt(force M^-1 force).
 /// ```
 ///
-/// Returns the form `c^2 2 E` on `(w^2, w v, v^2, z^2, z x, x^2)` and the growth of its
-/// root per step, less the factor `angle^n`.
+/// The result is the form `c^2 2 E` on `(w^2, w v, v^2, z^2, z x, x^2)`, and the growth of its root per step without
+/// the factor `angle^n`.
 fn gap_bound(oscillator: &model::Oscillator, domain: &model::Domain, h: f64) -> ([f64; 6], f64) {
     let coordinates = Coordinates::new(oscillator);
     let compliance = coordinates.compliance();
@@ -302,7 +302,7 @@ mod tests {
     use super::*;
     use rattlemap_dynamics::model::GearPair;
 
-    /// Underdamped, overdamped by the teeth and overdamped by a support.
+    /// Underdamped, overdamped by the teeth, and overdamped by a support.
     #[test]
     fn no_mode_turns_or_decays_by_more_than_a_step() {
         let paper = GearPair::paper(0.5);

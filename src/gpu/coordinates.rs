@@ -1,18 +1,17 @@
-//! An oscillator in the coordinates of lanes: the gap `z` and one displacement beside it.
+//! Oscillators in the coordinates of lanes: the gap `z` and one displacement `x`.
 
 use rattlemap_dynamics::model::{Domain, Oscillator, State};
 
-/// Which displacement stands beside the gap, and what the masses make of a push along the gap.
+/// Choice of the displacement `x`, and the effect of a force along the gap.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coordinates {
     gap: [f64; 2],
     mass: [[f64; 2]; 2],
-    /// Index of the displacement beside the gap: the one of which the gap has the lesser part.
+    /// Index of the displacement `x`: the one with the smaller factor in the gap.
     other: usize,
 }
 
-/// Second-order form `y'' = -stiffness y - damping y' + force cos + load` of a domain, in
-/// the displacements `(z, x)`.
+/// Second-order form of a domain's equations in `(z, x)`: `y'' = -stiffness y - damping y' + force cos + load`.
 pub(super) struct Equations {
     pub(super) stiffness: [[f64; 2]; 2],
     pub(super) damping: [[f64; 2]; 2],
@@ -27,7 +26,7 @@ impl Coordinates {
         Coordinates { gap, mass, other }
     }
 
-    /// `M^-1 f`.
+    /// Returns `M^-1 f`.
     fn accelerated(&self, f: [f64; 2]) -> [f64; 2] {
         let [[m1, m], [_, m2]] = self.mass;
         if m == 0.0 {
@@ -37,7 +36,7 @@ impl Coordinates {
         [(m2 * f[0] - m * f[1]) / determinant, (m1 * f[1] - m * f[0]) / determinant]
     }
 
-    /// `g M^-1 f`, for a force along the gap `g M^-1 g`.
+    /// Returns `g M^-1 f`.
     fn along(&self, f: [f64; 2]) -> f64 {
         let [[m1, m], [_, m2]] = self.mass;
         let [g0, g1] = self.gap;
@@ -48,24 +47,24 @@ impl Coordinates {
         g0 * a + g1 * b
     }
 
-    /// Acceleration of the gap per unit of force along it.
+    /// Returns the acceleration of the gap per unit of force along it.
     pub(super) fn compliance(&self) -> f64 {
         self.along(self.gap)
     }
 
-    /// Change of the other displacement's rate per unit of gap rate that an impulse along the gap removes.
+    /// Returns the change of the rate of `x` per unit of gap rate that an impulse along the gap removes.
     pub(super) fn kick(&self) -> f64 {
         -self.accelerated(self.gap)[self.other] / self.compliance()
     }
 
-    /// Lane units `(z, z', x, x')` of a state, rates per step of `h`.
+    /// Returns a state in lane units `(z, z', x, x')`, with rates per step of `h`.
     pub(super) fn to_lane(self, y: State, h: f64) -> [f64; 4] {
         let [g0, g1] = self.gap;
         let x = [y[2 * self.other], y[2 * self.other + 1]];
         [g0 * y[0] + g1 * y[2], h * (g0 * y[1] + g1 * y[3]), x[0], h * x[1]]
     }
 
-    /// The state of lane units.
+    /// Returns the state from lane units.
     pub(super) fn to_state(self, q: [f64; 4], h: f64) -> State {
         let (o, p) = (self.other, 1 - self.other);
         let (w, v) = (q[1] / h, q[3] / h);
@@ -76,11 +75,11 @@ impl Coordinates {
         y
     }
 
-    /// The equations in `(z, x)`, the gap measured from `wall`.
+    /// Returns the equations in `(z, x)`, with the gap measured from `wall`.
     pub(super) fn equations(&self, domain: &Domain, force: [f64; 2], wall: f64) -> Equations {
         let (o, p) = (self.other, 1 - self.other);
         let [g0, g1] = self.gap;
-        // x_p = (z - g_o x_o) / g_p turns columns, z = g . x turns rows.
+        // x_p = (z - g_o x_o) / g_p transforms columns, z = g . x transforms rows.
         let turned = |a: [[f64; 2]; 2]| {
             let columns = [0, 1].map(|j| self.accelerated([a[0][j], a[1][j]]));
             let row = |i: usize| {
@@ -102,7 +101,7 @@ impl Coordinates {
         }
     }
 
-    /// A symmetric form on displacements, `a[0][0] x1^2 + ...`, on `(z^2, z x, x^2)`.
+    /// Returns a symmetric form on displacements, `a[0][0] x1^2 + ...`, as factors of `(z^2, z x, x^2)`.
     pub(super) fn form(&self, a: [[f64; 2]; 2]) -> [f64; 3] {
         let (o, p) = (self.other, 1 - self.other);
         let (g, slope) = (self.gap[p], -self.gap[o] / self.gap[p]);
@@ -110,7 +109,7 @@ impl Coordinates {
         [own / (g * g), 2.0 * (own * slope + mixed) / g, own * slope * slope + 2.0 * mixed * slope + other]
     }
 
-    /// `sqrt(f M^-1 f)`.
+    /// Returns `sqrt(f M^-1 f)`.
     pub(super) fn pull(&self, f: [f64; 2]) -> f64 {
         let [[m1, m], [_, m2]] = self.mass;
         if m == 0.0 {
@@ -120,10 +119,10 @@ impl Coordinates {
         (f[0] * a + f[1] * b).max(0.0).sqrt()
     }
 
-    /// Spectral norms of a domain's mass-scaled damping, and the root of that of its stiffness.
+    /// Returns the spectral norm of a domain's mass-scaled damping, and the square root of that of its stiffness.
     pub(super) fn norms(&self, domain: &Domain) -> (f64, f64) {
         let [[m1, m], [_, m2]] = self.mass;
-        // The inverse of M's Cholesky factor, `a 0; b c`.
+        // Inverse `a 0; b c` of M's Cholesky factor.
         let a = m1.sqrt().recip();
         let c = if m == 0.0 { m2.sqrt().recip() } else { (m2 - m * m / m1).sqrt().recip() };
         let b = -m / m1 * c;
@@ -139,8 +138,8 @@ impl Coordinates {
         (norm(domain.damping), norm(domain.stiffness).sqrt())
     }
 
-    /// What the accelerations of gap and other displacement lose per unit of gap rate behind a wall with a damper along
-    /// the gap, beside those of free motion.
+    /// Returns the change of the accelerations of the gap and of `x`, per unit of gap rate, by a damper along the gap
+    /// behind a wall.
     pub(super) fn damper(&self, free: &Domain, behind: &Domain) -> [f64; 2] {
         let (g, p) = (self.gap, 1 - self.other);
         let c = (behind.damping[p][p] - free.damping[p][p]) / (g[p] * g[p]);

@@ -1,36 +1,35 @@
-//! Opening an adapter, and compiling for it.
+//! Opens adapters and compiles shaders.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::adapter::{AdapterChoice, AdapterReport, features, listed, no_adapter};
-use super::caught::{Dropped, caught};
 use super::dispatch_policy::DispatchPolicy;
+use super::panics::{PanicFree, catch_panic};
 use super::{Gpu, GpuError, Precision};
 
-/// Storage bindings of the shader by number: flows, shapes, phasors, laws, cells, motions,
-/// tallies, queue, starts, readings, findings, blocks; `true` where it writes.
+/// Whether the shader writes to each storage binding, from 1 on: flows, shapes, phasors, laws, cells, motions,
+/// tallies, queue, starts, readings, findings, blocks.
 const WRITES: [bool; 12] = [false, false, false, false, false, true, true, true, false, true, true, true];
 
-/// An entry point of the shader and the storage that it touches: no more than eight buffers,
-/// which every adapter has.
+/// An entry point of the shader and its storage bindings: at most eight, which every adapter supports.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EntryPoint {
     name: &'static str,
     pub(super) storage: &'static [u32],
 }
 
-/// Puts every lane at its start.
+/// Puts lanes at their starts.
 pub(super) const BEGIN: EntryPoint = EntryPoint { name: "begin", storage: &[1, 2, 5, 6, 7, 8, 9] };
-/// Integrates.
+/// Integrates lanes.
 pub(super) const SWEEP: EntryPoint = EntryPoint { name: "sweep", storage: &[1, 2, 3, 4, 5, 6, 7, 8] };
-/// Queues the lanes that a variant has work for, one after the other.
+/// Lists the lanes that a variant has work for, in three passes.
 pub(super) const COMPACT: [EntryPoint; 3] = [
-    EntryPoint { name: "count_left", storage: &[7, 8, 12] },
-    EntryPoint { name: "sum_left", storage: &[8, 12] },
-    EntryPoint { name: "move_left", storage: &[7, 8, 12] },
+    EntryPoint { name: "count_selected", storage: &[7, 8, 12] },
+    EntryPoint { name: "sum_selected", storage: &[8, 12] },
+    EntryPoint { name: "move_selected", storage: &[7, 8, 12] },
 ];
-/// Makes records.
+/// Writes the results of lanes.
 pub(super) const CONCLUDE: EntryPoint = EntryPoint { name: "conclude", storage: &[1, 2, 5, 6, 7, 8, 10, 11] };
 
 /// The pipelines of one variant.
@@ -41,8 +40,8 @@ pub(super) struct Pipelines {
     pub(super) conclude: wgpu::ComputePipeline,
 }
 
-/// What went wrong on a device outside any error scope: its loss, or a command it refused.
-/// Left alone, wgpu would panic.
+/// First failure of a device outside any error scope: its loss, or a command that it refused. Without these callbacks
+/// wgpu would panic.
 pub(super) struct Trouble(Arc<Mutex<Option<String>>>);
 
 impl Trouble {
@@ -51,11 +50,11 @@ impl Trouble {
         let sink = || Trouble(Arc::clone(&first));
         let (refused, lost) = (sink(), sink());
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| refused.note(error.to_string())));
-        device.set_device_lost_callback(move |reason, message| lost.note(told(reason, &message)));
+        device.set_device_lost_callback(move |reason, message| lost.note(loss_reason(reason, &message)));
         Trouble(first)
     }
 
-    /// Takes down what went wrong; what follows from it says less.
+    /// Stores the first failure. Later ones only follow from it.
     pub(super) fn note(&self, message: String) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
     }
@@ -66,14 +65,14 @@ impl Trouble {
         self.message().map_or(Ok(()), |message| Err(GpuError::Lost { message }))
     }
 
-    /// The first thing that went wrong, if anything has.
+    /// Returns the first failure.
     pub(super) fn message(&self) -> Option<String> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// Why a device was lost.
-fn told(reason: wgpu::DeviceLostReason, message: &str) -> String {
+/// Describes why a device was lost.
+fn loss_reason(reason: wgpu::DeviceLostReason, message: &str) -> String {
     match (reason, message) {
         (wgpu::DeviceLostReason::Unknown, "") => "its driver gives no reason".to_owned(),
         (wgpu::DeviceLostReason::Unknown, message) => format!("its driver says: {message}"),
@@ -97,12 +96,12 @@ pub(super) async fn open(precision: Precision, choice: &AdapterChoice) -> Result
         ..Default::default()
     };
     let no_device = |reason: String| GpuError::NoDevice { adapter: info.name.clone(), reason };
-    let asked = caught(|| adapter.request_device(&descriptor))
-        .map_err(|why| no_device(format!("the driver fails while it is opened ({why})")))?;
-    let (device, queue) = asked.await.map_err(|error| no_device(error.to_string()))?;
+    let requested = catch_panic(|| adapter.request_device(&descriptor))
+        .map_err(|why| no_device(format!("the driver failed while opening it ({why})")))?;
+    let (device, queue) = requested.await.map_err(|error| no_device(error.to_string()))?;
     let trouble = Trouble::watch(&device);
     let pipelines = HashMap::new();
-    let (queue, policy) = (Dropped::new(queue), DispatchPolicy::of(info.device_type));
+    let (queue, policy) = (PanicFree::new(queue), DispatchPolicy::of(info.device_type));
     Ok(Gpu {
         device,
         queue,
@@ -137,7 +136,7 @@ fn bind_group_layout(device: &wgpu::Device, entry_point: EntryPoint) -> wgpu::Bi
 
 /// Compiles a variant.
 pub(super) async fn pipelines(gpu: &Gpu, variant: super::Variant) -> Result<Pipelines, GpuError> {
-    // What a driver's own compiler refuses is internal, or memory.
+    // wgpu reports errors of a driver's own compiler as internal errors or as lack of memory.
     let filters =
         [wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::Validation];
     let scopes = filters.map(|filter| gpu.device.push_error_scope(filter));

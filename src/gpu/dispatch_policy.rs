@@ -1,24 +1,24 @@
-//! How often does the host check its lanes?
+//! How the host drives lanes on a kind of adapter.
 
 use web_time::Duration;
 
-/// How lanes are driven on a device. What they give depends on `late_tangent` and `keep` alone.
+/// How lanes are driven. Records depend on `late_tangent` and `keep` alone, by rounding.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DispatchPolicy {
-    /// Dispatches of one round, between two checks: a lane that has read a cycle goes on in the next one.
+    /// Dispatches of a round, between two checks. A lane that has read a cycle continues in the next dispatch.
     pub(super) dispatches: u32,
-    /// How long a round should take.
+    /// Desired duration of a round.
     pub(super) round: Duration,
-    /// Rounds after which lanes that have ended wait no longer for others.
+    /// Rounds after which lanes that have ended no longer wait for others.
     pub(super) patience: u32,
-    /// Whether lanes begin in a variant without the tangent vector and change over when they need it: less work,
-    /// but the two variants take turns.
+    /// Whether lanes begin in a variant without the tangent vector and change to the other variant when they need it.
+    /// That is less work, but the variants run one after the other.
     pub(super) late_tangent: bool,
     /// Whether lanes keep copies of all their constants.
     pub(super) keep: bool,
 }
 
-/// In software a round costs the more the more lanes there are, and work is what counts.
+/// Software: the duration of a round grows with the number of lanes, and only the amount of work matters.
 const SOFTWARE: DispatchPolicy = DispatchPolicy {
     dispatches: 4,
     round: Duration::from_millis(100),
@@ -27,7 +27,7 @@ const SOFTWARE: DispatchPolicy = DispatchPolicy {
     keep: true,
 };
 
-/// Hardware that shares the processor's memory and draws the screen: work counts there, too.
+/// Hardware that shares the processor's memory and draws the screen: the amount of work matters there, too.
 const INTEGRATED: DispatchPolicy = DispatchPolicy {
     dispatches: 4,
     round: Duration::from_millis(10),
@@ -36,8 +36,8 @@ const INTEGRATED: DispatchPolicy = DispatchPolicy {
     keep: false,
 };
 
-/// Hardware with more lanes than a map keeps busy: there cells that wait for each other's records are what counts,
-/// so that checks follow each other after some 64 periods of a lane, and all lanes run side by side.
+/// Hardware with room for more lanes than a map has: the wait for cells that others depend on matters. Checks follow
+/// each other after about 64 periods of a lane, and all lanes run side by side.
 const DEDICATED: DispatchPolicy = DispatchPolicy {
     dispatches: 8,
     round: Duration::from_millis(2),
@@ -47,7 +47,7 @@ const DEDICATED: DispatchPolicy = DispatchPolicy {
 };
 
 impl DispatchPolicy {
-    /// That of a kind of adapter.
+    /// Returns the policy for a kind of adapter.
     pub(super) fn of(kind: wgpu::DeviceType) -> DispatchPolicy {
         match kind {
             wgpu::DeviceType::Cpu => SOFTWARE,

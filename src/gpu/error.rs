@@ -1,55 +1,55 @@
-//! Why a graphics device cannot do what is asked, in words for users.
+//! Errors of the GPU engine, in words for users.
 
-/// Why the engine could not do what was asked.
+/// An error of the GPU engine.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
-    /// No adapter fits.
+    /// No adapter fits the request.
     #[error("no graphics adapter {wanted}; {remedy}, or use the CPU engine. Found: {found}")]
     NoAdapter {
-        /// What was asked for.
+        /// The request, in words.
         wanted: String,
-        /// What may give one.
+        /// How to get such an adapter.
         remedy: String,
-        /// What there is.
+        /// Adapters of this machine.
         found: String,
     },
-    /// The adapter gives no device.
-    #[error("the adapter {adapter} gives no device: {reason}")]
+    /// The adapter opens no device.
+    #[error("the adapter {adapter} opens no device: {reason}")]
     NoDevice {
-        /// Its name.
+        /// Name of the adapter.
         adapter: String,
-        /// The driver's words.
+        /// Message of the driver.
         reason: String,
     },
     /// The device refused a shader, a buffer or a command.
     #[error("the device refused {what}: {message}")]
     Refused {
-        /// What was asked of it.
+        /// The refused shader, buffer or command.
         what: &'static str,
-        /// Its words.
+        /// Message of the driver.
         message: String,
     },
-    /// The device ran out of memory.
-    #[error("the device has no memory for {count} {what}; ask for fewer at a time")]
+    /// The device has too little memory.
+    #[error("the device has no memory for {count} {what}; use fewer at a time")]
     OutOfMemory {
-        /// Lanes or flows.
+        /// "lanes" or "flows".
         what: &'static str,
-        /// How many.
+        /// Number of these.
         count: usize,
     },
-    /// The device was lost on the way.
-    #[error("the device was lost on the way: {message}")]
+    /// The device was lost.
+    #[error("the device was lost: {message}")]
     Lost {
-        /// The driver's words.
+        /// Message of the driver.
         message: String,
     },
-    /// Somebody raised the flag that the device heeds.
-    #[error("stopped on demand")]
+    /// The stop flag of the device was set.
+    #[error("stopped on request")]
     Halted,
-    /// The device computes something else than what is known.
+    /// The device does not reproduce a known answer.
     #[error(
-        "{adapter} fails the known answer of e = {e}, omega = {omega} by {error:.1e}: its driver cannot be trusted; \
-         choose another adapter or the CPU engine"
+        "{adapter} computes the known answer at e = {e}, omega = {omega} with an error of {error:.1e}: its driver cannot be \
+         trusted; choose another adapter or the CPU engine"
     )]
     WrongAnswer {
         /// Name of the adapter.
@@ -58,39 +58,39 @@ pub enum GpuError {
         e: f64,
         /// Frequency of the cell.
         omega: f64,
-        /// State error.
+        /// Error of the state.
         error: f64,
     },
-    /// Constants of the flows exceed what one buffer may hold.
+    /// Constants of the flows exceed the largest buffer.
     #[error(
-        "{flows} flows need {needed} bytes in one buffer, the adapter allows {allowed}; run fewer flows at a time"
+        "{flows} flows need {needed} bytes in one buffer, but the adapter allows {allowed}; run fewer flows at a time"
     )]
     TooManyFlows {
         /// Number of flows.
         flows: usize,
-        /// Bytes they need.
+        /// Bytes that they need.
         needed: u64,
-        /// Bytes the adapter allows.
+        /// Bytes that the adapter allows.
         allowed: u64,
     },
-    /// Walls that the settings have left out.
-    #[error("flow {flow} has an elastic or a rigid wall, and the settings say that there is none")]
+    /// A flow has a kind of wall that the settings exclude.
+    #[error("flow {flow} has an elastic or a rigid wall, but the settings exclude these walls; set `kinds`")]
     NotCompiled {
         /// Index of the flow.
         flow: usize,
     },
-    /// A lane names a flow or law that was not handed in.
-    #[error("lane {lane} names flow {flow} and law {law}, but there are {flows} flows and {laws} laws")]
+    /// A lane refers to a flow or a law that is not in the tables.
+    #[error("lane {lane} refers to flow {flow} and law {law}, but there are {flows} flows and {laws} laws")]
     NoSuchCell {
-        /// The lane.
+        /// Index of the lane.
         lane: usize,
-        /// Its flow.
+        /// Index of its flow.
         flow: u32,
-        /// Its law.
+        /// Index of its law.
         law: u32,
-        /// Flows there are.
+        /// Number of flows.
         flows: usize,
-        /// Laws there are.
+        /// Number of laws.
         laws: usize,
     },
 }

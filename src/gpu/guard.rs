@@ -1,28 +1,28 @@
-//! Making buffers, with an error where the device cannot.
+//! Creation of buffers, with errors in place of wgpu's panics.
 
 use super::{Gpu, GpuError};
 
-/// Runs `make`, which makes and fills buffers for `count` things called `what`.
+/// Runs `make`, which creates and fills buffers for `count` things called `what`.
 ///
 /// # Errors
-/// [`GpuError::OutOfMemory`] if the device has no room for them, else whatever it refused.
-pub(super) async fn guarded<T>(
+/// [`GpuError::OutOfMemory`] if the device has no room for them; other errors of the device.
+pub(super) async fn with_error_scopes<T>(
     gpu: &Gpu,
     what: &'static str,
     count: usize,
     make: impl FnOnce() -> T,
 ) -> Result<T, GpuError> {
     let out_of_memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-    // What is made of a buffer that is not there is refused, which says no more.
+    // Commands on a buffer that could not be created are refused, too.
     let refused = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let made = gpu.call(make);
+    let result = gpu.call(make);
     let (refused, out_of_memory) = (refused.pop(), out_of_memory.pop());
     let (refused, out_of_memory) = (refused.await, out_of_memory.await);
     if out_of_memory.is_some() {
         return Err(GpuError::OutOfMemory { what, count });
     }
-    let Some(error) = refused else { return made };
-    // A lost device refuses everything; that it is lost it tells when it is polled.
+    let Some(error) = refused else { return result };
+    // A lost device refuses everything; polling it reports the loss.
     gpu.poll(wgpu::PollType::Poll)?;
     Err(gpu.failure(GpuError::Refused { what, message: error.to_string() }))
 }
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
     use crate::gpu::{AdapterChoice, Precision};
 
-    /// A texture of terabytes, which no device has; buffers are limited to what most have.
+    /// A texture of terabytes. wgpu limits buffers to sizes that most devices have.
     fn huge(gpu: &Gpu) -> wgpu::Texture {
         let limits = gpu.device.limits();
         let side = limits.max_texture_dimension_2d;
@@ -53,11 +53,11 @@ mod tests {
     }
 
     #[test]
-    fn memory_that_is_not_there_is_an_error_that_says_so() {
+    fn missing_memory_is_an_error() {
         let gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
-        let error = pollster::block_on(guarded(&gpu, "flows", 7, || huge(&gpu))).unwrap_err();
+        let error = pollster::block_on(with_error_scopes(&gpu, "flows", 7, || huge(&gpu))).unwrap_err();
         assert!(matches!(error, GpuError::OutOfMemory { what: "flows", count: 7 }), "{error}");
         assert!(error.to_string().contains("no memory for 7 flows"), "{error}");
-        assert_eq!(gpu.trouble.message(), None, "caught here, not by the watch");
+        assert_eq!(gpu.trouble.message(), None, "the error scope catches the error");
     }
 }

@@ -1,17 +1,16 @@
-//! The GPU engine: WGSL lanes on whatever adapter there is.
+//! The GPU engine: runs WGSL lanes on a graphics adapter.
 //!
-//! [`Gpu::open`] takes an adapter and compiles the lane for one precision; [`Gpu::run`]
-//! integrates lanes, as many at a time as the adapter's limits allow, by short dispatches over
-//! state that stays on the device, and hands back one [`Record`] per lane; in a [`Pool`] lanes are begun and
-//! end at any time. The engine knows no files, threads or blocking waits of its own.
+//! [`Gpu::open`] opens an adapter for one precision. [`Gpu::run`] integrates lanes and returns one [`Record`] per
+//! lane. It runs as many lanes at a time as the adapter's limits allow, by short dispatches over state that stays on
+//! the device. In a [`Pool`], lanes can begin and end at any time. The engine uses no files and no
+//! threads of its own.
 //!
-//! The lane is independent of [`rattlemap_dynamics::reference`]: it takes the model's description
-//! ([`rattlemap_dynamics::model`]) and nothing else. A fixed grid of steps with the exact propagator
-//! carries it from event to event; see `shaders/`.
+//! Lanes are independent of [`rattlemap_dynamics::reference`]: they read the description of the model
+//! ([`rattlemap_dynamics::model`]) and nothing else. A lane moves from event to event on a fixed grid of steps with
+//! the exact propagator; see `shaders/`.
 
 mod adapter;
 mod averaging;
-mod caught;
 pub(crate) mod constants;
 mod coordinates;
 mod device;
@@ -19,7 +18,9 @@ mod dispatch_policy;
 mod error;
 mod guard;
 pub mod layout;
+mod panics;
 mod pool;
+mod precision;
 mod reading;
 mod rounds;
 pub(crate) mod rules;
@@ -40,16 +41,18 @@ pub(crate) use adapter::no_adapter;
 pub use adapter::{
     AdapterChoice, AdapterId, AdapterReport, adapters, describe, interface_rank, is_hardware, narrowed_by,
 };
-pub use constants::{Constants, STEP_ANGLE};
+pub use constants::{Constants, has_elastic_or_rigid_wall};
 pub use error::GpuError;
 pub use pool::Pool;
-pub use reading::Ended;
-pub use shader::{Precision, Variant, WORKGROUP};
+pub use precision::Precision;
+pub use reading::LaneResult;
+pub use shader::Variant;
+use shader::WORKGROUP;
 pub use stage::{DeviceTimes, Stage};
 pub use tables::Tables;
 pub(crate) use tables::{MOST_BYTES, MOST_FLOWS, bytes as table_bytes};
 
-use caught::{Dropped, caught};
+use panics::{PanicFree, catch_panic};
 
 use crate::record::Record;
 use crate::record::limits::MOST_STEPS;
@@ -57,29 +60,20 @@ use dispatch_policy::DispatchPolicy;
 use rattlemap_dynamics::model::{Law, Oscillator, State};
 use rattlemap_dynamics::orbit::Budget;
 
-/// Largest meshing speed with which lanes follow chatter by short flights, relative to half the walls' distance times
-/// the rate of free motion: above it too few of them are left to pay for.
-const FOLLOWED_MESH_SPEED: f64 = 4e-4;
-
-/// Events of all lanes at most, so that their count does not overflow.
+/// Default limit of a lane's events, so that their count does not overflow.
 const MOST_EVENTS: u32 = 1 << 31;
 
-/// Whether an oscillator has a wall that is elastic or rigid.
-pub fn has_elastic_or_rigid_wall(oscillator: &Oscillator) -> bool {
-    constants::has_elastic_or_rigid_wall(oscillator.contacts, oscillator.walls)
-}
-
-/// Whether lanes of such a meshing speed follow chatter by short flights.
+/// Whether lanes with this meshing speed follow chatter by short flights.
 pub fn follows_chatter(oscillator: &Oscillator, mesh_speed: f64) -> bool {
-    mesh_speed <= FOLLOWED_MESH_SPEED * constants::speed(oscillator)
+    mesh_speed <= rules::FOLLOWED_MESH_SPEED * constants::speed(oscillator)
 }
 
-/// One lane: which flow, which law, and where it starts at phase 0.
+/// Initial value problem of one lane: flow, law, and the state at phase 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lane {
-    /// Index into the flows.
+    /// Index of its flow in the tables.
     pub flow: u32,
-    /// Index into the laws.
+    /// Index of its law in the tables.
     pub law: u32,
     /// State `(x1, v1, x2, v2)` at phase 0.
     pub start: State,
@@ -88,55 +82,55 @@ pub struct Lane {
 /// How lanes are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneSettings {
-    /// Forcing periods to integrate at most, `undecided_periods` aside; the last of them read the cycle of a
-    /// periodic cell.
+    /// Most forcing periods to integrate, without `undecided_periods`. The last of them read the cycle of a periodic
+    /// cell.
     pub periods: u32,
-    /// Periods before averages are taken, or `exponent_from` if that is less and lanes stop
-    /// early. Those of periodic cells are taken over one cycle.
+    /// Periods before averages begin; `exponent_from` if that is less and lanes stop early. Averages of periodic
+    /// cells are taken over one cycle.
     pub transient_periods: u32,
-    /// Longest period searched for, at most 64; 0 searches for none.
+    /// Longest period that is searched for, at most 64; 0 searches for none.
     pub max_period: u32,
-    /// Whether lanes end once they are decided: a cycle confirmed and read, contact-free for
-    /// good, or chaotic by `chaos_errors` from `chaos_from` on.
+    /// Whether lanes end once they are decided: a cycle has been confirmed and read, the motion is free of contact
+    /// for good, or it is chaotic by `chaos_errors` after `chaos_from`.
     pub early_stop: bool,
-    /// Periods beyond the budget for lanes that are undecided by then; with early stops alone.
+    /// Further periods for lanes that are undecided after `periods`; only with early stops.
     pub undecided_periods: u32,
-    /// Whether exponents are asked for.
+    /// Whether records contain exponents.
     pub exponent: bool,
-    /// Whether words, their patterns, time spent meshing and symmetry are asked for.
+    /// Whether records contain words.
     pub word: bool,
-    /// See `word`.
+    /// Whether records contain the words' patterns.
     pub pattern: bool,
-    /// See `word`.
+    /// Whether records contain the time spent meshing.
     pub mesh: bool,
-    /// See `word`.
+    /// Whether records contain the symmetry of cycles.
     pub symmetry: bool,
-    /// Whether chatter may be followed by short flights; lanes do so where [`follows_chatter`] says.
+    /// Whether lanes may follow chatter by short flights. They do so if [`follows_chatter`] is true.
     pub chatter: bool,
-    /// Whether walls may be elastic or rigid.
+    /// Whether flows may have elastic or rigid walls.
     pub kinds: bool,
     /// Periods before the exponent of aperiodic cells is accumulated.
     pub exponent_from: u32,
-    /// The first period at which chaos may be called, with early stops.
+    /// First period at which a lane may stop as chaotic, with early stops.
     pub chaos_from: u32,
-    /// Standard errors by which the exponent must exceed zero then.
+    /// Standard errors by which the exponent must then exceed zero.
     pub chaos_errors: f32,
-    /// Free steps per period at least; none for as many as the motion needs. More gain nothing:
-    /// roundings add up like a random walk, and a short flight between impacts that spans
-    /// several steps is known to the rounding of the gap, no longer to its own.
+    /// Least number of free steps per period; `None` for as many as the motion needs. More steps do not improve
+    /// results: rounding errors add up like a random walk, and a short flight that spans several steps loses the
+    /// relative accuracy of its gap.
     pub steps_per_period: Option<u32>,
-    /// Lanes under way at most; none for what the adapter's limits allow.
+    /// Most lanes under way; `None` for as many as the adapter's limits allow.
     pub batch: Option<usize>,
-    /// Loop iterations that one dispatch may spend on a lane. Some drivers stop loops after
-    /// 65,535 iterations in all.
+    /// Loop iterations that one dispatch may spend on a lane. Some drivers stop loops after 65,535 iterations.
     pub iterations: u32,
     /// Invocations per workgroup.
     pub workgroup: u32,
-    /// Passes per period beyond which a cell is refused as too stiff.
+    /// Passes per period above which a lane ends as too stiff.
     pub passes_per_period: u32,
-    /// Events per period beyond which a cell ends.
+    /// Events per period above which a lane ends.
     pub events_per_period: u32,
-    /// Events in all beyond which a cell ends: looked at once a period, less than 2^32 by those of one.
+    /// Events in all periods above which a lane ends. Checked once per period: this limit and the events of one period
+    /// together must be below 2^32.
     pub most_events: u32,
 }
 
@@ -170,7 +164,7 @@ impl Default for LaneSettings {
 }
 
 impl LaneSettings {
-    /// What a budget says of how long lanes are integrated, and when they may stop.
+    /// Takes the lengths of integration and the rules of early stops from a budget.
     pub fn within(budget: &Budget) -> Self {
         LaneSettings {
             periods: budget.periods(),
@@ -186,8 +180,7 @@ impl LaneSettings {
         }
     }
 
-    /// So many periods from the start and nothing else: no cycle is searched for, no exponent
-    /// taken, and no lane ends early.
+    /// Integrates a number of periods and nothing else: no search for cycles, no exponent, no early end.
     pub fn only(periods: u32) -> Self {
         LaneSettings {
             periods,
@@ -202,7 +195,7 @@ impl LaneSettings {
 }
 
 impl Drop for Gpu {
-    /// A lost device is left to the driver: what still holds on to it would be the last to let go, and panic.
+    /// Leaves a lost device to the driver: the last owner of a lost device would panic when it is dropped.
     fn drop(&mut self) {
         if self.trouble.message().is_some() {
             std::mem::forget((self.device.clone(), (*self.queue).clone()));
@@ -213,8 +206,8 @@ impl Drop for Gpu {
 /// A device that integrates lanes in one precision.
 pub struct Gpu {
     device: wgpu::Device,
-    /// Dropped, it is waited for.
-    queue: Dropped<wgpu::Queue>,
+    /// Dropping a queue waits for it.
+    queue: PanicFree<wgpu::Queue>,
     number: usize,
     info: wgpu::AdapterInfo,
     precision: Precision,
@@ -230,47 +223,47 @@ impl Gpu {
     /// Opens an adapter for a precision.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] if there is none with that precision, and what the device refuses.
+    /// [`GpuError::NoAdapter`] if no adapter fits the choice and the precision; other errors of the device.
     pub async fn open(precision: Precision, choice: &AdapterChoice) -> Result<Gpu, GpuError> {
         device::open(precision, choice).await
     }
 
-    /// The adapter in use.
+    /// Returns the adapter in use.
     pub fn adapter(&self) -> &wgpu::AdapterInfo {
         &self.info
     }
 
-    /// Which of the machine's adapters it is.
+    /// Returns the adapter's identity on this machine.
     pub fn id(&self) -> AdapterId {
         AdapterId::of(self.number, &self.info)
     }
 
-    /// The precision in use.
+    /// Returns the precision in use.
     pub fn precision(&self) -> Precision {
         self.precision
     }
 
-    /// Compiles shaders from here on as `rewrite` turns them, whatever they compute: measurements count work and
-    /// compare forms of a loop in this way.
+    /// Compiles shaders after this call as `rewrite` changes their source. Measurements count work and compare forms
+    /// of a loop in this way.
     #[doc(hidden)]
     pub fn rewrite_shaders(&mut self, rewrite: fn(String) -> String) {
         self.rewrite = Some(rewrite);
         self.pipelines.clear();
     }
 
-    /// Drives lanes from here on as on hardware of their own: for tests where there is none.
+    /// Uses the dispatch policy of dedicated hardware after this call, for tests on software drivers.
     #[doc(hidden)]
     pub fn drive_as_dedicated(&mut self) {
         self.policy = DispatchPolicy::of(wgpu::DeviceType::DiscreteGpu);
     }
 
-    /// Tells `watcher` from here on how far lanes have come: for measurements.
+    /// Calls `watcher` after this call when lanes reach a stage, for measurements.
     pub fn watch(&mut self, watcher: impl Fn(Stage) + Send + Sync + 'static) {
         self.watcher = Some(Box::new(watcher));
     }
 
-    /// Looks at a flag from here on: while it is raised, [`Gpu::advance`] returns after the present round.
-    pub fn heed(&mut self, halt: &Arc<AtomicBool>) {
+    /// Checks a flag after this call. While it is set, [`Pool::advance`] returns after the present round.
+    pub fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
         self.halt = Arc::clone(halt);
     }
 
@@ -278,35 +271,35 @@ impl Gpu {
         self.halt.load(Ordering::Relaxed)
     }
 
-    /// Asks something of the device in a way that may panic where its driver fails; nothing is asked of a lost one.
+    /// Makes a call that may panic where the driver fails. Makes no call on a lost device.
     fn call<T>(&self, call: impl FnOnce() -> T) -> Result<T, GpuError> {
         self.trouble.check()?;
-        caught(call).map_err(|message| {
-            self.trouble.note(format!("its driver fails: {message}"));
+        catch_panic(call).map_err(|message| {
+            self.trouble.note(format!("its driver failed: {message}"));
             self.failure(GpuError::Lost { message })
         })
     }
 
-    /// What the device has to say: callbacks come while it is polled, native ones then alone.
+    /// Polls the device. Callbacks of native drivers run only here.
     fn poll(&self, poll: wgpu::PollType) -> Result<(), GpuError> {
         let lost = |error: wgpu::PollError| self.failure(GpuError::Lost { message: error.to_string() });
         self.call(|| self.device.poll(poll))?.map_err(lost)?;
         self.trouble.check()
     }
 
-    fn tell(&self, stage: Stage) {
+    fn report(&self, stage: Stage) {
         if let Some(watcher) = &self.watcher {
             watcher(stage);
         }
     }
 
-    /// Integrates every lane and returns its record, in the same order.
+    /// Integrates every lane and returns the records in the same order.
     ///
-    /// What a lane gives depends on its own flow, law and start alone: not on what else is
-    /// under way, dispatch length, workgroup size or neighbours.
+    /// A record depends on the lane's own flow, law and start alone: not on other lanes, dispatch length, workgroup
+    /// size or neighbours.
     ///
     /// # Errors
-    /// A [`GpuError`]; a lane that ends early is no error but a status in its record.
+    /// A [`GpuError`]. A lane that ends early is no error: its record has a status.
     pub async fn run(
         &mut self,
         flows: &[Oscillator],
@@ -318,14 +311,13 @@ impl Gpu {
         self.run_on(&tables, lanes, settings).await
     }
 
-    /// A device that is lost tells so once; what follows from it says less.
+    /// Returns the loss of the device in place of an error that follows from it.
     fn failure(&self, error: GpuError) -> GpuError {
         self.trouble.message().map_or(error, |message| GpuError::Lost { message })
     }
 
-    /// Derives the constants of flows and laws and uploads them, for any number of runs.
-    /// `steps_per_period` is the least number of free steps per forcing period; none for as
-    /// many as the motion needs.
+    /// Derives the constants of flows and laws and uploads them, for any number of runs. `steps_per_period` is the
+    /// least number of free steps per forcing period; `None` for as many as the motion needs.
     ///
     /// # Errors
     /// [`GpuError::TooManyFlows`] if they do not fit one buffer, [`GpuError::OutOfMemory`] if
@@ -337,14 +329,14 @@ impl Gpu {
         steps_per_period: Option<u32>,
     ) -> Result<Tables, GpuError> {
         let constants = flows.iter().map(|flow| Constants::new(flow, steps_per_period)).collect();
-        self.load_derived(constants, laws).await
+        self.load_constants(constants, laws).await
     }
 
-    /// [`Gpu::load`] of constants that have been derived already, none for a flow that lanes cannot carry.
+    /// Uploads constants that have already been derived; `None` for a flow that lanes cannot carry.
     ///
     /// # Errors
-    /// As [`Gpu::load`].
-    pub async fn load_derived(
+    /// Those of [`Gpu::load`].
+    pub async fn load_constants(
         &self,
         constants: Vec<Option<Constants>>,
         laws: &[Law],
@@ -352,11 +344,10 @@ impl Gpu {
         Tables::new(self, constants, laws).await
     }
 
-    /// [`Gpu::run`] on flows and laws that are loaded; the settings' `steps_per_period` is
-    /// that of the tables.
+    /// Integrates lanes on loaded flows and laws. The tables' `steps_per_period` replaces that of the settings.
     ///
     /// # Errors
-    /// As [`Gpu::run`].
+    /// Those of [`Gpu::run`].
     pub async fn run_on(
         &mut self,
         tables: &Tables,
@@ -370,7 +361,7 @@ impl Gpu {
             let next = begun..(begun + pool.room()).min(lanes.len());
             begun = next.end;
             let next: Vec<(u32, Lane)> = next.map(|i| (i as u32, lanes[i])).collect();
-            self.begin(&mut pool, tables, &next).await?;
+            pool.begin(self, tables, &next).await?;
             if pool.under_way() == 0 {
                 return Ok(records);
             }
@@ -378,21 +369,21 @@ impl Gpu {
                 return Err(GpuError::Halted);
             }
             let until = if begun < lanes.len() { pool.under_way() / 2 } else { 0 };
-            for ended in self.advance(&mut pool, tables, until).await? {
+            for ended in pool.advance(self, tables, until).await? {
                 records[ended.number() as usize] = ended.record(tables.constants());
             }
         }
     }
 
-    /// A pool without lanes. What has to be compiled for it is asked for known answers.
+    /// Returns a pool without lanes. Newly compiled shaders must first compute known answers.
     ///
     /// # Errors
-    /// [`GpuError::WrongAnswer`] if the device computes something else, and what it refuses.
+    /// [`GpuError::WrongAnswer`] if the device computes something else; other errors of the device.
     pub async fn pool(&mut self, settings: &LaneSettings) -> Result<Pool, GpuError> {
         let LaneSettings { workgroup, exponent, word, pattern, mesh, symmetry, chatter, kinds, .. } =
             *settings;
         let keep = self.policy.keep;
-        // Until they need it, lanes go on without the tangent vector where that pays.
+        // Where it saves time, lanes run without the tangent vector until they need it.
         let growths: &[bool] = match (exponent, self.policy.late_tangent) {
             (false, _) => &[false],
             (true, true) => &[false, true],
@@ -429,37 +420,8 @@ impl Gpu {
         Ok(Pool::new(self, variants, settings))
     }
 
-    /// Puts lanes at their starts, in a pool all of whose lanes are on these tables. Each has a number by which its
-    /// record is known.
-    ///
-    /// # Errors
-    /// [`GpuError::NoSuchCell`], [`GpuError::OutOfMemory`] if there are more than [`Pool::room`] or than
-    /// the device has memory for, or what the device refuses. None of them is begun then.
-    pub async fn begin(
-        &self,
-        pool: &mut Pool,
-        tables: &Tables,
-        lanes: &[(u32, Lane)],
-    ) -> Result<(), GpuError> {
-        pool.begin(self, tables, lanes).await
-    }
-
-    /// Bytes of its memory that so many lanes take at most.
+    /// Returns the largest number of bytes of device memory that so many lanes take.
     pub(crate) fn bytes_of_lanes(&self, lanes: usize) -> u64 {
         slots::bytes(lanes.min(adapter::most_slots(&self.device.limits())), self.precision)
-    }
-
-    /// Integrates until no more than `until` lanes are left; returns those that have ended. Only where a flag is
-    /// raised it may be that none has.
-    ///
-    /// # Errors
-    /// What the device refuses; the pool is of no use then.
-    pub async fn advance(
-        &self,
-        pool: &mut Pool,
-        tables: &Tables,
-        until: usize,
-    ) -> Result<Vec<Ended>, GpuError> {
-        pool.advance(self, tables, until).await
     }
 }

@@ -1,4 +1,4 @@
-//! Lanes under way on a device: each has a slot from its beginning to its record.
+//! A pool of lanes on a device. A lane has a slot from its start to its record.
 
 use std::ops::Range;
 
@@ -6,9 +6,9 @@ use bytemuck::Zeroable;
 
 use super::adapter::most_slots;
 use super::device::{BEGIN, Pipelines};
-use super::guard::guarded;
+use super::guard::with_error_scopes;
 use super::layout::Cell;
-use super::reading::Ended;
+use super::reading::LaneResult;
 use super::rounds::{Rounds, bind, dispatch};
 use super::shader::Variant;
 use super::slots::Slots;
@@ -18,24 +18,24 @@ use super::transfer::reals;
 use super::{Gpu, GpuError, Lane, LaneSettings};
 use rattlemap_dynamics::orbit::Status;
 
-/// Slots that are sent again lest there be one more transfer.
+/// Most unchanged slots that are uploaded again to avoid one more transfer.
 const WIDEST_GAP: usize = 1024;
 
-/// Lanes under way on a device. They may be begun at any time, and their records come as they end: what is
-/// begun later does not wait for the slowest.
+/// Lanes under way on a device. Lanes can begin at any time, and their records are available when they end, without
+/// waiting for the slowest lane.
 pub struct Pool {
     pub(super) settings: LaneSettings,
     pub(super) variants: Vec<Variant>,
-    /// Slots at most.
+    /// Most slots.
     most: usize,
     buffers: Option<Slots>,
-    /// Slots of the lanes under way, in the order in which they were begun: neighbours behave alike.
+    /// Slots of the lanes under way, in the order in which they began: neighbours behave alike.
     active_list: Vec<u32>,
     /// Slots without a lane.
     free: Vec<u32>,
-    /// By slot: the lane and its number.
+    /// Lane and its number, by slot.
     lanes: Vec<(u32, Lane)>,
-    /// What lies in the buffers, by slot.
+    /// Contents of the buffers, by slot.
     cells: Vec<Cell>,
     starts: Vec<[f64; 4]>,
     /// Iterations of the next round.
@@ -59,28 +59,29 @@ impl Pool {
         }
     }
 
-    /// Lanes under way.
+    /// Returns the number of lanes under way.
     pub fn under_way(&self) -> usize {
         self.active_list.len()
     }
 
-    /// Lanes that may be begun now.
+    /// Returns the number of lanes that may begin now.
     pub fn room(&self) -> usize {
         self.most - self.active_list.len()
     }
 
-    /// Forgets the lanes under way.
+    /// Discards the lanes under way.
     pub fn clear(&mut self) {
         self.free.append(&mut self.active_list);
     }
 
-    /// Puts lanes at their starts; each has a number of the caller's.
-    pub(super) async fn begin(
-        &mut self,
-        gpu: &Gpu,
-        tables: &Tables,
-        lanes: &[(u32, Lane)],
-    ) -> Result<(), GpuError> {
+    /// Puts lanes at their starts. All lanes of a pool are on the same tables. Each lane has a number by which its
+    /// record is recognised.
+    ///
+    /// # Errors
+    /// [`GpuError::NoSuchCell`] if a lane names a missing flow or law; [`GpuError::OutOfMemory`] if there are more
+    /// lanes than [`Pool::room`] or the device has memory for; other errors of the device. After an error, none of
+    /// the lanes has begun.
+    pub async fn begin(&mut self, gpu: &Gpu, tables: &Tables, lanes: &[(u32, Lane)]) -> Result<(), GpuError> {
         let (flows, laws) = (tables.constants.len(), tables.is_even.len());
         for (i, &(_, Lane { flow, law, .. })) in lanes.iter().enumerate() {
             if flow as usize >= flows || law as usize >= laws {
@@ -90,14 +91,14 @@ impl Pool {
         if lanes.is_empty() {
             return Ok(());
         }
-        if let Some(flow) = tables.of_another_kind.filter(|_| !self.settings.kinds) {
+        if let Some(flow) = tables.flow_of_another_kind.filter(|_| !self.settings.kinds) {
             return Err(GpuError::NotCompiled { flow });
         }
         self.make_room(gpu, lanes.len()).await?;
-        // A few lanes had long dispatches; with many more these would take as many times longer.
+        // A few lanes had long dispatches; with many more lanes the same dispatches would take longer in proportion.
         self.iterations = (u64::from(self.iterations) * self.active_list.len() as u64
             / (self.active_list.len() + lanes.len()) as u64) as u32;
-        // The lowest slots: what is begun together lies together.
+        // Takes the lowest slots, so that lanes that begin together are adjacent.
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         let slots = self.free.split_off(self.free.len() - lanes.len());
         for (&slot, &(number, lane)) in slots.iter().rev().zip(lanes) {
@@ -126,17 +127,21 @@ impl Pool {
             dispatch(&mut encoder, &first.begin, &bindings, buffers.grid(lanes.len() as u32), None);
             gpu.queue.submit([encoder.finish()]);
         })?;
-        gpu.tell(Stage::Uploaded);
+        gpu.report(Stage::Uploaded);
         Ok(())
     }
 
-    /// Integrates until no more than `until` lanes are left; returns those that have ended.
-    pub(super) async fn advance(
+    /// Integrates until at most `until` lanes are under way, and returns those that have ended. The result is empty
+    /// only if a flag has stopped the device.
+    ///
+    /// # Errors
+    /// Errors of the device. The pool cannot be used afterwards.
+    pub async fn advance(
         &mut self,
         gpu: &Gpu,
         tables: &Tables,
         until: usize,
-    ) -> Result<Vec<Ended>, GpuError> {
+    ) -> Result<Vec<LaneResult>, GpuError> {
         let Some(buffers) = self.buffers.as_ref().filter(|_| !self.active_list.is_empty()) else {
             return Ok(Vec::new());
         };
@@ -153,27 +158,27 @@ impl Pool {
         let variants: Vec<&Pipelines> = self.variants.iter().map(|variant| &gpu.pipelines[variant]).collect();
         gpu.call(|| buffers.call(gpu, &self.active_list, self.active_list.len(), &self.settings))?;
         let device = rounds.run(&variants, until as u32, &mut self.iterations).await?;
-        gpu.tell(Stage::Integrated { device });
+        gpu.report(Stage::Integrated { device });
         let last = variants[variants.len() - 1];
         let results = buffers.conclude(gpu, last, &bindings, self.active_list.len()).await?;
         if results.is_empty() && !gpu.is_halted() {
-            let message = "it has records of no lane that it said had ended".into();
+            let message = "it returned no results of the lanes that have ended".into();
             return Err(gpu.failure(GpuError::Lost { message }));
         }
         let mut ended = Vec::with_capacity(results.len());
         for &(reading, finding) in &results {
             let (number, Lane { flow, .. }) = self.lanes[finding.slot as usize];
-            ended.push(Ended { number, flow, reading, finding });
+            ended.push(LaneResult { number, flow, reading, finding });
             self.free.push(finding.slot);
         }
-        // Both are in the active list's order.
+        // Results and active list have the same order.
         let mut slots = results.iter().map(|(_, finding)| finding.slot).peekable();
         self.active_list.retain(|&slot| slots.next_if_eq(&slot).is_none());
-        gpu.tell(Stage::Read);
+        gpu.report(Stage::Read);
         Ok(ended)
     }
 
-    /// Makes slots for so many more lanes; those under way move with what they have.
+    /// Makes slots for a number of further lanes. Lanes under way move with their state.
     async fn make_room(&mut self, gpu: &Gpu, count: usize) -> Result<(), GpuError> {
         let (had, needed) = (self.lanes.len(), self.active_list.len() + count);
         if needed > self.most {
@@ -182,26 +187,26 @@ impl Pool {
         if needed <= had {
             return Ok(());
         }
-        // Twice as many, so that lanes seldom move; as many as it takes if there is no memory for that.
+        // Doubles the slots, so that lanes move rarely; makes only those that are needed if memory is too small.
         let ample = needed.max(2 * had).min(self.most);
         let make = async |slots| {
-            guarded(gpu, "lanes", slots, || Slots::new(gpu, slots, self.settings.workgroup)).await
+            with_error_scopes(gpu, "lanes", slots, || Slots::new(gpu, slots, self.settings.workgroup)).await
         };
-        let (slots, made) = match make(ample).await {
+        let (slots, buffers) = match make(ample).await {
             Err(GpuError::OutOfMemory { .. }) if needed < ample => (needed, make(needed).await?),
-            made => (ample, made?),
+            buffers => (ample, buffers?),
         };
         if let Some(old) = &self.buffers {
             gpu.call(|| {
                 let mut encoder = gpu.device.create_command_encoder(&Default::default());
-                for (from, to) in [(&old.motions, &made.motions), (&old.tallies, &made.tallies)] {
+                for (from, to) in [(&old.motions, &buffers.motions), (&old.tallies, &buffers.tallies)] {
                     encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
                 }
                 gpu.queue.submit([encoder.finish()]);
-                gpu.queue.write_buffer(&made.cells, 0, bytemuck::cast_slice(&self.cells));
+                gpu.queue.write_buffer(&buffers.cells, 0, bytemuck::cast_slice(&self.cells));
             })?;
         }
-        self.buffers = Some(made);
+        self.buffers = Some(buffers);
         self.free.extend(had as u32..slots as u32);
         self.lanes.resize(slots, (0, Lane { flow: 0, law: 0, start: [0.0; 4] }));
         self.cells.resize(slots, Cell::zeroed());
@@ -210,7 +215,7 @@ impl Pool {
     }
 }
 
-/// Stretches that hold all of these ascending slots, and no more than [`WIDEST_GAP`] others in a row.
+/// Returns the ranges that contain all of these ascending slots, joined across gaps of up to [`WIDEST_GAP`] slots.
 fn stretches(slots: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     for slot in slots {
@@ -222,7 +227,7 @@ fn stretches(slots: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
     found
 }
 
-/// What a lane integrates, and where it starts in lane units.
+/// Returns a lane's entry in the table of cells, and its start in lane units.
 fn start(tables: &Tables, lane: &Lane) -> (Cell, [f64; 4]) {
     let cell = Cell { flow_index: lane.flow, law_index: lane.law, refused: Status::Ok.code(), mirror: 0 };
     let refuse = |status: Status| (Cell { refused: status.code(), ..cell }, [0.0; 4]);

@@ -1,39 +1,41 @@
-//! What a lane handed back, in the units and the layout of a record.
+//! Conversion of a lane's results to a record.
 
 use super::constants::Constants;
-use super::layout::{Finding, Reading};
+use super::layout::{Finding, Reading, SYMBOLS_PER_NUMBER};
 use crate::record::{Record, WORD_SYMBOLS, joined, valid};
 use rattlemap_dynamics::word::Word;
 
-/// Symbols that the shader keeps in one number.
-pub(super) const SYMBOLS_PER_NUMBER: usize = 10;
+/// Growth per period, natural logarithms, below which all multipliers of a cycle are zero. WGSL has no infinity.
+const SUPERSTABLE_BELOW: f64 = -1e6;
 
-/// Growth per period below this is that of a cycle whose multipliers are zero: shaders have no infinity.
-const SUPERSTABLE: f64 = -1e6;
-
-/// A lane that has ended, as the device tells it.
+/// Results of a lane that has ended.
 #[derive(Clone, Copy, Debug)]
-pub struct Ended {
+pub struct LaneResult {
     pub(super) number: u32,
     pub(super) flow: u32,
     pub(super) reading: Reading,
     pub(super) finding: Finding,
 }
 
-impl Ended {
-    /// By which number the caller knows it.
+impl LaneResult {
+    /// Returns the number that the caller gave the lane.
     pub fn number(&self) -> u32 {
         self.number
     }
 
-    /// Its record; `constants` are those of the tables on which it ran. A million take the better part of a second:
-    /// to be made on all cores.
+    /// Returns the index of its flow.
+    pub fn flow(&self) -> u32 {
+        self.flow
+    }
+
+    /// Returns its record. `constants` are those of the tables on which it ran. A million records take most of a
+    /// second: convert them on all cores.
     pub fn record(&self, constants: &[Option<Constants>]) -> Record {
         record(constants[self.flow as usize].as_ref(), &self.reading, &self.finding)
     }
 }
 
-/// The record of a lane; without constants it was refused before it started.
+/// Returns the record of a lane. A lane without constants was refused before it started.
 fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -> Record {
     let status = finding.status;
     let Some(constants) = constants else { return Record { status, ..Record::default() } };
@@ -56,7 +58,7 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
     if is_valid(valid::LYAPUNOV) {
         let period = constants.flow.h * f64::from(constants.steps);
         (record.lyapunov, record.lyapunov_error) = (reading.growth / period, reading.growth_error / period);
-        if reading.growth < SUPERSTABLE {
+        if reading.growth < SUPERSTABLE_BELOW {
             record.lyapunov = f64::NEG_INFINITY;
         }
     }
@@ -81,7 +83,7 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
     record
 }
 
-/// The word of these symbols; none where they are too many to be all there.
+/// Returns the word with these symbols, or `None` if it is too long to be stored.
 fn spelled(symbols: [u32; 7], length: u32) -> Option<Word> {
     let symbol =
         |i: usize| b'0' + ((symbols[i / SYMBOLS_PER_NUMBER] >> (3 * (i % SYMBOLS_PER_NUMBER))) & 7) as u8;

@@ -1,56 +1,55 @@
-//! Rounds of dispatches over the lanes under way, until few enough are running.
+//! Rounds of dispatches over the lanes under way, until few enough are left.
 //!
-//! Every round queues the lanes that a variant has work for, in the order of the active list, dispatches them a few times,
-//! and counts those that are left. The next round is under way while the host checks the last one: rounds are kept
-//! short enough for drivers that reset a device whose work takes seconds, and long enough to cost nothing.
+//! Each round lists the lanes that a variant has work for, in the order of the active list, dispatches them a few
+//! times, and counts the lanes that are left. The next round runs while the host checks the last one. Rounds are
+//! short, because some drivers reset a device whose work takes seconds, and long enough that their overhead is small.
 
 use web_time::{Duration, Instant};
 
 use super::device::{COMPACT, EntryPoint, Pipelines, SWEEP};
-use super::slots::{BEAT_AT, COUNT_AT};
+use super::layout::{BEAT_AT, BLOCK, COUNT_AT, Settings};
 use super::stage::{Clock, DeviceTimes};
 use super::transfer::{read, readback};
 use super::{Gpu, GpuError};
 
-/// Iterations of the first round of all, and at least of any: shorter dispatches cost more than they do.
+/// Least iterations of a dispatch, and those of the first round: shorter dispatches cost more than they do.
 const FEWEST_ITERATIONS: u32 = 250;
 
-/// With more lanes than this as many fewer of them, so that the first round, whose time nobody knows, is no longer.
+/// Number of lanes above which this minimum is lowered in proportion, so that the first round, whose duration is
+/// unknown, is no longer.
 const FEWEST_ITERATIONS_FOR: u32 = 1 << 14;
 
-/// Lanes of a workgroup that compacts.
-pub(super) const BLOCK: u32 = 256;
-
-/// Bytes of a check: lanes left for each of two variants, the device's count of its own work; then timestamps.
+/// Byte offsets in a check. It begins with the lanes left for each of two variants; the counter of compactions and
+/// the timestamps follow.
 const BEAT: u64 = 8;
 const TIMES: u64 = 16;
 
 /// Byte offset of the iterations in the shader's settings.
-const ITERATIONS: u64 = std::mem::offset_of!(super::layout::Settings, iterations) as u64;
+const ITERATIONS: u64 = std::mem::offset_of!(Settings, iterations) as u64;
 
-/// What the host needs of a pool for its rounds.
+/// Parts of a pool that its rounds use.
 pub(super) struct Rounds<'a> {
     pub(super) gpu: &'a Gpu,
     pub(super) settings: &'a wgpu::Buffer,
     pub(super) queue: &'a wgpu::Buffer,
     /// All buffers, by binding.
     pub(super) buffers: &'a [&'a wgpu::Buffer],
-    /// Lanes of the active list.
+    /// Length of the active list.
     pub(super) active_lanes: u32,
-    /// Workgroups for so many lanes.
+    /// Returns the workgroups for a number of lanes.
     pub(super) grid: &'a dyn Fn(u32) -> [u32; 2],
     /// Most iterations that one dispatch may spend on a lane.
     pub(super) most_iterations: u32,
 }
 
-/// A variant, bound to the buffers.
-struct Bound<'a> {
+/// A variant with its buffers.
+struct BoundVariant<'a> {
     sweep: (&'a wgpu::ComputePipeline, wgpu::BindGroup),
     compact: Vec<(&'a wgpu::ComputePipeline, wgpu::BindGroup)>,
 }
 
-/// A round under way.
-struct Sent<'a> {
+/// A round that has been submitted.
+struct Round<'a> {
     check: &'a wgpu::Buffer,
     submission: wgpu::SubmissionIndex,
     /// Which variants it dispatched.
@@ -61,9 +60,10 @@ struct Sent<'a> {
 }
 
 impl Rounds<'_> {
-    /// Runs lanes until no more than `until` are left, or, if that is not none, some have ended and waited for long
-    /// enough; `iterations` at first in a dispatch. Each variant takes over where the one before leaves off. Returns the
-    /// device's own time where somebody measures.
+    /// Runs lanes until at most `until` are left. If `until` is above zero, it also stops when some lanes have ended
+    /// and have waited for a number of rounds. `iterations` are those of the first dispatch, and of the last on
+    /// return. Each variant continues lanes where the one before it stops. Returns the device's times if a watcher
+    /// measures.
     pub(super) async fn run(
         &self,
         variants: &[&Pipelines],
@@ -74,11 +74,12 @@ impl Rounds<'_> {
         let dispatches = gpu.policy.dispatches * variants.len() as u32;
         let (clock, bound, checks) = gpu.call(|| {
             let clock = gpu.watcher.as_ref().and_then(|_| Clock::new(&gpu.device, &gpu.queue, dispatches));
-            let bound: Vec<Bound<'_>> = variants.iter().map(|pipelines| self.bound(pipelines)).collect();
+            let bound: Vec<BoundVariant<'_>> =
+                variants.iter().map(|pipelines| self.bound(pipelines)).collect();
             let checks = [(); 2].map(|()| readback(gpu, "check", TIMES + Clock::bytes(dispatches)));
             (clock, bound, checks)
         })?;
-        // Lanes that a variant may have work for, those aside that come from the ones before.
+        // Lanes that each variant may have work for, besides those that come from the variants before it.
         let mut left = vec![0; variants.len()];
         left[0] = self.active_lanes;
         let most = self.most_iterations.max(1);
@@ -86,7 +87,7 @@ impl Rounds<'_> {
         *iterations = (*iterations).clamp(fewest, most);
         let (mut device, mut device_end) = (DeviceTimes::default(), None);
         let mut last_beat = 0;
-        let mut before: Option<Sent<'_>> = None;
+        let mut before: Option<Round<'_>> = None;
         let mut last_end = Instant::now();
         let mut checked = 0;
         for (slot, check) in (0..2).zip(&checks).cycle() {
@@ -100,7 +101,7 @@ impl Rounds<'_> {
             };
             let [first, second, beat] = read(gpu, sent.check, sent.bytes, sent.submission, take).await?;
             if beat <= last_beat {
-                return Err(gpu.failure(GpuError::Lost { message: "it drops what it is given to do".into() }));
+                return Err(gpu.failure(GpuError::Lost { message: "it executes no commands".into() }));
             }
             last_beat = beat;
             for (left, (now, ran)) in left.iter_mut().zip([first, second].into_iter().zip(sent.ran)) {
@@ -118,7 +119,7 @@ impl Rounds<'_> {
                 next_iterations(sent.iterations, last_end.elapsed(), gpu.policy.round).clamp(fewest, most);
             last_end = Instant::now();
         }
-        // The last round is in time, too; what comes next waits for it anyway.
+        // The last round belongs to the measured time, too; what follows waits for it anyway.
         if let (Some(clock), Some(sent)) = (&clock, before) {
             let take = |bytes: &[u8]| clock.times(&bytes[TIMES as usize..], &mut device_end);
             device = device.and(read(gpu, sent.check, sent.bytes, sent.submission, take).await?);
@@ -126,30 +127,31 @@ impl Rounds<'_> {
         Ok(clock.map(|_| device))
     }
 
-    fn bound<'a>(&self, pipelines: &'a Pipelines) -> Bound<'a> {
+    fn bound<'a>(&self, pipelines: &'a Pipelines) -> BoundVariant<'a> {
         let with = |pipeline: &'a wgpu::ComputePipeline, entry_point| {
             (pipeline, bind(self.gpu, pipeline, entry_point, self.buffers))
         };
         let compact = COMPACT.into_iter().zip(&pipelines.compact);
-        Bound {
+        BoundVariant {
             sweep: with(&pipelines.sweep, SWEEP),
             compact: compact.map(|(entry_point, pipeline)| with(pipeline, entry_point)).collect(),
         }
     }
 
-    /// Submits a round: each variant's queue and its dispatches, then what each has left.
+    /// Submits a round: each variant's list of lanes and its dispatches, then a count of the lanes that each has
+    /// left.
     fn send<'a>(
         &self,
-        variants: &[Bound<'_>],
+        variants: &[BoundVariant<'_>],
         left: &[u32],
         iterations: u32,
         (slot, check): (u32, &'a wgpu::Buffer),
         clock: Option<&Clock>,
-    ) -> Sent<'a> {
+    ) -> Round<'a> {
         let gpu = self.gpu;
         gpu.queue.write_buffer(self.settings, ITERATIONS, bytemuck::bytes_of(&iterations));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        // Lanes may come from the variants before, so that a variant has work if one of them has.
+        // A variant has work if one of the variants before it has: their lanes may reach it.
         let first = left.iter().position(|&left| left > 0).unwrap_or(0);
         let (mut lanes, mut dispatches) = (0, 0);
         for (n, variant) in variants.iter().enumerate().skip(first) {
@@ -181,38 +183,38 @@ impl Rounds<'_> {
         }
         let submission = gpu.queue.submit([encoder.finish()]);
         let ran = (0..variants.len()).map(|n| n >= first).collect();
-        Sent { check, submission, ran, iterations, bytes }
+        Round { check, submission, ran, iterations, bytes }
     }
 }
 
-/// Passes of the compaction after which the queue's length is known.
+/// Passes of the compaction after which the number of selected lanes is known.
 const COUNTED: usize = 2;
 
-/// Workgroups of a pass of the compaction.
+/// Returns the workgroups of a pass of the compaction.
 pub(super) fn compacting(pass: usize, active_lanes: u32) -> [u32; 2] {
     [if pass == 1 { 1 } else { active_lanes.div_ceil(BLOCK).min(65_535) }, 1]
 }
 
-/// Iterations of a round at least, with so many lanes.
+/// Returns the least iterations of a round with so many lanes.
 fn fewest_iterations(lanes: u32) -> u32 {
     (FEWEST_ITERATIONS * FEWEST_ITERATIONS_FOR / lanes.max(1)).clamp(1, FEWEST_ITERATIONS)
 }
 
-/// Iterations for a round of the wanted length, from those of an earlier one and the time that it took.
-/// What is done does not depend on it.
+/// Returns the iterations of a round that should take `round`, from those of an earlier round and its duration.
+/// Results do not depend on them.
 fn next_iterations(iterations: u32, took: Duration, round: Duration) -> u32 {
     let factor = round.as_secs_f64() / took.as_secs_f64().max(1e-6);
     (f64::from(iterations) * factor.clamp(0.25, 2.0)) as u32
 }
 
-/// Workgroups in a row of the grid for so many lanes.
+/// Returns the workgroups in a row of the grid for so many lanes.
 pub(super) fn row(gpu: &Gpu, lanes: usize, workgroup: u32) -> u32 {
     let groups = (lanes as u32).div_ceil(workgroup).max(1);
     let widest = gpu.device.limits().max_compute_workgroups_per_dimension;
     groups.div_ceil(groups.div_ceil(widest))
 }
 
-/// The buffers of an entry point.
+/// Binds the buffers of an entry point.
 pub(super) fn bind(
     gpu: &Gpu,
     pipeline: &wgpu::ComputePipeline,
@@ -249,7 +251,7 @@ mod tests {
 
     #[test]
     fn rounds_tend_to_their_length() {
-        // 0.3 ms per iteration; what a round took is known when the next one is already under way.
+        // 0.3 ms per iteration. The duration of a round is known when the next one already runs.
         let (mut under_way, mut iterations) = (1000, 1000);
         for _ in 0..20 {
             let next = next_iterations(under_way, Duration::from_micros(300) * under_way, ROUND);

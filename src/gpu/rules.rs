@@ -1,49 +1,51 @@
-//! Rules by which lanes judge their motion. Validation needs them, too, to tell what a lane would have said. They are
-//! written once, here; the shaders are compiled with them.
+//! Rules by which lanes judge their motion. The shaders are compiled with these numbers; validation uses them, too.
 
-use super::Precision;
+use super::precision::Precision;
 use rattlemap_dynamics::orbit::{
-    CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR, NEUTRAL_ORDER, ON_STROBE_TURNS, SHOWN_CYCLES,
+    BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LINEAR_TOLERANCE, NEUTRAL_ORDER, ON_STROBE_TURNS,
 };
 use rattlemap_dynamics::reference::{GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 
-/// Chaos is called early by this many blocks of growth at least: a standard error of fewer is none.
+/// Largest meshing speed at which lanes follow chatter by short flights, relative to half the walls' distance times
+/// the rate of free motion. At higher speeds short flights are too few to save time.
+pub(crate) const FOLLOWED_MESH_SPEED: f64 = 4e-4;
+
+/// Fewest blocks of growth after which a lane may stop as chaotic: fewer give no standard error.
 pub(crate) const FEWEST_BLOCKS: u32 = 6;
 
-/// Distances are kept in so many parts of an octave below the size of the motion: 4 means half.
-pub(crate) const OCTAVE: u32 = 4;
+/// Resolution of recurrence distances, in parts of an octave below the size of the motion: 4 means half.
+pub(crate) const PARTS_PER_OCTAVE: u32 = 4;
 
-/// Recurrences farther apart than this are none, in parts of an octave: 2^-6 of the motion.
-pub(crate) const NEAR: u32 = 24;
+/// Largest distance of a recurrence, in parts of an octave: 2^-6 of the motion.
+pub(crate) const RECURRENCE_LIMIT: u32 = 24;
 
-/// A window of recurrence is so much of the time that has passed.
+/// Length of a recurrence window: this fraction (one fifth) of the time that has passed.
 pub(crate) const WINDOW_SHARE: u32 = 5;
 
-/// Steps of Newton's method that a lane takes to one cycle.
-pub(crate) const REFINEMENTS: u32 = 5;
+/// Most steps of Newton's method towards one cycle.
+pub(crate) const MOST_NEWTON_STEPS: u32 = 5;
 
-/// None of which is longer than this, relative to the motion: what contracts from farther off may still have a fold
-/// of the strobe map before it.
-pub(crate) const REACH: f64 = 3e-2;
+/// Longest Newton step, relative to the motion. From farther away, the strobe map may have a fold before the cycle.
+pub(crate) const LONGEST_NEWTON_STEP: f64 = 3e-2;
 
-/// Strobes that a lane looks back at, to see whether it approaches a cycle.
+/// Number of last strobes by which a lane judges whether it approaches a cycle.
 pub(crate) const TRAIL: usize = 32;
 
-/// Failed Newton searches after which a lane asks it no more.
+/// Failed Newton searches after which a lane makes no more.
 pub(crate) const MOST_FAILED_SEARCHES: u32 = 2;
 
-/// A cycle this close to its mirror image, 2^-12 of the motion, is symmetric; states this close are the same.
-pub(crate) const MIRROR: f64 = 2.44e-4;
+/// Largest distance of a symmetric cycle from its mirror image, and of equal states: 2^-12 of the motion.
+pub(crate) const MIRROR_DISTANCE: f64 = 2.44e-4;
 
-/// A lane has settled once it is this close to its cycle, relative to the motion.
+/// Largest distance of a settled lane from its cycle, relative to the motion.
 pub(crate) const ON_CYCLE: f64 = 1e-4;
 
-/// [`NEAR`] as a distance.
-pub(crate) fn near() -> f64 {
-    (-f64::from(NEAR) / f64::from(OCTAVE)).exp2()
+/// Returns [`RECURRENCE_LIMIT`] as a distance relative to the motion.
+pub(crate) fn recurrence_distance() -> f64 {
+    (-f64::from(RECURRENCE_LIMIT) / f64::from(PARTS_PER_OCTAVE)).exp2()
 }
 
-/// Events this close to phase 0, in turns, lie on the strobe.
+/// Returns the distance from phase 0, in turns, within which events lie on the strobe.
 pub(crate) const fn on_strobe(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 1e-6,
@@ -51,7 +53,7 @@ pub(crate) const fn on_strobe(precision: Precision) -> f64 {
     }
 }
 
-/// What strobes of a settled lane scatter by, relative to the motion, if nothing amplifies it.
+/// Returns the scatter of a settled lane's strobes, relative to the motion, if nothing amplifies it.
 pub(crate) const fn noise(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 4e-6,
@@ -59,25 +61,47 @@ pub(crate) const fn noise(precision: Precision) -> f64 {
     }
 }
 
-/// Recurrences within rounding, in parts of an octave: they need not shrink.
-pub(crate) const fn resolved(precision: Precision) -> u32 {
+/// Returns the recurrence distance that is rounding error, in parts of an octave: it need not shrink.
+pub(crate) const fn within_rounding(precision: Precision) -> u32 {
     match precision {
         Precision::F32 => 60,
         Precision::F64 => 160,
     }
 }
 
-/// The rules as the shaders' constants.
+/// Returns the rules as declarations of the shaders' constants.
 pub(super) fn declarations(precision: Precision) -> String {
-    let (resolved, noise, on_strobe) = (resolved(precision), noise(precision), on_strobe(precision));
-    format!(
-        "const FEWEST_BLOCKS: u32 = {FEWEST_BLOCKS}u;\nconst NEUTRAL_ORDER: f32 = {NEUTRAL_ORDER:?};\n\
-         const CHAOS_ERRORS: Real = {CHAOS_ERRORS:?};\nconst ESCAPE_GROWTH: Real = {ESCAPE_GROWTH:?};\n\
-         const OCTAVE: f32 = f32({OCTAVE}u);\nconst NEAR: u32 = {NEAR}u;\nconst RESOLVED: u32 = {resolved}u;\n\
-         const REFINEMENTS: u32 = {REFINEMENTS}u;\nconst REACH: f32 = {REACH:?};\nconst MOST_FAILED_SEARCHES: u32 = {MOST_FAILED_SEARCHES}u;\n\
-         const GRAZING_SPEED: Real = {GRAZING_SPEED:?};\nconst NO_SPEED: Real = {NO_SPEED:?};\nconst NO_THRESHOLD: Real = {NO_THRESHOLD:?};\n\
-         const TRAIL: u32 = {TRAIL}u;\nconst LINEAR: Real = {LINEAR:?};\nconst SHOWN_CYCLES: u32 = {SHOWN_CYCLES}u;\n\
-         const WINDOW_SHARE: u32 = {WINDOW_SHARE}u;\nconst MIRROR: f32 = {MIRROR:?};\nconst NOISE: f32 = {noise:?};\n\
-         const ON_CYCLE: f32 = {ON_CYCLE:?};\nconst ON_STROBE: Real = {on_strobe:?};\n"
-    )
+    let (rounding, noise, on_strobe) = (within_rounding(precision), noise(precision), on_strobe(precision));
+    let counts = [
+        ("FEWEST_BLOCKS", FEWEST_BLOCKS),
+        ("RECURRENCE_LIMIT", RECURRENCE_LIMIT),
+        ("WITHIN_ROUNDING", rounding),
+        ("MOST_NEWTON_STEPS", MOST_NEWTON_STEPS),
+        ("MOST_FAILED_SEARCHES", MOST_FAILED_SEARCHES),
+        ("TRAIL", TRAIL as u32),
+        ("REQUIRED_CYCLES", BRANCH_CYCLES as u32),
+        ("WINDOW_SHARE", WINDOW_SHARE),
+    ];
+    let singles = [
+        ("NEUTRAL_ORDER", NEUTRAL_ORDER),
+        ("PARTS_PER_OCTAVE", f64::from(PARTS_PER_OCTAVE)),
+        ("LONGEST_NEWTON_STEP", LONGEST_NEWTON_STEP),
+        ("MIRROR_DISTANCE", MIRROR_DISTANCE),
+        ("NOISE", noise),
+        ("ON_CYCLE", ON_CYCLE),
+    ];
+    let reals = [
+        ("CHAOS_ERRORS", CHAOS_ERRORS),
+        ("ESCAPE_GROWTH", ESCAPE_GROWTH),
+        ("FOLLOWED_MESH_SPEED", FOLLOWED_MESH_SPEED),
+        ("GRAZING_SPEED", GRAZING_SPEED),
+        ("NO_SPEED", NO_SPEED),
+        ("NO_THRESHOLD", NO_THRESHOLD),
+        ("LINEAR", LINEAR_TOLERANCE),
+        ("ON_STROBE", on_strobe),
+    ];
+    let count = |(name, value): (&str, u32)| format!("const {name}: u32 = {value}u;\n");
+    let number =
+        |ty: &'static str| move |(name, value): (&str, f64)| format!("const {name}: {ty} = {value:?};\n");
+    counts.map(count).concat() + &singles.map(number("f32")).concat() + &reals.map(number("Real")).concat()
 }

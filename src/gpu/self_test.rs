@@ -1,4 +1,4 @@
-//! Known answers: every program that a device has compiled must give them before it is trusted.
+//! Known answers: newly compiled shaders must reproduce them before they are used.
 
 use super::{Gpu, GpuError, Lane, LaneSettings, Pool, Precision, Variant};
 use crate::record::distance::{apart, farther, is_within};
@@ -7,9 +7,9 @@ use rattlemap_dynamics::model::{GearPair, State};
 /// Forcing periods from rest to the answers.
 const PERIODS: u32 = 20;
 
-/// `(e, omega)` of the paper's pair and its state after [`PERIODS`] from rest, computed by
-/// the reference: meshing on both sides, impacts, long chatter, and no contact. Drivers that
-/// stop long loops or lose double precision on the way fail at least one of them.
+/// Restitution and frequency of the paper's pair, and its state after [`PERIODS`] periods from rest, computed by the
+/// reference: meshing on both sides, impacts, long chatter, and no contact. Drivers that stop long loops or lose
+/// double precision fail at least one of them.
 const ANSWERS: [(f64, f64, State); 4] = [
     (0.06, 5.6, [-1.1109238855820154, 2.276300122629451, -1.2325975673960383, -2.2388145312446635]),
     (0.605, 5.6, [-1.1845082044663513, 2.232746822969534, -1.1056690234652184, -1.8839235166200696]),
@@ -17,10 +17,10 @@ const ANSWERS: [(f64, f64, State); 4] = [
     (0.5, 11.5, [-0.21607397150986443, 0.2323746135365504, 0.0, 0.0]),
 ];
 
-/// Runs the known answers by variants that have just been compiled for these settings.
+/// Computes the known answers with variants that have just been compiled for these settings.
 ///
 /// # Errors
-/// [`GpuError::WrongAnswer`] if the device computes something else, and what it refuses.
+/// [`GpuError::WrongAnswer`] if the device computes something else; other errors of the device.
 pub(super) async fn check(
     gpu: &Gpu,
     variants: Vec<Variant>,
@@ -68,17 +68,17 @@ mod tests {
     use crate::gpu::AdapterChoice;
 
     #[test]
-    fn a_driver_that_computes_wrongly_is_found_out() {
+    fn a_driver_with_wrong_arithmetic_is_rejected() {
         let mut gpu = pollster::block_on(Gpu::open(Precision::F32, &AdapterChoice::default())).unwrap();
         let settings = LaneSettings::default();
-        let asked = async |gpu: &mut Gpu| {
+        let run_check = async |gpu: &mut Gpu| {
             let pool = gpu.pool(&settings).await?;
             check(gpu, pool.variants, &settings).await
         };
-        pollster::block_on(asked(&mut gpu)).unwrap();
-        // The forcing's part in a step, a hundredth too large.
+        pollster::block_on(run_check(&mut gpu)).unwrap();
+        // The forcing's part in a step, 1 % too large.
         gpu.rewrite_shaders(|source| source.replace("(m[4] * c +", "(1.01 * m[4] * c +"));
-        let error = pollster::block_on(asked(&mut gpu)).unwrap_err();
+        let error = pollster::block_on(run_check(&mut gpu)).unwrap_err();
         assert!(matches!(error, GpuError::WrongAnswer { .. }), "{error}");
     }
 }

@@ -1,44 +1,13 @@
-//! Shader variants: one source, put together from small files.
+//! Shader variants: one source, composed of small files.
 
-use super::reading::SYMBOLS_PER_NUMBER;
-use super::rounds::BLOCK;
-use super::tables::CONTACTS;
+use super::layout::{BLOCK, CONTACTS, SYMBOLS_PER_NUMBER};
+use super::precision::Precision;
+use super::rules;
 use super::unroll::unroll;
-use super::{FOLLOWED_MESH_SPEED, rules};
 use crate::record::{WORD_SYMBOLS, valid};
 use rattlemap_dynamics::orbit::Status;
 
-/// Precision of a variant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Precision {
-    /// Single precision, on every adapter.
-    F32,
-    /// Double precision, where the adapter has `SHADER_F64`.
-    F64,
-}
-
-impl Precision {
-    /// Both precisions.
-    pub const ALL: [Precision; 2] = [Precision::F32, Precision::F64];
-
-    /// The name in manifests and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Precision::F32 => "f32",
-            Precision::F64 => "f64",
-        }
-    }
-
-    /// Bytes of a real number.
-    pub fn bytes(self) -> usize {
-        match self {
-            Precision::F32 => 4,
-            Precision::F64 => 8,
-        }
-    }
-}
-
-/// What is compiled.
+/// Options of a compiled shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Precision of the motion.
@@ -47,28 +16,28 @@ pub struct Variant {
     pub workgroup: u32,
     /// Whether cycles are read with their monodromy matrix.
     pub exponent: bool,
-    /// Whether a tangent vector is carried for the exponent of motion at no cycle.
+    /// Whether lanes carry a tangent vector for the exponent of aperiodic motion.
     pub growth: bool,
-    /// Whether cycles get their word spelled out.
+    /// Whether the words of cycles are stored.
     pub word: bool,
-    /// Whether they get their word's pattern.
+    /// Whether the words' patterns are stored.
     pub pattern: bool,
     /// Whether the time spent meshing is counted.
     pub mesh: bool,
     /// Whether cycles are compared with their mirror image.
     pub symmetry: bool,
-    /// Whether chatter may be followed by short flights.
+    /// Whether lanes may follow chatter by short flights.
     pub chatter: bool,
     /// Whether walls may be elastic or rigid.
     pub kinds: bool,
-    /// Whether lanes keep copies of all their constants, and of what strobes alone take: for software drivers.
+    /// Whether lanes keep copies of all their constants and of the state that only strobes use: for software drivers.
     pub keep: bool,
 }
 
-/// Invocations per workgroup where nothing else is asked for.
-pub const WORKGROUP: u32 = 64;
+/// Default number of invocations per workgroup.
+pub(super) const WORKGROUP: u32 = 64;
 
-/// All but the precision.
+/// The shader without the declarations of the precision.
 const BODY: &str = concat!(
     include_str!("../../shaders/layout.wgsl"),
     include_str!("../../shaders/domain.wgsl"),
@@ -95,7 +64,7 @@ const BODY: &str = concat!(
 );
 
 impl Variant {
-    /// The variant of a precision with the usual workgroup.
+    /// Returns the variant of a precision with all quantities and the default workgroup.
     pub fn of(precision: Precision) -> Variant {
         Variant {
             precision,
@@ -112,36 +81,45 @@ impl Variant {
         }
     }
 
-    /// Its WGSL source.
+    /// Returns its WGSL source.
     pub fn source(&self) -> String {
         let real = match self.precision {
             Precision::F32 => include_str!("../../shaders/real_f32.wgsl"),
             Precision::F64 => include_str!("../../shaders/real_f64.wgsl"),
         };
-        let Variant {
-            workgroup, exponent, growth, word, pattern, mesh, symmetry, chatter, kinds, keep, ..
-        } = self;
         let names = ["TERMS", "SHORT_TERMS"].map(|name| (name, count(real, name)));
         let body = unroll(BODY, &names);
-        let valid = VALID.map(|(name, bits)| ("VALID", name.to_owned(), bits));
-        let status = Status::ALL.map(|status| ("STATUS", status.name().to_uppercase(), status.code()));
-        let contacts = CONTACTS.map(|(name, code)| ("CONTACT", name.to_owned(), code));
-        let numbered = valid.into_iter().chain(status).chain(contacts);
-        let codes: String =
-            numbered.map(|(kind, name, code)| format!("const {kind}_{name}: u32 = {code}u;\n")).collect();
-        let rules = rules::declarations(self.precision);
-        format!(
-            "{real}\nconst WORKGROUP: u32 = {workgroup}u;\nconst EXPONENT: bool = {exponent};\n\
-             const GROWTH: bool = {growth};\n\
-             const WORD: bool = {word};\nconst PATTERN: bool = {pattern};\nconst MESH: bool = {mesh};\nconst SYMMETRY: bool = {symmetry};\n\
-             const CHATTER: bool = {chatter};\nconst KINDS: bool = {kinds};\nconst FOLLOWED_MESH_SPEED: Real = {FOLLOWED_MESH_SPEED};\n\
-             const KEEP: bool = {keep};\nconst WORD_SYMBOLS: u32 = {WORD_SYMBOLS}u;\n\
-             const SYMBOLS_PER_NUMBER: u32 = {SYMBOLS_PER_NUMBER}u;\nconst BLOCK: u32 = {BLOCK}u;\n{codes}{rules}{body}"
-        )
+        let valid = VALID.map(|(name, bits)| (format!("VALID_{name}"), bits));
+        let status = Status::ALL.map(|s| (format!("STATUS_{}", s.name().to_uppercase()), s.code()));
+        let contacts = CONTACTS.map(|(name, code)| (format!("CONTACT_{name}"), code));
+        let sizes = [
+            ("WORKGROUP", self.workgroup),
+            ("BLOCK", BLOCK),
+            ("WORD_SYMBOLS", WORD_SYMBOLS as u32),
+            ("SYMBOLS_PER_NUMBER", SYMBOLS_PER_NUMBER as u32),
+        ]
+        .map(|(name, value)| (name.to_owned(), value));
+        let numbers = valid.into_iter().chain(status).chain(contacts).chain(sizes);
+        let numbers: String =
+            numbers.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
+        let options = [
+            ("EXPONENT", self.exponent),
+            ("GROWTH", self.growth),
+            ("WORD", self.word),
+            ("PATTERN", self.pattern),
+            ("MESH", self.mesh),
+            ("SYMMETRY", self.symmetry),
+            ("CHATTER", self.chatter),
+            ("KINDS", self.kinds),
+            ("KEEP", self.keep),
+        ]
+        .map(|(name, value)| format!("const {name}: bool = {value};\n"))
+        .concat();
+        format!("{real}\n{options}{numbers}{}{body}", rules::declarations(self.precision))
     }
 }
 
-/// The records' validity bits under their names in the shader.
+/// The records' validity bits, by their names in the shader.
 const VALID: [(&str, u32); 8] = [
     ("PERIOD", valid::PERIOD),
     ("LYAPUNOV", valid::LYAPUNOV),
@@ -153,7 +131,7 @@ const VALID: [(&str, u32); 8] = [
     ("PATTERN", valid::PATTERN),
 ];
 
-/// A number that a precision's file declares.
+/// Returns a number that a precision's file declares.
 fn count(real: &str, name: &str) -> u32 {
     let (_, after) = real
         .split_once(&format!("const {name}: u32 = "))

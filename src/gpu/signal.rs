@@ -6,27 +6,27 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 
 /// A value that a callback delivers once.
-pub(super) struct Signal<T>(Arc<Mutex<Slot<T>>>);
+pub(super) struct Signal<T>(Arc<Mutex<Delivery<T>>>);
 
-struct Slot<T> {
+struct Delivery<T> {
     value: Option<T>,
     waker: Option<Waker>,
 }
 
 impl<T: Send + 'static> Signal<T> {
-    /// The future and the callback that completes it.
+    /// Returns the future and the callback that completes it.
     pub(super) fn new() -> (Signal<T>, impl FnOnce(T) + Send + 'static) {
-        let slot = Arc::new(Mutex::new(Slot { value: None, waker: None }));
-        let sender = Arc::clone(&slot);
+        let delivery = Arc::new(Mutex::new(Delivery { value: None, waker: None }));
+        let sender = Arc::clone(&delivery);
         let send = move |value| {
-            if let Ok(mut slot) = sender.lock() {
-                slot.value = Some(value);
-                if let Some(waker) = slot.waker.take() {
+            if let Ok(mut delivery) = sender.lock() {
+                delivery.value = Some(value);
+                if let Some(waker) = delivery.waker.take() {
                     waker.wake();
                 }
             }
         };
-        (Signal(slot), send)
+        (Signal(delivery), send)
     }
 }
 
@@ -34,12 +34,12 @@ impl<T> Future for Signal<T> {
     type Output = T;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<T> {
-        // The callback only stores: a poisoned lock still holds a sound slot.
-        let mut slot = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        match slot.value.take() {
+        // The callback only stores a value: the delivery of a poisoned lock is valid.
+        let mut delivery = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        match delivery.value.take() {
             Some(value) => Poll::Ready(value),
             None => {
-                slot.waker = Some(context.waker().clone());
+                delivery.waker = Some(context.waker().clone());
                 Poll::Pending
             }
         }

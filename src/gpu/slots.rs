@@ -1,25 +1,20 @@
-//! The buffers of a pool: what lies on the device for each slot, what the host writes there and reads back.
+//! The buffers of a pool: the state of each slot on the device, and the transfers to and from the host.
 
 use super::averaging::Averaging;
 use super::device::{COMPACT, CONCLUDE, Pipelines};
-use super::layout::{Cell, Finding, Motion, Reading, Settings, Tally};
+use super::layout::{COUNT_AT, Cell, Finding, Motion, QUEUE_HEAD, Reading, Settings, Tally};
 use super::rounds::{bind, compacting, dispatch, row};
 use super::tables::Tables;
 use super::transfer::{buffer, from_reals, read, readback, upload};
 use super::{Gpu, GpuError, LaneSettings, Precision};
 use crate::record::limits::LONGEST_CYCLE;
 
-/// Numbers of the queue before its lanes, and where they lie.
-const QUEUE_HEAD: usize = 2;
-pub(super) const COUNT_AT: u64 = 0;
-pub(super) const BEAT_AT: u64 = 4;
-
-/// Byte offset of what compaction selects, in the shader's settings.
+/// Byte offset, in the shader's settings, of the flag that selects lanes for compaction.
 const ENDED: u64 = std::mem::offset_of!(Settings, ended) as u64;
 
 const COUNT_BYTES: u64 = size_of::<u32>() as u64;
 
-/// The buffers of so many slots.
+/// The buffers for a number of slots.
 pub(super) struct Slots {
     count: usize,
     workgroup: u32,
@@ -32,14 +27,14 @@ pub(super) struct Slots {
     blocks: wgpu::Buffer,
     readings: wgpu::Buffer,
     findings: wgpu::Buffer,
-    /// Where the host reads the last two, and how many there are.
+    /// Buffers in which the host reads `readings` and `findings`; and the number of results.
     readbacks: [wgpu::Buffer; 2],
     count_readback: wgpu::Buffer,
     /// Workgroups in a row of the grid.
     row: u32,
 }
 
-/// Bytes of the device's memory that so many slots take.
+/// Returns the bytes of device memory that so many slots take.
 pub(super) fn bytes(slots: usize, precision: Precision) -> u64 {
     let reals = size_of::<Reading>() + size_of::<[f64; 4]>() + size_of::<Motion>();
     let reals = reals / size_of::<f64>() * precision.bytes();
@@ -72,7 +67,7 @@ impl Slots {
         }
     }
 
-    /// All buffers by binding.
+    /// Returns all buffers, by binding.
     pub(super) fn bindings<'a>(&'a self, tables: &'a Tables) -> [&'a wgpu::Buffer; 13] {
         [
             &self.settings,
@@ -91,22 +86,22 @@ impl Slots {
         ]
     }
 
-    /// Workgroups for so many lanes.
+    /// Returns the workgroups for so many lanes.
     pub(super) fn grid(&self, lanes: u32) -> [u32; 2] {
         let groups = lanes.div_ceil(self.workgroup).max(1);
         [groups.min(self.row), groups.div_ceil(self.row)]
     }
 
-    /// Tells the device which slots have lanes, in the order in which these were begun; those from place `fresh` on
-    /// are to begin.
-    pub(super) fn call(&self, gpu: &Gpu, active_list: &[u32], fresh: usize, settings: &LaneSettings) {
-        let called = uniform(self, active_list.len(), fresh, settings, gpu.policy.late_tangent);
+    /// Uploads the active list, in the order in which its lanes began, and the settings. Lanes from place `first_new`
+    /// on have yet to begin.
+    pub(super) fn call(&self, gpu: &Gpu, active_list: &[u32], first_new: usize, settings: &LaneSettings) {
+        let called = uniform(self, active_list.len(), first_new, settings, gpu.policy.late_tangent);
         gpu.queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&called));
         let head = (QUEUE_HEAD * size_of::<u32>()) as u64;
         gpu.queue.write_buffer(&self.queue, head, bytemuck::cast_slice(active_list));
     }
 
-    /// What those of the active list's lanes have to say that have ended, in its order.
+    /// Reads the results of the lanes that have ended, in the order of the active list.
     pub(super) async fn conclude(
         &self,
         gpu: &Gpu,
@@ -154,13 +149,13 @@ impl Slots {
 fn uniform(
     slots: &Slots,
     active_lanes: usize,
-    fresh: usize,
+    first_new: usize,
     settings: &LaneSettings,
     late_tangent: bool,
 ) -> Settings {
     let LaneSettings { periods, early_stop, .. } = *settings;
     let more = if early_stop { settings.undecided_periods } else { 0 };
-    // Lanes that stop early may do so before a long transient is over.
+    // Lanes that stop early may stop before a long transient is over.
     let transient_periods = if early_stop {
         settings.transient_periods.min(settings.exponent_from)
     } else {
@@ -170,7 +165,7 @@ fn uniform(
     Settings {
         slots: slots.count as u32,
         active_lanes: active_lanes as u32,
-        fresh: fresh as u32,
+        first_new: first_new as u32,
         periods,
         longest: periods.saturating_add(more),
         chaos_from: settings.chaos_from,

@@ -1,34 +1,34 @@
-//! How far lanes have come. Whoever measures is told, and keeps the clock.
+//! Progress of lanes, for measurements.
 
-/// What has just been done for lanes.
+/// A stage that lanes have reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stage {
-    /// They are handed to the device.
+    /// The device has received them.
     Uploaded,
-    /// They have ended, or many of them.
+    /// They have ended, or many of them have.
     Integrated {
-        /// By the device's own clock; none if it has none.
+        /// Times by the device's clock; `None` if it has none.
         device: Option<DeviceTimes>,
     },
-    /// The records of those are here.
+    /// Their records have been read.
     Read,
 }
 
-/// What lanes took by the device's own clock, in seconds.
+/// Times of lanes by the device's clock, in seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeviceTimes {
-    /// Between the first and the last pass of every submission.
+    /// Time between the first and the last pass of each submission.
     pub busy: f64,
-    /// The longest dispatch of these: some drivers reset a device whose work takes seconds.
+    /// Longest dispatch. Some drivers reset a device whose work takes seconds.
     pub longest_dispatch: f64,
-    /// Between one submission and the next.
+    /// Time between submissions.
     pub idle: f64,
-    /// The longest of these gaps.
+    /// Longest time between submissions.
     pub longest_gap: f64,
 }
 
 impl DeviceTimes {
-    /// Of both, one after the other.
+    /// Returns the times of both, one after the other.
     pub fn and(self, other: DeviceTimes) -> DeviceTimes {
         DeviceTimes {
             busy: self.busy + other.busy,
@@ -39,29 +39,29 @@ impl DeviceTimes {
     }
 }
 
-/// Whoever is told.
+/// Function that is called at each stage.
 pub(super) type Watcher = Box<dyn Fn(Stage) + Send + Sync>;
 
-/// Bytes of a pair of timestamps: of a beginning and an end.
+/// Bytes of a pair of timestamps: a beginning and an end.
 const PAIR: u64 = 16;
 
-/// Timestamps about the passes of a submission: a pair for all of them, then one for each dispatch of lanes. Two
+/// Timestamps of a submission's passes: a pair for all passes, then one pair for each dispatch of lanes. Two
 /// submissions are under way at a time.
 pub(super) struct Clock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     seconds_per_tick: f64,
-    /// Pairs of a submission at most.
+    /// Most pairs of a submission.
     pairs: u32,
 }
 
 impl Clock {
-    /// Bytes that [`Clock::copy`] writes of a submission with so many dispatches, or fewer.
+    /// Returns the bytes that [`Clock::copy`] writes for a submission with so many dispatches.
     pub(super) fn bytes(dispatches: u32) -> u64 {
         PAIR * u64::from(1 + dispatches)
     }
 
-    /// For submissions of so many dispatches at most; none if the device has no timestamps.
+    /// Creates the clock of submissions with at most so many dispatches; `None` if the device has no timestamps.
     pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, dispatches: u32) -> Option<Clock> {
         if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
@@ -82,7 +82,7 @@ impl Clock {
         Some(Clock { queries, resolved, seconds_per_tick, pairs })
     }
 
-    /// What a pass of submission `slot` (0 or 1) writes; only the first and the last do.
+    /// Returns the timestamps of a pass of submission `slot` (0 or 1). Only the first and the last pass have any.
     pub(super) fn writes(
         &self,
         slot: u32,
@@ -97,7 +97,7 @@ impl Clock {
         })
     }
 
-    /// What the `nth` dispatch of lanes writes.
+    /// Returns the timestamps of the `nth` dispatch of lanes.
     pub(super) fn dispatch_writes(&self, slot: u32, nth: u32) -> wgpu::ComputePassTimestampWrites<'_> {
         let at = self.first_query(slot) + 2 * (1 + nth);
         wgpu::ComputePassTimestampWrites {
@@ -107,7 +107,7 @@ impl Clock {
         }
     }
 
-    /// Copies what submission `slot` with so many dispatches has written to `readback`, from byte `at` on.
+    /// Copies the timestamps of submission `slot` with so many dispatches to `readback`, from byte `at` on.
     pub(super) fn copy(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -121,7 +121,8 @@ impl Clock {
         encoder.copy_buffer_to_buffer(&self.resolved, from, readback, at, Clock::bytes(dispatches));
     }
 
-    /// What a submission took, as it was copied, after one that ended at `last_end`, which is the end of this one then.
+    /// Returns the times of a submission from its copied timestamps. `last_end` is the end of the one before, and
+    /// becomes the end of this one.
     pub(super) fn times(&self, copied: &[u8], last_end: &mut Option<u64>) -> DeviceTimes {
         let tick = |at: usize| bytemuck::pod_read_unaligned::<u64>(&copied[at..at + 8]);
         let seconds = |from: u64, to: u64| to.saturating_sub(from) as f64 * self.seconds_per_tick;
@@ -142,7 +143,7 @@ impl Clock {
     }
 }
 
-/// Bytes from one submission's timestamps to the other's: as wgpu aligns them.
+/// Returns the bytes from one submission's timestamps to the other's, in wgpu's alignment.
 fn stride(pairs: u32) -> u64 {
     (PAIR * u64::from(pairs)).next_multiple_of(wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT)
 }

@@ -1,67 +1,54 @@
-//! What lanes share, on the device: flows and contact laws.
+//! Tables on the device that lanes share: flows and contact laws.
 
 use super::constants::Constants;
-use super::guard::guarded;
-use super::layout::{self, Flow, FlowShape};
+use super::guard::with_error_scopes;
+use super::layout::{self, Flow, FlowShape, contact_code};
 use super::transfer::{reals, upload};
 use super::{Gpu, GpuError};
-use rattlemap_dynamics::model::{Contact, Law, Oscillator};
+use rattlemap_dynamics::model::{Law, Oscillator};
 
-/// Flows and laws of a run, uploaded once for all its batches.
+/// Flows and laws, uploaded once for any number of runs.
 pub struct Tables {
-    /// None for a flow that lanes cannot carry.
+    /// Constants by flow; `None` for a flow that lanes cannot carry.
     pub(super) constants: Vec<Option<Constants>>,
-    /// Of each law, whether it is the same at both walls.
+    /// Whether each law is the same at both walls.
     pub(super) is_even: Vec<bool>,
-    /// A flow with a wall that is elastic or rigid, if there is one.
-    pub(super) of_another_kind: Option<usize>,
+    /// Index of a flow with an elastic or a rigid wall, if there is one.
+    pub(super) flow_of_another_kind: Option<usize>,
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
     pub(super) phasors: wgpu::Buffer,
     pub(super) laws: wgpu::Buffer,
 }
 
-/// Copies of all constants while they are handed over: those of the lanes, the lists of flows and
-/// phasors, these in the lanes' precision, what the driver is given, and the device's own where it
-/// has no memory of its own.
+/// Copies of all constants during an upload: the lanes' constants, the lists of flows and phasors, these lists in the
+/// lanes' precision, the driver's copy, and the device's copy if it shares the host's memory.
 const COPIES: u64 = 5;
 
-/// Most flows that are handed over at a time where they are too many to be kept, and most bytes of memory that their
-/// constants take then: lanes enough to keep hardware busy.
+/// Most flows that are uploaded at a time if there are too many for one upload, and most bytes that their constants
+/// then take. So many lanes keep hardware busy.
 pub(crate) const MOST_FLOWS: usize = 1 << 16;
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// Bytes of memory that the constants of one flow take at most.
+/// Returns the most bytes of memory that the constants of one flow take.
 pub(crate) fn bytes(oscillator: &Oscillator, steps_per_period: Option<u32>) -> u64 {
     let steps = Constants::steps(oscillator, steps_per_period);
     let phasors = steps.map_or(0, |steps| (u64::from(steps) + 1) * size_of::<[f64; 2]>() as u64);
     COPIES * (size_of::<Constants>() as u64 + size_of::<FlowShape>() as u64 + phasors)
 }
 
-/// Codes of the kinds of contact, with their names in the shader.
-pub(super) const CONTACTS: [(&str, u32); 3] = [("IMPACT", 0), ("RIGID", 1), ("ELASTIC", 2)];
-
-fn contact_code(contact: Contact) -> u32 {
-    let [(_, impact), (_, rigid), (_, elastic)] = CONTACTS;
-    match contact {
-        Contact::Impact => impact,
-        Contact::Rigid => rigid,
-        Contact::Elastic => elastic,
-    }
-}
-
 impl Tables {
-    /// Free steps per forcing period of a flow; 0 if lanes cannot carry it.
+    /// Returns the free steps per forcing period of a flow; 0 if lanes cannot carry it.
     pub fn steps_per_period(&self, flow: u32) -> u32 {
         self.constants[flow as usize].as_ref().map_or(0, |constants| constants.steps)
     }
 
-    /// Bytes of the device's memory.
+    /// Returns the bytes of device memory.
     pub(crate) fn bytes(&self) -> u64 {
         [&self.flows, &self.shapes, &self.phasors, &self.laws].map(wgpu::Buffer::size).iter().sum()
     }
 
-    /// What each flow was derived to; none for a flow that lanes cannot carry.
+    /// Returns the constants of each flow; `None` for a flow that lanes cannot carry.
     pub fn constants(&self) -> &[Option<Constants>] {
         &self.constants
     }
@@ -87,7 +74,7 @@ impl Tables {
                     tables.push(constants.flow);
                     phasors.extend_from_slice(&constants.phasors);
                 }
-                // Its lanes are refused before they start.
+                // Lanes of this flow are refused before they start.
                 None => {
                     shapes.push(FlowShape { steps: 1, ..bytemuck::Zeroable::zeroed() });
                     tables.push(bytemuck::Zeroable::zeroed());
@@ -104,8 +91,8 @@ impl Tables {
         if needed > allowed {
             return Err(GpuError::TooManyFlows { flows, needed, allowed });
         }
-        let is_other = |c: &Option<Constants>| c.as_ref().is_some_and(Constants::has_elastic_or_rigid_wall);
-        let of_another_kind = constants.iter().position(is_other);
+        let is_other = |c: &Option<Constants>| c.as_ref().is_some_and(|c| c.has_elastic_or_rigid_wall);
+        let flow_of_another_kind = constants.iter().position(is_other);
         let make = || Tables {
             flows: upload(gpu, "flows", &tables),
             shapes: upload(gpu, "shapes", bytemuck::cast_slice(&shapes)),
@@ -113,8 +100,8 @@ impl Tables {
             laws: upload(gpu, "laws", &reals(&rows, gpu.precision)),
             constants,
             is_even: laws.iter().map(Law::is_symmetric).collect(),
-            of_another_kind,
+            flow_of_another_kind,
         };
-        guarded(gpu, "flows", flows, make).await
+        with_error_scopes(gpu, "flows", flows, make).await
     }
 }

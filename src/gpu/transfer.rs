@@ -1,10 +1,10 @@
-//! Bytes to the device and back.
+//! Transfers of bytes to and from the device.
 
-use super::shader::Precision;
+use super::precision::Precision;
 use super::signal::Signal;
 use super::{Gpu, GpuError};
 
-/// Numbers of structs of reals in the variant's precision.
+/// Converts structs of real numbers to bytes in a precision.
 pub(super) fn reals<T: bytemuck::Pod>(items: &[T], precision: Precision) -> Vec<u8> {
     match precision {
         Precision::F64 => bytemuck::cast_slice(items).to_vec(),
@@ -16,7 +16,7 @@ pub(super) fn reals<T: bytemuck::Pod>(items: &[T], precision: Precision) -> Vec<
     }
 }
 
-/// The reverse of [`reals`].
+/// Converts bytes in a precision to structs of real numbers.
 pub(super) fn from_reals<T: bytemuck::Pod>(bytes: &[u8], precision: Precision) -> Vec<T> {
     let numbers: Vec<f64> = match precision {
         Precision::F64 => return bytemuck::pod_collect_to_vec(bytes),
@@ -27,7 +27,7 @@ pub(super) fn from_reals<T: bytemuck::Pod>(bytes: &[u8], precision: Precision) -
     bytemuck::pod_collect_to_vec(&numbers)
 }
 
-/// A storage buffer of `size` bytes.
+/// Creates a storage buffer of `size` bytes.
 pub(super) fn buffer(gpu: &Gpu, label: &'static str, size: usize) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
@@ -40,14 +40,14 @@ pub(super) fn buffer(gpu: &Gpu, label: &'static str, size: usize) -> wgpu::Buffe
     })
 }
 
-/// A storage buffer that holds `bytes`.
+/// Creates a storage buffer that holds `bytes`.
 pub(super) fn upload(gpu: &Gpu, label: &'static str, bytes: &[u8]) -> wgpu::Buffer {
     let buffer = buffer(gpu, label, bytes.len());
     gpu.queue.write_buffer(&buffer, 0, bytes);
     buffer
 }
 
-/// A buffer of `size` bytes that the host can read.
+/// Creates a buffer of `size` bytes that the host can read.
 pub(super) fn readback(gpu: &Gpu, label: &'static str, size: u64) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
@@ -57,7 +57,7 @@ pub(super) fn readback(gpu: &Gpu, label: &'static str, size: u64) -> wgpu::Buffe
     })
 }
 
-/// The first `size` bytes of what a [`readback`] holds after the work up to `submission`, handed to `take`.
+/// Passes the first `size` bytes of a [`readback`] buffer to `take`, after the work up to `submission`.
 pub(super) async fn read<T>(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,
@@ -70,7 +70,7 @@ pub(super) async fn read<T>(
     buffer.map_async(wgpu::MapMode::Read, ..size, send);
     gpu.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })?;
     mapped.await.map_err(|error| lost(error.to_string()))?;
-    let taken = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
+    let value = take(&buffer.get_mapped_range(..size).map_err(|error| lost(error.to_string()))?);
     buffer.unmap();
-    Ok(taken)
+    Ok(value)
 }

@@ -1,7 +1,7 @@
 //! Unrolling of the shaders' series.
 //!
-//! Drivers keep an array in registers only where every index is a constant, and unroll no
-//! loop that carries a bound. So loops over Taylor terms are written with a marker,
+//! Drivers keep an array in registers only if every index is a constant, and do not unroll loops with a variable
+//! bound. Loops over Taylor terms are therefore written with a marker,
 //!
 //! ```text
 //! //% for k in FIRST..LAST      (or LAST-1 down to FIRST: "for k in FIRST..LAST down")
@@ -9,8 +9,8 @@
 //! //% end
 //! ```
 //!
-//! and copied out once per term before they are compiled. A loop with a name may be repeated
-//! elsewhere over other terms, in functions that name their variables alike:
+//! and are copied once per term before they are compiled. A loop with a name can be repeated over other terms in a
+//! function that uses the same variable names:
 //!
 //! ```text
 //! //% for k in FIRST..LAST: NAME
@@ -21,7 +21,7 @@
 
 use std::collections::HashMap;
 
-/// The source with every marked loop copied out; `names` are constants that its bounds may name.
+/// Returns the source with every marked loop copied out. The bounds of loops may contain the constants in `names`.
 pub(super) fn unroll(source: &str, names: &[(&str, u32)]) -> String {
     let mut out = String::with_capacity(4 * source.len());
     let copies = |body: &[&str], range: &str| -> String {
@@ -49,7 +49,7 @@ pub(super) fn unroll(source: &str, names: &[(&str, u32)]) -> String {
     out
 }
 
-/// A line that is not copied as it stands.
+/// A line that starts or repeats a marked loop.
 enum Marker<'a> {
     Loop { range: &'a str, name: Option<&'a str> },
     Again { range: &'a str, name: &'a str },
@@ -70,7 +70,7 @@ impl Marker<'_> {
     }
 }
 
-/// The values that a header runs through.
+/// Returns the indices of a loop header.
 fn indices(header: &str, names: &[(&str, u32)]) -> Vec<u32> {
     let (range, down) = header.strip_suffix(" down").map_or((header, false), |range| (range, true));
     let number = |text: &str| text.parse::<u32>().expect("a marker's bound is a number or a known name");
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_marked_loop_is_copied_out() {
+    fn marked_loops_are_copied_once_per_index() {
         let source = "a\n  //% for k in 1..TERMS-1 down\n  t[$(k+1)] = t[$k] + t[$(k-1)];\n  //% end\nb\n";
         let four = [("TERMS", 4)];
         assert_eq!(unroll(source, &four), "a\n  t[3] = t[2] + t[1];\n  t[2] = t[1] + t[0];\nb\n");

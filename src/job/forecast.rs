@@ -48,7 +48,7 @@ impl Forecast {
             return Ok(Forecast { seconds: 0.0, interval: Some([0.0; 2]), sampled: 0 });
         }
         let halt = halted_after(LONGEST);
-        engine.heed(&halt);
+        engine.stop_on(&halt);
         // Where cells follow their neighbours, a map computes one row at a time.
         let row = plan.policy().follows().then_some(plan.counts()[0]);
         let mut count = runs.min(row.unwrap_or(engine.least_batch()));

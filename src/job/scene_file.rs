@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::map::scene::{Along, FileBeside, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
+use crate::map::scene::{Along, CompanionFile, FileText, Format, Place, Problem, Purpose, Scene, SceneError};
 use crate::store::finished_map::MOST_LIST_BYTES;
 use crate::store::plain_file::read_text;
 
@@ -47,7 +47,7 @@ impl SceneFile<'_> {
         })?;
         let find = |what, file: &str| {
             let path = self.path.parent().unwrap_or(Path::new("")).join(file);
-            if what == FileBeside::Model {
+            if what == CompanionFile::Model {
                 return find_model(&path);
             }
             match self.list_copy.filter(|copy| !path.exists() && copy.exists()) {
@@ -55,7 +55,7 @@ impl SceneFile<'_> {
                 None => find_table(&path, MOST),
             }
         };
-        Scene::parse_along(&text, &name, sets, self.purpose, self.along, &find)
+        Scene::parse_with_files(&text, &name, sets, self.purpose, self.along, &find)
     }
 
     /// Returns the `--set` arguments with one that replaces the scene's figures by these formats, if there are any.

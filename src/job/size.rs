@@ -6,7 +6,7 @@ use crate::gpu;
 use crate::job::engine_choice::EngineKind;
 use crate::job::error::JobError;
 use crate::job::processor;
-use crate::map::plan::{Parts, keeps_flows};
+use crate::map::plan::{Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
 use crate::record::Record;
@@ -235,7 +235,7 @@ fn list_rows(scene: &Scene) -> u64 {
 /// Bytes of the flows that the CPU engine keeps.
 fn kept_flows(flows: &Parts, runs: u64) -> u64 {
     let count = flows.count() as u64;
-    if keeps_flows(count, runs) { count * FLOW } else { 0 }
+    if stores_flows(count, runs) { count * FLOW } else { 0 }
 }
 
 /// Bytes of the constants that are in memory for lanes at a time, estimated from flows spread over the map. If the flows
@@ -253,7 +253,7 @@ fn lane_tables(scene: &Scene, parts: &Parts, runs: u64) -> u64 {
         let model = scene.points().model(parts.cell(flow as u32));
         model.oscillator().map_or(0, |oscillator| gpu::table_bytes(&oscillator, steps))
     });
-    if keeps_flows(flows, runs) {
+    if stores_flows(flows, runs) {
         (sizes.sum::<u64>() as f64 / sampled as f64 * flows as f64) as u64
     } else {
         let largest = sizes.max().unwrap_or(0);
@@ -287,7 +287,7 @@ mod tests {
         {
             let scene = scene(second, min, max, [5, 400], &[]);
             let (plan, parts) = (Plan::new(&scene), Parts::flows(scene.points()));
-            assert!(plan.keeps_flows());
+            assert!(plan.stores_flows());
             let oscillators: Vec<_> =
                 (0..plan.flow_count() as u32).map(|flow| plan.oscillator(flow)).collect();
             let flows: usize = oscillators.iter().map(|oscillator| Flow::new(oscillator).bytes()).sum();

@@ -123,7 +123,7 @@ impl ValidateJob {
             true => None,
             false => open(Precision::F64, &own).or_else(|_| open(Precision::F64, &any)).ok(),
         };
-        gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.heed(halt));
+        gpu.iter_mut().chain(&mut double).for_each(|gpu| gpu.stop_on(halt));
         let lanes = pollster::block_on(Lanes::run(&subject, &self.sample, gpu.as_mut(), double.as_mut()));
         let lanes = lanes
             .map_err(|error| JobError::Failed(format!("cannot compute the sample's lanes again: {error}")))?;

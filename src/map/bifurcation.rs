@@ -1,4 +1,4 @@
-//! Section points and the motion's class against one parameter, as in Fig. 5 of the paper.
+//! Bifurcation diagrams: section points and class of the motion against one parameter, as in Fig. 5 of the paper.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -10,45 +10,45 @@ use rattlemap_dynamics::model::{Model, ModelError, REST, Side, State};
 use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Settings, Status};
 use rattlemap_dynamics::word::Word;
 
-/// The attractor at one value of the axis: what it is, and its section points.
+/// The attractor at one value of the axis, with its section points.
 #[derive(Clone, Debug)]
 pub struct Column {
     /// Value of the axis parameter.
     pub value: f64,
-    /// Which way the attractor was followed, in a diagram that shows both; none in one of a single pass.
+    /// Direction in which the attractor was followed, in a diagram with both; none in a diagram with one pass.
     pub direction: Option<Direction>,
-    /// What the motion is.
+    /// Class of the motion.
     pub class: Class,
-    /// How the integration ended.
+    /// End of the integration.
     pub status: Status,
-    /// Largest Lyapunov exponent per unit time; not a number where the integration failed.
+    /// Largest Lyapunov exponent per unit time; NaN if the integration failed.
     pub lyapunov: f64,
-    /// Its standard error where it is an average; none for periodic motion.
+    /// Standard error of the exponent; none for periodic motion, whose exponent is not an average.
     pub lyapunov_error: Option<f64>,
-    /// Impacts per forcing period, starts of meshing not counted; not a number where the integration failed.
+    /// Impacts per forcing period, without starts of meshing; NaN if the integration failed.
     pub impacts_per_period: f64,
-    /// Fraction of the time spent meshing; not a number where the integration failed.
+    /// Fraction of the time spent meshing; NaN if the integration failed.
     pub mesh_fraction: f64,
     /// Whether a periodic orbit is its own mirror image.
     pub symmetric: Option<bool>,
     /// The word of a periodic orbit.
     pub word: Option<Word>,
-    /// Forcing periods that the motion was followed for.
+    /// Number of integrated forcing periods.
     pub periods_run: u64,
-    /// Every crossing of a wall: contacts and ends of meshing.
+    /// All crossings of walls: contacts and ends of meshing.
     pub points: Vec<SectionPoint>,
-    /// The state at phase 0 of every period that is shown, where walls [fix](fixed) a displacement; else none.
+    /// States at phase 0 of the shown periods, if walls [fix](fixed) a displacement; else empty.
     pub strobes: Vec<State>,
 }
 
 impl Column {
-    /// The pattern of a periodic orbit's word.
+    /// Returns the pattern of a periodic orbit's word.
     pub fn pattern(&self) -> Option<Word> {
         self.word.as_ref().map(Word::pattern)
     }
 }
 
-/// Which way the attractor was followed.
+/// Direction in which an attractor is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// From the first value to the last.
@@ -58,10 +58,10 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Both, in the order in which they are shown.
+    /// Both directions, in the order of the columns.
     pub const BOTH: [Direction; 2] = [Direction::Up, Direction::Down];
 
-    /// The name in tables.
+    /// Returns the name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Direction::Up => "up",
@@ -70,12 +70,12 @@ impl Direction {
     }
 }
 
-/// One event seen as a point of the section `|z| = b`.
+/// One event as a point of the section `|z| = b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectionPoint {
     /// The wall.
     pub side: Side,
-    /// What happened there.
+    /// Kind of the event.
     pub kind: EventKind,
     /// Time since the last phase 0, in `[0, T)`.
     pub t_mod_period: f64,
@@ -85,45 +85,30 @@ pub struct SectionPoint {
     pub after: State,
 }
 
-/// The displacement, by its index, that is the same at every crossing of a wall: the gap is a multiple of this one
-/// alone, in every cell. None where the gap mixes two, or there is no cell.
+/// Returns the index of the displacement that has one value at all crossings of a wall, because the gap depends on this
+/// displacement only, in every cell. None if the gap depends on both displacements, or without cells.
 ///
-/// Section points of such a model differ by velocity and phase. Its displacement is shown at phase 0.
+/// Section points of such a model differ only in velocity and phase, so its displacement is shown at phase 0.
 pub fn fixed(cells: &[(f64, Box<dyn Model>)]) -> Option<usize> {
     let gap = |model: &dyn Model| model.oscillator().map(|oscillator| oscillator.gap);
     let fixes = |i: usize| cells.iter().all(|(_, model)| gap(&**model).is_ok_and(|gap| gap[1 - i] == 0.0));
     (0..2).find(|&i| !cells.is_empty() && fixes(i))
 }
 
-/// How many columns a diagram of so many cells has.
+/// Returns the number of columns of a diagram.
 pub fn column_count(cells: usize, start: Start) -> usize {
     if start == Start::Both { 2 * cells } else { cells }
 }
 
-/// Integrates every cell; `progress` is told how many columns are done so far.
+/// Integrates every cell and calls `progress` with the number of finished columns. Returns none if `halt` was raised before
+/// the last column ended.
 ///
-/// Columns that start from one state are independent and run in parallel; columns that
-/// follow the attractor run one after the other, the first of them from rest. With
-/// [`Start::Both`] there are two columns per cell, all those followed upwards first; the two
-/// passes run side by side. Columns are in the order of their cells.
-///
-/// # Errors
-/// [`ModelError`] of a cell that has no motion, before any is integrated.
-pub fn run(
-    cells: &[(f64, Box<dyn Model>)],
-    start: Start,
-    settings: &Settings,
-    progress: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<Column>, ModelError> {
-    let columns = run_until(cells, start, settings, progress, &AtomicBool::new(false))?;
-    // Nobody raises the flag.
-    Ok(columns.unwrap_or_default())
-}
-
-/// [`run`] until a flag is raised; none if it was before the last column ended.
+/// Columns that start from one state are independent and run in parallel. Columns that follow the attractor run one
+/// after the other, the first of them from rest. With [`Start::Both`] there are two columns per cell, those followed
+/// upwards first; the two passes run in parallel. Columns are in the order of their cells.
 ///
 /// # Errors
-/// As [`run`].
+/// [`ModelError`] of a cell without motion, before any is integrated.
 pub fn run_until(
     cells: &[(f64, Box<dyn Model>)],
     start: Start,
@@ -151,7 +136,7 @@ pub fn run_until(
     }
 }
 
-/// What all columns share.
+/// Data shared by all columns.
 struct Run<'a> {
     cells: &'a [(f64, Box<dyn Model>)],
     settings: &'a Settings,
@@ -187,7 +172,7 @@ impl Run<'_> {
         Ok(columns)
     }
 
-    /// One column, and a state on its attractor to start the next one from; none once the flag is raised.
+    /// Computes one column, and a state on its attractor from which the next column can start; none after `halt` is raised.
     fn column(
         &self,
         value: f64,
@@ -205,7 +190,7 @@ impl Run<'_> {
     }
 }
 
-/// The states of an orbit at phase 0, one for each period that its events span.
+/// Returns the states of an orbit at phase 0, one for each shown period.
 fn strobes(model: &dyn Model, orbit: &Orbit) -> Result<Vec<State>, ModelError> {
     let Some(later) = orbit.cycle_periods.checked_sub(1) else { return Ok(Vec::new()) };
     let mut states = vec![orbit.strobe];
@@ -216,7 +201,7 @@ fn strobes(model: &dyn Model, orbit: &Orbit) -> Result<Vec<State>, ModelError> {
 
 #[cfg(test)]
 impl Column {
-    /// A column without points, of which only this is told.
+    /// Builds a column without points for tests.
     pub(crate) fn plain(value: f64, class: Class) -> Column {
         Column {
             value,

@@ -1,4 +1,4 @@
-//! A cycle as the reference runs through it: where it passes at phase 0, and half a period later.
+//! A cycle given by its states at phase 0 and half a period later, computed by the reference.
 
 use crate::record::distance::{apart, farther};
 use rattlemap_dynamics::flow::Flow;
@@ -6,51 +6,55 @@ use rattlemap_dynamics::model::{Law, State};
 use rattlemap_dynamics::reference::{Stop, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
-/// States this close, relative to the motion's size, lie on the same cycle. Engines confirm a
-/// period from as far away where the approach is slow.
-pub const SAME: f64 = 3e-2;
+/// Relative distance within which a state belongs to a cycle. Engines confirm a period at this distance if the motion
+/// approaches its cycle slowly.
+pub const CYCLE_TOLERANCE: f64 = 3e-2;
 
-/// And a cycle this close to a run's last state is the run's own: engines measure by the whole motion.
-const ITS_OWN: f64 = 2.0 * SAME;
+/// Relative distance within which a cycle found by Newton's method is the one that a run approaches. It is twice as large
+/// because engines measure distances relative to the whole motion.
+const REFINEMENT_TOLERANCE: f64 = 2.0 * CYCLE_TOLERANCE;
 
-/// A cycle.
+/// A periodic motion.
 #[derive(Clone, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct StrobeCycle {
     pub(crate) period: u32,
-    /// Its strobe states: the first, and one after every period.
+    /// Strobe states: the first, and one after each period.
     pub(crate) points: Vec<State>,
-    /// Its states half a period after these.
+    /// States half a period after each strobe state.
     pub(crate) halves: Vec<State>,
-    /// Where the motion is one cycle later.
+    /// The state one cycle after the first strobe state.
     pub(crate) last: State,
     pub(crate) is_non_impacting: bool,
-    /// Whether the mirror image of a motion is a motion.
+    /// Whether the mirror image of each motion is a motion, half a period later.
     pub(crate) mirrors: bool,
 }
 
-impl Seen {
-    /// The cycle that a run was on its way to, by Newton's method; the motion from its last state if that finds none.
-    pub(crate) fn from(flow: &Flow, law: Law, strobe: State, period: u32) -> Seen {
-        Seen::refined(flow, law, strobe, period).unwrap_or_else(|| Seen::through(flow, law, strobe, period))
+impl StrobeCycle {
+    /// Returns the cycle that a run approaches, found by Newton's method; without success the motion from its last state.
+    pub(crate) fn from(flow: &Flow, law: Law, strobe: State, period: u32) -> StrobeCycle {
+        StrobeCycle::refined(flow, law, strobe, period)
+            .unwrap_or_else(|| StrobeCycle::through(flow, law, strobe, period))
     }
 
-    /// The stable cycle close by, if Newton's method finds one.
-    pub(crate) fn refined(flow: &Flow, law: Law, strobe: State, period: u32) -> Option<Seen> {
+    /// Returns the stable cycle near a state, if Newton's method finds one.
+    pub(crate) fn refined(flow: &Flow, law: Law, strobe: State, period: u32) -> Option<StrobeCycle> {
         let cycle = refine(&Trajectory::new(flow, law, strobe), StrobeMap::Periods(period))?;
-        let is_its_own = Seen::at(strobe, period).distance(flow, &cycle.state, &strobe) < ITS_OWN;
-        (cycle.is_stable() && is_its_own).then(|| Seen::through(flow, law, cycle.state, period))
+        let is_its_own =
+            StrobeCycle::at(strobe, period).distance(flow, &cycle.state, &strobe) < REFINEMENT_TOLERANCE;
+        (cycle.is_stable() && is_its_own).then(|| StrobeCycle::through(flow, law, cycle.state, period))
     }
 
-    /// The motion from a state, for so many periods.
-    pub(crate) fn through(flow: &Flow, law: Law, state: State, period: u32) -> Seen {
-        let mut seen = Seen { mirrors: flow.mirror_symmetric(&law), ..Seen::at(state, period) };
-        // A motion that stops here is known by the state that it had.
-        let _: Result<(), Stop> = seen.run(flow, law);
-        seen
+    /// Follows the motion from a state for `period` periods.
+    pub(crate) fn through(flow: &Flow, law: Law, state: State, period: u32) -> StrobeCycle {
+        let mut cycle =
+            StrobeCycle { mirrors: flow.mirror_symmetric(&law), ..StrobeCycle::at(state, period) };
+        // If the reference stops early, the cycle is described by the states so far.
+        let _: Result<(), Stop> = cycle.run(flow, law);
+        cycle
     }
 
-    fn at(state: State, period: u32) -> Seen {
-        Seen {
+    fn at(state: State, period: u32) -> StrobeCycle {
+        StrobeCycle {
             period,
             points: vec![state],
             halves: Vec::new(),
@@ -75,26 +79,26 @@ impl Seen {
         Ok(())
     }
 
-    /// Strobe states of its symmetry-conjugate orbit: the mirror image of a motion is a motion, half a period later.
+    /// Returns the strobe states of the symmetry-conjugate orbit.
     fn mirrored(&self) -> impl Iterator<Item = State> {
         let halves: &[State] = if self.mirrors { &self.halves } else { &[] };
         halves.iter().map(|half| half.map(|x| -x))
     }
 
-    /// Whether it, or its symmetry-conjugate orbit, comes through a state of a cycle of `period`.
+    /// Whether the cycle, or its symmetry-conjugate orbit, passes through a state of a cycle of `period`.
     pub(crate) fn passes(&self, flow: &Flow, state: &State, period: u32) -> bool {
-        let is_close = |point: State| self.distance(flow, &point, state) < SAME;
+        let is_close = |point: State| self.distance(flow, &point, state) < CYCLE_TOLERANCE;
         self.is_related(period)
             && (self.points.iter().copied().any(is_close) || self.mirrored().any(is_close))
     }
 
-    /// Whether one period divides the other: at a flip, noise makes a multiple of a period.
+    /// Whether one period divides the other. Near a period doubling, rounding can turn a period into a multiple.
     pub(crate) fn is_related(&self, period: u32) -> bool {
         self.period.is_multiple_of(period) || period.is_multiple_of(self.period)
     }
 
-    /// What distances are relative to: the size of the motion, but not less than the scale of length and what that is
-    /// as a velocity.
+    /// Returns the units of displacements and velocities: the largest of the motion, but at least the scale of length and
+    /// the corresponding velocity.
     pub(crate) fn units(&self, flow: &Flow) -> [f64; 2] {
         let all = || self.points.iter().copied().chain(self.mirrored());
         let largest = |i: usize, j: usize| all().flat_map(|y| [y[i].abs(), y[j].abs()]).fold(0.0, f64::max);
@@ -102,13 +106,13 @@ impl Seen {
         [position, largest(1, 3).max(flow.omega * position)]
     }
 
-    /// The distance of two states.
+    /// Returns the distance of two states in the units of the cycle.
     pub(crate) fn distance(&self, flow: &Flow, a: &State, b: &State) -> f64 {
         distance(self.units(flow), a, b)
     }
 }
 
-/// The distance of two states in these units.
+/// Returns the largest difference of the components of two states, in units of displacement and velocity.
 pub(crate) fn distance(units: [f64; 2], a: &State, b: &State) -> f64 {
     (0..4).map(|i| apart(a[i], b[i]) / units[i % 2]).fold(0.0, farther)
 }
@@ -119,17 +123,17 @@ mod tests {
     use rattlemap_dynamics::model::GearPair;
 
     #[test]
-    fn a_state_that_is_no_number_lies_on_no_cycle() {
+    fn a_state_with_nan_or_infinity_is_on_no_cycle() {
         let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
-        let seen = |point: State| Seen::at(point, 1);
+        let through = |point: State| StrobeCycle::at(point, 1);
         let state = [0.1, 0.2, -0.1, 0.3];
-        assert!(seen(state).passes(&flow, &state, 1));
+        assert!(through(state).passes(&flow, &state, 1));
         for i in 0..4 {
             for value in [f64::NAN, f64::INFINITY] {
                 let mut lost = state;
                 lost[i] = value;
-                assert!(!seen(state).passes(&flow, &lost, 1) && !seen(lost).passes(&flow, &state, 1));
-                assert!(!seen(lost).passes(&flow, &lost, 1), "{i}: {value}");
+                assert!(!through(state).passes(&flow, &lost, 1) && !through(lost).passes(&flow, &state, 1));
+                assert!(!through(lost).passes(&flow, &lost, 1), "{i}: {value}");
             }
         }
     }

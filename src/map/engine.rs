@@ -1,8 +1,7 @@
-//! Engines: one interface between a plan and whoever computes it.
+//! Engines compute the cells of a plan.
 //!
-//! An [`Engine`] takes up cells of a plan at any time and returns one record for each, in whatever order they
-//! end. A record depends on its cell, its start and the plan alone: not on what else is under way, the
-//! neighbours, or the number of threads.
+//! An [`Engine`] accepts cells at any time and returns one record for each, in any order. A record depends on its cell,
+//! its start and the plan only. It does not depend on other cells under way, on neighbours, or on the number of threads.
 
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 mod cards;
@@ -25,7 +24,8 @@ pub use fake::Fake;
 pub(crate) use flows::Flows;
 #[cfg(feature = "gpu")]
 pub use gpu::Gpu;
-pub(crate) use gpu::{keep, lane_settings};
+#[cfg(feature = "gpu")]
+pub(crate) use gpu::{drop_unrequested, lane_settings};
 
 #[cfg(feature = "gpu")]
 use crate::gpu::AdapterId;
@@ -35,34 +35,34 @@ use crate::record::Record;
 /// Why a batch was not computed.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum EngineError {
-    /// Cells do not fit the engine's memory; fewer may.
+    /// The cells do not fit into the engine's memory. Fewer cells may fit.
     #[error("no memory on {device} for {cells} cells at a time")]
     OutOfMemory {
         /// The engine's device.
         device: String,
-        /// Cells under way and those that were to be begun.
+        /// Number of cells under way, including those that were to be begun.
         cells: usize,
     },
-    /// The engine's device did not do what it was asked.
+    /// The device failed to do its work.
     #[error("{device}: {reason}")]
     Refused {
         /// The engine's device.
         device: String,
-        /// What happened.
+        /// The device's message.
         reason: String,
     },
-    /// The engine is gone and computes nothing any more.
+    /// The device is lost; the engine computes nothing any more.
     #[error("{device} was lost ({reason})")]
     Lost {
         /// The engine's device.
         device: String,
-        /// What its driver says.
+        /// The driver's message.
         reason: String,
     },
 }
 
 impl EngineError {
-    /// What happened, without the device.
+    /// Describes the error without the device.
     pub fn reason(&self) -> String {
         match self {
             EngineError::OutOfMemory { cells, .. } => format!("no memory for {cells} cells at a time"),
@@ -71,82 +71,104 @@ impl EngineError {
     }
 }
 
-/// What one of several cards has done.
+/// The work of one of several cards.
 #[cfg(feature = "gpu")]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CardReport {
-    /// Which card.
+    /// The card.
     pub adapter: AdapterId,
-    /// Cells that it has computed.
+    /// Number of cells that it has computed.
     pub cells: usize,
-    /// Why it computes no more, if it was lost.
+    /// Why it was lost, if it was.
     pub lost: Option<String>,
 }
 
-/// A card of several that is lost.
+/// The loss of one of several cards.
 #[cfg(feature = "gpu")]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loss {
-    /// Which card.
+    /// The lost card.
     pub adapter: AdapterId,
-    /// Cells that it leaves to the others.
+    /// Number of its cells that the other cards compute instead.
     pub cells: usize,
-    /// What happened.
+    /// The cause.
     pub reason: String,
 }
 
-/// What computes cells.
+/// Computes cells.
 pub enum Engine<'p> {
     /// The event-driven reference on all processor cores, in f64.
     Cpu(Cpu<'p>),
     /// Lanes in WGSL on a graphics device, in f32 or f64.
     #[cfg(feature = "gpu")]
     Gpu(Box<Gpu<'p>>),
-    /// The same on several equal cards.
+    /// Lanes in WGSL on several equal cards.
     #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
     Cards(Box<Cards>),
-    /// Records by rule, and failures on demand: for tests of everything around an engine.
+    /// Computes records by a rule and fails on demand, for tests.
     Fake(Fake),
 }
 
+/// Properties of an engine's device; the defaults are those of an engine without a device of its own.
+trait Device {
+    fn name(&self) -> &'static str;
+
+    fn precision(&self) -> &'static str {
+        "f64"
+    }
+
+    fn device(&self) -> String;
+
+    fn device_bytes(&self) -> Option<u64> {
+        None
+    }
+
+    fn least_batch(&self) -> usize;
+
+    fn lane_steps(&self) -> Option<u64> {
+        None
+    }
+
+    fn steps_per_period(&self) -> Option<[u32; 2]> {
+        None
+    }
+
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>);
+}
+
 impl Engine<'_> {
-    /// The name in manifests and record files.
+    fn properties(&self) -> &dyn Device {
+        match self {
+            Engine::Cpu(cpu) => cpu,
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu) => &**gpu,
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            Engine::Cards(cards) => &**cards,
+            Engine::Fake(fake) => fake,
+        }
+    }
+
+    /// Returns the name in manifests and record files.
     pub fn name(&self) -> &'static str {
-        match self {
-            Engine::Cpu(_) => "cpu",
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(_) => "gpu",
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.name(),
-            Engine::Fake(_) => "fake",
-        }
+        self.properties().name()
     }
 
-    /// The precision in manifests and record files.
+    /// Returns the precision in manifests and record files.
     pub fn precision(&self) -> &'static str {
-        match self {
-            Engine::Cpu(_) | Engine::Fake(_) => "f64",
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => gpu.precision(),
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.precision(),
-        }
+        self.properties().precision()
     }
 
-    /// What it runs on, in words: part of a record file's identity, since results are
-    /// bitwise the same on one device only.
+    /// Describes the device. The text is part of a record file's identity, since only one device reproduces results bit
+    /// by bit.
     pub fn device(&self) -> String {
-        match self {
-            Engine::Cpu(_) => "event-driven reference".to_owned(),
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => gpu.device(),
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.device(),
-            Engine::Fake(_) => "fake".to_owned(),
-        }
+        self.properties().device()
     }
 
-    /// The adapter that computes; none where there is none, or more than one.
+    /// Returns the adapter, if the engine has exactly one.
     #[cfg(feature = "gpu")]
     pub fn adapter(&self) -> Option<AdapterId> {
         match self {
@@ -155,7 +177,7 @@ impl Engine<'_> {
         }
     }
 
-    /// Devices that compute side by side.
+    /// Returns the number of devices that compute in parallel.
     pub fn card_count(&self) -> usize {
         match self {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
@@ -164,7 +186,7 @@ impl Engine<'_> {
         }
     }
 
-    /// What each card has done so far, where several compute; else none.
+    /// Reports the work of each card so far. Empty unless several cards compute.
     #[cfg(feature = "gpu")]
     pub fn cards(&self) -> Vec<CardReport> {
         match self {
@@ -174,7 +196,7 @@ impl Engine<'_> {
         }
     }
 
-    /// Tells `listener` from here on, while [`Engine::advance`] waits, of cards that are lost and leave their cells to others.
+    /// Calls `listener` during [`Engine::advance`] for each card that is lost and leaves its cells to other cards.
     #[cfg(feature = "gpu")]
     #[cfg_attr(target_arch = "wasm32", expect(unused_variables, reason = "there is one card"))]
     pub fn listen(&mut self, listener: impl Fn(&Loss) + Send + 'static) {
@@ -184,80 +206,49 @@ impl Engine<'_> {
         }
     }
 
-    /// Bytes of a device's memory that the map takes at most, of all devices; none where no device of its own
-    /// is at work.
+    /// Returns the largest number of bytes that the map needs in the memory of all devices; none without a device.
     pub fn device_bytes(&self) -> Option<u64> {
-        match self {
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => Some(gpu.device_bytes()),
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.device_bytes(),
-            Engine::Cpu(_) | Engine::Fake(_) => None,
-        }
+        self.properties().device_bytes()
     }
 
-    /// The fewest cells that keep the engine busy: the size of the first batch.
+    /// Returns the smallest number of cells that keeps the engine busy: the size of the first batch.
     pub fn least_batch(&self) -> usize {
-        match self {
-            Engine::Cpu(cpu) => cpu.least_batch(),
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => gpu.least_batch(),
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.least_batch(),
-            Engine::Fake(_) => 16,
-        }
+        self.properties().least_batch()
     }
 
-    /// Free steps that lanes have taken so far; none where there is no grid.
+    /// Returns the number of free steps that lanes have taken so far; none without a time grid.
     pub fn lane_steps(&self) -> Option<u64> {
-        match self {
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => Some(gpu.steps()),
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.lane_steps(),
-            Engine::Cpu(_) | Engine::Fake(_) => None,
-        }
+        self.properties().lane_steps()
     }
 
-    /// The least and the most free steps that lanes take per forcing period, over all flows that they
-    /// can carry; none where there is no grid.
+    /// Returns the smallest and the largest number of free steps per forcing period, over all flows that lanes support;
+    /// none without a time grid.
     pub fn steps_per_period(&self) -> Option<[u32; 2]> {
-        match self {
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => gpu.steps_per_period(),
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.steps_per_period(),
-            Engine::Cpu(_) | Engine::Fake(_) => None,
-        }
+        self.properties().steps_per_period()
     }
 
-    /// Cells that may be begun now: more would be refused for want of memory.
+    /// Returns the number of cells for which the engine has memory now.
     pub fn room(&self) -> usize {
-        match self {
-            Engine::Cpu(_) | Engine::Fake(_) => usize::MAX,
-            #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => gpu.room(),
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.room(),
-        }
+        self.properties().room()
     }
 
-    /// Looks at a flag from here on: while it is raised, [`Engine::advance`] soon returns what has ended by then.
-    pub fn heed(&mut self, halt: &Arc<AtomicBool>) {
-        match self {
-            Engine::Cpu(cpu) => cpu.halt = Arc::clone(halt),
+    /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have ended.
+    pub fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        let engine: &mut dyn Device = match self {
+            Engine::Cpu(cpu) => cpu,
             #[cfg(feature = "gpu")]
-            Engine::Gpu(gpu) => gpu.heed(halt),
+            Engine::Gpu(gpu) => &mut **gpu,
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Engine::Cards(cards) => cards.heed(halt),
-            Engine::Fake(_) => {}
-        }
+            Engine::Cards(cards) => &mut **cards,
+            Engine::Fake(fake) => fake,
+        };
+        engine.stop_on(halt);
     }
 
-    /// Takes up cells; their records come from [`Engine::advance`].
+    /// Begins cells. [`Engine::advance`] returns their records.
     ///
     /// # Errors
-    /// [`EngineError`], with none of these cells taken up.
+    /// [`EngineError`], after which none of these cells is under way.
     pub async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
         match self {
             Engine::Cpu(cpu) => cpu.begin(cells),
@@ -270,12 +261,12 @@ impl Engine<'_> {
         Ok(())
     }
 
-    /// Computes until some of the cells under way have ended, best until no more than `until` are left: the records
-    /// of those that have, by id. None if no cell is under way, or a raised flag is heeded.
+    /// Computes until some cells have ended, if possible until at most `until` are left. Returns the ids and records of
+    /// those that have ended; empty if no cell is under way or the flag of [`Engine::stop_on`] is raised.
     ///
     /// # Errors
-    /// [`EngineError`], after which nothing is under way.
-    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "for lanes alone"))]
+    /// [`EngineError`], after which no cell is under way.
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "only lanes use it"))]
     pub async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         match self {
             Engine::Cpu(cpu) => Ok(cpu.advance()),
@@ -287,10 +278,10 @@ impl Engine<'_> {
         }
     }
 
-    /// Computes cells: one record for each, in their order. Nothing else may be under way.
+    /// Computes cells and returns their records in the same order. No other cell may be under way.
     ///
     /// # Errors
-    /// [`EngineError`], with none of them computed.
+    /// [`EngineError`], after which none of them is computed.
     pub async fn run(&mut self, cells: &[Cell]) -> Result<Vec<Record>, EngineError> {
         let ids = || cells.iter().map(|cell| cell.id as usize);
         let (Some(first), Some(last)) = (ids().min(), ids().max()) else { return Ok(Vec::new()) };
@@ -308,7 +299,7 @@ impl Engine<'_> {
             }
             ended.into_iter().for_each(|(id, record)| records[places[id as usize - first]] = record);
         }
-        // Cells that were asked for twice.
+        // A cell may occur twice in the list; both occurrences get the record of the last.
         Ok(ids().map(|id| records[places[id - first]]).collect())
     }
 }

@@ -1,10 +1,12 @@
-//! Maps: many motions. A scene says what is asked ([`scene`]); its cells are numbered ([`plan`])
-//! and put in order ([`schedule`]); an engine takes them up and hands back records ([`engine`],
-//! [`sweep`]). Over one axis it is a bifurcation diagram ([`bifurcation`]). [`run`] computes a whole map in one call.
+//! Maps: many motions, one for each cell of a parameter plane.
+//!
+//! A scene defines the map ([`scene`]); a plan numbers its cells ([`plan`]); a schedule orders them ([`schedule`]); an
+//! engine computes their records ([`engine`], [`sweep`]). A scene over one axis is a bifurcation diagram ([`bifurcation`]).
 
 pub use crate::text::{expression, printable};
 
 pub mod random;
+pub(crate) mod statistics;
 
 pub mod scene;
 

@@ -1,13 +1,12 @@
-//! What has to be computed: a scene as numbered cells. Pure.
+//! A plan: a scene as numbered cells. Pure.
 //!
-//! Cell `id = j * count0 + i` has index `i` on the first axis and `j` on the second. It
-//! needs a flow, which depends on everything but the contact law, and a law; cells that
-//! differ in parameters of the law alone share their flow. Engines get cells in
-//! Morton order: whatever the batch, its cells are neighbours and behave alike. The cells of a list are one row:
-//! they have the numbers of their places in it, and come in that order.
+//! Cell `id = j * count0 + i` has index `i` on the first axis and `j` on the second. It needs a flow, which depends on
+//! everything but the contact law, and a law. Cells that differ only in parameters of the law share their flow. Engines
+//! get cells in Morton order, so that the cells of a batch are neighbours and behave alike. The cells of a list are one
+//! row, in the order of the list.
 //!
-//! A cell with several starts is as many runs. Run `k` of the cell `id` has the number
-//! `k * cell_count + id`, so that the first runs are the map itself.
+//! A cell with several starts has as many runs. Run `k` of the cell `id` has the number `k * cell_count + id`, so the
+//! first runs are the map itself.
 
 mod morton;
 mod parts;
@@ -30,44 +29,44 @@ use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Class};
 use start::Starts;
 
-/// Most flows that engines keep for all batches: below 1 GB but for motion that needs thousands of steps per forcing
-/// period.
-const KEPT_FLOWS: usize = 8_192;
+/// Largest number of flows that engines store for all batches: less than 1 GB, unless the motion needs thousands of steps
+/// per forcing period.
+const MOST_STORED_FLOWS: usize = 8_192;
 
-/// What a run of a cell is made of: indices of its flow and its law in the plan, and its start.
+/// A run of a cell: indices of its flow and its law in the plan, and its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// `j * count0 + i`; for further starts of that cell, as many times the number of cells more.
+    /// Number of the run: `j * count0 + i`, plus the number of cells for each further start.
     pub id: u32,
-    /// Which flow it moves on, below [`Plan::flow_count`].
+    /// Index of the flow, below [`Plan::flow_count`].
     pub flow: u32,
-    /// Which contact law it obeys, below [`Plan::law_count`].
+    /// Index of the contact law, below [`Plan::law_count`].
     pub law: u32,
-    /// The state in which it starts at phase 0.
+    /// State at phase 0.
     pub start: State,
 }
 
-/// Which quantities somebody asks for; nothing else is computed.
+/// Quantities that are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Needs {
-    /// An exponent for motion that is not periodic: for its own sake or for the class.
+    /// Exponent of motion that is not periodic, as a quantity or for the class.
     pub exponent: bool,
-    /// The exponent for its own sake.
+    /// Exponent as a quantity.
     pub lyapunov: bool,
     /// Impacts per forcing period.
     pub impacts: bool,
     /// Fraction of the time spent meshing.
     pub mesh: bool,
-    /// Whether a cycle is its own mirror image.
+    /// Whether a cycle is symmetric.
     pub symmetric: bool,
-    /// The cycle's word.
+    /// Word of a cycle.
     pub word: bool,
-    /// Its pattern.
+    /// Pattern of a cycle.
     pub pattern: bool,
 }
 
 impl Needs {
-    /// All that a record can tell.
+    /// All quantities of a record.
     pub const EVERYTHING: Needs = Needs {
         exponent: true,
         lyapunov: true,
@@ -79,20 +78,20 @@ impl Needs {
     };
 }
 
-/// A cell in which the model has no motion.
+/// Error: the model has no motion in a cell.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("at {cell}: {reason}; change the parameters")]
 pub struct NoMotion {
-    /// The axes' values there.
+    /// Values of the swept parameters.
     pub cell: String,
     /// Why there is no motion.
     pub reason: ModelError,
 }
 
-/// Looks for cells of a scene with one axis in which the model has no motion.
+/// Checks that the model has a motion in every cell of a scene with one axis.
 ///
 /// # Errors
-/// [`NoMotion`] for the first of them.
+/// [`NoMotion`] for the first cell without one.
 pub fn check_line(scene: &Scene) -> Result<(), NoMotion> {
     let points = scene.points();
     (0..points.counts()[0]).try_for_each(|cell| checked(points, cell))
@@ -103,7 +102,7 @@ fn checked(points: &Points, cell: usize) -> Result<(), NoMotion> {
     verdict.map(|_| ()).map_err(|reason| NoMotion { cell: points.named(cell), reason })
 }
 
-/// A scene as cells, flows and laws.
+/// A scene as numbered cells, flows and laws.
 #[derive(Clone, Debug)]
 pub struct Plan {
     points: Points,
@@ -120,14 +119,13 @@ impl Plan {
     /// Plans a map. The scene must have been read for a map, and its [`Size`](crate::map::size::Size) accepted.
     ///
     /// # Panics
-    /// If the scene has neither two axes nor a list, or more runs than a `u32` numbers: reading a scene for a
-    /// map and asking its size rule that out.
+    /// If the scene has neither two axes nor a list, or has more runs than a `u32` can number.
     pub fn new(scene: &Scene) -> Plan {
         assert!(scene.axes().len() == 2 || scene.list().is_some(), "a map has two axes, or a list of cells");
         assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
         let points = scene.points().clone();
         let mut needs = needs(&scene.outputs().quantities);
-        // Chaos is an attractor, too.
+        // A map of basins needs the exponent, because chaos is an attractor, too.
         needs.exponent |= scene.is_basin();
         let integration = scene.integration();
         Plan {
@@ -148,11 +146,11 @@ impl Plan {
         }
     }
 
-    /// Looks for cells in which the model has no motion. A model that has one wherever its parameters are
-    /// in their ranges, as the gear pair but for overflow, has none, unless a derived parameter leaves its range.
+    /// Checks that the model has a motion in every cell. For a model like the gear pair, only overflow or a derived parameter
+    /// outside its range can prevent it.
     ///
     /// # Errors
-    /// [`NoMotion`] for one of them, before anything is computed.
+    /// [`NoMotion`] for one of the cells without motion.
     pub fn check(&self) -> Result<(), NoMotion> {
         let verdict = |parts: &Parts| {
             let each = (0..parts.count() as u32).into_par_iter();
@@ -162,8 +160,7 @@ impl Plan {
         verdict(&self.laws)
     }
 
-    /// The same cells with at most `periods` forcing periods each, half of them observed: for
-    /// trials.
+    /// Returns a plan of the same cells with at most `periods` forcing periods each, half of them observed, for trials.
     pub fn shortened(&self, periods: u32) -> Plan {
         let mut plan = self.clone();
         let settings = &mut plan.budget.settings;
@@ -174,17 +171,17 @@ impl Plan {
         plan
     }
 
-    /// The two axes; none where cells are listed.
+    /// Returns the two axes; empty for a list.
     pub fn axes(&self) -> &[Axis] {
         self.points.axes()
     }
 
-    /// Whether cells are listed: those of neighbouring numbers are no neighbours then.
+    /// Whether cells are listed. Listed cells with consecutive numbers need not be similar.
     pub fn is_list(&self) -> bool {
         self.points.list().is_some()
     }
 
-    /// Cells along the two axes; a list is one row.
+    /// Returns the numbers of cells along the two axes. A list is one row.
     pub fn counts(&self) -> [usize; 2] {
         self.points.counts()
     }
@@ -193,37 +190,37 @@ impl Plan {
         &self.points
     }
 
-    /// Whether it is a map of basins: an axis sweeps a component of the start.
+    /// Whether this is a map of basins: at least one axis sweeps a component of the start.
     pub fn is_basin(&self) -> bool {
         !self.is_list() && self.points.sweeps_start()
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     pub fn cell_count(&self) -> usize {
         self.points.counts().iter().product()
     }
 
-    /// Cell ids in the order in which engines get them; for further starts the same again.
+    /// Returns the cell ids in the order in which engines get them. Further starts have the same order.
     pub fn order(&self) -> Vec<u32> {
         (0..self.cell_count()).map(|place| self.run_at(place)).collect()
     }
 
-    /// What is counted while a map is made: cells, or runs where cells have several starts.
+    /// Returns the unit of progress: `cells`, or `runs` if cells have several starts.
     pub fn unit(&self) -> &'static str {
         if self.start_count() > 1 { "runs" } else { "cells" }
     }
 
-    /// Starts per cell.
+    /// Returns the number of starts per cell.
     pub fn start_count(&self) -> usize {
         self.starts.count()
     }
 
-    /// How many runs there are: one per cell and start.
+    /// Returns the number of runs: one per cell and start.
     pub fn run_count(&self) -> usize {
         self.cell_count() * self.start_count()
     }
 
-    /// The run at this place of the order: every cell with its first start, then with the next.
+    /// Returns the run at a place of the order: all cells with their first start, then with the next.
     pub fn run_at(&self, place: usize) -> u32 {
         let (nth, place) = (place / self.cell_count(), place % self.cell_count());
         let counts = self.counts();
@@ -231,13 +228,13 @@ impl Plan {
         (nth * self.cell_count() + j * counts[0] + i) as u32
     }
 
-    /// How cells start: the first run of each.
+    /// Returns the policy of the first start of each cell.
     pub fn policy(&self) -> Start {
         self.starts.policy()
     }
 
-    /// The run that the run `id` starts from the last state of, if cells follow their
-    /// neighbours; none at the end where following begins.
+    /// Returns the run from whose last state the run `id` starts, if cells follow their neighbours; none for the first
+    /// row, which starts at rest.
     pub fn before(&self, id: u32) -> Option<u32> {
         let [columns, rows] = self.counts();
         let (j, columns) = (self.indices(id)[1], columns as u32);
@@ -248,14 +245,13 @@ impl Plan {
         }
     }
 
-    /// Whether anybody reads the last states of runs that have ended: to tell attractors apart, or to go on from them.
+    /// Whether the last states of runs are needed, to distinguish attractors or as starts of other cells.
     pub fn reads_strobes(&self) -> bool {
         self.start_count() > 1 || self.is_basin() || self.policy().follows()
     }
 
-    /// The state in which the run `id` starts at phase 0. `records`, by run, are read only
-    /// where cells follow their neighbours: there the neighbour's last strobe state, or rest
-    /// where the neighbour failed or has no record yet.
+    /// Returns the state of the run `id` at phase 0. If cells follow their neighbours, it is the neighbour's last strobe state
+    /// from `records`, or rest if the neighbour failed or has no record yet.
     pub fn start(&self, id: u32, records: &(impl Records + ?Sized)) -> State {
         let of = |before: u32| {
             let before = before as usize;
@@ -267,7 +263,7 @@ impl Plan {
         }
     }
 
-    /// The start of a run that follows no neighbour.
+    /// Returns the start of a run that follows no neighbour.
     fn own_start(&self, id: u32) -> State {
         let nth = id as usize / self.cell_count();
         match nth {
@@ -276,45 +272,45 @@ impl Plan {
         }
     }
 
-    /// How long each cell is integrated.
+    /// Returns how long each cell is integrated.
     pub fn budget(&self) -> &Budget {
         &self.budget
     }
 
-    /// Whether records may be of this plan's runs: periods that nobody searched for come of damage or malice alone.
+    /// Whether records can be results of this plan. Periods longer than the longest search show damaged records.
     pub fn admits(&self, kept: &[(u32, Record)]) -> bool {
         let longest = self.budget.settings.max_period.max(1);
         kept.iter().all(|(_, record)| record.period <= longest)
     }
 
-    /// How fine the grid of the lanes is at least.
+    /// Returns the smallest resolution of the lanes' time grid.
     pub fn steps_per_period(&self) -> Steps {
         self.steps
     }
 
-    /// How the map is refined; none if every cell is integrated.
+    /// Returns the settings of an adaptive map; none if every cell is integrated.
     pub fn refine(&self) -> Option<Refine> {
         self.refine
     }
 
-    /// What is asked for.
+    /// Returns the quantities that are computed.
     pub fn needs(&self) -> &Needs {
         &self.needs
     }
 
-    /// Indices on the two axes of a run's cell.
+    /// Returns the indices of a run's cell on the two axes.
     pub fn indices(&self, id: u32) -> [usize; 2] {
         self.points.indices(id as usize % self.cell_count())
     }
 
-    /// What the run `id` is made of. One that follows its neighbour starts at rest here: only
-    /// the neighbour's record says where it does ([`Plan::start`]).
+    /// Returns flow, law and start of the run `id`. The start of a run that follows its neighbour is rest here; the actual
+    /// start depends on the neighbour's record ([`Plan::start`]).
     pub fn cell(&self, id: u32) -> Cell {
         let law = self.laws.of(id as usize % self.cell_count());
         Cell { id, flow: self.flow_of(id), law, start: self.own_start(id) }
     }
 
-    /// The runs at these places of the order, each made as [`Plan::cell`] says.
+    /// Returns the runs at these places of the order, as [`Plan::cell`] does.
     pub fn cells(&self, places: Range<usize>) -> Vec<Cell> {
         places.map(|place| self.cell(self.run_at(place))).collect()
     }
@@ -323,63 +319,63 @@ impl Plan {
         self.flows.of(id as usize % self.cell_count())
     }
 
-    /// How many distinct flows there are.
+    /// Returns the number of distinct flows.
     pub fn flow_count(&self) -> usize {
         self.flows.count()
     }
 
-    /// Whether several runs share a flow, and all flows can be kept.
-    pub fn keeps_flows(&self) -> bool {
-        keeps_flows(self.flow_count() as u64, self.run_count() as u64)
+    /// Whether several runs share a flow, and all flows can be stored.
+    pub fn stores_flows(&self) -> bool {
+        stores_flows(self.flow_count() as u64, self.run_count() as u64)
     }
 
-    /// How many distinct laws there are.
+    /// Returns the number of distinct laws.
     pub fn law_count(&self) -> usize {
         self.laws.count()
     }
 
-    /// The oscillator of flow `index`.
+    /// Returns the oscillator of flow `index`.
     ///
     /// # Panics
-    /// If the model has none there: [`Plan::check`] tells before.
+    /// If the model has no oscillator there, which [`Plan::check`] detects.
     pub fn oscillator(&self, index: u32) -> Oscillator {
         match self.points.model(self.flows.cell(index)).oscillator() {
             Ok(oscillator) => oscillator,
-            Err(error) => panic!("a plan that was not checked: {error}"),
+            Err(error) => panic!("the plan was not checked: {error}"),
         }
     }
 
-    /// The contact law `index`.
+    /// Returns the contact law `index`.
     pub fn law(&self, index: u32) -> Law {
         self.points.model(self.laws.cell(index)).law()
     }
 
-    /// The model of the run `id`.
+    /// Returns the model of the run `id`.
     pub fn model(&self, id: u32) -> Box<dyn Model> {
         self.points.model(id as usize % self.cell_count())
     }
 }
 
-/// Whether several runs share a flow, and all flows can be kept.
-pub(crate) fn keeps_flows(flows: u64, runs: u64) -> bool {
-    flows < runs && flows <= KEPT_FLOWS as u64
+/// Whether several runs share a flow, and all flows can be stored.
+pub(crate) fn stores_flows(flows: u64, runs: u64) -> bool {
+    flows < runs && flows <= MOST_STORED_FLOWS as u64
 }
 
 fn needs(quantities: &[Quantity]) -> Needs {
-    let asked = |quantity| quantities.contains(&quantity);
+    let has = |quantity| quantities.contains(&quantity);
     Needs {
-        // Without it chaos cannot be told from a cycle that was not found.
-        exponent: asked(Quantity::Lyapunov) || asked(Quantity::Class),
-        lyapunov: asked(Quantity::Lyapunov),
-        impacts: asked(Quantity::Impacts),
-        mesh: asked(Quantity::Mesh),
-        symmetric: asked(Quantity::Symmetric),
-        word: asked(Quantity::Word),
-        pattern: asked(Quantity::Pattern),
+        // The exponent distinguishes chaos from a cycle that was not found.
+        exponent: has(Quantity::Lyapunov) || has(Quantity::Class),
+        lyapunov: has(Quantity::Lyapunov),
+        impacts: has(Quantity::Impacts),
+        mesh: has(Quantity::Mesh),
+        symmetric: has(Quantity::Symmetric),
+        word: has(Quantity::Word),
+        pattern: has(Quantity::Pattern),
     }
 }
 
-/// How many cells are in each class: periodic, chaotic, undecided, failed.
+/// Counts the classes: periodic, chaotic, undecided, failed.
 pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
     let mut counts = [0; 4];
     for class in classes {
@@ -388,26 +384,27 @@ pub fn count_classes(classes: impl Iterator<Item = Class>) -> [usize; 4] {
     counts
 }
 
+/// Plans a map over two parameters from 0.5 to 1, with further lines of the scene.
+#[cfg(test)]
+pub(crate) fn test_plan(axes: [(&str, usize); 2], more: &str) -> Plan {
+    let [first, second] = axes.map(|(name, count)| {
+        format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1.0\ncount = {count}\n")
+    });
+    let text = format!("{first}{second}{more}");
+    Plan::new(&Scene::parse(&text, "s", &[], crate::map::scene::Purpose::Map).unwrap())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::scene::Purpose;
-
-    fn plan(first: &str, second: &str, counts: [usize; 2]) -> Plan {
-        let axis = |name, count| {
-            format!("[[axis]]\nparameter = '{name}'\nmin = 0.25\nmax = 0.75\ncount = {count}\n")
-        };
-        let text = axis(first, counts[0]) + &axis(second, counts[1]);
-        let e = if first == "e" || second == "e" { vec![] } else { vec!["e=0.5".to_owned()] };
-        Plan::new(&Scene::parse(&text, "s", &e, Purpose::Map).unwrap())
-    }
 
     #[test]
     fn every_cell_has_the_flow_and_law_of_its_model() {
         for (first, second, flows, laws) in
             [("e", "omega", 5, 3), ("omega", "e", 3, 5), ("e", "mesh_speed", 1, 15), ("k", "omega", 15, 1)]
         {
-            let plan = plan(first, second, [3, 5]);
+            let e = if [first, second].contains(&"e") { "" } else { "[parameters]\ne = 0.5\n" };
+            let plan = test_plan([(first, 3), (second, 5)], e);
             assert_eq!((plan.flow_count(), plan.law_count()), (flows, laws), "{first} {second}");
             for id in 0..15 {
                 let (cell, model) = (plan.cell(id), plan.model(id));
@@ -422,7 +419,7 @@ mod tests {
 
     #[test]
     fn the_order_is_that_of_the_keys_and_has_every_cell_once() {
-        let plan = plan("e", "omega", [7, 5]);
+        let plan = test_plan([("e", 7), ("omega", 5)], "");
         let keys: Vec<u64> = plan.order().iter().map(|&id| morton_key(plan.indices(id))).collect();
         assert!(keys.is_sorted());
         let mut ids = plan.order();

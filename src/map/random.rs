@@ -1,15 +1,15 @@
-//! Random numbers that are the same everywhere: SplitMix64 (Steele, Lea, Flood 2014).
+//! Pseudorandom numbers that are equal on every machine: SplitMix64 (Steele, Lea, Flood 2014).
 
-/// A stream of numbers that its seed decides.
+/// A stream of numbers, determined by its seed.
 pub struct Random(u64);
 
 impl Random {
-    /// The stream of `seed`.
+    /// Begins the stream of `seed`.
     pub fn new(seed: u64) -> Random {
         Random(seed)
     }
 
-    /// Any 64 bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
@@ -18,17 +18,17 @@ impl Random {
         x ^ (x >> 31)
     }
 
-    /// A number below `bound`, which is not zero. Unevenness is below `bound / 2^64`.
+    /// Returns a number below `bound`, which must not be 0. The bias is below `bound / 2^64`.
     pub fn below(&mut self, bound: usize) -> usize {
         ((u128::from(self.bits()) * bound as u128) >> 64) as usize
     }
 
-    /// A number from 0 (included) to 1 (excluded), one of 2^53.
+    /// Returns a multiple of 2^-53 from 0 (included) to 1 (excluded).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * 2f64.powi(-53)
     }
 
-    /// Moves `count` entries to the front, every choice and order of them equally likely.
+    /// Moves `count` random entries to the front. All choices and orders are equally likely.
     pub fn draw<T>(&mut self, list: &mut [T], count: usize) {
         for i in 0..count.min(list.len()) {
             let from = i + self.below(list.len() - i);

@@ -1,9 +1,8 @@
-//! What is asked: a scene, read from TOML or [built](Scene::builder) in Rust, and checked whole.
+//! A scene: the definition of a map or a bifurcation diagram, read from TOML or [built](Scene::builder) in Rust.
 //!
-//! Parsing is pure: it takes the text and the name that messages give it. Whatever is
-//! wrong is found here, with its place and its remedy; what parsing returns cannot fail
-//! later. `--set` arguments are applied before anything is checked, so a value is judged
-//! the same way wherever it came from.
+//! Reading is pure: it needs only the text and the name that messages use for it. It finds every error, with its place
+//! and its remedy, so that a scene that was read cannot fail later. `--set` arguments are applied before anything is
+//! checked, so the same checks apply to values of any origin.
 
 mod along;
 mod axis;
@@ -11,6 +10,7 @@ mod builder;
 mod derived;
 mod identity;
 mod keys;
+mod limits;
 mod list;
 mod models;
 mod overrides;
@@ -21,41 +21,42 @@ mod start;
 #[cfg(test)]
 mod tests;
 
-pub use crate::text::error::{Place, Problem, SceneError};
+pub use crate::text::error::{Fault, Place, Problem, SceneError};
 pub use along::Along;
-pub use axis::{Axis, MAX_COUNT, Scale, Target};
+pub use axis::{Axis, Scale, Target};
 pub use builder::SceneBuilder;
 pub(crate) use derived::Rule;
 pub use keys::{KEYS, Key, KeyDefault, Takes};
-pub use list::{Beside as FileBeside, FileText, FindFile, List};
+pub use limits::MAX_COUNT;
+pub use list::{CompanionFile, FileText, FindFile, List};
 pub(crate) use points::Points;
-pub use settings::{AUDIT, Continuous, Format, Integration, Outputs, Quantity, Refine, Steps};
+pub use settings::{Continuous, DEFAULT_AUDIT, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 
 use crate::text::document::{self, Node};
 use crate::text::error;
 use crate::text::section::{self, Section};
 use derived::Derived;
-use parameters::Beside;
+use parameters::ParameterSources;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Model, ModelError, Parameter, ParameterError};
 use rattlemap_dynamics::orbit;
 
-/// What stands outside of any table, and the tables.
+/// Keys outside of any table, and the names of the tables.
 const TOP_LEVEL: [&str; 10] =
     ["title", "model", "parameters", "derived", "axis", "cells", "integration", "start", "refine", "outputs"];
 
-/// What a scene is read for; it decides the number of axes and the files that can be asked for.
+/// Purpose for which a scene is read. It decides the number of axes and the kinds of output files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// A map over two axes.
+    /// A map over two axes or a list of cells.
     Map,
-    /// Section points over one axis.
+    /// A bifurcation diagram over one axis.
     Bifurcation,
 }
 
 impl Purpose {
-    /// The command's name and the number of axes that it needs.
+    /// Returns the command's name and the number of axes that it needs.
     fn needs(self) -> (&'static str, usize) {
         match self {
             Purpose::Map => ("map", 2),
@@ -64,7 +65,7 @@ impl Purpose {
     }
 }
 
-/// A checked scene.
+/// A scene without errors.
 #[derive(Clone, Debug)]
 pub struct Scene {
     text: String,
@@ -78,40 +79,26 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads a scene from its text, which must do without files beside it.
+    /// Reads a scene that names no other files.
     ///
-    /// `name` is what messages call the text, usually the file's path as the user gave it;
-    /// `sets` are `NAME=VALUE` arguments, later ones winning over earlier ones and all of
-    /// them over the text.
+    /// Messages call the text `name`, usually the file's path as the user gave it. `sets` are `NAME=VALUE` arguments; each
+    /// overrides the text and earlier arguments.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong.
+    /// [`SceneError`] for the first error.
     pub fn parse(text: &str, name: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
         let find: FindFile<'_> = &|_, _| Err("names a file, and no files are read here".to_owned());
-        Scene::parse_beside(text, name, sets, purpose, find)
+        Scene::parse_with_files(text, name, sets, purpose, None, find)
     }
 
-    /// The same where a list of cells, or the model, may stand in a file of its own, which `find` reads: nothing here
-    /// does.
+    /// Reads a scene that may name a model file or a table of cells, which `find` returns.
+    ///
+    /// With `along`, a bifurcation diagram runs along one of several axes. Settings in the text that only maps have
+    /// (`[refine]`, further starts, some kinds of files) are then ignored.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong, in the text or in such a file.
-    pub fn parse_beside(
-        text: &str,
-        name: &str,
-        sets: &[String],
-        purpose: Purpose,
-        find: FindFile<'_>,
-    ) -> Result<Scene, SceneError> {
-        Scene::parse_along(text, name, sets, purpose, None, find)
-    }
-
-    /// The same where a bifurcation diagram may run along one of several axes. Of such a scene, what its text asks of a
-    /// map alone is left out: `[refine]`, further starts, files that diagrams have not.
-    ///
-    /// # Errors
-    /// [`SceneError`] for the first thing that is wrong, in the scene or in `along`.
-    pub fn parse_along(
+    /// [`SceneError`] for the first error, in the text, in one of the files, or in `along`.
+    pub fn parse_with_files(
         text: &str,
         name: &str,
         sets: &[String],
@@ -122,11 +109,11 @@ impl Scene {
         Scene::parse_document(text, document::read(text, name)?, sets, purpose, along, find)
     }
 
-    /// The same of a text that a program has written for somebody: errors do not tell lines that nobody has seen.
+    /// Reads a scene whose text a program has generated. Errors name no lines, because the user has not seen the text.
     ///
     /// # Errors
-    /// As [`Scene::parse_along`].
-    pub fn parse_written(
+    /// As for [`Scene::parse_with_files`].
+    pub fn parse_generated(
         text: &str,
         sets: &[String],
         purpose: Purpose,
@@ -150,17 +137,17 @@ impl Scene {
         }
         let model = models::read(&Section::open(&document, "", &TOP_LEVEL)?, find)?;
         if purpose == Purpose::Bifurcation {
-            along::take(&mut document, &model, along)?;
+            along::reduce(&mut document, &model, along)?;
         }
         Scene::read(text.to_owned(), &document, &model, purpose, find)
     }
 
-    /// A scene without a file: see [`SceneBuilder`].
+    /// Begins a scene without a file: see [`SceneBuilder`].
     pub fn builder(model: impl Model) -> SceneBuilder {
         SceneBuilder::new(Box::new(model))
     }
 
-    /// Reads the tree of a scene whose model is known.
+    /// Reads the tree of a scene with its model.
     fn read(
         text: String,
         document: &Node,
@@ -184,8 +171,8 @@ impl Scene {
             axes.iter().any(|axis| axis.target() == target) || list.as_ref().is_some_and(is_column)
         };
         let derived = derived::read(&root, model, is_swept)?;
-        let beside = Beside { axes: &axes, list: list.as_ref(), derived: &derived };
-        let base = parameters::read(&root, model, beside)?;
+        let sources = ParameterSources { axes: &axes, list: list.as_ref(), derived: &derived };
+        let base = parameters::read(&root, model, sources)?;
         let title = root.get("title").map(|title| settings::read_title(&title)).transpose()?;
         let is_list = list.is_some();
         let points = Points::new(base, axes, list, derived);
@@ -207,15 +194,15 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Refuses a scene whose model has no motion in a cell at a corner. What lies between is looked at
-    /// by [`Plan::check`](crate::map::plan::Plan::check), once the size is known to be sane.
+    /// Refuses a scene whose model has no motion in a cell at a corner of the plane. The other cells are checked by
+    /// [`Plan::check`](crate::map::plan::Plan::check) after the size of the map.
     fn check_corners(&self, root: &Section<'_>) -> Result<(), SceneError> {
         let [columns, rows] = self.points.counts();
         for cell in [0, columns - 1, columns * (rows - 1), columns * rows - 1] {
             let model = self.points.model(cell);
             if let Err(error) = Flow::validate(&*model) {
                 let named = self.points.named(cell);
-                // What derives a value that is out of range is what has to change.
+                // If the value is derived, the error belongs to its expression.
                 let derives = match &error {
                     ModelError::Parameter(ParameterError::OutOfRange { name, .. }) => self.rule(name),
                     _ => None,
@@ -230,28 +217,27 @@ impl Scene {
         Ok(())
     }
 
-    /// What derives a parameter.
+    /// Returns the rule that derives a parameter.
     fn rule(&self, name: &str) -> Option<&derived::Rule> {
         self.points.derived().rules().iter().find(|rule| rule.parameter().name == name)
     }
 
-    /// The text that was parsed, without the `--set` arguments; of a scene that was built, the
-    /// same in TOML.
+    /// Returns the scene's text without the `--set` arguments. For a scene that was built, this is generated TOML.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The heading of figures and reports.
+    /// Returns the heading of figures and reports.
     pub fn title(&self) -> &str {
         &self.title
     }
 
-    /// The axes in their order, which is meaning: the first runs along columns. None where cells are listed.
+    /// Returns the axes. The first runs along the columns of a map. Empty for a list of cells.
     pub fn axes(&self) -> &[Axis] {
         self.points.axes()
     }
 
-    /// The list of cells, where one stands in the place of axes.
+    /// Returns the list of cells, if the scene has one instead of axes.
     pub fn list(&self) -> Option<&List> {
         self.points.list()
     }
@@ -260,13 +246,12 @@ impl Scene {
         &self.points
     }
 
-    /// The model in the first cell: swept parameters at the first of their values.
+    /// Returns the model in the first cell.
     pub fn base(&self) -> &dyn Model {
         self.points.base()
     }
 
-    /// The parameters, and components of the start, that cells differ in: those of the axes, or the columns of a list.
-    /// Derived ones are not among them.
+    /// Returns the parameters and components of the start that axes or columns sweep. Derived parameters are not included.
     pub fn swept(&self) -> impl Iterator<Item = &Parameter> {
         self.points.swept()
     }
@@ -282,17 +267,17 @@ impl Scene {
         self.points.sweeps_start()
     }
 
-    /// Whether it is a map of basins: an axis sweeps a component of the start.
+    /// Whether this is a map of basins: at least one axis sweeps a component of the start.
     pub fn is_basin(&self) -> bool {
         self.list().is_none() && self.sweeps_start()
     }
 
-    /// The parameters that follow others, each with its expression, in an order in which they can be computed.
+    /// Returns the derived parameters with their expressions, ordered so that each needs only earlier ones.
     pub fn derived(&self) -> impl Iterator<Item = (&Parameter, &str)> {
         self.points.derived().rules().iter().map(|rule| (rule.parameter(), rule.text()))
     }
 
-    /// Names and values of the parameters that are the same in every cell by being set so: neither swept nor derived.
+    /// Returns names and values of the parameters that are neither swept nor derived.
     pub fn fixed(&self) -> impl Iterator<Item = (&str, f64)> {
         let base = self.base();
         let all = base.parameters().iter().enumerate();
@@ -301,57 +286,57 @@ impl Scene {
         fixed.map(|(index, parameter)| (&*parameter.name, base.value(index)))
     }
 
-    /// How long each cell is integrated, and what for.
+    /// Returns how long each cell is integrated.
     pub fn integration(&self) -> &Integration {
         &self.integration
     }
 
-    /// The same as the orbit analysis takes it.
+    /// Returns the settings of the integration in the form that the orbit analysis needs.
     pub fn orbit_settings(&self) -> orbit::Settings {
         (&self.integration).into()
     }
 
-    /// Where cells start.
+    /// Returns the states in which cells start.
     pub fn start(&self) -> Start {
         self.start
     }
 
-    /// How many more starts each cell has; none where there is one alone.
+    /// Returns the random starts of each cell; none if each cell has one start.
     pub fn draw(&self) -> Option<Draw> {
         self.draw
     }
 
-    /// Bounds of an adaptive map; none where every cell is integrated.
+    /// Returns the settings of an adaptive map; none if every cell is integrated.
     pub fn refine(&self) -> Option<Refine> {
         self.refine
     }
 
-    /// What is computed and written.
+    /// Returns the quantities and files of the map.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     pub fn cell_count(&self) -> u64 {
         self.points.counts().iter().map(|&count| count as u64).product()
     }
 
-    /// How many runs there are: one per cell and start.
+    /// Returns the number of runs: one per cell and start.
     pub fn run_count(&self) -> u64 {
         self.cell_count().saturating_mul(self.draw.map_or(1, |draw| u64::from(draw.count)))
     }
 
-    /// The model in the cell with the given index on each axis; with the place in a list that stands for axes.
+    /// Returns the model of a cell, given its index on each axis, or its place in the list.
     ///
     /// # Panics
-    /// If there are not as many indices as axes.
+    /// If the number of indices is not that of the axes (1 for a list).
     pub fn cell(&self, indices: &[usize]) -> Box<dyn Model> {
         assert_eq!(indices.len(), self.axes().len().max(1), "one index per axis");
         let [columns, _] = self.points.counts();
         self.points.model(indices[0] + columns * indices.get(1).unwrap_or(&0))
     }
 
-    /// Axis value and model of every cell of a scene with one axis, in order.
+    /// Returns the axis value and the model of every cell of a scene with one axis, in order.
     ///
     /// # Panics
     /// If the scene does not have exactly one axis.
@@ -361,11 +346,11 @@ impl Scene {
     }
 }
 
-/// One cell of a model from `NAME=VALUE` arguments alone: its own values unless set.
+/// Sets parameters of a model by `NAME=VALUE` arguments.
 ///
 /// # Errors
-/// [`SceneError`] for an unknown parameter, a value out of its range, or a setting that is
-/// not a parameter; for a model that has no motion.
+/// [`SceneError`] for an unknown parameter, a value out of its range, a setting that is not a parameter, or values for
+/// which the model has no motion.
 pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>, SceneError> {
     let values = model.parameters().iter().enumerate();
     let values = values.map(|(index, parameter)| format!("{} = {:?}\n", parameter.name, model.value(index)));
@@ -375,10 +360,10 @@ pub fn single_cell(model: &dyn Model, sets: &[String]) -> Result<Box<dyn Model>,
         overrides::apply(&mut document, set)?;
     }
     let root = Section::open(&document, "", &["parameters"])?;
-    let beside = Beside { axes: &[], list: None, derived: &Derived::default() };
-    let cell = parameters::read(&root, model, beside)?;
+    let sources = ParameterSources { axes: &[], list: None, derived: &Derived::default() };
+    let cell = parameters::read(&root, model, sources)?;
     Flow::validate(&*cell).map_err(|error| {
-        // Defaults are fine: it is what was set that has to change.
+        // The defaults have a motion, so the error is in the arguments.
         let error = root.no_motion("", &error);
         match sets {
             [] => error,

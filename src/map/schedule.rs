@@ -1,19 +1,19 @@
-//! Which cells are integrated, in which order, and which need not be. Pure.
+//! The schedule: which cells are integrated, and in which order. Pure.
 //!
-//! Without `[refine]` every cell is, in Morton order. With it the map is adaptive: cells of a
-//! coarse grid first, then what lies in blocks in which cells are known to differ (in
-//! class, period, and symmetry or word where they are asked for; in a map of basins in the attractor), or that touch one whose corners do,
-//! down to single cells. The rest is filled from the corners around it. An audit then
-//! integrates a random sample of the filled cells. If it finds too many of them wrong, and more
-//! than chance may put there, blocks filled with what is wrong are halved and the audit is
-//! repeated; if not, only the blocks with wrong cells are refined on.
+//! Without `[refine]` every cell is integrated, in Morton order. With it the map is adaptive. The cells of a coarse grid
+//! come first. A block of cells is then halved if cells in it are known to differ, or if it touches a block whose corners
+//! differ, down to single cells. Cells differ in class and period, and in symmetry, word or pattern if the scene requests
+//! them; in a map of basins they differ in the attractor. The other cells are filled from the corners around them. An audit
+//! integrates a random sample of the filled cells. If significantly more of them are wrong than allowed, blocks filled with
+//! the most frequently wrong values are halved and the audit is repeated. Otherwise only the blocks with wrong cells are
+//! halved.
 //!
-//! Where cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells
-//! starts from the last states of the row before. Several starts per cell are
-//! further runs over all cells, one start after the other: what runs side by side starts alike.
+//! If cells follow their neighbours (`start.policy = "up"` or `"down"`), every row of cells starts from the last states of
+//! the preceding row. Several starts per cell are further runs over all cells, one start after the other, so that
+//! simultaneous runs start alike.
 //!
-//! What is asked for follows from the records that have come, not from their order. So nobody waits for the
-//! slowest cell but what depends on it, and a run that was interrupted goes on by replaying its records.
+//! Requests depend on the records that have arrived, not on their order. So no cell waits for a slow cell unless it depends
+//! on it, and an interrupted run continues by replaying its records.
 
 mod adaptive;
 mod audit;
@@ -37,102 +37,101 @@ use crate::map::plan::{Cell, Plan};
 use crate::map::shard::Shard;
 use crate::record::Record;
 
-/// The order of work on a map: which cells are asked for, and which of them have their records.
+/// The order of work on a map: the requested cells, and which of them have their records.
 pub struct Schedule {
-    /// Cells in the order in which they were asked for.
+    /// Cells in the order of their requests.
     sequence: Vec<u32>,
-    /// Places of it that were handed out, and how many had been before the last time.
+    /// Number of places of the sequence that were begun, now and before the last call of `next`.
     begun: usize,
     begun_before: usize,
-    /// How many records have come.
-    come: usize,
-    /// By run.
-    states: Vec<State>,
-    /// Where the last row begins.
+    /// Number of records that have arrived.
+    done: usize,
+    /// State of each run.
+    states: Vec<RunState>,
+    /// Place in the sequence where the last row begins.
     row: usize,
-    rule: Rule,
+    strategy: Strategy,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum State {
-    Unasked,
-    Asked,
-    Come,
+enum RunState {
+    Unrequested,
+    Requested,
+    Done,
 }
 
-/// What asks for cells.
-enum Rule {
-    /// All are asked for from the beginning.
+/// The rule that requests cells.
+enum Strategy {
+    /// All cells are requested at the beginning.
     Whole,
-    /// Rows that follow each other.
+    /// Rows are requested one after the other.
     Follow(Follow),
-    /// Blocks that differ.
+    /// Blocks with different cells are refined.
     Adaptive(Box<Adaptive>),
 }
 
-/// What became of an adaptive map.
+/// Result of an adaptive map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refined {
-    /// Cells that were integrated.
+    /// Number of integrated cells.
     pub integrated: usize,
-    /// Cells that were filled.
+    /// Number of filled cells.
     pub filled: usize,
-    /// Steps that had to follow each other: the coarse grid, the halvings of the block that was halved most, the
-    /// samples of the audits.
+    /// Number of consecutive steps: the coarse grid, the halvings of the block that was halved most, and the samples of audits.
     pub rounds: usize,
-    /// Fraction of the filled cells that the scene lets be wrong.
+    /// Allowed fraction of wrong filled cells.
     pub max_error: f64,
-    /// Audits in order; the last one found no more wrong cells than the scene allows, unless
-    /// nothing was left to refine or blocks had been halved as often as they may.
+    /// Audits in order. The last one found at most the allowed fraction of wrong cells, unless no more blocks could be halved.
     pub audits: Vec<Audit>,
-    /// Of a map of basins: for every cell the one that it was filled from, itself where it was integrated.
+    /// For a map of basins, the cell from which each cell was filled; itself if it was integrated. Otherwise empty.
     pub filled_from: Vec<u32>,
 }
 
 impl Schedule {
-    /// The schedule of a plan.
+    /// Builds the schedule of a plan.
     pub fn new(plan: &Plan) -> Schedule {
         Schedule::of(plan, None)
     }
 
-    /// The schedule of a part of a plan, or of all of it.
+    /// Builds the schedule of a shard of a plan, or of the whole plan.
     ///
     /// # Panics
-    /// If there is a part of an adaptive map, which [`Shard::check`] refuses.
+    /// For a shard of an adaptive map, which [`Shard::check`] refuses.
     pub fn of(plan: &Plan, shard: Option<Shard>) -> Schedule {
-        assert!(shard.is_none() || plan.refine().is_none(), "an adaptive map is not dealt out");
+        assert!(shard.is_none() || plan.refine().is_none(), "an adaptive map has no shards");
         let mut sequence = Vec::new();
-        let rule = match plan.refine() {
-            Some(refine) => Rule::Adaptive(Box::new(Adaptive::new(plan, refine, &mut sequence))),
+        let strategy = match plan.refine() {
+            Some(refine) => Strategy::Adaptive(Box::new(Adaptive::new(plan, refine, &mut sequence))),
             None if plan.policy().follows() => {
                 let follow = Follow::new(plan, shard);
                 sequence = follow.row();
-                Rule::Follow(follow)
+                Strategy::Follow(follow)
             }
             None => {
                 let all = || (0..plan.run_count()).map(|place| plan.run_at(place)).collect();
                 sequence = shard.map_or_else(all, |shard| shard.runs(plan));
-                Rule::Whole
+                Strategy::Whole
             }
         };
-        let states = vec![State::Unasked; plan.run_count()];
-        let mut schedule = Schedule { sequence, begun: 0, begun_before: 0, come: 0, states, row: 0, rule };
-        schedule.note_asked(0);
+        let states = vec![RunState::Unrequested; plan.run_count()];
+        let mut schedule =
+            Schedule { sequence, begun: 0, begun_before: 0, done: 0, states, row: 0, strategy };
+        schedule.note_requested(0);
         schedule
     }
 
-    /// Ids of the cells to integrate, as far as they are known by now.
+    /// Returns the ids of the cells requested so far.
     pub fn sequence(&self) -> &[u32] {
         &self.sequence
     }
 
-    /// Up to `count` cells to begin next; none while what comes next depends on cells under way, or if
-    /// the map is finished.
+    /// Returns up to `count` cells to begin next; none if the next requests depend on cells under way, or if the map is
+    /// finished.
     pub fn next(&mut self, plan: &Plan, count: usize) -> Vec<Cell> {
         let mut cells = Vec::new();
         self.begun_before = self.begun;
         while cells.len() < count && self.begun < self.sequence.len() {
-            if self.states[self.sequence[self.begun] as usize] == State::Asked {
+            if self.states[self.sequence[self.begun] as usize] == RunState::Requested {
                 cells.push(self.cell(plan, self.begun));
             }
             self.begun += 1;
@@ -140,85 +139,84 @@ impl Schedule {
         cells
     }
 
-    /// Takes back what [`Schedule::next`] handed out last, which could not be begun.
-    pub fn take_back(&mut self) {
+    /// Takes back the cells that [`Schedule::next`] returned last, because they could not be begun.
+    pub fn return_last(&mut self) {
         self.begun = self.begun_before;
     }
 
-    /// Whether a cell is asked for and has no record yet.
-    pub fn waits_for(&self, id: u32) -> bool {
-        self.states.get(id as usize) == Some(&State::Asked)
+    /// Whether a cell is requested and has no record yet.
+    pub fn is_waiting_for(&self, id: u32) -> bool {
+        self.states.get(id as usize) == Some(&RunState::Requested)
     }
 
-    /// Whether records may be taken up in any order: no cell depends on another.
+    /// Whether records may be accepted in any order, because no cell depends on another.
     pub fn takes_any_order(&self) -> bool {
-        matches!(self.rule, Rule::Whole)
+        matches!(self.strategy, Strategy::Whole)
     }
 
-    /// Looks at records that are taken up next: all at once is faster, and the same.
-    pub fn foresee(&mut self, records: &[(u32, Record)]) {
-        if let Rule::Adaptive(adaptive) = &mut self.rule {
-            adaptive.foresee(records);
+    /// Prepares for records that are accepted next. This is only faster: it evaluates them in parallel.
+    pub fn prepare(&mut self, records: &[(u32, Record)]) {
+        if let Strategy::Adaptive(adaptive) = &mut self.strategy {
+            adaptive.prepare(records);
         }
     }
 
-    /// Whether it reads the records of other cells: else there need be none when one is taken up.
+    /// Whether the schedule reads records of other cells. Otherwise the slice of records may be empty in [`Schedule::take`].
     pub fn reads_records(&self) -> bool {
-        !matches!(self.rule, Rule::Whole)
+        !matches!(self.strategy, Strategy::Whole)
     }
 
-    /// Takes up the record of a cell that it waits for; `records` are those of all runs, this one included, if it reads
-    /// them.
+    /// Accepts the record of a requested cell. `records` are those of all runs, including this one, if the schedule reads them.
     pub fn take(&mut self, id: u32, records: &[Record]) {
-        self.states[id as usize] = State::Come;
-        self.come += 1;
+        self.states[id as usize] = RunState::Done;
+        self.done += 1;
         let end = self.sequence.len();
-        if let Rule::Adaptive(adaptive) = &mut self.rule {
+        if let Strategy::Adaptive(adaptive) = &mut self.strategy {
             adaptive.take(id, &records[id as usize], &mut self.sequence);
         }
-        if self.come == self.sequence.len() {
-            match &mut self.rule {
-                Rule::Whole => {}
-                Rule::Follow(follow) => {
+        if self.done == self.sequence.len() {
+            match &mut self.strategy {
+                Strategy::Whole => {}
+                Strategy::Follow(follow) => {
                     self.sequence.extend(follow.next(records));
                     self.row = end;
                 }
-                Rule::Adaptive(adaptive) => adaptive.settle(records, &mut self.sequence),
+                Strategy::Adaptive(adaptive) => adaptive.settle(records, &mut self.sequence),
             }
         }
-        self.note_asked(end);
+        self.note_requested(end);
     }
 
-    fn note_asked(&mut self, from: usize) {
+    fn note_requested(&mut self, from: usize) {
         for &id in &self.sequence[from..] {
-            self.states[id as usize] = State::Asked;
+            self.states[id as usize] = RunState::Requested;
         }
     }
 
-    /// Whether every cell that is asked for has its record.
+    /// Whether every requested cell has its record.
     pub fn is_finished(&self) -> bool {
-        self.come == self.sequence.len()
+        self.done == self.sequence.len()
     }
 
-    /// Runs that there will be, as far as is known by now.
+    /// Returns the number of runs that are expected so far.
     pub fn expected(&self) -> usize {
-        match &self.rule {
-            Rule::Follow(follow) => follow.cell_count(),
-            Rule::Whole | Rule::Adaptive(_) => self.sequence.len(),
+        match &self.strategy {
+            Strategy::Follow(follow) => follow.cell_count(),
+            Strategy::Whole | Strategy::Adaptive(_) => self.sequence.len(),
         }
     }
 
     fn cell(&self, plan: &Plan, place: usize) -> Cell {
         let cell = plan.cell(self.sequence[place]);
-        match &self.rule {
-            Rule::Follow(follow) => Cell { start: follow.start(place - self.row), ..cell },
-            Rule::Whole | Rule::Adaptive(_) => cell,
+        match &self.strategy {
+            Strategy::Follow(follow) => Cell { start: follow.start(place - self.row), ..cell },
+            Strategy::Whole | Strategy::Adaptive(_) => cell,
         }
     }
 
-    /// Fills what was not integrated and says how it went; none where every cell was.
+    /// Fills the cells that were not integrated and returns the result; none unless the map is adaptive.
     pub fn finish(&self, records: &mut [Record]) -> Option<Refined> {
-        let Rule::Adaptive(adaptive) = &self.rule else { return None };
+        let Strategy::Adaptive(adaptive) = &self.strategy else { return None };
         let (filled, filled_from) = adaptive.fill(records);
         Some(Refined {
             integrated: self.sequence.len(),

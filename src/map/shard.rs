@@ -1,15 +1,13 @@
-//! A part of a map for one of several machines: which runs are its own. Pure.
+//! Shards: parts of a map for several machines. Pure.
 //!
-//! Cells go to shards in small blocks of the plan's order: cells side by side stay together, as lanes that run together
-//! should, and the blocks of a shard are spread over the whole map, for regions differ in what their cells cost by a
-//! factor of 100. Block `n` is the next shard's, and after every round of all shards the turn is shifted: else a shard
-//! would own stripes of a map whose side is a multiple of their number. Of 64 shards of the main map the one with the most
-//! work has 9 % more than the mean; without the shift 20 %, as 64 ranges of the order five times as much. All starts of a
-//! cell are in its shard. Where cells follow their neighbours along the last axis, what is dealt out are columns: a chain
-//! of cells stays whole.
+//! Cells are assigned in small blocks of the plan's order. Neighbouring cells stay together, because their lanes take
+//! similar work. The blocks of a shard are spread over the whole map, because regions differ in cost by a factor of 100.
+//! Blocks are dealt out in rounds, one block to each shard, and the order of the shards is shifted after each round.
+//! Without the shift a shard would get stripes of a map whose side is a multiple of the number of shards. With 64 shards
+//! of the main map, the largest share of work is 9 % above the mean. It is 20 % above without the shift, and five times
+//! the mean if each shard gets one range of the order.
 //!
-//! A shard derives those flows that its cells need, lanes all of the map's where they are kept (8,192 at most): on the
-//! main map 512 flows, in some milliseconds.
+//! All starts of a cell are in one shard. If cells follow their neighbours along the last axis, whole columns are assigned.
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -21,14 +19,14 @@ use thiserror::Error;
 
 use super::plan::Plan;
 
-/// Most cells of a block: what a subgroup of a graphics card runs together.
+/// Largest number of cells per block: the size of a subgroup of a graphics card.
 const LARGEST_BLOCK: usize = 64;
 
-/// Blocks that each shard gets, of smaller ones where cells are few: the more, the better work is spread. Cells that are
-/// no neighbours make lanes wait for each other: 5 % in blocks of 16, a quarter one by one.
+/// Number of blocks per shard; for few cells the blocks are smaller. More blocks balance the work better, but lanes of
+/// distant cells wait for each other: 5 % of the time in blocks of 16, a quarter for single cells.
 const BLOCKS: usize = 256;
 
-/// An odd number near the golden section of 2^32: its multiples are spread.
+/// An odd number near the golden section of 2^32. Its multiples modulo 2^32 are evenly spread.
 const GOLDEN: u32 = 2_654_435_761;
 
 /// One of `count` shards of a map, counted from 1.
@@ -42,68 +40,68 @@ const GOLDEN: u32 = 2_654_435_761;
 /// # Ok::<(), rattlemap::map::shard::ShardError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(try_from = "Written")]
+#[serde(try_from = "RawShard")]
 pub struct Shard {
     index: NonZeroU32,
     count: NonZeroU32,
 }
 
-/// As it comes from a file.
+/// A shard as read from a file, before it is checked.
 #[derive(Deserialize)]
-struct Written {
+struct RawShard {
     index: u32,
     count: u32,
 }
 
-impl TryFrom<Written> for Shard {
+impl TryFrom<RawShard> for Shard {
     type Error = ShardError;
 
-    fn try_from(written: Written) -> Result<Shard, ShardError> {
-        Shard::new(written.index, written.count)
+    fn try_from(raw: RawShard) -> Result<Shard, ShardError> {
+        Shard::new(raw.index, raw.count)
     }
 }
 
-/// Why there is no such shard.
+/// Why a shard is invalid.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ShardError {
-    /// It is not written as one.
+    /// The text is not of the form `index/count`.
     #[error("it must be two whole numbers, such as 3/16: the third of 16 shards")]
     NotAShard,
-    /// There are none.
-    #[error("there must be one shard at least, such as 1/1")]
+    /// The number of shards is 0.
+    #[error("there must be at least one shard, such as 1/1")]
     NoShards,
-    /// They are counted from 1.
+    /// The index is not between 1 and the number of shards.
     #[error("shards are counted from 1: of {count} the first is 1/{count}, the last {count}/{count}")]
     OutOfRange {
-        /// How many there are.
+        /// Number of shards.
         count: u32,
     },
-    /// Some would be empty.
-    #[error("{shard} is one of {} shards, and the map has {parts} {what} to deal out; ask for {parts} shards at most", .shard.count)]
+    /// The map has fewer parts than shards.
+    #[error("{shard} is one of {} shards, but the map has only {parts} {what}; use at most {parts} shards", .shard.count)]
     TooMany {
-        /// The one asked for.
+        /// The requested shard.
         shard: Shard,
-        /// How many there can be.
+        /// Number of parts.
         parts: usize,
-        /// Of what each gets one at least.
+        /// Name of the parts.
         what: &'static str,
     },
-    /// The map is adaptive.
+    /// An adaptive map cannot be split.
     #[error(
-        "{shard}: which cells an adaptive map integrates follows from the records of all others, and no shard has them; \
-         drop [refine] from the scene, or make the map on one machine"
+        "{shard}: an adaptive map needs the records of all cells to decide which cells to integrate; \
+         remove [refine] from the scene, or compute the map on one machine"
     )]
     Adaptive {
-        /// The one asked for.
+        /// The requested shard.
         shard: Shard,
     },
 }
 
 impl Shard {
-    /// The shard `index`, from 1, of `count`.
+    /// Returns the shard `index`, from 1, of `count`.
     ///
     /// # Errors
-    /// [`ShardError`] if there is none.
+    /// [`ShardError`] for an invalid index or count.
     pub fn new(index: u32, count: u32) -> Result<Shard, ShardError> {
         let counted = NonZeroU32::new(count).ok_or(ShardError::NoShards)?;
         match NonZeroU32::new(index) {
@@ -112,22 +110,22 @@ impl Shard {
         }
     }
 
-    /// Every shard of so many.
+    /// Returns all shards of `count`.
     pub fn all(count: u32) -> impl Iterator<Item = Shard> {
         (1..=count).filter_map(move |index| Shard::new(index, count).ok())
     }
 
-    /// Which it is, from 1.
+    /// Returns the index, from 1.
     pub fn index(self) -> u32 {
         self.index.get()
     }
 
-    /// How many there are.
+    /// Returns the number of shards.
     pub fn count(self) -> u32 {
         self.count.get()
     }
 
-    /// Looks whether a plan can be dealt out to so many.
+    /// Checks that a plan can be split into this number of shards.
     ///
     /// # Errors
     /// [`ShardError::Adaptive`], [`ShardError::TooMany`].
@@ -142,7 +140,7 @@ impl Shard {
         }
     }
 
-    /// Its runs, in the order of the plan. Of a map whose cells follow their neighbours these are not the order of work.
+    /// Returns the runs of this shard in the order of the plan. It is not the order of work if cells follow their neighbours.
     pub fn runs(self, plan: &Plan) -> Vec<u32> {
         if plan.policy().follows() {
             let [width, rows] = plan.counts();
@@ -154,18 +152,18 @@ impl Shard {
         (0..plan.start_count()).flat_map(of_start).map(|place| plan.run_at(place)).collect()
     }
 
-    /// How many runs it has.
+    /// Returns the number of runs.
     pub fn run_count(self, plan: &Plan) -> usize {
         let (parts, _) = parts(plan);
         self.blocks(parts).map(|block| block.len()).sum::<usize>() * (plan.run_count() / parts)
     }
 
-    /// The columns of a map whose cells follow their neighbours: indices on the first axis, ascending.
+    /// Returns the columns of this shard, for a map whose cells follow their neighbours: increasing indices on the first axis.
     pub(crate) fn columns(self, plan: &Plan) -> Vec<u32> {
         self.blocks(plan.counts()[0]).flatten().map(|column| column as u32).collect()
     }
 
-    /// Its share of so many parts, ascending.
+    /// Returns the ranges of this shard's parts, increasing.
     fn blocks(self, parts: usize) -> impl Iterator<Item = Range<usize>> {
         let (own, count) = (self.index() as usize - 1, self.count() as usize);
         let length = block_length(parts, count);
@@ -175,7 +173,7 @@ impl Shard {
     }
 }
 
-/// How many parts of a map are dealt out, and what they are.
+/// Returns the number of parts of a map that can be assigned, and their name.
 fn parts(plan: &Plan) -> (usize, &'static str) {
     match plan.policy().follows() {
         true => (plan.counts()[0], "columns of cells that follow each other"),
@@ -183,13 +181,13 @@ fn parts(plan: &Plan) -> (usize, &'static str) {
     }
 }
 
-/// Parts per block: a power of two, so that blocks of cells are squares or halves of them.
+/// Returns the number of parts per block: a power of two, so that blocks of cells are squares or halves of squares.
 fn block_length(parts: usize, shards: usize) -> usize {
     let most = (parts / (BLOCKS * shards)).clamp(1, LARGEST_BLOCK);
     1 << most.ilog2()
 }
 
-/// By how many shards the turn is shifted in a round.
+/// Returns the shift of the shards' order in a round.
 fn shift(round: usize, count: usize) -> usize {
     ((u64::from((round as u32).wrapping_mul(GOLDEN)) * count as u64) >> 32) as usize
 }
@@ -213,13 +211,10 @@ impl FromStr for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::scene::{Purpose, Scene};
+    use crate::map::plan::test_plan;
 
-    fn plan(counts: [usize; 2], more: &str) -> Plan {
-        let axis =
-            |name, count| format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1.0\ncount = {count}\n");
-        let text = format!("{}{}{more}", axis("e", counts[0]), axis("omega", counts[1]));
-        Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+    fn plan([columns, rows]: [usize; 2], more: &str) -> Plan {
+        test_plan([("e", columns), ("omega", rows)], more)
     }
 
     #[test]
@@ -237,8 +232,8 @@ mod tests {
             for count in [1, 2, 3, 4, 7, 16, 64].into_iter().filter(|&count| count as usize <= parts) {
                 let shards: Vec<Vec<u32>> = Shard::all(count).map(|shard| shard.runs(&plan)).collect();
                 let sizes: Vec<usize> = shards.iter().map(Vec::len).collect();
-                let told: Vec<usize> = Shard::all(count).map(|shard| shard.run_count(&plan)).collect();
-                assert_eq!(sizes, told);
+                let counted: Vec<usize> = Shard::all(count).map(|shard| shard.run_count(&plan)).collect();
+                assert_eq!(sizes, counted);
                 let block = block_length(parts, count as usize) * (plan.run_count() / parts);
                 let (least, most) = (sizes.iter().min().unwrap(), sizes.iter().max().unwrap());
                 assert!(*least > 0 && most - least <= block, "{counts:?} {more} {count}: {sizes:?}");
@@ -249,9 +244,9 @@ mod tests {
         }
     }
 
-    /// All starts of a cell are compared with each other, and a cell may wait for its neighbour's last state.
+    /// All starts of a cell, and all cells that follow each other, are in one shard.
     #[test]
-    fn what_belongs_together_is_in_one_shard() {
+    fn starts_and_columns_stay_in_one_shard() {
         let starts = plan([20, 16], "[start]\ncount = 3\n");
         let rows = plan([20, 16], "[start]\npolicy = 'up'\n");
         for shard in Shard::all(5) {
@@ -267,7 +262,7 @@ mod tests {
         }
     }
 
-    /// A narrow band along either axis, and a square, cost every shard about the same.
+    /// Every shard gets about the same part of a narrow band along either axis, and of a square.
     #[test]
     fn regions_are_spread_over_shards() {
         let plan = plan([512, 512], "");
@@ -286,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_shard_is_refused() {
+    fn invalid_shards_are_refused() {
         let error = |text: &str| text.parse::<Shard>().unwrap_err();
         for text in ["3", "", "/", "1/", "a/b", "1/2/3", "-1/4", "1.5/4", "1/4294967296"] {
             assert_eq!(error(text), ShardError::NotAShard, "{text}");

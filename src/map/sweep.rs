@@ -1,4 +1,4 @@
-//! The run of a map. Cells go to an engine as soon as the schedule asks for them; records are kept as they come.
+//! The run of a map: gives cells to an engine as soon as the schedule requests them, and stores their records.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -12,54 +12,55 @@ use crate::map::plan::Plan;
 use crate::map::schedule::Schedule;
 use crate::record::Record;
 
-/// What cells should take until some have ended: short enough to lose them, long enough not to be noticed.
+/// Target time in seconds until some of the cells under way have ended: little work is lost on an interruption, and the
+/// overhead per batch stays small.
 const BATCH_SECONDS: f64 = 1.0;
 
-/// Records that came after the last ones were kept wait no longer than this.
-const KEPT_AFTER: Duration = Duration::from_millis(500);
+/// Longest time that records wait until they are stored.
+const STORE_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Most cells under way per card, lest those of a fast engine fill the memory.
+/// Largest number of cells under way per card. It bounds the memory that a fast engine uses.
 const LARGEST_BATCH: usize = 1 << 20;
 
-/// Why a sweep ended before its last cell.
+/// Why a sweep ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// The engine failed. Batches that were kept before are kept.
+    /// The engine failed. Records that were stored before remain valid.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// A batch could not be kept.
+    /// Records could not be stored.
     #[error(transparent)]
-    Keep(Box<dyn Error + Send + Sync>),
+    Store(Box<dyn Error + Send + Sync>),
 }
 
-/// Runs the cells that a schedule asks for, puts their records into `records` (by
-/// run; empty where neither the schedule reads them nor anybody else) and hands them to `keep` about once a second, with the number of runs that are foreseen by
-/// now. It ends before, and soon, once `halt` is raised. True if the map is finished.
+/// Runs the cells that a schedule requests. Puts their records into `records`, by run; it may be empty if neither the
+/// schedule nor the caller reads them. Calls `store` about twice a second with new records and the number of runs that
+/// are expected so far. Stops soon after `halt` is raised. Returns whether the map is finished.
 ///
-/// So many cells are under way that some end in about a second; records do not depend on it. If there are too many
-/// for the engine's memory it gets half as many.
+/// The number of cells under way is adapted so that some end within about a second; records do not depend on it. It is
+/// halved if the cells do not fit into the engine's memory.
 ///
 /// # Errors
-/// [`SweepError`], after which everything handed to `keep` before is still good.
+/// [`SweepError`]. Records that were given to `store` before remain valid.
 pub async fn run(
     plan: &Plan,
     schedule: &mut Schedule,
     engine: &mut Engine<'_>,
     records: &mut [Record],
     halt: &Arc<AtomicBool>,
-    mut keep: impl FnMut(&[(u32, Record)], usize) -> Result<(), Box<dyn Error + Send + Sync>>,
+    mut store: impl FnMut(&[(u32, Record)], usize) -> Result<(), Box<dyn Error + Send + Sync>>,
 ) -> Result<bool, SweepError> {
-    engine.heed(halt);
+    engine.stop_on(halt);
     let mut pace = Pace { cells: engine.least_batch(), most: LARGEST_BATCH * engine.card_count() };
     let mut under_way = 0;
-    let (mut unkept, mut last_kept, mut last_ended) = (Vec::new(), Instant::now(), Instant::now());
+    let (mut unstored, mut last_stored, mut last_ended) = (Vec::new(), Instant::now(), Instant::now());
     while !schedule.is_finished() {
         let next = schedule.next(plan, pace.cells.saturating_sub(under_way).min(engine.room()));
-        // Several cards go on meanwhile.
+        // Several cards compute between two calls of `advance`, one engine does not.
         let clock = if engine.card_count() > 1 { last_ended } else { Instant::now() };
         let ended = match engine.begin(&next).await {
             Err(EngineError::OutOfMemory { .. }) if pace.halve(under_way + next.len()) => {
-                schedule.take_back();
+                schedule.return_last();
                 continue;
             }
             Err(error) => Err(error),
@@ -76,19 +77,19 @@ pub async fn run(
             Ok(ended) => {
                 pace.adapt(under_way, ended.len(), last_ended - clock);
                 under_way -= ended.len();
-                schedule.foresee(ended);
+                schedule.prepare(ended);
                 for &(id, record) in ended {
                     put(records, id, record);
                     schedule.take(id, records);
                 }
-                unkept.extend_from_slice(ended);
+                unstored.extend_from_slice(ended);
                 schedule.is_finished() || is_halted
             }
         };
-        if !unkept.is_empty() && (is_over || last_kept.elapsed() >= KEPT_AFTER) {
-            keep(&unkept, schedule.expected()).map_err(SweepError::Keep)?;
-            unkept.clear();
-            last_kept = Instant::now();
+        if !unstored.is_empty() && (is_over || last_stored.elapsed() >= STORE_INTERVAL) {
+            store(&unstored, schedule.expected()).map_err(SweepError::Store)?;
+            unstored.clear();
+            last_stored = Instant::now();
         }
         ended?;
         if is_halted && !schedule.is_finished() {
@@ -98,17 +99,17 @@ pub async fn run(
     Ok(true)
 }
 
-/// Takes up records of an interrupted run, in the order in which they were kept. False if the schedule does not
-/// wait for one of them.
-pub fn replay(schedule: &mut Schedule, records: &mut [Record], kept: &[(u32, Record)]) -> bool {
-    schedule.foresee(kept);
-    kept.iter().all(|&(id, record)| {
-        let is_waited_for = schedule.waits_for(id);
-        if is_waited_for {
+/// Repeats the stored records of an interrupted run in their order. Returns false if the schedule does not wait for one of
+/// them.
+pub fn replay(schedule: &mut Schedule, records: &mut [Record], stored: &[(u32, Record)]) -> bool {
+    schedule.prepare(stored);
+    stored.iter().all(|&(id, record)| {
+        let is_expected = schedule.is_waiting_for(id);
+        if is_expected {
             put(records, id, record);
             schedule.take(id, records);
         }
-        is_waited_for
+        is_expected
     })
 }
 
@@ -118,23 +119,22 @@ fn put(records: &mut [Record], id: u32, record: Record) {
     }
 }
 
-/// How many cells are under way.
+/// Controls the number of cells under way.
 struct Pace {
     cells: usize,
     most: usize,
 }
 
 impl Pace {
-    /// Makes them fewer for good; false if it was one cell already.
+    /// Lowers the limit to half of `tried` cells. Returns false if that is none.
     fn halve(&mut self, tried: usize) -> bool {
         self.most = tried / 2;
         self.cells = self.most;
         self.most > 0
     }
 
-    /// Aims at a second, by no more than a factor of 4 at a time: costs differ from one part of a map to the
-    /// next. Of `under_way` cells `ended` did in the time that elapsed; the last few, which are waited for, say
-    /// nothing.
+    /// Adapts the number of cells to [`BATCH_SECONDS`], by a factor of at most 4, because costs differ between parts of a map.
+    /// `ended` of `under_way` cells ended within `elapsed`. The last cells of a map are ignored: they are too few to measure.
     fn adapt(&mut self, under_way: usize, ended: usize, elapsed: Duration) {
         if 2 * under_way < self.cells || 4 * ended < under_way {
             return;
@@ -149,13 +149,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_under_way_aim_at_a_second() {
+    fn the_number_of_cells_under_way_aims_at_one_second() {
         let mut pace = Pace { cells: 100, most: 1000 };
         pace.adapt(100, 60, Duration::from_millis(500));
         assert_eq!(pace.cells, 200);
         pace.adapt(200, 200, Duration::from_nanos(1));
         assert_eq!(pace.cells, 800);
-        // The slowest few.
+        // The last cells are ignored.
         pace.adapt(10, 10, Duration::from_secs(2));
         pace.adapt(800, 10, Duration::from_secs(20));
         assert_eq!(pace.cells, 800);

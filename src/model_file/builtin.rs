@@ -1,4 +1,4 @@
-//! The models that are built into the program: the files of `models/`.
+//! The built-in models: the files in `models/`.
 
 use std::sync::LazyLock;
 
@@ -6,10 +6,10 @@ use rattlemap_dynamics::model::Model;
 
 use super::FileModel;
 
-/// The model of scenes and commands that name none.
+/// The default model of scenes and commands.
 pub const DEFAULT: &str = "gear-pair";
 
-/// Names and texts.
+/// Names and texts of the built-in models.
 pub const BUILT_IN: &[(&str, &str)] = &[
     (DEFAULT, include_str!("../../models/gear_pair.toml")),
     ("impact-oscillator", include_str!("../../models/impact_oscillator.toml")),
@@ -21,7 +21,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("shaking-table", include_str!("../../models/shaking_table.toml")),
 ];
 
-/// They are read once. A test reads each of them, so none is left out.
+/// The built-in models, read once. A test shows that each can be read.
 static READ: LazyLock<Vec<FileModel>> = LazyLock::new(|| {
     BUILT_IN.iter().filter_map(|(name, text)| FileModel::parse(text, &format!("{name}.toml")).ok()).collect()
 });

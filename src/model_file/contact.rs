@@ -1,4 +1,4 @@
-//! `[[contact]]`: the walls, one or two, and what they do.
+//! `[[contact]]`: the walls and their contact laws.
 
 use rattlemap_dynamics::model::{Contact, Side};
 
@@ -7,37 +7,37 @@ use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
-/// Its keys.
-const KEYS: [&str; 7] = ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping"];
+/// Keys of `[[contact]]`.
+const CONTACT_KEYS: [&str; 7] = ["side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping"];
 
 /// A wall.
 #[derive(Clone, Debug)]
 pub struct Wall {
-    /// Where it is, on the scale of the gap.
+    /// Position, as a value of the gap.
     pub at: Expression,
-    /// What happens there.
+    /// Contact law.
     pub law: WallLaw,
-    /// What lies behind it; none where it does not yield.
-    pub behind: Option<Behind>,
+    /// Spring and damper behind the wall; none for a rigid wall.
+    pub spring: Option<WallSpring>,
 }
 
-/// What happens at a wall.
+/// The law of contact with a wall.
 #[derive(Clone, Debug)]
 pub enum WallLaw {
     /// An impact.
     Impact {
         /// Coefficient of restitution.
         restitution: Expression,
-        /// Leaving speed at or below which a pressed contact lasts.
+        /// Largest leaving speed at which contact is sustained.
         mesh_speed: Expression,
     },
-    /// The motion goes on behind the wall.
+    /// The motion continues behind the wall without a jump.
     Elastic,
 }
 
 /// A spring and a damper along the gap row.
 #[derive(Clone, Debug)]
-pub struct Behind {
+pub struct WallSpring {
     /// Stiffness.
     pub stiffness: Expression,
     /// Damping.
@@ -45,28 +45,28 @@ pub struct Behind {
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum LawKind {
     Impact,
     Elastic,
 }
 
 impl Wall {
-    /// What it is to the oscillator.
+    /// Returns the kind of contact.
     pub fn contact(&self) -> Contact {
-        match (&self.law, &self.behind) {
+        match (&self.law, &self.spring) {
             (WallLaw::Elastic, _) => Contact::Elastic,
             (WallLaw::Impact { .. }, Some(_)) => Contact::Impact,
             (WallLaw::Impact { .. }, None) => Contact::Rigid,
         }
     }
 
-    /// Entries that the oscillator depends on.
+    /// Returns the entries on which the oscillator depends.
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
-        let behind = self.behind.iter().flat_map(|behind| [&behind.stiffness, &behind.damping]);
-        behind.chain([&self.at])
+        let spring = self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping]);
+        spring.chain([&self.at])
     }
 
-    /// Entries that the law depends on.
+    /// Returns the entries on which the contact law depends.
     pub(super) fn shaping_law(&self) -> impl Iterator<Item = &Expression> {
         let both = match &self.law {
             WallLaw::Impact { restitution, mesh_speed } => Some([restitution, mesh_speed]),
@@ -76,21 +76,21 @@ impl Wall {
     }
 }
 
-/// Reads the walls: right, left.
+/// Reads the right and the left wall.
 pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Option<Wall>; 2], SceneError> {
     let field = root.require("contact", "write [[contact]] with side, at and law; a model has one or two")?;
     let two = "one or two tables, [[contact]]: a model has at most two walls, one on each side";
     let items = field.list(two)?;
     if !(1..=2).contains(&items.len()) {
-        return Err(field.counted(items.len(), "tables", two));
+        return Err(field.wrong_count(items.len(), "tables", two));
     }
     let mut walls = [None, None];
     for item in &items {
         let (side, field, wall) = read_one(item, names)?;
         if walls[side.index()].is_some() {
-            return Err(field.conflict(
-                "there is a wall on this side already; a model has one on each side at most".to_owned(),
-            ));
+            return Err(
+                field.conflict("there is already a wall on this side; a model has at most one on each side")
+            );
         }
         walls[side.index()] = Some(wall);
     }
@@ -98,7 +98,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<[Option<Wall>
 }
 
 fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, Wall), SceneError> {
-    let section = Section::open(item.node, &item.path, &KEYS)?;
+    let section = Section::open(item.node, &item.path, &CONTACT_KEYS)?;
     let side = section.require("side", "write side = \"right\" (z <= at) or side = \"left\" (z >= at)")?;
     let which = side.choice(&[("right", Side::Right), ("left", Side::Left)])?;
     let at = section.require("at", "write where the wall is, such as at = \"b\"")?;
@@ -107,18 +107,17 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
     let entry = |name: &str| section.get(name).map(|field| names.entry(&field)).transpose();
     let zero = || Expression::number(0.0);
     let (stiffness, damping) = (entry("stiffness")?, entry("damping")?);
-    let law = match law.choice(&[("impact", Kind::Impact), ("elastic", Kind::Elastic)])? {
-        Kind::Impact => {
+    let law = match law.choice(&[("impact", LawKind::Impact), ("elastic", LawKind::Elastic)])? {
+        LawKind::Impact => {
             let restitution = section.require("restitution", "an impact needs one: w+ = -restitution w-")?;
             let restitution = names.entry(&restitution)?;
             WallLaw::Impact { restitution, mesh_speed: entry("mesh_speed")?.unwrap_or_else(zero) }
         }
-        Kind::Elastic => {
+        LawKind::Elastic => {
             for name in ["restitution", "mesh_speed"] {
                 if let Some(field) = section.get(name) {
                     return Err(field.conflict(
-                        "it belongs to law = \"impact\" alone: elastic contact has no jump; drop it, or change the law"
-                            .to_owned(),
+                        "it needs law = \"impact\", because elastic contact has no jump; remove it, or change the law",
                     ));
                 }
             }
@@ -126,7 +125,9 @@ fn read_one<'a>(item: &Field<'a>, names: Names<'_>) -> Result<(Side, Field<'a>, 
             WallLaw::Elastic
         }
     };
-    let behind = (stiffness.is_some() || damping.is_some())
-        .then(|| Behind { stiffness: stiffness.unwrap_or_else(zero), damping: damping.unwrap_or_else(zero) });
-    Ok((which, side, Wall { at, law, behind }))
+    let spring = (stiffness.is_some() || damping.is_some()).then(|| WallSpring {
+        stiffness: stiffness.unwrap_or_else(zero),
+        damping: damping.unwrap_or_else(zero),
+    });
+    Ok((which, side, Wall { at, law, spring }))
 }

@@ -1,4 +1,4 @@
-//! A whole model: what its file says, and what that makes of values of its parameters.
+//! The contents of a model file, and the oscillator and contact law that it defines.
 
 use rattlemap_dynamics::model::{
     Contact, Domain, Law, ModelError, Oscillator, OscillatorError, Parameter, Shapes, Side,
@@ -13,55 +13,55 @@ use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
-/// What stands outside of any table, and the tables.
-const TOP_LEVEL: [&str; 8] =
+/// Keys outside of any table, and the names of the tables.
+const MODEL_KEYS: [&str; 8] =
     ["name", "title", "summary", "source", "notes", "parameters", "motion", "contact"];
 
-/// Characters of the name: it stands in scenes and in names of files.
-const LONGEST_NAME: usize = 40;
+/// Largest number of characters of a model's name, which occurs in scenes and file names.
+const LONGEST_MODEL_NAME: usize = 40;
 
-/// Characters of title, summary and source: each has one line.
+/// Largest number of characters of title, summary and source, which are one line each.
 const LONGEST_LINE: usize = 200;
 
-/// Characters of the notes.
+/// Largest number of characters of the notes.
 const LONGEST_NOTES: usize = 4000;
 
-/// What a model's file says.
+/// The contents of a model file.
 #[derive(Clone, Debug)]
 pub struct Definition {
-    /// The whole file.
+    /// The text of the file.
     pub text: String,
-    /// The name in scenes.
+    /// Name in scenes.
     pub name: String,
-    /// The name in headings.
+    /// Name in headings.
     pub title: String,
-    /// One line for lists.
+    /// Description in one line.
     pub summary: Option<String>,
-    /// Where it comes from.
+    /// Publication or other source.
     pub source: Option<String>,
-    /// What people should know, in some lines.
+    /// Further notes for users.
     pub notes: Option<String>,
-    /// The table of parameters, in the order of the file.
+    /// Parameters, in the order of the file.
     pub parameters: Vec<Parameter>,
-    /// A value of each: also of those that a scene must say.
+    /// Default of each parameter, also of those that a scene must set.
     pub defaults: Vec<f64>,
     /// Free motion.
     pub motion: Motion,
-    /// The right and the left wall.
+    /// Right and left wall.
     pub walls: [Option<Wall>; 2],
 }
 
-/// A text means one thing.
+/// Definitions are equal if their texts are.
 impl PartialEq for Definition {
     fn eq(&self, other: &Definition) -> bool {
         self.text == other.text
     }
 }
 
-/// Reads a model's file and looks at its motion at the defaults.
+/// Reads a model file and checks that the model has a motion at its defaults.
 pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let document = document::read(text, file)?;
-    let root = Section::open(&document, "", &TOP_LEVEL)?;
+    let root = Section::open(&document, "", &MODEL_KEYS)?;
     let name = root.require("name", "name the model, such as name = \"my-model\"")?;
     let name = read_name(&name)?;
     let line = |key| root.get(key).map(|field| field.line(LONGEST_LINE)).transpose();
@@ -91,7 +91,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
         parameters: written
             .into_iter()
             .zip(shapes)
-            .map(|(written, shapes)| written.shaping(shapes))
+            .map(|(written, shapes)| written.into_parameter(shapes))
             .collect(),
         motion,
         walls,
@@ -106,18 +106,17 @@ fn read_name(field: &Field<'_>) -> Result<String, SceneError> {
     let name = field.text()?;
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let is_name = name.chars().all(is_word) && name.starts_with(|c: char| c.is_ascii_alphanumeric());
-    match is_name && name.len() <= LONGEST_NAME {
+    match is_name && name.len() <= LONGEST_MODEL_NAME {
         true => Ok(name.to_owned()),
-        false => {
-            Err(field
-                .out_of_range(&format!("1 to {LONGEST_NAME} letters, digits and hyphens, such as my-model")))
-        }
+        false => Err(field.out_of_range(&format!(
+            "1 to {LONGEST_MODEL_NAME} letters, digits and hyphens, such as my-model"
+        ))),
     }
 }
 
-/// The error for a model without motion at its defaults, at the field that has to change.
+/// Builds the error for a model without motion at its defaults, at the place of the field with the error.
 fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) -> SceneError {
-    let (table, key) = blamed(error);
+    let (table, key) = blame(error);
     let wall = |of: &Field<'_>, has: &dyn Fn(&str) -> bool| match (&of.node.value, table) {
         (Value::Table(fields), Table::Wall(side)) => {
             let is_there = |side: Side| match fields.get("side").map(|node| &node.value) {
@@ -146,8 +145,8 @@ enum Table {
     Wall(Option<Side>),
 }
 
-/// Where the number comes from that an error names.
-fn blamed(error: &ModelError) -> (Table, &str) {
+/// Returns the table and the key of the quantity that an error names.
+fn blame(error: &ModelError) -> (Table, &str) {
     let ModelError::Oscillator(error) = error else { return (Table::Motion, "") };
     let quantity = match error {
         OscillatorError::OutOfRange { quantity, .. }
@@ -175,12 +174,12 @@ fn blamed(error: &ModelError) -> (Table, &str) {
 }
 
 impl Definition {
-    /// The wall on a side.
+    /// Returns the wall on a side.
     pub fn wall(&self, side: Side) -> Option<&Wall> {
         self.walls[side.index()].as_ref()
     }
 
-    /// The oscillator at these values, which the caller validates.
+    /// Builds the oscillator for values of the parameters. The caller validates it.
     pub(super) fn oscillator(&self, values: &[f64]) -> Result<Oscillator, OscillatorError> {
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let motion = &self.motion;
@@ -192,7 +191,7 @@ impl Definition {
         let gap = vector(&motion.gap, of);
         let mut mass = matrix(&motion.mass, of);
         if motion.degrees() == 1 {
-            // The second displacement does not exist; nothing acts on its mass.
+            // The second displacement does not exist; its mass must not be 0.
             mass[1][1] = 1.0;
         }
         let mut oscillator = Oscillator {
@@ -209,7 +208,7 @@ impl Definition {
         for side in Side::BOTH {
             let Some(wall) = self.wall(side) else { continue };
             let at = of(&wall.at);
-            // An infinite one would be none.
+            // An infinite position means that there is no wall.
             if !at.is_finite() {
                 let name = if side == Side::Right { "right" } else { "left" };
                 let quantity = format!("position of the {name} wall");
@@ -222,15 +221,15 @@ impl Definition {
             let i = side.index();
             oscillator.walls[i] = at;
             oscillator.contacts[i] = wall.contact();
-            if let Some(behind) = &wall.behind {
+            if let Some(spring) = &wall.spring {
                 oscillator.meshing[i] =
-                    with_spring(free, gap, at, of(&behind.stiffness), of(&behind.damping));
+                    with_spring(free, gap, at, of(&spring.stiffness), of(&spring.damping));
             }
         }
         Ok(oscillator)
     }
 
-    /// The contact law at these values.
+    /// Builds the contact law for values of the parameters.
     pub(super) fn law(&self, values: &[f64]) -> Law {
         let of = |entry: &Expression| entry.evaluate(&|index| values[index]);
         let mut law = Law::both(0.0, 0.0);
@@ -244,10 +243,10 @@ impl Definition {
     }
 }
 
-/// Motion against a spring `stiffness (z - at)` and a damper along the gap row.
+/// Adds a spring with the force `stiffness (z - at)` and a damper along the gap row.
 fn with_spring(free: Domain, gap: [f64; 2], at: f64, stiffness: f64, damping: f64) -> Domain {
     let along = |matrix: [[f64; 2]; 2], k: f64| {
-        // Symmetric to the bit.
+        // The product of the gap entries comes first, so that the matrix is exactly symmetric.
         let entry = |i: usize, j: usize| plus(matrix[i][j], k * (gap[i] * gap[j]));
         [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
     };
@@ -259,7 +258,7 @@ fn with_spring(free: Domain, gap: [f64; 2], at: f64, stiffness: f64, damping: f6
     }
 }
 
-/// A sum. What is added to nothing keeps its sign, also if it is 0.
+/// Adds two numbers. If `a` is 0, `b` keeps its sign, even if it is 0.
 fn plus(a: f64, b: f64) -> f64 {
     if a == 0.0 { b } else { a + b }
 }

@@ -1,10 +1,10 @@
-//! Entries of vectors and matrices: numbers, or expressions in parameters.
+//! Entries of vectors and matrices: numbers or expressions in parameters.
 
 use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
-/// What entries may be made of: the parameters' names, in the order of their values.
+/// Names of the parameters in the order of their values.
 #[derive(Clone, Copy)]
 pub(super) struct Names<'a>(pub(super) &'a [&'a str]);
 
@@ -18,7 +18,7 @@ impl Names<'_> {
         field.expression(self.0, &all, "\"2*zeta\"")
     }
 
-    /// Reads a list of one entry per coordinate; `what` says what it is.
+    /// Reads a list of one entry per coordinate. `what` names it in messages.
     pub(super) fn vector(
         self,
         field: &Field<'_>,
@@ -46,7 +46,7 @@ impl Names<'_> {
         rows.iter().map(|row| self.vector(row, count, "a row")).collect()
     }
 
-    /// The same where zeros stand for what is left out.
+    /// Reads a list of one entry per coordinate; zeros if it is missing.
     pub(super) fn vector_or_zeros(
         self,
         section: &Section<'_>,
@@ -59,7 +59,7 @@ impl Names<'_> {
         }
     }
 
-    /// The same of a matrix.
+    /// Reads a square matrix; zeros if it is missing.
     pub(super) fn matrix_or_zeros(
         self,
         section: &Section<'_>,

@@ -1,11 +1,11 @@
-//! A model's equations, written out from its file.
+//! Writes the equations of motion of a model.
 
 use rattlemap_dynamics::model::{Contact, Side};
 
 use super::definition::Definition;
 use crate::text::expression::Expression;
 
-/// Free motion, then what lies behind each wall; indented by what belongs to what.
+/// Returns the equations as lines: free motion, then contact with each wall.
 pub(super) fn lines(definition: &Definition) -> Vec<String> {
     let motion = &definition.motion;
     let mut lines = vec![
@@ -17,10 +17,10 @@ pub(super) fn lines(definition: &Definition) -> Vec<String> {
     for side in Side::BOTH {
         let Some(wall) = definition.wall(side) else { continue };
         let name = name(side);
-        match (wall.contact(), &wall.behind) {
-            (Contact::Impact | Contact::Elastic, Some(behind)) => {
-                let spring = product(&behind.stiffness, &format!("({})", minus("z", &wall.at)));
-                let force = sum([spring, product(&behind.damping, "w")]);
+        match (wall.contact(), &wall.spring) {
+            (Contact::Impact | Contact::Elastic, Some(spring)) => {
+                let elastic = product(&spring.stiffness, &format!("({})", minus("z", &wall.at)));
+                let force = sum([elastic, product(&spring.damping, "w")]);
                 lines.push(format!("behind the {name} wall, with N = {force}"));
                 lines.extend(equations(definition, Some("N")).map(|line| format!("    {line}")));
             }
@@ -31,7 +31,7 @@ pub(super) fn lines(definition: &Definition) -> Vec<String> {
     lines
 }
 
-/// A side in words.
+/// Returns the name of a side.
 pub(super) fn name(side: Side) -> &'static str {
     match side {
         Side::Right => "right",
@@ -47,7 +47,7 @@ fn row(entries: &[Expression], names: &[String], result: &str) -> String {
     format!("{result} = {}", sum(entries.iter().zip(names).map(|(entry, name)| product(entry, name))))
 }
 
-/// Where free motion is.
+/// Returns the range of the gap in free motion.
 fn between(definition: &Definition) -> String {
     let at = |side| definition.wall(side).map(|wall| text(&wall.at));
     match (at(Side::Left), at(Side::Right)) {
@@ -58,7 +58,7 @@ fn between(definition: &Definition) -> String {
     }
 }
 
-/// One equation per coordinate, with a force along the gap row.
+/// Returns one equation per coordinate, with an optional force along the gap row.
 fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Iterator<Item = String> + 'd {
     let motion = &definition.motion;
     let rate = |suffix: &str| -> Vec<String> {
@@ -82,7 +82,7 @@ fn equations<'d>(definition: &'d Definition, force: Option<&'d str>) -> impl Ite
     })
 }
 
-/// Terms with their signs; 0 where there is none.
+/// Joins terms with their signs; `0` without terms.
 fn sum(terms: impl IntoIterator<Item = Option<String>>) -> String {
     let mut sum = String::new();
     for term in terms.into_iter().flatten() {
@@ -95,7 +95,7 @@ fn sum(terms: impl IntoIterator<Item = Option<String>>) -> String {
     if sum.is_empty() { "0".to_owned() } else { sum }
 }
 
-/// `coefficient name`; none where the coefficient is 0.
+/// Returns `coefficient name`; none if the coefficient is 0.
 fn product(coefficient: &Expression, name: &str) -> Option<String> {
     match coefficient.as_number() {
         Some(0.0) => None,
@@ -109,7 +109,7 @@ fn constant(load: &Expression) -> Option<String> {
     (load.as_number() != Some(0.0)).then(|| text(load))
 }
 
-/// `name - entry`.
+/// Returns `name - entry`.
 fn minus(name: &str, entry: &Expression) -> String {
     let entry_text = text(entry);
     match entry_text.strip_prefix('-').filter(|positive| is_product(positive)) {
@@ -119,7 +119,7 @@ fn minus(name: &str, entry: &Expression) -> String {
     }
 }
 
-/// An entry that something is multiplied by.
+/// Returns an entry as a factor, in parentheses if it is a sum.
 pub(crate) fn factor(entry: &Expression) -> String {
     let text = text(entry);
     match is_product(text.strip_prefix('-').unwrap_or(&text)) {
@@ -128,7 +128,7 @@ pub(crate) fn factor(entry: &Expression) -> String {
     }
 }
 
-/// Whether a text has no sum outside of parentheses; the sign of an exponent may look like one, which is no harm.
+/// Whether a text has no sum outside of parentheses. The sign of an exponent looks like a sum, which only adds parentheses.
 fn is_product(text: &str) -> bool {
     let mut depth = 0;
     text.chars().all(|c| {
@@ -141,7 +141,7 @@ fn is_product(text: &str) -> bool {
     })
 }
 
-/// An entry as it was written; a number as short as it can be.
+/// Returns an entry as written; a number in its shortest form.
 fn text(entry: &Expression) -> String {
     match entry.as_number() {
         Some(number) => number.to_string(),

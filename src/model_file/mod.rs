@@ -1,8 +1,8 @@
-//! Models as files: names, parameters and matrices in TOML, read into a [`Model`].
+//! Model files: names, parameters and matrices in TOML, read into a [`Model`]. Pure.
 //!
-//! `M x'' + C x' + K x = force cos(frequency t) + load` in one or two coordinates, a gap `z = g . x`, and one or two
-//! walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in f64; nothing is
-//! compiled. Reading is pure, and looks at everything: `docs/models.md` has each key.
+//! A file defines `M x'' + C x' + K x = force cos(frequency t) + load` in one or two coordinates, a gap `z = g . x`, and one or two
+//! walls. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in f64.
+//! `docs/models.md` describes each key.
 
 mod builtin;
 mod contact;
@@ -19,14 +19,14 @@ use std::sync::Arc;
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter};
 
 pub use builtin::{BUILT_IN, DEFAULT};
-pub use contact::{Behind, Wall, WallLaw};
+pub use contact::{Wall, WallLaw, WallSpring};
 pub use definition::Definition;
 #[cfg(feature = "cli")]
 pub(crate) use equations::factor;
 
 use crate::text::error::SceneError;
 
-/// A model from a file, with values of its parameters. A clone shares all but the values.
+/// A model from a file, with values of its parameters. Clones share everything but the values.
 #[derive(Clone, Debug)]
 pub struct FileModel {
     definition: Arc<Definition>,
@@ -34,35 +34,35 @@ pub struct FileModel {
 }
 
 impl FileModel {
-    /// Reads a model; messages call its text `file`. Its parameters have their defaults.
+    /// Reads a model and sets its parameters to their defaults. Messages call the text `file`.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong.
+    /// [`SceneError`] for the first error.
     pub fn parse(text: &str, file: &str) -> Result<FileModel, SceneError> {
         definition::read(text, file)
     }
 
-    /// A model that is built into the program; none of that name.
+    /// Returns a built-in model; none if there is none with this name.
     pub fn built_in(name: &str) -> Option<FileModel> {
         builtin::find(name).cloned()
     }
 
-    /// All that are built in.
+    /// Returns all built-in models.
     pub fn all_built_in() -> Vec<FileModel> {
         BUILT_IN.iter().filter_map(|(name, _)| FileModel::built_in(name)).collect()
     }
 
-    /// Whether it is the model that is built in under its name.
+    /// Whether the model is equal to the built-in model with its name.
     pub fn is_built_in(&self) -> bool {
         builtin::find(self.name()).is_some_and(|own| own.definition == self.definition)
     }
 
-    /// What the file says.
+    /// Returns the contents of the file.
     pub fn definition(&self) -> &Definition {
         &self.definition
     }
 
-    /// Its equations, a line each: free motion, then what lies behind each wall.
+    /// Writes the equations of motion as lines: free motion, then contact with each wall.
     pub fn equations(&self) -> Vec<String> {
         equations::lines(&self.definition)
     }
@@ -72,7 +72,7 @@ impl FileModel {
     }
 }
 
-/// Models of the same text with the same values.
+/// Models are equal if their texts and values are.
 impl PartialEq for FileModel {
     fn eq(&self, other: &FileModel) -> bool {
         self.values == other.values && self.definition == other.definition

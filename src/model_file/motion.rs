@@ -7,24 +7,17 @@ use crate::text::error::SceneError;
 use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
-/// Its keys.
-const KEYS: [&str; 10] = [
-    "coordinates",
-    "velocities",
-    "bodies",
-    "mass",
-    "damping",
-    "stiffness",
-    "force",
-    "load",
-    "frequency",
+/// Keys of `[motion]`.
+#[rustfmt::skip]
+const MOTION_KEYS: [&str; 10] = [
+    "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "load", "frequency",
     "gap",
 ];
 
-/// What no key can ask for.
+/// Limits of all models, for messages.
 const LIMITS: &str = "a model has one or two coordinates, one harmonic force and one gap row";
 
-/// Characters of the name of what moves.
+/// Largest number of characters of a body's name.
 const LONGEST_BODY: usize = 40;
 
 /// Free motion and its gap.
@@ -34,7 +27,7 @@ pub struct Motion {
     pub coordinates: Vec<String>,
     /// Names of their rates.
     pub velocities: Vec<String>,
-    /// What moves, one for each coordinate.
+    /// Names of the moving bodies, one for each coordinate.
     pub bodies: Vec<String>,
     /// Mass matrix, row by row.
     pub mass: Vec<Vec<Expression>>,
@@ -48,22 +41,22 @@ pub struct Motion {
     pub load: Vec<Expression>,
     /// Excitation frequency.
     pub frequency: Expression,
-    /// The gap is `gap . x`.
+    /// Gap row: the gap is `gap . x`.
     pub gap: Vec<Expression>,
 }
 
 impl Motion {
-    /// Degrees of freedom.
+    /// Returns the number of degrees of freedom.
     pub fn degrees(&self) -> usize {
         self.coordinates.len()
     }
 
-    /// Names of the state's components.
+    /// Returns the names of the state's components.
     pub fn state_names(&self) -> impl Iterator<Item = &str> {
         self.coordinates.iter().zip(&self.velocities).flat_map(|(x, v)| [x.as_str(), v.as_str()])
     }
 
-    /// Every entry.
+    /// Returns all entries.
     pub(super) fn entries(&self) -> impl Iterator<Item = &Expression> {
         let matrices = [&self.mass, &self.damping, &self.stiffness].into_iter().flatten().flatten();
         let vectors = [&self.force, &self.load, &self.gap].into_iter().flatten();
@@ -74,7 +67,8 @@ impl Motion {
 /// Reads `[motion]`.
 pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, SceneError> {
     root.require("motion", "write [motion] with coordinates, mass, frequency and gap")?;
-    let section = root.section_among("motion", &KEYS, &format!("{}; {LIMITS}", KEYS.join(", ")))?;
+    let section =
+        root.section_among("motion", &MOTION_KEYS, &format!("{}; {LIMITS}", MOTION_KEYS.join(", ")))?;
     let field = section.require("coordinates", "name one or two, such as coordinates = [\"x\"]")?;
     let two = "one or two names: a model has at most two degrees of freedom";
     let coordinates = read_names(&field, two)?;
@@ -98,7 +92,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
     for (i, name) in all.iter().enumerate() {
         if names.0.contains(&name.as_str()) || all[..i].contains(name) {
             return Err(field.conflict(format!(
-                "`{name}` names something else already, a parameter, a coordinate or a velocity; rename either"
+                "`{name}` is already the name of a parameter, a coordinate or a velocity; rename one of them"
             )));
         }
     }
@@ -113,8 +107,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<Motion, Scene
         None => coordinates.clone(),
     };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
-    let gap =
-        section.require("gap", "write the row that makes the gap, such as gap = [\"1\"]: z = gap . x")?;
+    let gap = section.require("gap", "write the gap row, such as gap = [\"1\"]: z = gap . x")?;
     Ok(Motion {
         mass: names.matrix(&mass, count)?,
         damping: names.matrix_or_zeros(&section, "damping", count)?,

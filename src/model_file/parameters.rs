@@ -1,4 +1,4 @@
-//! `[parameters]`: the table of a model.
+//! `[parameters]`: the parameters of a model.
 
 use std::borrow::Cow;
 
@@ -10,57 +10,35 @@ use crate::text::expression;
 use crate::text::section::{Field, Section};
 
 /// Keys of a parameter's own table.
-const KEYS: [&str; 6] = ["default", "min", "max", "open", "meaning", "required"];
+const PARAMETER_KEYS: [&str; 6] = ["default", "min", "max", "open", "meaning", "required"];
 
-/// Characters of a name: tables and figures have columns for it.
-const LONGEST_NAME: usize = 32;
+/// Largest number of characters of a parameter's name, which occurs in tables and figures.
+const LONGEST_PARAMETER_NAME: usize = 32;
 
-/// Characters of a meaning: it stands beside an axis.
+/// Largest number of characters of a meaning, which labels an axis.
 const LONGEST_MEANING: usize = 120;
 
-/// Columns that tables have beside those of parameters and states, and what stands beside states in that of an orbit.
+/// Names of columns of tables, which cannot be names of parameters.
+#[rustfmt::skip]
 pub(super) const COLUMNS: [&str; 26] = [
-    "i",
-    "j",
-    "t",
-    "z",
-    "w",
-    "n",
-    "phase",
-    "class",
-    "period",
-    "lyapunov",
-    "lyapunov_error",
-    "impacts_per_period",
-    "mesh_fraction",
-    "symmetric",
-    "word",
-    "pattern",
-    "status",
-    "periods_run",
-    "source",
-    "attractor",
-    "attractors",
-    "domain",
-    "event",
-    "side",
-    "kind",
-    "moment",
+    "i", "j", "t", "z", "w", "n", "phase", "class", "period", "lyapunov", "lyapunov_error",
+    "impacts_per_period", "mesh_fraction", "symmetric", "word", "pattern", "status", "periods_run",
+    "source", "attractor", "attractors", "domain", "event", "side", "kind", "moment",
 ];
 
-/// A parameter as the file has it: what it shapes is found out from where it is used.
-pub(super) struct Written {
+/// A parameter as written in the file. Its use in the model is found later.
+pub(super) struct ParameterEntry {
     pub(super) name: String,
     meaning: String,
     pub(super) default: f64,
-    /// Whether a scene must say it.
+    /// Whether a scene must set the parameter.
     is_required: bool,
     range: Range,
 }
 
-impl Written {
-    /// The line of the model's table.
-    pub(super) fn shaping(self, shapes: Shapes) -> Parameter {
+impl ParameterEntry {
+    /// Converts the entry to a parameter that affects `shapes`.
+    pub(super) fn into_parameter(self, shapes: Shapes) -> Parameter {
         Parameter {
             name: Cow::Owned(self.name),
             meaning: Cow::Owned(self.meaning),
@@ -71,8 +49,8 @@ impl Written {
     }
 }
 
-/// Reads `[parameters]`, in the order in which it is written.
-pub(super) fn read(root: &Section<'_>) -> Result<Vec<Written>, SceneError> {
+/// Reads `[parameters]` in the order of the text.
+pub(super) fn read(root: &Section<'_>) -> Result<Vec<ParameterEntry>, SceneError> {
     let Some(field) = root.get("parameters") else { return Ok(Vec::new()) };
     let Value::Table(table) = &field.node.value else {
         return Err(field.wrong_type("a table, [parameters]"));
@@ -82,7 +60,7 @@ pub(super) fn read(root: &Section<'_>) -> Result<Vec<Written>, SceneError> {
     section.fields_as_written().into_iter().map(|(name, field)| read_one(name, &field)).collect()
 }
 
-fn read_one(name: &str, field: &Field<'_>) -> Result<Written, SceneError> {
+fn read_one(name: &str, field: &Field<'_>) -> Result<ParameterEntry, SceneError> {
     check_name(name, field)?;
     let Value::Table(_) = &field.node.value else {
         let expected = "a number, its default, or a table such as { default = 1.0, min = 0.0 }";
@@ -91,15 +69,17 @@ fn read_one(name: &str, field: &Field<'_>) -> Result<Written, SceneError> {
             return Err(field.out_of_range("a finite number"));
         }
         let (name, meaning) = (name.to_owned(), name.to_owned());
-        return Ok(Written { name, meaning, default, is_required: false, range: Range::Finite });
+        return Ok(ParameterEntry { name, meaning, default, is_required: false, range: Range::Finite });
     };
-    let section = Section::open(field.node, &field.path, &KEYS)?;
+    let section = Section::open(field.node, &field.path, &PARAMETER_KEYS)?;
     let given = section.require("default", "a parameter needs a default: write default = 1.0")?;
     let flag = |name| section.get(name).map_or(Ok(false), |field| field.flag());
     let open = section.get("open");
     let is_open = flag("open")?;
     if let (Some(field), None) = (open, section.get("min")) {
-        return Err(field.conflict("it leaves out `min` itself, and there is none".to_owned()));
+        return Err(
+            field.conflict("it excludes the value `min`, but `min` is missing; add min or remove open")
+        );
     }
     let end = |name, none| match section.get(name) {
         None => Ok(none),
@@ -121,16 +101,16 @@ fn read_one(name: &str, field: &Field<'_>) -> Result<Written, SceneError> {
         Some(field) => field.line(LONGEST_MEANING)?,
         None => name.to_owned(),
     };
-    Ok(Written { name: name.to_owned(), meaning, default, is_required: flag("required")?, range })
+    Ok(ParameterEntry { name: name.to_owned(), meaning, default, is_required: flag("required")?, range })
 }
 
-/// Refuses what cannot be a name: of a parameter, a coordinate, a velocity.
+/// Checks a name of a parameter, a coordinate or a velocity.
 pub(super) fn check_name(name: &str, field: &Field<'_>) -> Result<(), SceneError> {
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let is_name = name.chars().all(is_word) && name.starts_with(|c: char| c.is_ascii_alphabetic());
-    if !is_name || name.len() > LONGEST_NAME {
+    if !is_name || name.len() > LONGEST_PARAMETER_NAME {
         return Err(field.conflict(format!(
-            "a name begins with a letter and has at most {LONGEST_NAME} letters, digits and underscores"
+            "a name begins with a letter and has at most {LONGEST_PARAMETER_NAME} letters, digits and underscores"
         )));
     }
     if name == "t" || expression::is_reserved(name) {
@@ -139,11 +119,11 @@ pub(super) fn check_name(name: &str, field: &Field<'_>) -> Result<(), SceneError
             "pi" => "is a number",
             _ => "is a function",
         };
-        return Err(field.conflict(format!("`{name}` {meaning} and can be no name; choose another")));
+        return Err(field.conflict(format!("`{name}` {meaning} and cannot be used; choose another name")));
     }
     if COLUMNS.contains(&name) {
         return Err(
-            field.conflict(format!("`{name}` is a column of tables and can be no name; choose another"))
+            field.conflict(format!("`{name}` is a column of tables and cannot be used; choose another name"))
         );
     }
     Ok(())

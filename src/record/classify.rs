@@ -1,25 +1,24 @@
-//! What a cell is, from what it measured. Pure: the same record always has the same class.
+//! Classes of cells, from their records. The same record always has the same class.
 //!
 //! A motion is
 //!
-//! - `failed` if the integration could not be continued (`cap_events`, `cap_root`,
-//!   `too_stiff`, `non_finite`);
-//! - `periodic` if the engine confirmed a period: recurrence of strobe states alone is not
-//!   enough, the orbit has to be stable;
-//! - `chaotic` if there is none, the exponent exceeds zero by [`CHAOS_ERRORS`] standard
-//!   errors, and the engine did not see it stay near a cycle (status `slow`);
-//! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than
-//!   `max_period`, where the exponent is far below zero, on tori (quasi-periodic motion), and where a
-//!   multiplier is 1, as for pairs without supports.
+//! - `failed` if the integration could not continue (`cap_events`, `cap_root`, `too_stiff`, `non_finite`);
+//! - `periodic` if the engine confirmed a period. Recurrence of strobe states is not enough: the orbit must be
+//!   stable;
+//! - `chaotic` if there is no period, the exponent exceeds zero by [`CHAOS_ERRORS`] standard errors, and the motion
+//!   did not stay near a cycle (status `slow`);
+//! - `undecided` otherwise: near bifurcations, in long transients, on cycles longer than `max_period`, if the
+//!   exponent is clearly negative, on tori (quasi-periodic motion), and if a multiplier is 1, as for pairs without
+//!   supports.
 //!
-//! This misleads in two ways that are known: transient chaos that outlives the budget, and growth that
-//! is not bounded for good, as of undamped elastic pairs, are called chaotic.
+//! Two motions are wrongly called chaotic: transient chaos that outlasts the budget, and motion that grows without
+//! bound, as of undamped elastic pairs.
 
 use crate::record::{Record, valid};
 pub use rattlemap_dynamics::orbit::CHAOS_ERRORS;
 use rattlemap_dynamics::orbit::{Class, Status};
 
-/// The class of a record.
+/// Returns the class of a record.
 pub fn classify(record: &Record) -> Class {
     match status(record) {
         status if status.is_failure() => Class::Failed,
@@ -32,8 +31,8 @@ pub fn classify(record: &Record) -> Class {
     }
 }
 
-/// How a record's integration ended. An unknown code can only come from a damaged record;
-/// it counts as not finite.
+/// Returns how the integration of a record ended. An unknown code can only come from a damaged record and counts as
+/// not finite.
 pub fn status(record: &Record) -> Status {
     Status::from_code(record.status).unwrap_or(Status::NonFinite)
 }
@@ -70,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn four_statuses_fail_and_no_other() {
+    fn exactly_four_statuses_are_failures() {
         let failures = [Status::CapEvents, Status::CapRoot, Status::TooStiff, Status::NonFinite];
         for status in Status::ALL {
             let failed = classify(&record(status, 1, 0.2, 0.01)) == Class::Failed;

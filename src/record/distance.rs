@@ -1,18 +1,18 @@
-//! How far two numbers are apart. What is not finite is infinitely far from anything: `f64::max` would drop it, and a
-//! comparison call it equal.
+//! Distances of numbers. A value that is not finite is infinitely far from everything; `f64::max` would ignore it,
+//! and a comparison would call it equal.
 
-/// The distance of two numbers; infinite if one of them is not finite.
+/// Returns the distance of two numbers; infinite if one of them is not finite.
 pub fn apart(a: f64, b: f64) -> f64 {
     let distance = (a - b).abs();
     if distance.is_nan() { f64::INFINITY } else { distance }
 }
 
-/// The larger of two distances; what is not a number is the largest.
+/// Returns the larger of two distances; infinite if one of them is not a number.
 pub fn farther(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 
-/// Whether a distance is no more than what is allowed. An infinite one never is, whatever is allowed.
+/// Whether a distance is at most `allowed`. An infinite distance never is.
 pub fn is_within(distance: f64, allowed: f64) -> bool {
     distance.is_finite() && distance <= allowed
 }
@@ -24,7 +24,7 @@ mod tests {
     const NOT_FINITE: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
     #[test]
-    fn what_is_not_finite_is_infinitely_far_and_within_no_bar() {
+    fn values_that_are_not_finite_are_infinitely_far() {
         assert_eq!((apart(1.0, -2.5), farther(1.0, 2.0)), (3.5, 2.0));
         assert!(is_within(2.0, 2.0) && !is_within(2.0, 1.0) && !is_within(0.0, f64::NAN));
         for x in NOT_FINITE {

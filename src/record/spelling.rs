@@ -1,36 +1,35 @@
-//! Words and patterns inside records: 64 symbols spelled out, longer ones as hash and length.
+//! Words and patterns in records: up to 64 symbols, or hash and length.
 
 use super::{Record, WORD_SYMBOLS, valid};
 use rattlemap_dynamics::word::Word;
 
-/// Symbols that one `u64` holds.
+/// Symbols in one `u64`.
 const PER_WORD: usize = 21;
 
-/// Consecutive symbols that the hash takes together.
+/// Consecutive symbols that are hashed together.
 const HASH_WINDOW: usize = 8;
 
-/// A word or a pattern as a record keeps it.
+/// A word or a pattern as a record stores it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Spelling {
     /// All its symbols.
     Whole(Word),
-    /// More than 64 symbols: their hash and number.
+    /// Hash and length of more than 64 symbols.
     Hashed {
         /// [`word_hash`] of the symbols.
         hash: u64,
-        /// How many there are.
+        /// Number of symbols.
         length: u32,
     },
 }
 
 impl Spelling {
-    /// As a record would keep it.
+    /// Returns the form in which a record stores a word.
     pub fn new(word: &Word) -> Spelling {
         Spelling::unpacked(Spelling::packed(word))
     }
 
-    /// What figures and JSON show: the symbols in time order, or `#hash/length`. Never more than 64
-    /// characters.
+    /// Returns the text for figures and JSON: the symbols in time order, or `#hash/length`; at most 64 characters.
     pub fn text(&self) -> String {
         match self {
             Spelling::Whole(word) => word.time_order(),
@@ -38,7 +37,8 @@ impl Spelling {
         }
     }
 
-    /// What tables show: the text behind a `w`, lest a reader take it for a number. A cycle without events is `w`.
+    /// Returns the text for tables, which begins with `w` so that no program reads it as a number. A cycle without
+    /// events is `w`.
     pub fn in_table(&self) -> String {
         format!("w{}", self.text())
     }
@@ -59,23 +59,22 @@ impl Spelling {
             return Spelling::Hashed { hash, length };
         }
         let symbol = |i: usize| (symbols[i / PER_WORD] >> (3 * (i % PER_WORD)) & 7) as u8 + b'0';
-        // An engine need not know the canonical rotation; tables do.
+        // Engines need not store the canonical rotation.
         Spelling::Whole(Word::cyclic(&(0..length as usize).map(symbol).collect::<Vec<_>>()))
     }
 }
 
-/// Three fields of a record.
+/// The three fields of a record that store a word or a pattern.
 struct Packed {
     symbols: [u64; 4],
     hash: u64,
     length: u32,
 }
 
-/// A hash of a cyclic word that does not depend on where it starts.
+/// Returns a hash of a cyclic word that does not depend on where the word starts.
 ///
-/// The sum over all places of a mix of the eight symbols that begin there, in two halves of
-/// 32 bits: an engine without 64-bit integers can build it symbol by symbol, closing the
-/// circle with the first seven.
+/// It is the sum over all places of a mix of the eight symbols that begin there, in two halves of 32 bits. An engine
+/// without 64-bit integers can compute it symbol by symbol, and closes the circle with the first seven symbols.
 pub fn word_hash(symbols: &[u8]) -> u64 {
     let n = symbols.len();
     let mut halves = [0u32; 2];
@@ -86,17 +85,17 @@ pub fn word_hash(symbols: &[u8]) -> u64 {
     joined(halves)
 }
 
-/// The hash from its two halves, low and high.
+/// Returns the hash from its low and high halves.
 pub(crate) fn joined([low, high]: [u32; 2]) -> u64 {
     u64::from(high) << 32 | u64::from(low)
 }
 
-/// Adds one window of symbols, 3 bits each, to the halves of a hash; the shader does the same.
+/// Adds one window of symbols, 3 bits each, to the halves of a hash, as the shader does.
 fn add_window([low, high]: [u32; 2], code: u32) -> [u32; 2] {
     [low.wrapping_add(mix(code)), high.wrapping_add(mix(code ^ 0x5bd1_e995))]
 }
 
-/// The shader's `mix_bits`: every input bit moves every output bit.
+/// Mixes bits like the shader's `mix_bits`: every input bit changes every output bit.
 fn mix(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
@@ -104,21 +103,21 @@ fn mix(mut x: u32) -> u32 {
 }
 
 impl Record {
-    /// Packs a word and marks it valid.
+    /// Stores a word and marks it valid.
     pub fn set_word(&mut self, word: &Word) {
         self.valid |= valid::WORD;
         Packed { symbols: self.word, hash: self.word_hash, length: self.word_length } =
             Spelling::packed(word);
     }
 
-    /// Packs a pattern and marks it valid.
+    /// Stores a pattern and marks it valid.
     pub fn set_pattern(&mut self, pattern: &Word) {
         self.valid |= valid::PATTERN;
         Packed { symbols: self.pattern, hash: self.pattern_hash, length: self.pattern_length } =
             Spelling::packed(pattern);
     }
 
-    /// The word, if the record has one and spells it out.
+    /// Returns the word if the record has one and holds its symbols.
     pub fn word(&self) -> Option<Word> {
         match self.spelling()? {
             Spelling::Whole(word) => Some(word),
@@ -126,13 +125,13 @@ impl Record {
         }
     }
 
-    /// The word, spelled out or hashed, if the record has one.
+    /// Returns the word, as symbols or hash, if the record has one.
     pub fn spelling(&self) -> Option<Spelling> {
         let packed = Packed { symbols: self.word, hash: self.word_hash, length: self.word_length };
         (self.valid & valid::WORD != 0).then(|| Spelling::unpacked(packed))
     }
 
-    /// The word's pattern, spelled out or hashed, if the record has it.
+    /// Returns the word's pattern, as symbols or hash, if the record has one.
     pub fn pattern(&self) -> Option<Spelling> {
         let packed = Packed { symbols: self.pattern, hash: self.pattern_hash, length: self.pattern_length };
         (self.valid & valid::PATTERN != 0).then(|| Spelling::unpacked(packed))
@@ -144,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_survive_packing() {
+    fn words_are_unchanged_by_packing() {
         let long: Vec<u8> = (0..64u32).map(|i| b'1' + (i * 5 % 6) as u8).collect();
         for symbols in [&b""[..], b"36", b"2356", &long[..21], &long[..22], &long] {
             let word = Word::cyclic(symbols);
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn longer_words_are_hashed_whatever_their_start() {
+    fn hashes_do_not_depend_on_the_start_of_the_word() {
         let mut symbols: Vec<u8> = (0..100u32).map(|i| b'1' + (i * i % 6) as u8).collect();
         let hash = word_hash(&symbols);
         symbols.rotate_left(37);
@@ -173,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn no_table_has_a_word_that_is_a_number() {
+    fn words_in_tables_are_not_numbers() {
         for (symbols, text) in [("", "w"), ("36", "w36")] {
             assert_eq!(Spelling::Whole(Word::cyclic(symbols.as_bytes())).in_table(), text);
         }

@@ -1,21 +1,22 @@
-//! Records of all runs, by the run's number: as they are, or column by column in a fraction of the memory.
+//! Access to the records of all runs by number, and a compact container of many records.
 
 use std::collections::HashMap;
 use std::fmt::Debug;
+use std::hash::Hash;
 
-use bytemuck::Zeroable;
+use bytemuck::Pod;
 
 use super::Record;
 
-/// Records by number, however they are kept.
+/// Records by number, in any container.
 pub trait Records: Debug + Sync {
-    /// How many there are.
+    /// Returns the number of records.
     fn count(&self) -> usize;
 
-    /// The record with this number, below [`Records::count`].
+    /// Returns the record with a number below [`Records::count`].
     ///
     /// # Panics
-    /// If there is none.
+    /// If there is no such record.
     fn record(&self, id: usize) -> Record;
 }
 
@@ -29,148 +30,103 @@ impl<R: AsRef<[Record]> + Debug + Sync + ?Sized> Records for R {
     }
 }
 
-/// Records by column. A column in which no record has anything takes no memory, a word takes as much as its number: a
-/// map of class and exponent has 24 bytes per run where a [`Record`] has 176.
+/// A fixed number of records, stored by column.
 ///
-/// What is put in comes out to the bit, but for strobe states, which are kept where they are wanted.
+/// A column that is zero in all records takes no memory, and equal words are stored once. A map of classes and
+/// exponents takes 24 bytes per run; a [`Record`] takes 176. Records come back to the bit, but for strobe states,
+/// which are stored on request only.
 #[derive(Clone, Debug)]
 pub struct RecordStore {
-    heads: Vec<Head>,
+    count: usize,
+    with_strobes: bool,
+    numbers: [Column<f64>; 4],
+    strobe: Column<[f64; 4]>,
     periods_run: Column<u32>,
-    lyapunov: Column<f64>,
-    lyapunov_error: Column<f64>,
-    impacts_per_period: Column<f64>,
-    mesh_fraction: Column<f64>,
-    /// None where they are not wanted.
-    strobe: Option<Column<[f64; 4]>>,
-    word: Column<u32>,
-    pattern: Column<u32>,
-    spelled: Spelled,
-    /// Records that have numbers which the columns have no room for.
-    odd: HashMap<usize, Record>,
+    /// Period, status, symmetry, validity and the reserved field: few combinations occur.
+    flags: Distinct<[u32; 5]>,
+    word: Distinct<([u64; 4], u64, u32)>,
+    pattern: Distinct<([u64; 4], u64, u32)>,
 }
-
-/// What is small in every record of an engine.
-#[derive(Clone, Copy, Debug, Default)]
-struct Head {
-    /// Validity bits; above them whether the orbit is symmetric, and whether the record is an odd one.
-    bits: u16,
-    period: u8,
-    status: u8,
-}
-
-const SYMMETRIC: u16 = 1 << 14;
-const ODD: u16 = 1 << 15;
 
 impl RecordStore {
-    /// As many empty records, with room for strobe states if those are wanted.
+    /// Creates `count` empty records, with room for strobe states on request.
     pub fn new(count: usize, with_strobes: bool) -> RecordStore {
         RecordStore {
-            heads: vec![Head::default(); count],
+            count,
+            with_strobes,
+            numbers: Default::default(),
+            strobe: Column::default(),
             periods_run: Column::default(),
-            lyapunov: Column::default(),
-            lyapunov_error: Column::default(),
-            impacts_per_period: Column::default(),
-            mesh_fraction: Column::default(),
-            strobe: with_strobes.then(Column::default),
-            word: Column::default(),
-            pattern: Column::default(),
-            spelled: Spelled::default(),
-            odd: HashMap::new(),
+            flags: Distinct::default(),
+            word: Distinct::default(),
+            pattern: Distinct::default(),
         }
     }
 
-    /// Puts a record in the place of the one with this number.
+    /// Replaces the record with this number.
     ///
     /// # Panics
-    /// If there is none.
+    /// If there is no such record.
     pub fn put(&mut self, id: usize, record: &Record) {
-        let count = self.heads.len();
-        if self.heads[id].bits & ODD != 0 {
-            self.odd.remove(&id);
+        let count = self.count;
+        assert!(id < count, "record {id} of {count}");
+        let &Record { lyapunov, lyapunov_error, impacts_per_period, mesh_fraction, .. } = record;
+        let numbers = [lyapunov, lyapunov_error, impacts_per_period, mesh_fraction];
+        self.numbers.iter_mut().zip(numbers).for_each(|(column, number)| column.put(count, id, number));
+        if self.with_strobes {
+            self.strobe.put(count, id, record.strobe);
         }
-        let kept = Record { strobe: if self.strobe.is_some() { record.strobe } else { [0.0; 4] }, ..*record };
-        let Some(head) = Head::of(&kept) else {
-            self.heads[id] = Head { bits: ODD, ..Head::default() };
-            self.odd.insert(id, kept);
-            return;
-        };
-        self.heads[id] = head;
-        self.periods_run.put(count, id, kept.periods_run);
-        self.lyapunov.put(count, id, kept.lyapunov);
-        self.lyapunov_error.put(count, id, kept.lyapunov_error);
-        self.impacts_per_period.put(count, id, kept.impacts_per_period);
-        self.mesh_fraction.put(count, id, kept.mesh_fraction);
-        if let Some(strobe) = &mut self.strobe {
-            strobe.put(count, id, kept.strobe);
-        }
-        let word = self.spelled.number((kept.word, kept.word_hash, kept.word_length));
-        self.word.put(count, id, word);
-        let pattern = self.spelled.number((kept.pattern, kept.pattern_hash, kept.pattern_length));
-        self.pattern.put(count, id, pattern);
+        self.periods_run.put(count, id, record.periods_run);
+        let &Record { period, status, symmetric, valid, reserved, .. } = record;
+        self.flags.put(count, id, [period, status, symmetric, valid, reserved]);
+        self.word.put(count, id, (record.word, record.word_hash, record.word_length));
+        self.pattern.put(count, id, (record.pattern, record.pattern_hash, record.pattern_length));
     }
 
-    /// Bytes of memory that it takes, words aside.
+    /// Returns the bytes of memory of the columns, without the lists of words.
     pub fn bytes(&self) -> usize {
-        let numbers = [&self.lyapunov, &self.lyapunov_error, &self.impacts_per_period, &self.mesh_fraction];
-        let small = [&self.periods_run, &self.word, &self.pattern];
-        size_of_val(&*self.heads)
-            + numbers.iter().map(|column| column.bytes()).sum::<usize>()
+        let small = [&self.periods_run, &self.flags.places, &self.word.places, &self.pattern.places];
+        self.numbers.iter().map(Column::bytes).sum::<usize>()
             + small.iter().map(|column| column.bytes()).sum::<usize>()
-            + self.strobe.as_ref().map_or(0, Column::bytes)
-            + self.odd.len() * size_of::<(usize, Record)>()
+            + self.strobe.bytes()
     }
 }
 
 impl Records for RecordStore {
     fn count(&self) -> usize {
-        self.heads.len()
+        self.count
     }
 
     fn record(&self, id: usize) -> Record {
-        let head = self.heads[id];
-        if head.bits & ODD != 0 {
-            return self.odd[&id];
-        }
-        let (word, word_hash, word_length) = self.spelled.of(self.word.get(id));
-        let (pattern, pattern_hash, pattern_length) = self.spelled.of(self.pattern.get(id));
+        assert!(id < self.count, "record {id} of {}", self.count);
+        let [lyapunov, lyapunov_error, impacts_per_period, mesh_fraction] =
+            self.numbers.each_ref().map(|column| column.get(id));
+        let [period, status, symmetric, valid, reserved] = self.flags.get(id);
+        let (word, word_hash, word_length) = self.word.get(id);
+        let (pattern, pattern_hash, pattern_length) = self.pattern.get(id);
         Record {
-            lyapunov: self.lyapunov.get(id),
-            lyapunov_error: self.lyapunov_error.get(id),
-            impacts_per_period: self.impacts_per_period.get(id),
-            mesh_fraction: self.mesh_fraction.get(id),
-            strobe: self.strobe.as_ref().map_or([0.0; 4], |column| column.get(id)),
+            lyapunov,
+            lyapunov_error,
+            impacts_per_period,
+            mesh_fraction,
+            strobe: self.strobe.get(id),
             word,
             word_hash,
             word_length,
-            period: head.period.into(),
+            period,
             periods_run: self.periods_run.get(id),
-            status: head.status.into(),
-            symmetric: u32::from(head.bits & SYMMETRIC != 0),
-            valid: (head.bits & !SYMMETRIC).into(),
+            status,
+            symmetric,
+            valid,
             pattern,
             pattern_hash,
             pattern_length,
-            reserved: 0,
+            reserved,
         }
     }
 }
 
-impl Head {
-    /// None of a record that has more than fits.
-    fn of(record: &Record) -> Option<Head> {
-        let bits = u16::try_from(record.valid).ok().filter(|bits| *bits < SYMMETRIC)?;
-        let symmetric = match record.symmetric {
-            0 => 0,
-            1 => SYMMETRIC,
-            _ => return None,
-        };
-        let (period, status) = (record.period.try_into().ok()?, record.status.try_into().ok()?);
-        (record.reserved == 0).then_some(Head { bits: bits | symmetric, period, status })
-    }
-}
-
-/// A number of every record; nothing until one is not zero.
+/// One value for every record. It is empty while all bits of all values are zero.
 #[derive(Clone, Debug)]
 struct Column<T>(Vec<T>);
 
@@ -180,10 +136,10 @@ impl<T> Default for Column<T> {
     }
 }
 
-impl<T: bytemuck::Pod> Column<T> {
+impl<T: Pod> Column<T> {
     fn put(&mut self, count: usize, id: usize, value: T) {
         if self.0.is_empty() {
-            // Minus zero is none.
+            // A comparison of bits, because minus zero equals zero.
             if bytemuck::bytes_of(&value).iter().all(|byte| *byte == 0) {
                 return;
             }
@@ -193,7 +149,7 @@ impl<T: bytemuck::Pod> Column<T> {
     }
 
     fn get(&self, id: usize) -> T {
-        self.0.get(id).copied().unwrap_or_else(Zeroable::zeroed)
+        self.0.get(id).copied().unwrap_or_else(T::zeroed)
     }
 
     fn bytes(&self) -> usize {
@@ -201,29 +157,30 @@ impl<T: bytemuck::Pod> Column<T> {
     }
 }
 
-/// A word or a pattern as a record has it: symbols, hash, length.
-type Packed = ([u64; 4], u64, u32);
-
-/// Words and patterns by number, from 1 on; 0 is nothing.
+/// One value for every record, where many records have the same value.
 #[derive(Clone, Debug, Default)]
-struct Spelled {
-    list: Vec<Packed>,
-    numbers: HashMap<Packed, u32>,
+struct Distinct<T> {
+    /// Each record's value by its place in `values`, from 1 on; 0 is the default value.
+    places: Column<u32>,
+    values: Vec<T>,
+    known: HashMap<T, u32>,
 }
 
-impl Spelled {
-    fn number(&mut self, packed: Packed) -> u32 {
-        if packed == Packed::default() {
-            return 0;
-        }
-        *self.numbers.entry(packed).or_insert_with(|| {
-            self.list.push(packed);
-            self.list.len() as u32
-        })
+impl<T: Copy + Default + Eq + Hash> Distinct<T> {
+    fn put(&mut self, count: usize, id: usize, value: T) {
+        let place = if value == T::default() {
+            0
+        } else {
+            *self.known.entry(value).or_insert_with(|| {
+                self.values.push(value);
+                self.values.len() as u32
+            })
+        };
+        self.places.put(count, id, place);
     }
 
-    fn of(&self, number: u32) -> Packed {
-        (number as usize).checked_sub(1).map_or(Packed::default(), |place| self.list[place])
+    fn get(&self, id: usize) -> T {
+        (self.places.get(id) as usize).checked_sub(1).map_or(T::default(), |place| self.values[place])
     }
 }
 
@@ -231,64 +188,43 @@ impl Spelled {
 mod tests {
     use super::*;
     use crate::record::valid;
+    use bytemuck::Zeroable;
     use proptest::prelude::*;
     use rattlemap_dynamics::word::Word;
 
-    /// Every tenth bit pattern is one that no engine writes.
+    /// Records of any bits; some are empty, some share their words.
     fn records() -> impl Strategy<Value = Vec<Record>> {
-        let number = || any::<u64>().prop_map(f64::from_bits);
-        let numbers = (number(), number(), number(), number(), [number(), number(), number(), number()]);
-        let small = (0u32..300, any::<u32>(), 0u32..300, 0u32..3, 0u32..1 << 17);
-        let word = || "[1-6]{0,70}";
-        let one =
-            (numbers, small, word(), word(), 0u32..20).prop_map(|(numbers, small, word, pattern, odd)| {
-                let (lyapunov, lyapunov_error, impacts_per_period, mesh_fraction, strobe) = numbers;
-                let (period, periods_run, status, symmetric, bits) = small;
-                let mut record = Record {
-                    lyapunov,
-                    lyapunov_error,
-                    impacts_per_period,
-                    mesh_fraction,
-                    strobe,
-                    period,
-                    periods_run,
-                    status,
-                    symmetric,
-                    reserved: u32::from(odd == 0),
-                    ..Record::default()
-                };
-                record.set_word(&Word::cyclic(word.as_bytes()));
-                record.set_pattern(&Word::cyclic(pattern.as_bytes()));
-                record.valid = bits;
-                record
-            });
-        let nothing = Just(Record::default());
-        prop::collection::vec(prop_oneof![1 => nothing, 3 => one], 1..40)
+        let bits = prop::collection::vec(any::<u64>(), size_of::<Record>() / 8);
+        let any_bits = bits.prop_map(|bits| bytemuck::pod_read_unaligned(bytemuck::cast_slice(&bits)));
+        let with_words = ("[1-6]{0,70}", "[1-6]{0,2}").prop_map(|(word, pattern)| {
+            let mut record = Record::default();
+            record.set_word(&Word::cyclic(word.as_bytes()));
+            record.set_pattern(&Word::cyclic(pattern.as_bytes()));
+            record
+        });
+        prop::collection::vec(prop_oneof![Just(Record::zeroed()), any_bits, with_words], 1..40)
     }
 
     proptest! {
         #[test]
-        fn what_is_put_in_comes_out_to_the_bit(list in records(), with_strobes: bool) {
+        fn records_come_back_to_the_bit(list in records(), with_strobes: bool) {
             let mut store = RecordStore::new(list.len(), with_strobes);
-            // Each place has another record first.
-            for (id, record) in list.iter().rev().enumerate() {
-                store.put(id, record);
-            }
-            for (id, record) in list.iter().enumerate() {
-                store.put(id, record);
+            // Another record is replaced in each place.
+            for record_list in [list.iter().rev().collect::<Vec<_>>(), list.iter().collect()] {
+                record_list.into_iter().enumerate().for_each(|(id, record)| store.put(id, record));
             }
             prop_assert_eq!(store.count(), list.len());
             for (id, &record) in list.iter().enumerate() {
                 let strobe = if with_strobes { record.strobe } else { [0.0; 4] };
-                let (kept, expected) = (store.record(id), Record { strobe, ..record });
-                prop_assert_eq!(bytemuck::bytes_of(&kept), bytemuck::bytes_of(&expected));
+                let (stored, expected) = (store.record(id), Record { strobe, ..record });
+                prop_assert_eq!(bytemuck::bytes_of(&stored), bytemuck::bytes_of(&expected));
             }
         }
     }
 
-    /// What a map of 10^9 cells needs hangs on it.
+    /// Maps of 10^9 cells depend on these sizes.
     #[test]
-    fn a_run_takes_the_bytes_of_what_was_asked_for() {
+    fn a_run_takes_the_bytes_of_its_quantities() {
         let count = 1000;
         let per_run = |record: &Record, with_strobes: bool| {
             let mut store = RecordStore::new(count, with_strobes);

@@ -16,8 +16,8 @@ use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::MANIFEST;
-use crate::store::manifest::bifurcation::BifurcationManifest;
 pub use crate::store::manifest::bifurcation::DiagramArguments;
+use crate::store::manifest::bifurcation::bifurcation;
 
 const CSV: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
@@ -87,7 +87,7 @@ pub fn write(
     }
     let listed = inventory::entries(folder, &files)?;
     let times = [elapsed, clock.elapsed()];
-    inventory::write_manifest(folder, &BifurcationManifest::new(scene, arguments, columns, times, &listed))?;
+    inventory::write_manifest(folder, &bifurcation(scene, arguments, columns, times, &listed))?;
     files.push(MANIFEST);
     Ok(files)
 }

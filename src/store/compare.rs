@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::findings::compare::{Comparison, Kind, Tally};
 use crate::map::scene::Format;
@@ -15,9 +15,9 @@ use crate::show::names;
 use crate::show::table::compare_csv;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
-use crate::store::inventory::{self, FileEntry};
+use crate::store::inventory;
 use crate::store::manifest::map::Made;
-use crate::store::manifest::{Head, MANIFEST};
+use crate::store::manifest::{Head, MANIFEST, joined};
 use rattlemap_dynamics::orbit::Class;
 
 const CSV: &str = "compare.csv";
@@ -110,118 +110,48 @@ pub struct Transition {
     pub cells: usize,
 }
 
-#[derive(Serialize)]
-struct SideObject<'a> {
-    folder: &'a str,
-    title: &'a str,
-    engine: &'a str,
-    precision: &'a str,
-    device: &'a str,
-    crate_version: &'a str,
-    commit: &'a str,
-}
-
-#[derive(Serialize)]
-struct TallyObject {
-    compared: usize,
-    differing: usize,
-}
-
-/// The largest difference of exponents and its cell; null if none was compared or if it is infinite.
-#[derive(Serialize)]
-struct ExponentsObject {
-    compared: usize,
-    largest: Option<f64>,
-    i: Option<usize>,
-    j: Option<usize>,
-}
-
-/// Result of the comparison.
-#[derive(Serialize)]
-struct Object<'a> {
-    a: SideObject<'a>,
-    b: SideObject<'a>,
-    scene_differences: Vec<Difference>,
-    cells: usize,
-    differing: usize,
-    /// Number of differing cells by kind.
-    by_class: usize,
-    by_period: usize,
-    /// Cells that agree in class and period and differ by pattern, or by word if a map has no patterns.
-    by_pattern: usize,
-    by_word: usize,
-    transitions: Vec<Transition>,
-    /// Counts over cells with one period; null if a map has no such values.
-    symmetric: Option<TallyObject>,
-    words: Option<TallyObject>,
-    patterns: Option<TallyObject>,
-    exponents: ExponentsObject,
-    attractors: Option<TallyObject>,
-}
-
-#[derive(Serialize)]
-struct CompareManifest<'a> {
-    #[serde(flatten)]
-    head: Head,
-    #[serde(flatten)]
-    object: Object<'a>,
-    timings: TimingsObject,
-    files: &'a [FileEntry],
-}
-
-#[derive(Serialize)]
-struct TimingsObject {
-    read: f64,
-    write: f64,
-}
-
-#[derive(Serialize)]
-struct PrintedObject<'a> {
-    /// The folder as the user named it.
-    folder: String,
-    files: &'a [&'static str],
-    #[serde(flatten)]
-    object: Object<'a>,
-}
-
-impl<'a> Object<'a> {
-    fn of(compared: &Compared<'a>) -> Object<'a> {
-        let Compared { sides, comparison } = compared;
-        let [a, b] = sides.map(|side| SideObject {
-            folder: side.name,
-            title: side.cells.scene().title(),
-            engine: side.made.engine,
-            precision: side.made.precision,
-            device: side.made.device,
-            crate_version: side.crate_version,
-            commit: side.commit,
-        });
-        let tally =
-            |Tally { compared, differing }| (compared > 0).then_some(TallyObject { compared, differing });
-        let indices = comparison.exponent.map(|largest| sides[0].cells.row(largest.id).indices);
-        Object {
-            a,
-            b,
-            scene_differences: compared.scene_differences(),
-            cells: comparison.kinds.len(),
-            differing: comparison.differing(),
-            by_class: comparison.count(Kind::Class),
-            by_period: comparison.count(Kind::Period),
-            by_pattern: comparison.count(Kind::Pattern),
-            by_word: comparison.count(Kind::Word),
-            transitions: compared.transitions(),
-            symmetric: tally(comparison.symmetric),
-            words: tally(comparison.words),
-            patterns: tally(comparison.patterns),
-            exponents: ExponentsObject {
-                compared: comparison.exponents,
-                largest: comparison.exponent.map(|largest| largest.difference).filter(|x| x.is_finite()),
-                i: indices.map(|[i, _]| i),
-                j: indices.map(|[_, j]| j),
-            },
-            attractors: tally(comparison.attractors),
-        }
-    }
+/// Describes the result of the comparison. `by_pattern` and `by_word` count cells that agree in class and period and differ
+/// by pattern, or by word if a map has no patterns. Counts over cells with one period are null if a map has no such values;
+/// the largest difference of exponents is null if it is infinite.
+fn result(compared: &Compared<'_>) -> Value {
+    let Compared { sides, comparison } = compared;
+    let [a, b] = sides.map(|side| {
+        json!({
+            "folder": side.name,
+            "title": side.cells.scene().title(),
+            "engine": side.made.engine,
+            "precision": side.made.precision,
+            "device": side.made.device,
+            "crate_version": side.crate_version,
+            "commit": side.commit,
+        })
+    });
+    let tally = |Tally { compared, differing }| {
+        (compared > 0).then(|| json!({ "compared": compared, "differing": differing }))
+    };
+    let indices = comparison.exponent.map(|largest| sides[0].cells.row(largest.id).indices);
+    json!({
+        "a": a,
+        "b": b,
+        "scene_differences": compared.scene_differences(),
+        "cells": comparison.kinds.len(),
+        "differing": comparison.differing(),
+        "by_class": comparison.count(Kind::Class),
+        "by_period": comparison.count(Kind::Period),
+        "by_pattern": comparison.count(Kind::Pattern),
+        "by_word": comparison.count(Kind::Word),
+        "transitions": compared.transitions(),
+        "symmetric": tally(comparison.symmetric),
+        "words": tally(comparison.words),
+        "patterns": tally(comparison.patterns),
+        "exponents": {
+            "compared": comparison.exponents,
+            "largest": comparison.exponent.map(|largest| largest.difference).filter(|x| x.is_finite()),
+            "i": indices.map(|[i, _]| i),
+            "j": indices.map(|[_, j]| j),
+        },
+        "attractors": tally(comparison.attractors),
+    })
 }
 
 /// Writes the table, the figure in these formats, and the manifest last. A list of cells has no figure. `reading` is the
@@ -245,23 +175,18 @@ pub fn write(
         files.push(name);
     }
     let listed = inventory::entries(folder, &files)?;
-    let manifest = CompareManifest {
-        head: Head::of("compare"),
-        object: Object::of(compared),
-        timings: TimingsObject { read: reading.as_secs_f64(), write: clock.elapsed().as_secs_f64() },
-        files: &listed,
-    };
+    let timings = json!({ "read": reading.as_secs_f64(), "write": clock.elapsed().as_secs_f64() });
+    let manifest = joined([
+        json!(Head::of("compare")),
+        result(compared),
+        json!({ "timings": timings, "files": listed }),
+    ]);
     inventory::write_manifest(folder, &manifest)?;
     files.push(MANIFEST);
     Ok(files)
 }
 
 /// Returns the object that `compare --json` prints. Scripts depend on its fields.
-///
-/// # Errors
-/// [`OutputError`] if a result cannot be put into JSON.
-pub fn object(folder: &Path, files: &[&'static str], compared: &Compared<'_>) -> Result<Value, OutputError> {
-    let folder = folder.to_string_lossy().into_owned();
-    let object = PrintedObject { folder, files, object: Object::of(compared) };
-    Ok(serde_json::to_value(object)?)
+pub fn object(folder: &Path, files: &[&'static str], compared: &Compared<'_>) -> Value {
+    joined([json!({ "folder": folder.to_string_lossy(), "files": files }), result(compared)])
 }

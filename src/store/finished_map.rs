@@ -8,7 +8,7 @@ use serde_json::Value;
 use thiserror::Error;
 
 use crate::map::plan::Plan;
-use crate::map::scene::{FileBeside, FileText, Purpose, Scene, SceneError};
+use crate::map::scene::{CompanionFile, FileText, Purpose, Scene, SceneError};
 use crate::map::schedule::Refined;
 use crate::map::shard::Shard;
 use crate::record::Record;
@@ -69,16 +69,6 @@ pub enum FinishedMapError {
         .folder.display()
     )]
     NoRecords { folder: PathBuf },
-    /// The records belong to another run than the manifest.
-    #[error(
-        "{} does not belong to the {MANIFEST} in its folder: {differences}; make the map again with \
-         `rattlemap map SCENE --force`",
-        .path.display()
-    )]
-    OtherRecords { path: PathBuf, differences: String },
-    /// The record file is damaged.
-    #[error("{} is damaged at byte {at}: {what}; make the map again with `rattlemap map SCENE --force`", .path.display())]
-    DamagedRecords { path: PathBuf, at: u64, what: &'static str },
     /// Records are missing.
     #[error(
         "{}: {}{count} of {expected} {unit} are there; `{command}` keeps them and computes the others",
@@ -92,19 +82,19 @@ pub enum FinishedMapError {
         unit: &'static str,
         command: String,
     },
-    /// The record file cannot be read.
+    /// The record file cannot be read, or belongs to another run.
     #[error(transparent)]
-    Records(RecordFileError),
+    Records(#[from] RecordFileError),
 }
 
 impl FinishedMapError {
     /// Whether the caller named a wrong folder; otherwise the folder is damaged.
     pub fn is_usage(&self) -> bool {
-        let is_damage = matches!(
+        !matches!(
             self,
-            FinishedMapError::DamagedRecords { .. } | FinishedMapError::Incomplete { damage: Some(_), .. }
-        );
-        !is_damage
+            FinishedMapError::Records(RecordFileError::Damaged { .. })
+                | FinishedMapError::Incomplete { damage: Some(_), .. }
+        )
     }
 }
 
@@ -123,9 +113,12 @@ pub fn read_manifest(folder: &Path) -> Result<Value, FinishedMapError> {
             None => FinishedMapError::NoManifest { folder: folder.to_owned() },
         });
     }
-    let read = fs::read_to_string(&manifest).map_err(|error| error.to_string());
-    read.and_then(|text| serde_json::from_str(&text).map_err(|error| error.to_string()))
-        .map_err(|reason| FinishedMapError::Unreadable { manifest, reason })
+    let text = fs::read_to_string(&manifest).map_err(|error| unreadable(folder, error))?;
+    serde_json::from_str(&text).map_err(|error| unreadable(folder, error))
+}
+
+fn unreadable(folder: &Path, error: impl ToString) -> FinishedMapError {
+    FinishedMapError::Unreadable { manifest: folder.join(MANIFEST), reason: error.to_string() }
 }
 
 /// Refuses the manifest of another format.
@@ -149,8 +142,9 @@ pub fn require_format(folder: &Path, manifest: &Value) -> Result<(), FinishedMap
 pub fn read_tables(folder: &Path) -> Result<Value, FinishedMapError> {
     let manifest = manifest_of(folder, &["map", "bifurcation"])?;
     match Option::<Shard>::deserialize(&manifest["shard"]) {
+        Ok(None) => Ok(manifest),
         Ok(Some(shard)) => Err(FinishedMapError::IsShard { folder: folder.to_owned(), shard }),
-        _ => Ok(manifest),
+        Err(error) => Err(unreadable(folder, error)),
     }
 }
 
@@ -184,36 +178,21 @@ pub struct StoredManifest {
     pub shard: Option<Shard>,
     pub elapsed_seconds: f64,
     pub files: Vec<FileEntry>,
-    model: StoredModel,
-    integration: StoredIntegration,
-    timings: StoredTimings,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-struct StoredModel {
-    text: Option<String>,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-struct StoredIntegration {
-    least_steps_used: Option<u32>,
-    most_steps_used: Option<u32>,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-struct StoredTimings {
-    open: f64,
+    model: Value,
+    integration: Value,
+    timings: Value,
 }
 
 impl StoredManifest {
     /// The smallest and the largest number of free steps that lanes took per forcing period.
     pub(crate) fn lane_grid(&self) -> Option<[u32; 2]> {
-        Some([self.integration.least_steps_used?, self.integration.most_steps_used?])
+        let steps = |name: &str| u32::try_from(self.integration[name].as_u64()?).ok();
+        Some([steps("least_steps_used")?, steps("most_steps_used")?])
     }
 
     /// Seconds until the engine was ready.
     pub(crate) fn opening_seconds(&self) -> f64 {
-        self.timings.open
+        self.timings["open"].as_f64().unwrap_or_default()
     }
 
     /// Returns the command that computes a shard of the same map; into `out`, if that is given.
@@ -260,11 +239,8 @@ impl FinishedMap {
     /// # Errors
     /// [`FinishedMapError`] if the folder is not one of these, not finished, or of another format.
     pub fn open_part(folder: &Path) -> Result<FinishedMap, FinishedMapError> {
-        let unreadable = |error: serde_json::Error| FinishedMapError::Unreadable {
-            manifest: folder.join(MANIFEST),
-            reason: error.to_string(),
-        };
-        let manifest = serde_json::from_value(manifest_of(folder, &["map"])?).map_err(unreadable)?;
+        let manifest = serde_json::from_value(manifest_of(folder, &["map"])?);
+        let manifest = manifest.map_err(|error| unreadable(folder, error))?;
         Ok(FinishedMap { folder: folder.to_owned(), manifest })
     }
 
@@ -315,10 +291,10 @@ impl FinishedMap {
     pub fn scene(&self) -> Result<Scene, FinishedMapError> {
         let name = self.folder.join(MANIFEST).display().to_string();
         let find = |what, _: &str| {
-            if what == FileBeside::Model {
-                let text = self.manifest.model.text.clone();
+            if what == CompanionFile::Model {
+                let text = self.manifest.model["text"].as_str();
                 let text = text.ok_or("is not in the manifest; make the map again with --force")?;
-                return Ok(FileText { name: format!("{name}, model"), text });
+                return Ok(FileText { name: format!("{name}, model"), text: text.to_owned() });
             }
             let path = self.folder.join(LIST);
             let text = read_text(&path, MOST_LIST_BYTES, "list fewer cells").map_err(|error| {
@@ -329,7 +305,14 @@ impl FinishedMap {
             })?;
             Ok(FileText { name: path.display().to_string(), text })
         };
-        Ok(Scene::parse_beside(&self.manifest.scene, &name, &self.manifest.set, Purpose::Map, &find)?)
+        Ok(Scene::parse_with_files(
+            &self.manifest.scene,
+            &name,
+            &self.manifest.set,
+            Purpose::Map,
+            None,
+            &find,
+        )?)
     }
 
     /// Reads the records of a whole map.
@@ -344,15 +327,7 @@ impl FinishedMap {
         let StoredManifest { engine, precision, device, sources, target, .. } = &self.manifest;
         let identity = Identity::new(engine, precision, device, scene.identity()).built_from(sources, target);
         let mut work = Work::new(plan, None);
-        let Extent { count, damage, .. } = work.read(&path, &identity).map_err(|error| match error {
-            RecordFileError::OtherRun { path, differences } => {
-                FinishedMapError::OtherRecords { path, differences }
-            }
-            RecordFileError::Damaged { path, at, what } => {
-                FinishedMapError::DamagedRecords { path, at, what }
-            }
-            other => FinishedMapError::Records(other),
-        })?;
+        let Extent { count, damage, .. } = work.read(&path, &identity)?;
         let Work { schedule, mut records, .. } = work;
         let unit = plan.unit();
         if !schedule.is_finished() {

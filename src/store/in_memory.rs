@@ -12,7 +12,7 @@ use crate::show::table::words_csv::Rows;
 use crate::show::table::{attractors_csv, bifurcation_columns_csv, bifurcation_csv};
 use crate::show::{layers, words};
 use crate::store::error::OutputError;
-use crate::store::manifest::bifurcation::{BifurcationManifest, DiagramArguments};
+use crate::store::manifest::bifurcation::{DiagramArguments, bifurcation};
 use crate::store::manifest::map::{self, Run};
 
 /// A map in memory.
@@ -38,7 +38,7 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
     let attractors =
         cells.basins().map(|basins| text(|to| attractors_csv::write(to, cells, basins))).transpose()?;
     Ok(Map {
-        manifest: serde_json::to_string(&map::map(cells, run, Duration::ZERO, &[]))?,
+        manifest: map::map(cells, run, Duration::ZERO, &[]).to_string(),
         columns: cell_columns::read(cells, &rows),
         texts: rows.texts(),
         attractors,
@@ -77,10 +77,10 @@ pub fn diagram(
     elapsed: Duration,
 ) -> Result<Diagram, OutputError> {
     let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
-    let manifest = BifurcationManifest::new(scene, arguments, columns, [elapsed, Duration::ZERO], &[]);
+    let manifest = bifurcation(scene, arguments, columns, [elapsed, Duration::ZERO], &[]);
     let [kinds, directions] = bifurcation_csv::point_codes();
     Ok(Diagram {
-        manifest: serde_json::to_string(&manifest)?,
+        manifest: manifest.to_string(),
         columns: text(|to| bifurcation_columns_csv::write(to, axis, columns))?,
         points: bifurcation_csv::points(axis, &names, columns),
         kinds,

@@ -22,8 +22,7 @@ use crate::store::error::OutputError;
 use crate::store::file_names::{RECORDS, UNFINISHED};
 use crate::store::folder::Folder;
 use crate::store::plain_file::PARTIAL;
-use crate::store::validation_json::ValidationObject;
-use crate::store::{inventory, manifest, unfinished};
+use crate::store::{inventory, manifest, unfinished, validation_json};
 use crate::validate::Validation;
 
 pub use crate::store::file_names::{LIST, MANIFEST, MODEL, VALIDATION};
@@ -123,7 +122,7 @@ pub fn write_validation(
     validation: &Validation,
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
-    let object = serde_json::to_value(ValidationObject::new(cells, made, again, validation))?;
+    let object = validation_json::object(cells, made, again, validation);
     folder.write_json(VALIDATION, &object)?;
     let mut files = vec![VALIDATION];
     if folder.path().join(HTML).is_file() {

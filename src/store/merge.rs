@@ -6,30 +6,25 @@
 //! folder is unchanged until all records are there.
 //!
 //! ```no_run
-//! use std::path::{Path, PathBuf};
-//!
 //! use rattlemap::store::folder::Folder;
 //! use rattlemap::store::merge::{Parts, Progress};
 //!
 //! // The shards of a map, in any order.
-//! let shards: Vec<PathBuf> = (1..=4).map(|i| format!("out/s.shard-{i}-of-4").into()).collect();
-//! let parts = Parts::open(&shards)?;
-//! let out = Path::new("out/s");
-//! parts.refuse(out)?;
-//! let folder = Folder::open(out, false)?;
+//! let parts = Parts::open(&["s.shard-1-of-2".into(), "s.shard-2-of-2".into()])?;
+//! parts.refuse("out/s".as_ref())?;
+//! let folder = Folder::open("out/s".as_ref(), false)?;
 //! // Returning false stops the merge and leaves the folder as it was.
-//! let gathered = parts.gather(&folder, |Progress { done, of }| {
+//! let records = parts.gather(&folder, |Progress { done, of }| {
 //!     println!("{done} of {of} runs");
 //!     true
 //! })?;
-//! let merged = gathered.write(&folder)?;
-//! println!("{}", merged.files.join(", "));
+//! println!("{}", records.write(&folder)?.files.join(", "));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod error;
 
-pub use error::{MergeError, MissingShard, UnfinishedShard};
+pub use error::MergeError;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -40,14 +35,14 @@ use crate::findings::effect;
 use crate::map::plan::{Plan, count_classes};
 use crate::map::scene::{Scene, Start};
 use crate::map::shard::Shard;
-use crate::record::{Record, RecordStore, Records};
+use crate::record::{RecordStore, Records};
 use crate::show::cells::{Cells, Survey};
 use crate::store::error::OutputError;
 use crate::store::finished_map::{FinishedMap, StoredManifest, UnfinishedRun};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
 use crate::store::map::{self, Made, Run, ShardOrigin};
-use crate::store::record_file::{Identity, RECORDS, RecordFile, RecordFileError};
+use crate::store::record_file::{Extent, Identity, RECORDS, RecordFile, RecordFileError};
 use crate::store::run_records::Work;
 use crate::store::{in_memory, map_json, unfinished};
 use crate::text::shell::quoted;
@@ -154,26 +149,79 @@ impl Parts {
         let plan = Plan::new(&self.scene);
         plan.check()?;
         let path = folder.path().join(RECORDS);
-        let mut gathering = Gathering {
-            plan: &plan,
-            file: RecordFile::create_aside(&path, &self.identity)?,
-            go_on,
-            records: RecordStore::new(plan.run_count(), plan.reads_strobes()),
-            done: 0,
-            waiting: Vec::new(),
-            warnings: Vec::new(),
+        let mut file = RecordFile::create_aside(&path, &self.identity)?;
+        let (records, warnings) = match self.copy_records(&plan, &mut file, go_on) {
+            Ok(copied) => copied,
+            Err(error) => {
+                file.discard();
+                return Err(error);
+            }
         };
-        let read = self.parts.iter().try_for_each(|part| gathering.read(part));
-        let read = read.and_then(|()| gathering.finish());
-        let Gathering { file, records, warnings, .. } = gathering;
-        if let Err(error) = read {
-            file.discard();
-            return Err(error);
-        }
         map::begin(folder, &self.scene)?;
         file.put_in_place(&path)?;
         unfinished::store_elapsed(folder, self.elapsed())?;
         Ok(MapRecords { parts: self, plan, records, warnings, reading: clock.elapsed() })
+    }
+
+    /// Copies the records of all parts to a file. Returns them, and warnings about damage behind the last record of a part.
+    fn copy_records(
+        &self,
+        plan: &Plan,
+        file: &mut RecordFile,
+        mut go_on: impl FnMut(Progress) -> bool,
+    ) -> Result<(RecordStore, Vec<String>), MergeError> {
+        let mut records = RecordStore::new(plan.run_count(), plan.reads_strobes());
+        let (mut warnings, mut waiting, mut done) = (Vec::new(), Vec::new(), 0);
+        let follows = plan.policy().follows();
+        // A batch for each core, because the cores compress them in parallel.
+        let enough = BATCH * rayon::current_num_threads().min(MOST_BATCHES);
+        for part in &self.parts {
+            let mut work = Work::without_records(plan, Some(part.shard));
+            let mut failed = None;
+            let read = RecordFile::read(&part.records(), &part.identity, work.order(), |batch| {
+                if !go_on(Progress { done, of: records.count() }) {
+                    failed = Some(MergeError::Stopped);
+                    return false;
+                }
+                if !work.replay(batch) {
+                    return false;
+                }
+                batch.iter().for_each(|(id, record)| records.put(*id as usize, record));
+                done += batch.len();
+                if !follows {
+                    waiting.extend_from_slice(batch);
+                }
+                if waiting.len() >= enough {
+                    failed = file.append(&std::mem::take(&mut waiting)).err().map(MergeError::from);
+                }
+                failed.is_none()
+            });
+            if let Some(error) = failed {
+                return Err(error);
+            }
+            let Extent { count, damage, .. } = read.map_err(|error| part.damaged(fault(error)))?;
+            if !work.schedule.is_finished() {
+                let damage = damage.map_or(String::new(), |damage| format!("{damage}: "));
+                let expected = part.shard.run_count(plan);
+                return Err(part.damaged(format!("{damage}{count} of {expected} runs are there")));
+            }
+            let folder = part.map.folder().display();
+            warnings.extend(damage.map(|damage| format!("{folder}: {damage}; all {count} runs are there")));
+        }
+        if follows {
+            // A resumed run takes up each row after the one before, so rows are written in order.
+            let [columns, rows] = plan.counts();
+            let is_down = plan.policy() == Start::Down;
+            let row = |nth: usize| if is_down { rows - 1 - nth } else { nth };
+            let mut ids = (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns).peekable();
+            while ids.peek().is_some() {
+                let next = ids.by_ref().take(BATCH);
+                file.append(&next.map(|id| (id as u32, records.record(id))).collect::<Vec<_>>())?;
+            }
+        } else if !waiting.is_empty() {
+            file.append(&waiting)?;
+        }
+        Ok((records, warnings))
     }
 
     /// Sum of the times that the parts were integrated.
@@ -232,6 +280,10 @@ impl Part {
         }
     }
 
+    fn records(&self) -> PathBuf {
+        self.map.folder().join(RECORDS)
+    }
+
     fn damaged(&self, what: String) -> MergeError {
         damaged(&self.map, self.shard, what)
     }
@@ -275,115 +327,44 @@ fn require_one_run(parts: &[Part], begun: &[UnfinishedRun]) -> Result<(), MergeE
     Ok(())
 }
 
-/// Refuses to merge if shards are missing or unfinished.
+/// Refuses to merge if shards are missing or unfinished, with the commands that compute them.
 fn require_all(parts: &[Part], begun: &[UnfinishedRun], scene: Option<&Scene>) -> Result<(), MergeError> {
     let first = parts.first();
     let present: Vec<Shard> =
         parts.iter().map(|part| part.shard).chain(begun.iter().filter_map(UnfinishedRun::shard)).collect();
-    let missing: Vec<MissingShard> = first.map_or(Vec::new(), |first| {
-        Shard::all(first.shard.count())
+    let mut incomplete = Vec::new();
+    if let Some(first) = first {
+        let count = first.shard.count();
+        let missing: Vec<String> = Shard::all(count)
             .filter(|shard| !present.contains(shard))
-            .map(|shard| MissingShard { shard, command: first.map.manifest().shard_command(shard, None) })
-            .collect()
-    });
-    if missing.is_empty() && begun.is_empty() {
-        return Ok(());
+            .map(|shard| format!("{shard} (`{}`)", first.map.manifest().shard_command(shard, None)))
+            .collect();
+        let are = if missing.len() == 1 { "is" } else { "are" };
+        if !missing.is_empty() {
+            let list = missing.join(", ");
+            incomplete.push(format!("{} of {count} shards {are} missing: {list}", missing.len()));
+        }
     }
     let countable = scene.filter(|scene| !begun.is_empty() && u32::try_from(scene.run_count()).is_ok());
     let plan = countable.map(Plan::new);
     let sets = first.map_or(&[][..], |first| &first.map.manifest().set);
-    let unfinished = begun.iter().map(|run| {
-        let (part, shard) = (run.folder.clone(), run.shard());
-        let command = match shard {
-            Some(_) => run.command(sets),
-            None => {
-                let out = quoted(&part.display().to_string());
-                format!("rattlemap map SCENE --out {out} --engine E --shard I/N --resume")
+    for run in begun {
+        let (part, count) = (run.folder.display(), run.count());
+        let of = plan.as_ref().zip(run.shard()).map(|(plan, shard)| shard.run_count(plan));
+        let of = of.map_or(String::new(), |of| format!(" of {of}"));
+        incomplete.push(match run.shard() {
+            Some(shard) => {
+                let command = run.command(sets);
+                format!("shard {shard} in {part} is unfinished: {count}{of} runs are there (`{command}`)")
             }
-        };
-        let of = plan.as_ref().zip(shard).map(|(plan, shard)| shard.run_count(plan));
-        UnfinishedShard { part, shard, count: run.count(), of, command }
-    });
-    Err(MergeError::Incomplete { missing, unfinished: unfinished.collect() })
-}
-
-/// Records on their way from the parts to the map.
-struct Gathering<'p, G> {
-    plan: &'p Plan,
-    file: RecordFile,
-    go_on: G,
-    /// All records, by run.
-    records: RecordStore,
-    done: usize,
-    /// Records to be written next.
-    waiting: Vec<(u32, Record)>,
-    warnings: Vec<String>,
-}
-
-impl<G: FnMut(Progress) -> bool> Gathering<'_, G> {
-    /// Reads the records of a part.
-    fn read(&mut self, part: &Part) -> Result<(), MergeError> {
-        let path = part.map.folder().join(RECORDS);
-        let mut work = Work::without_records(self.plan, Some(part.shard));
-        let mut failed = None;
-        let read = RecordFile::read(&path, &part.identity, work.order(), |batch| {
-            if !work.replay(batch) {
-                return false;
-            }
-            failed = self.take(batch).err();
-            failed.is_none()
+            None => format!(
+                "{part} is an unfinished run: {count} runs are there (`rattlemap map SCENE --out {} --engine E --shard I/N \
+                 --resume`)",
+                quoted(&part.to_string())
+            ),
         });
-        if let Some(error) = failed {
-            return Err(error);
-        }
-        let extent = read.map_err(|error| part.damaged(fault(error)))?;
-        let count = extent.count;
-        if !work.schedule.is_finished() {
-            let damage = extent.damage.map_or(String::new(), |damage| format!("{damage}: "));
-            let expected = part.shard.run_count(self.plan);
-            return Err(part.damaged(format!("{damage}{count} of {expected} runs are there")));
-        }
-        let folder = part.map.folder().display();
-        let warning = |damage| format!("{folder}: {damage}; all {count} runs are there");
-        self.warnings.extend(extent.damage.map(warning));
-        Ok(())
     }
-
-    fn take(&mut self, batch: &[(u32, Record)]) -> Result<(), MergeError> {
-        if !(self.go_on)(Progress { done: self.done, of: self.records.count() }) {
-            return Err(MergeError::Stopped);
-        }
-        batch.iter().for_each(|(id, record)| self.records.put(*id as usize, record));
-        self.done += batch.len();
-        if self.plan.policy().follows() {
-            // A resumed run takes up each row after the one before, so rows are written in order, at the end.
-            return Ok(());
-        }
-        self.waiting.extend_from_slice(batch);
-        // A batch for each core, because the cores compress them in parallel.
-        if self.waiting.len() >= BATCH * rayon::current_num_threads().min(MOST_BATCHES) {
-            self.file.append(&std::mem::take(&mut self.waiting))?;
-        }
-        Ok(())
-    }
-
-    /// Writes the remaining records.
-    fn finish(&mut self) -> Result<(), MergeError> {
-        if self.plan.policy().follows() {
-            let [columns, rows] = self.plan.counts();
-            let is_down = self.plan.policy() == Start::Down;
-            let row = |nth: usize| if is_down { rows - 1 - nth } else { nth };
-            let mut ids = (0..rows).flat_map(|nth| row(nth) * columns..(row(nth) + 1) * columns).peekable();
-            while ids.peek().is_some() {
-                let next = ids.by_ref().take(BATCH);
-                let batch: Vec<_> = next.map(|id| (id as u32, self.records.record(id))).collect();
-                self.file.append(&batch)?;
-            }
-        } else if !self.waiting.is_empty() {
-            self.file.append(&std::mem::take(&mut self.waiting))?;
-        }
-        Ok(())
-    }
+    if incomplete.is_empty() { Ok(()) } else { Err(MergeError::Incomplete(incomplete.join("; "))) }
 }
 
 /// All records of a map, in its folder and in memory.
@@ -434,7 +415,7 @@ impl MapRecords {
         let (files, object, classes, writing) = self.with_cells(|cells, run| {
             let files = map::write(folder, cells, run)?;
             let writing = clock.elapsed();
-            let object = map_json::object(folder.path(), &files, cells, run, writing)?;
+            let object = map_json::object(folder.path(), &files, cells, run, writing);
             Ok((files, object, count_classes(cells.classes()), writing))
         })?;
         Ok(MergedMap { files, classes, object, warnings: self.warnings, times: [self.reading, writing] })

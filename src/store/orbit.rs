@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::{Duration, Instant as Clock};
 
-use serde::Serialize;
+use serde_json::json;
 
 use crate::map::scene::Format;
 use crate::show::figure;
@@ -14,15 +14,16 @@ use crate::show::table::orbit_tables;
 pub use crate::show::table::orbit_tables::Moment;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
-use crate::store::inventory::{self, FileEntry};
-use crate::store::manifest::{Head, MANIFEST, ModelObject, TimingsObject};
+use crate::store::inventory;
+use crate::store::manifest::{self, Head, MANIFEST, joined};
 use rattlemap_dynamics::model::{Model, ModelError, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, trace};
 
 /// Returns the number of samples per forcing period that figures need: 400, or 20 per oscillation of the relative motion
 /// in contact, if that is more.
 pub(crate) fn samples_per_period(oscillator: &Oscillator) -> usize {
-    let stiffness = Side::BOTH.map(|side| oscillator.added(side)[0]).into_iter().fold(0.0, f64::max);
+    let stiffness =
+        Side::BOTH.map(|side| oscillator.wall_stiffness_and_damping(side)[0]).into_iter().fold(0.0, f64::max);
     let ringing = (stiffness * oscillator.mobility(oscillator.gap)).sqrt() / oscillator.omega;
     (20.0 * ringing).clamp(400.0, 50_000.0) as usize
 }
@@ -34,22 +35,6 @@ const SPECTRUM: &str = "spectrum.csv";
 /// Number of samples in the table of the motion, and smallest number of samples per forcing period.
 const TABLED: usize = 2000;
 const LEAST_TABLED: usize = 50;
-
-/// The manifest of an orbit.
-#[derive(Serialize)]
-struct OrbitManifest<'a> {
-    #[serde(flatten)]
-    head: Head,
-    engine: &'static str,
-    model: ModelObject,
-    parameters: Parameters,
-    start: Vec<f64>,
-    transient_periods: u32,
-    observed_periods: u32,
-    max_period: u32,
-    timings: TimingsObject,
-    files: &'a [FileEntry],
-}
 
 /// Settings of an orbit, and the time of its computation.
 #[derive(Clone, Copy, Debug)]
@@ -116,21 +101,21 @@ pub fn write(
     }
     let listed = inventory::entries(folder, &files)?;
     let Settings { transient_periods, observed_periods, max_period } = request.settings;
-    let manifest = OrbitManifest {
-        head: Head::of("orbit"),
-        engine: "reference f64",
-        model: ModelObject::of(model),
-        parameters: Parameters::of(model),
-        start: request.start[..model.state_names().len()].to_vec(),
-        transient_periods,
-        observed_periods,
-        max_period,
-        timings: TimingsObject {
-            integrate: request.elapsed.as_secs_f64(),
-            write: clock.elapsed().as_secs_f64(),
-        },
-        files: &listed,
-    };
+    let (elapsed, writing) = (request.elapsed.as_secs_f64(), clock.elapsed().as_secs_f64());
+    let manifest = joined([
+        json!(Head::of("orbit")),
+        json!({
+            "engine": "reference f64",
+            "model": manifest::model(model),
+            "parameters": Parameters::of(model),
+            "start": request.start[..model.state_names().len()],
+            "transient_periods": transient_periods,
+            "observed_periods": observed_periods,
+            "max_period": max_period,
+            "timings": { "integrate": elapsed, "write": writing },
+            "files": listed,
+        }),
+    ]);
     inventory::write_manifest(folder, &manifest)?;
     files.push(MANIFEST);
     Ok(files)
@@ -155,7 +140,7 @@ pub fn moments(
     Ok(orbit_tables::moments(&model.oscillator()?, orbit, &trace, samples_per_period))
 }
 
-/// What `orbit --json` prints.
+/// Returns the object that `orbit --json` prints.
 ///
 /// # Errors
 /// [`OutputError`] if it cannot be put into JSON.

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
@@ -16,12 +15,11 @@ use crate::show::names;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
-use crate::store::manifest::map::{
-    IntegrationObject, ListObject, MadeObject, MapTimings, ResumedObject, integration,
-};
-use crate::store::manifest::{AxisObject, Head, MANIFEST, ModelObject, StartObject, start};
+use crate::store::manifest::map::{integration, made, run_and_scene, timings};
+use crate::store::manifest::{self, MANIFEST, joined};
 use crate::store::map::{self, Run};
-use crate::store::record_file::{Identity, RECORDS};
+use crate::store::map_json::resumed;
+use crate::store::record_file::RECORDS;
 use crate::store::unfinished;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -78,39 +76,6 @@ pub struct FinishedShard<'a> {
     pub tally: &'a Tally,
 }
 
-/// The manifest of a shard: the fields of a map's manifest that do not need the records of other shards.
-#[derive(Serialize)]
-struct ShardManifest<'a> {
-    #[serde(flatten)]
-    head: Head,
-    shard: Shard,
-    #[serde(flatten)]
-    made: MadeObject<'a>,
-    processor: &'a str,
-    sources: &'static str,
-    target: &'static str,
-    title: &'a str,
-    scene: &'a str,
-    set: &'a [String],
-    model: ModelObject,
-    axes: Vec<AxisObject>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    list: Option<ListObject>,
-    start: StartObject,
-    integration: IntegrationObject,
-    /// Number of cells of the map.
-    cells: usize,
-    /// Number of runs of the shard. All fields below describe the shard.
-    runs: usize,
-    classes: BTreeMap<&'static str, usize>,
-    statuses: BTreeMap<&'static str, usize>,
-    periods: u64,
-    elapsed_seconds: f64,
-    resumed_cells: usize,
-    timings: MapTimings,
-    files: &'a [FileEntry],
-}
-
 /// Writes the files of a finished shard other than its records, and the manifest last. Returns the names of the files.
 ///
 /// # Errors
@@ -127,81 +92,45 @@ pub fn write(folder: &Folder, finished: &FinishedShard<'_>) -> Result<Vec<String
     Ok(files)
 }
 
-fn manifest<'a>(
-    finished: &FinishedShard<'a>,
-    writing: Duration,
-    files: &'a [FileEntry],
-) -> ShardManifest<'a> {
-    let FinishedShard { shard, scene, plan, run, tally } = *finished;
-    ShardManifest {
-        head: Head::of("map"),
-        shard,
-        made: MadeObject::of(run),
-        processor: run.processor,
-        sources: Identity::own_sources(),
-        target: Identity::own_target(),
-        title: scene.title(),
-        scene: scene.text(),
-        set: run.sets,
-        model: ModelObject::of(scene.base()),
-        axes: scene.axes().iter().map(AxisObject::from).collect(),
-        list: scene.list().map(ListObject::from),
-        start: start(scene),
-        integration: integration(scene, run.lane_grid),
-        cells: plan.cell_count(),
-        runs: shard.run_count(plan),
-        classes: tally.classes(),
-        statuses: tally.statuses(),
-        periods: tally.periods,
-        elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
-        resumed_cells: run.resumed_cells,
-        timings: MapTimings::of(run, writing),
-        files,
-    }
+/// Returns the manifest of a shard: the fields of a map's manifest that do not need the records of other shards.
+fn manifest(finished: &FinishedShard<'_>, writing: Duration, files: &[FileEntry]) -> Value {
+    let FinishedShard { shard, scene, run, .. } = *finished;
+    joined([
+        run_and_scene("map", Some(shard), run, scene),
+        json!({ "start": manifest::start(scene), "integration": integration(scene, run.lane_grid) }),
+        counts(finished),
+        json!({
+            "elapsed_seconds": (run.elapsed_before + run.elapsed).as_secs_f64(),
+            "resumed_cells": run.resumed_cells,
+            "timings": timings(run, writing),
+            "files": files,
+        }),
+    ])
 }
 
-/// The object that `map --shard --json` prints. Scripts depend on its fields.
-#[derive(Serialize)]
-struct ShardObject<'a> {
-    folder: String,
-    files: &'a [String],
-    shard: Shard,
-    #[serde(flatten)]
-    made: MadeObject<'a>,
-    cells: usize,
-    runs: usize,
-    classes: BTreeMap<&'static str, usize>,
-    statuses: BTreeMap<&'static str, usize>,
-    periods: u64,
-    resumed: ResumedObject,
-    seconds: SecondsObject,
+/// Counts the cells of the map and, for the shard, runs, classes, statuses and forcing periods.
+fn counts(finished: &FinishedShard<'_>) -> Value {
+    let FinishedShard { shard, plan, tally, .. } = *finished;
+    json!({
+        "cells": plan.cell_count(),
+        "runs": shard.run_count(plan),
+        "classes": tally.classes(),
+        "statuses": tally.statuses(),
+        "periods": tally.periods,
+    })
 }
 
-/// Seconds that each phase of this run took.
-#[derive(Serialize)]
-struct SecondsObject {
-    open: f64,
-    integrate: f64,
-}
-
-/// Returns the object for a shard whose files were written to a folder.
-///
-/// # Errors
-/// [`OutputError`] if a result cannot be put into JSON.
-pub fn object(folder: &Path, files: &[String], finished: &FinishedShard<'_>) -> Result<Value, OutputError> {
-    let FinishedShard { shard, plan, run, tally, .. } = *finished;
-    let object = ShardObject {
-        folder: folder.to_string_lossy().into_owned(),
-        files,
-        shard,
-        made: MadeObject::of(run),
-        cells: plan.cell_count(),
-        runs: shard.run_count(plan),
-        classes: tally.classes(),
-        statuses: tally.statuses(),
-        periods: tally.periods,
-        resumed: ResumedObject::of(run),
-        seconds: SecondsObject { open: run.opening.as_secs_f64(), integrate: run.elapsed.as_secs_f64() },
-    };
-    Ok(serde_json::to_value(object)?)
+/// Returns the object that `map --shard --json` prints for a shard whose files were written to a folder. Scripts depend
+/// on its fields.
+pub fn object(folder: &Path, files: &[String], finished: &FinishedShard<'_>) -> Value {
+    let FinishedShard { shard, run, .. } = *finished;
+    joined([
+        json!({ "folder": folder.to_string_lossy(), "files": files, "shard": shard }),
+        made(run),
+        counts(finished),
+        json!({
+            "resumed": resumed(run),
+            "seconds": { "open": run.opening.as_secs_f64(), "integrate": run.elapsed.as_secs_f64() },
+        }),
+    ])
 }

@@ -1,16 +1,14 @@
-//! The text of a scene or a model as a tree in which every value knows where it came from.
+//! The text of a scene or a model as a tree in which every value knows its place in the text.
 //!
-//! Serde would lose that knowledge as soon as a range is checked after parsing, and
-//! `--set` would have none to give.
+//! Serde would lose the places before ranges are checked, and `--set` arguments have none.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Place, Problem, SHOWN, SceneError};
+use super::error::{LONGEST_EXCERPT, Place, Problem, SceneError};
 
 /// The fields of a table by name.
 pub(crate) type Table = BTreeMap<String, Node>;
@@ -18,17 +16,17 @@ pub(crate) type Table = BTreeMap<String, Node>;
 /// One value of the tree.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    /// Where its name stands; the value itself where it has none.
+    /// Place of the name; that of the value if it has no name.
     pub(crate) name_place: Place,
-    /// Where the value stands.
+    /// Place of the value.
     pub(crate) place: Place,
-    /// The value as it was written, shortened for messages.
-    pub(crate) shown: String,
+    /// The value as written, shortened for messages.
+    pub(crate) excerpt: String,
     /// The value.
     pub(crate) value: Value,
 }
 
-/// TOML's types, as far as scenes use them.
+/// The types of TOML that scenes use.
 #[derive(Clone, Debug)]
 pub(crate) enum Value {
     Integer(i64),
@@ -37,48 +35,48 @@ pub(crate) enum Value {
     Flag(bool),
     List(Vec<Node>),
     Table(Table),
-    /// A date, or an integer too large for its type.
+    /// A date, or an integer that is too large.
     Other,
 }
 
-/// Reads TOML text; `file` is the name that messages give it.
+/// Reads TOML text. Messages call it `file`.
 pub(crate) fn read(text: &str, file: &str) -> Result<Node, SceneError> {
     let source = Source::new(text, file);
     let table = DeTable::parse(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
         let line = shorten(source.line_of(at));
-        source.error(at, Problem::Syntax { message: error.message().replace('\n', ", "), line })
+        let problem = Problem::Syntax { message: error.message().replace('\n', ", "), line };
+        SceneError { place: source.place(at), problem }
     })?;
     Ok(Node {
         name_place: source.place(0),
         place: source.place(0),
-        shown: "the file".into(),
+        excerpt: "the file".into(),
         value: Value::Table(source.table(table.into_inner())),
     })
 }
 
-/// Reads the value of a `--set` argument. Bare words are text, so that shells need no
-/// second layer of quotes.
+/// Reads the value of a `--set` argument. Bare words are text, so that shells need no additional quotes.
 pub(crate) fn read_argument(value: &str, argument: &Arc<str>) -> Node {
     let parsed = match DeValue::parse(value) {
         Ok(parsed) => Source::new(value, "").value(parsed.into_inner()),
         Err(_) => value.parse().map_or_else(|_| Value::Text(value.to_owned()), Value::Float),
     };
     let place = Place::Set { argument: argument.clone() };
-    let mut node = Node { name_place: place.clone(), place, shown: shorten(value), value: parsed };
+    let mut node = Node { name_place: place.clone(), place, excerpt: shorten(value), value: parsed };
     node.relocate();
     node
 }
 
 impl Node {
-    /// The same tree with everything in one place.
+    /// Returns the tree with all values at one place.
     pub(crate) fn placed(mut self, place: Place) -> Node {
         (self.place, self.name_place) = (place.clone(), place);
         self.relocate();
         self
     }
 
-    /// Gives list elements the place of the whole: a `--set` argument has no lines.
+    /// Gives all values below this one its place: a `--set` argument has no lines.
     fn relocate(&mut self) {
         let place = self.place.clone();
         let children: Box<dyn Iterator<Item = &mut Node>> = match &mut self.value {
@@ -94,21 +92,21 @@ impl Node {
     }
 }
 
-/// The text that spans point into.
+/// A text, prepared to convert byte offsets to lines and columns.
 struct Source<'a> {
     text: &'a str,
     file: Arc<str>,
-    /// Where lines begin, in bytes.
+    /// Byte offsets at which lines begin.
     line_starts: Vec<usize>,
-    /// Characters before every [`STRIDE`]th byte: a text has as many places as values, and lines may be long.
+    /// Number of characters before every [`STRIDE`]th byte, so that columns of long lines are found quickly.
     characters: Vec<usize>,
 }
 
-/// Bytes between those that characters are counted up to.
+/// Distance of the bytes up to which characters are counted in advance.
 const STRIDE: usize = 64;
 
 impl<'a> Source<'a> {
-    /// A text, which is gone through once.
+    /// Prepares a text in one pass.
     fn new(text: &'a str, file: &str) -> Source<'a> {
         let newlines = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
         let line_starts = std::iter::once(0).chain(newlines.map(|(at, _)| at + 1)).collect();
@@ -119,27 +117,27 @@ impl<'a> Source<'a> {
         Source { text, file: file.into(), line_starts, characters }
     }
 
-    /// Characters that begin before a byte.
+    /// Returns the number of characters that begin before a byte.
     fn characters_before(&self, offset: usize) -> usize {
         let chunk = offset / STRIDE;
         self.characters[chunk] + begun(&self.text.as_bytes()[chunk * STRIDE..offset])
     }
 
-    /// The number of the line, from 0, that a byte is in.
+    /// Returns the number of the line, from 0, that contains a byte.
     fn line(&self, offset: usize) -> usize {
         self.line_starts.partition_point(|&start| start <= offset) - 1
     }
 
-    /// The line that a byte is in.
+    /// Returns the line that contains a byte.
     fn line_of(&self, offset: usize) -> &'a str {
         let from = self.line_starts[self.line(offset.min(self.text.len()))];
         self.text[from..].lines().next().unwrap_or_default()
     }
+
     fn table(&self, table: DeTable<'_>) -> Table {
-        let entry = |(key, value): (Spanned<_>, Spanned<DeValue<'_>>)| {
+        let entry = |(key, value): (Spanned<std::borrow::Cow<'_, str>>, Spanned<DeValue<'_>>)| {
             let name_place = self.place(key.span().start);
-            let name: std::borrow::Cow<'_, str> = key.into_inner();
-            (name.into_owned(), Node { name_place, ..self.node(value) })
+            (key.into_inner().into_owned(), Node { name_place, ..self.node(value) })
         };
         table.into_iter().map(entry).collect()
     }
@@ -147,8 +145,12 @@ impl<'a> Source<'a> {
     fn node(&self, value: Spanned<DeValue<'_>>) -> Node {
         let span = value.span();
         let place = self.place(span.start);
-        let shown = self.shown(span, value.get_ref());
-        Node { name_place: place.clone(), place, shown, value: self.value(value.into_inner()) }
+        let excerpt = match value.get_ref() {
+            // The span of a table is only its header.
+            DeValue::Table(_) => "{ ... }".to_owned(),
+            _ => shorten(self.text.get(span).unwrap_or_default()),
+        };
+        Node { name_place: place.clone(), place, excerpt, value: self.value(value.into_inner()) }
     }
 
     fn value(&self, value: DeValue<'_>) -> Value {
@@ -165,40 +167,23 @@ impl<'a> Source<'a> {
         }
     }
 
-    fn shown(&self, span: Range<usize>, value: &DeValue<'_>) -> String {
-        match value {
-            // The span of a table is its header, which says nothing as a value.
-            DeValue::Table(_) => "{ ... }".to_owned(),
-            _ => shorten(self.text.get(span).unwrap_or_default()),
-        }
-    }
-
     fn place(&self, offset: usize) -> Place {
-        let (line, column) = self.line_and_column(offset);
-        Place::Text { file: self.file.clone(), line, column }
-    }
-
-    fn error(&self, offset: usize, problem: Problem) -> SceneError {
-        SceneError { place: self.place(offset), problem }
-    }
-
-    fn line_and_column(&self, offset: usize) -> (usize, usize) {
         let offset = offset.min(self.text.len());
         let line = self.line(offset);
         let column = self.characters_before(offset) - self.characters_before(self.line_starts[line]);
-        (line + 1, column + 1)
+        Place::Text { file: self.file.clone(), line: line + 1, column: column + 1 }
     }
 }
 
-/// Characters of UTF-8 that begin in some bytes.
+/// Counts the UTF-8 characters that begin in `bytes`.
 fn begun(bytes: &[u8]) -> usize {
     bytes.iter().filter(|&&byte| byte & 0xc0 != 0x80).count()
 }
 
-/// One line of at most [`SHOWN`] characters; no more of the text is looked at.
+/// Returns the beginning of a text as one line of at most [`LONGEST_EXCERPT`] characters. The rest is not read.
 pub(crate) fn shorten(text: &str) -> String {
     let mut line = String::new();
-    let mut left = SHOWN;
+    let mut left = LONGEST_EXCERPT;
     for word in text.split_whitespace() {
         let space = if line.is_empty() { "" } else { " " };
         for c in space.chars().chain(word.chars()) {

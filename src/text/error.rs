@@ -1,4 +1,4 @@
-//! Why a scene or a model is refused, with the place, the value and the remedy.
+//! Errors in scenes and models, with place, value and remedy.
 
 use std::fmt;
 use std::sync::Arc;
@@ -8,10 +8,10 @@ use super::printable;
 use rattlemap_dynamics::model::ModelError;
 use thiserror::Error;
 
-/// Where the text that has to change stands.
+/// Place of the text that must be changed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
-    /// A spot in a scene file; line and column count from 1, columns in characters.
+    /// A place in a file. Lines and columns count from 1, columns in characters.
     Text {
         /// The file as it was named by the caller.
         file: Arc<str>,
@@ -20,29 +20,29 @@ pub enum Place {
         /// Column, from 1.
         column: usize,
     },
-    /// A `--set` argument, which wins over the file.
+    /// A `--set` argument.
     Set {
-        /// `NAME=VALUE` as it was given.
+        /// `NAME=VALUE` as given.
         argument: Arc<str>,
     },
     /// Another argument: `--along` or `--at`.
     Option {
-        /// The option's name, dashes included.
+        /// Name of the option, including dashes.
         option: &'static str,
-        /// What was given with it.
+        /// Argument of the option.
         argument: Arc<str>,
     },
-    /// A file that could not be read at all.
+    /// A file that cannot be read.
     File {
         /// The file as it was named by the caller.
         file: Arc<str>,
     },
-    /// A scene that was built without a file.
+    /// A scene without a file.
     Builder,
 }
 
 impl Place {
-    /// Where it stands in its text; none where it is in none.
+    /// Returns line and column; none for a place outside of a file.
     pub(crate) fn line_and_column(&self) -> Option<(usize, usize)> {
         match self {
             Place::Text { line, column, .. } => Some((*line, *column)),
@@ -51,8 +51,8 @@ impl Place {
     }
 }
 
-/// Characters of a name or a value that a message shows.
-pub(crate) const SHOWN: usize = 60;
+/// Largest number of characters of a name or a value in a message.
+pub(crate) const LONGEST_EXCERPT: usize = 60;
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -66,142 +66,135 @@ impl fmt::Display for Place {
     }
 }
 
-/// A scene, or a model beside it, that cannot be run; its text is one line that says how to mend it, fit for a terminal.
+/// An error in a scene or a model. Its message is one line, safe for a terminal.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("{}", printable::line(&format!("{place}: {problem}")))]
 pub struct SceneError {
-    /// Where it stands.
+    /// Place of the error.
     pub place: Place,
-    /// What is wrong there.
+    /// The error.
     pub problem: Problem,
 }
 
-/// What can be wrong with a scene. Fields are full paths as `--set` takes them.
+/// What can be wrong with a scene or a model. Fields are named by their full path, as `--set` takes it.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Problem {
-    /// The file could not be read.
+    /// The file cannot be read.
     #[error("cannot read the scene ({reason}); give the path of a TOML file such as scenes/smoke.toml")]
     Unreadable {
-        /// The operating system's words.
+        /// The operating system's message.
         reason: String,
     },
     /// The text is not TOML.
     #[error("not valid TOML: {message}; the line reads `{line}`")]
     Syntax {
-        /// The parser's words.
+        /// The parser's message.
         message: String,
-        /// The offending line.
+        /// The line with the error.
         line: String,
     },
-    /// A `--set` argument without a name, a value, or the equals sign between them.
+    /// A `--set` argument lacks a name, a value, or the equals sign between them.
     #[error("expected NAME=VALUE, such as e=0.6 or integration.max_period=32")]
     NotAnAssignment,
-    /// A field that scenes do not have.
-    #[error("unknown field `{field} = {value}`; {remedy}")]
-    UnknownField {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// The nearest known name, and all of them.
-        remedy: String,
-    },
-    /// A value that must be one of a list of names and is not.
-    #[error("`{field} = {value}` is not known; {remedy}")]
-    UnknownName {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// The nearest known name, and all of them.
-        remedy: String,
-    },
-    /// A name within a value that is not known.
-    #[error("`{field} = {value}` has an unknown name, {remedy}")]
-    UnknownWithin {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// The name, the nearest known one, and all of them.
-        remedy: String,
-    },
-    /// Text, or a file that a field names, that cannot be read as what it should be.
-    #[error("`{field} = {value}` {reason}")]
-    UnreadableValue {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// Why not, and what to write.
-        reason: String,
-    },
-    /// A table of cells that is none.
+    /// A table of cells is empty or malformed.
     #[error("{message}")]
     Table {
-        /// What is wrong there.
+        /// The fault and its remedy.
         message: String,
     },
-    /// A value of the wrong type.
-    #[error("`{field} = {value}` has the wrong type: it must be {expected}")]
-    WrongType {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// What it must be.
-        expected: String,
-    },
-    /// A value outside its range.
-    #[error("`{field} = {value}` is out of range: it must be {requirement}")]
-    OutOfRange {
-        /// The field.
-        field: String,
-        /// Its value as written.
-        value: String,
-        /// What it must be.
-        requirement: String,
-    },
-    /// A required field that is not there.
+    /// A required field is missing.
     #[error("`{field}` is missing; {remedy}")]
     Missing {
-        /// The field.
+        /// Path of the field.
         field: String,
         /// What to write.
         remedy: String,
     },
-    /// Parameters that are fine one by one, and together make no oscillator.
+    /// Each parameter is in its range, but together they do not make an oscillator.
     #[error("{}{reason}; change the parameters", if .cell.is_empty() { String::new() } else { format!("at {cell}: ") })]
     NoMotion {
-        /// The axes' values there; empty where there are no axes.
+        /// Values of the swept parameters; empty without axes.
         cell: String,
         /// Why there is no motion.
         reason: Box<ModelError>,
     },
-    /// A value that is fine by itself but not beside another.
-    #[error("`{field} = {value}` does not fit: {remedy}")]
-    Conflict {
-        /// The field.
+    /// A field has a value that cannot be used.
+    #[error("{}`{field} = {value}`{}{detail}", .fault.before(), .fault.after())]
+    Value {
+        /// Kind of the fault.
+        fault: Fault,
+        /// Path of the field.
         field: String,
-        /// Its value as written.
+        /// The value as written, shortened.
         value: String,
-        /// The other value, and which one to change.
-        remedy: String,
+        /// The requirement that is not met, or the remedy.
+        detail: String,
     },
 }
 
-/// The sentence for an unknown name: the nearest known one, if any is near, and `all` of them, listed.
+impl Problem {
+    /// Builds [`Problem::Value`].
+    pub(crate) fn value(
+        fault: Fault,
+        field: impl Into<String>,
+        value: impl Into<String>,
+        detail: impl Into<String>,
+    ) -> Problem {
+        Problem::Value { fault, field: field.into(), value: value.into(), detail: detail.into() }
+    }
+}
+
+/// Kinds of values that cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Scenes have no field of this name.
+    UnknownField,
+    /// The value must be one of a list of names, and is not.
+    UnknownName,
+    /// An expression contains an unknown name.
+    UnknownWithin,
+    /// An expression, or the file that the field names, cannot be read.
+    Unreadable,
+    /// The value has the wrong type.
+    WrongType,
+    /// The value is outside its range.
+    OutOfRange,
+    /// The value contradicts another field.
+    Conflict,
+}
+
+impl Fault {
+    /// Returns the text in front of the field.
+    fn before(self) -> &'static str {
+        if self == Fault::UnknownField { "unknown field " } else { "" }
+    }
+
+    /// Returns the text between the value and the detail.
+    fn after(self) -> &'static str {
+        match self {
+            Fault::UnknownField => "; ",
+            Fault::UnknownName => " is not known; ",
+            Fault::UnknownWithin => " has an unknown name, ",
+            Fault::Unreadable => " ",
+            Fault::WrongType => " has the wrong type: it must be ",
+            Fault::OutOfRange => " is out of range: it must be ",
+            Fault::Conflict => " does not fit: ",
+        }
+    }
+}
+
+/// Returns the remedy for an unknown name: the most similar known one, if there is one, and `all`, the list of known names.
 pub(crate) fn suggest(name: &str, known: &[&str], all: &str) -> String {
     let length = name.chars().count();
-    // One slip per three letters; a name that is all slips resembles nothing.
+    // One typing error per three letters, but fewer errors than letters.
     let most = (length / 3).max(1).min(length.saturating_sub(1));
-    // As many as lengths differ by, at least: a name of a million letters is compared with nothing.
+    // Names of very different length are not compared, which would take long for a name of a million letters.
     let may_be_near = |candidate: &&&str| candidate.chars().count().abs_diff(length) <= most;
-    let slips =
+    let typos =
         |candidate: &str| strsim::damerau_levenshtein(&candidate.to_lowercase(), &name.to_lowercase());
-    let candidates = known.iter().filter(may_be_near).map(|candidate| (slips(candidate), candidate));
-    match candidates.min_by_key(|(slips, _)| *slips) {
-        Some((slips, nearest)) if slips <= most => {
+    let candidates = known.iter().filter(may_be_near).map(|candidate| (typos(candidate), candidate));
+    match candidates.min_by_key(|(typos, _)| *typos) {
+        Some((typos, nearest)) if typos <= most => {
             format!("did you mean `{nearest}`? valid names: {all}")
         }
         _ => format!("valid names: {all}"),

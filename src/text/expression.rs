@@ -1,7 +1,7 @@
-//! Expressions in parameters, as scenes and models write them: `0.5*k1`, `F0*omega^2`. Pure.
+//! Expressions in parameters, as in scenes and models: `0.5*k1`, `F0*omega^2`. Pure.
 //!
-//! They are computed in f64, from left to right as they are written, with the functions of the crate `libm`: the same
-//! bits on every machine.
+//! Values are computed in f64, from left to right, with the functions of the crate `libm`, so that every machine computes the
+//! same bits.
 
 mod grammar;
 
@@ -9,20 +9,20 @@ use thiserror::Error;
 
 use grammar::Tree;
 
-/// Characters of an expression: enough for any formula, and few enough to go down its parentheses by recursion.
+/// Largest number of characters of an expression: enough for any formula, and few enough for recursion.
 pub const LONGEST: usize = 500;
 
-/// Characters that a message shows of what cannot be read.
-const SHOWN: usize = 20;
+/// Largest number of characters of unreadable text in a message.
+const LONGEST_REST: usize = 20;
 
-/// What expressions are made of, for messages.
+/// The elements of expressions, for messages.
 pub const TAKES: &str = "numbers, parameters, pi, + - * / ^, parentheses, and sqrt exp log sin cos tan abs (of one), min max (of two)";
 
-type One = fn(f64) -> f64;
-type Two = fn(f64, f64) -> f64;
+type Unary = fn(f64) -> f64;
+type Binary = fn(f64, f64) -> f64;
 
 /// Functions of one argument.
-const ONE: [(&str, One); 7] = [
+const UNARY: [(&str, Unary); 7] = [
     ("sqrt", libm::sqrt),
     ("exp", libm::exp),
     ("log", libm::log),
@@ -33,67 +33,67 @@ const ONE: [(&str, One); 7] = [
 ];
 
 /// Functions of two arguments.
-const TWO: [(&str, Two); 2] = [("min", smaller), ("max", larger)];
+const BINARY: [(&str, Binary); 2] = [("min", smaller), ("max", larger)];
 
-/// Why a text is no expression.
+/// Why a text is not an expression.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ExpressionError {
-    /// It does not follow the grammar.
+    /// The text does not follow the grammar.
     #[error("cannot be read {}; an expression has {TAKES}", place(.rest))]
     Syntax {
-        /// What follows the part that can be read.
+        /// The text after the readable part.
         rest: String,
     },
-    /// A name that is no parameter.
+    /// A name is not a parameter.
     #[error("unknown name `{name}`")]
     Unknown {
         /// The name.
         name: String,
     },
-    /// A function that there is not, or one without its arguments.
+    /// An unknown function, or a wrong number of arguments.
     #[error("{name}")]
     Call {
-        /// The sentence.
+        /// The message.
         name: String,
     },
-    /// More than [`LONGEST`] characters.
+    /// The text has more than [`LONGEST`] characters.
     #[error("it has {count} characters, and may have {LONGEST}")]
     TooLong {
-        /// How many there are.
+        /// Number of characters.
         count: usize,
     },
 }
 
 fn place(rest: &str) -> String {
-    let shown: String = rest.chars().take(SHOWN).collect();
-    let more = if shown.len() < rest.len() { "..." } else { "" };
-    if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{shown}{more}` on") }
+    let excerpt: String = rest.chars().take(LONGEST_REST).collect();
+    let more = if excerpt.len() < rest.len() { "..." } else { "" };
+    if rest.trim().is_empty() { "to its end".to_owned() } else { format!("from `{excerpt}{more}` on") }
 }
 
-/// An expression in some names, ready to be computed.
+/// An expression that can be evaluated.
 #[derive(Clone, Debug)]
 pub struct Expression {
     text: String,
     term: Term,
-    /// Places of the names that occur, ascending.
+    /// Indices of the names in the expression, increasing.
     uses: Vec<usize>,
 }
 
 #[derive(Clone, Debug)]
 enum Term {
     Number(f64),
-    /// A name by its place.
+    /// A name, by its index.
     Name(usize),
     Negative(Box<Term>),
-    One(One, Box<Term>),
-    Two(Two, Box<[Term; 2]>),
+    Unary(Unary, Box<Term>),
+    Binary(Binary, Box<[Term; 2]>),
 }
 
 impl Expression {
-    /// Reads an expression in `names`. `-a^2` is `-(a^2)`, and `a^b^c` is `a^(b^c)`, as in mathematics.
+    /// Reads an expression in `names`. `-a^2` means `-(a^2)`, and `a^b^c` means `a^(b^c)`.
     ///
     /// # Errors
-    /// [`ExpressionError`] for the first thing that is wrong.
+    /// [`ExpressionError`] for the first error.
     pub fn parse(text: &str, names: &[&str]) -> Result<Expression, ExpressionError> {
         let count = text.chars().count();
         if count > LONGEST {
@@ -107,12 +107,12 @@ impl Expression {
         Ok(Expression { text: text.trim().to_owned(), term, uses })
     }
 
-    /// A number alone.
+    /// Builds an expression from a number.
     pub(crate) fn number(number: f64) -> Expression {
         Expression { text: format!("{number:?}"), term: Term::Number(number), uses: Vec::new() }
     }
 
-    /// The number, if it is one alone.
+    /// Returns the number if the expression is only a number, possibly with a sign.
     pub(crate) fn as_number(&self) -> Option<f64> {
         match &self.term {
             Term::Number(number) => Some(*number),
@@ -124,17 +124,17 @@ impl Expression {
         }
     }
 
-    /// As it was written.
+    /// Returns the expression as written.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Places of the names that occur in it, ascending.
+    /// Returns the indices of the names in the expression, increasing.
     pub fn uses(&self) -> &[usize] {
         &self.uses
     }
 
-    /// Its value where `value` tells those of the names by their places. It may be infinite or no number.
+    /// Computes the value. `value(index)` returns the value of a name. The result may be infinite or NaN.
     pub fn evaluate(&self, value: &dyn Fn(usize) -> f64) -> f64 {
         self.term.evaluate(value)
     }
@@ -146,13 +146,13 @@ impl Term {
             Term::Number(number) => *number,
             Term::Name(place) => value(*place),
             Term::Negative(of) => -of.evaluate(value),
-            Term::One(function, of) => function(of.evaluate(value)),
-            Term::Two(function, of) => function(of[0].evaluate(value), of[1].evaluate(value)),
+            Term::Unary(function, of) => function(of.evaluate(value)),
+            Term::Binary(function, of) => function(of[0].evaluate(value), of[1].evaluate(value)),
         }
     }
 }
 
-/// The tree with its names and functions looked up.
+/// Looks up the names and functions of a tree.
 fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Term, ExpressionError> {
     Ok(match tree {
         Tree::Number(number) => Term::Number(number),
@@ -169,7 +169,7 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
         Tree::Binary(sign, of) => {
             let [a, b] = *of;
             let of = [resolved(a, names, uses)?, resolved(b, names, uses)?];
-            Term::Two(operator(sign), Box::new(of))
+            Term::Binary(operator(sign), Box::new(of))
         }
         Tree::Call(name, arguments) => {
             let given = arguments.len();
@@ -177,12 +177,12 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
             for argument in arguments {
                 terms.push(resolved(argument, names, uses)?);
             }
-            let one = ONE.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
-            let two = TWO.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
+            let one = UNARY.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
+            let two = BINARY.iter().find(|(known, _)| *known == name).map(|&(_, function)| function);
             match (one, two, <[Term; 2]>::try_from(terms)) {
-                (_, Some(function), Ok(both)) => Term::Two(function, Box::new(both)),
+                (_, Some(function), Ok(both)) => Term::Binary(function, Box::new(both)),
                 (Some(function), _, Err(mut terms)) if given == 1 => {
-                    Term::One(function, Box::new(terms.remove(0)))
+                    Term::Unary(function, Box::new(terms.remove(0)))
                 }
                 _ => return Err(call(name, given)),
             }
@@ -190,14 +190,14 @@ fn resolved(tree: Tree<'_>, names: &[&str], uses: &mut Vec<usize>) -> Result<Ter
     })
 }
 
-/// Whether a name means something already: a function, or `pi`.
+/// Whether a name is a function or `pi`.
 pub fn is_reserved(name: &str) -> bool {
     name == "pi" || arity(name).is_some()
 }
 
 fn arity(name: &str) -> Option<usize> {
-    let one = ONE.iter().any(|(known, _)| *known == name);
-    let two = TWO.iter().any(|(known, _)| *known == name);
+    let one = UNARY.iter().any(|(known, _)| *known == name);
+    let two = BINARY.iter().any(|(known, _)| *known == name);
     if one { Some(1) } else { two.then_some(2) }
 }
 
@@ -210,7 +210,7 @@ fn call(name: &str, given: usize) -> ExpressionError {
     ExpressionError::Call { name }
 }
 
-fn operator(sign: char) -> Two {
+fn operator(sign: char) -> Binary {
     match sign {
         '+' => |a, b| a + b,
         '-' => |a, b| a - b,
@@ -220,11 +220,12 @@ fn operator(sign: char) -> Two {
     }
 }
 
-/// What is no number makes the result none.
+/// Returns the smaller number; NaN if one of them is NaN.
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b || a.is_nan() { a } else { b }
 }
 
+/// Returns the larger number; NaN if one of them is NaN.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }
@@ -264,7 +265,7 @@ mod tests {
         ] {
             assert_eq!(value(text), expected, "{text}");
         }
-        // From left to right, whatever could be computed beforehand.
+        // The order of operations is from left to right, also for constants.
         assert_eq!(value("0.1 + 0.2 + x"), 0.1 + 0.2 + 3.0);
         assert_eq!(value("x*0.1*0.2"), 3.0 * 0.1 * 0.2);
         assert_eq!(value("sin(pi/6)"), libm::sin(std::f64::consts::PI / 6.0));
@@ -273,14 +274,14 @@ mod tests {
     }
 
     #[test]
-    fn what_occurs_in_it_is_known() {
+    fn uses_are_the_indices_of_the_names() {
         let uses = |text| Expression::parse(text, &NAMES).unwrap().uses().to_vec();
         assert_eq!(uses("x + k1*x"), [0, 2]);
         assert!(uses("2*pi").is_empty());
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn errors_name_the_unreadable_part() {
         for (text, expected) in [
             ("", "cannot be read to its end"),
             ("2*", "cannot be read to its end"),
@@ -303,7 +304,7 @@ mod tests {
         }
     }
 
-    /// However deep, on the stack of a thread.
+    /// The deepest nesting fits on the stack of a thread.
     #[test]
     fn the_deepest_expressions_are_read() {
         let nested = |count: usize| format!("{}x{}", "(".repeat(count), ")".repeat(count));

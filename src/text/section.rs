@@ -1,13 +1,13 @@
-//! Reading one table of a scene or a model: known names only, typed fields, errors with paths.
+//! Reads one table of a scene or a model: checks the names of fields and their types, and builds errors with paths.
 
 use std::ops::RangeInclusive;
 
 use super::document::{Node, Table, Value, shorten};
-use super::error::{Place, Problem, SceneError, suggest};
+use super::error::{Fault, Place, Problem, SceneError, suggest};
 use super::expression::{Expression, ExpressionError};
 use rattlemap_dynamics::model::ModelError;
 
-/// A table whose field names have been checked; an absent one has no fields.
+/// A table whose field names have been checked. A missing table has no fields.
 pub(crate) struct Section<'a> {
     path: String,
     place: Place,
@@ -15,12 +15,12 @@ pub(crate) struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// Opens the table `node` that stands at `path` and may have the fields `known`.
+    /// Opens the table `node` at `path`, which may have the fields `known`.
     pub(crate) fn open(node: &'a Node, path: &str, known: &[&str]) -> Result<Self, SceneError> {
         Section::open_among(node, path, known, &known.join(", "))
     }
 
-    /// The same where `all` says what the known names mean.
+    /// Opens the table `node` at `path`; messages list the known names as `all`.
     fn open_among(node: &'a Node, path: &str, known: &[&str], all: &str) -> Result<Self, SceneError> {
         let Value::Table(table) = &node.value else {
             return Err(Field { path: path.to_owned(), node }.wrong_type(&format!("a table, [{path}]")));
@@ -28,32 +28,29 @@ impl<'a> Section<'a> {
         let section = Section { path: path.to_owned(), place: node.name_place.clone(), table: Some(table) };
         let mut unknown = table.iter().filter(|(name, _)| !known.contains(&name.as_str()));
         let Some((name, node)) = unknown.next() else { return Ok(section) };
-        // One is shown; a list of thousands would help nobody.
+        // The message shows one of them, because there may be thousands.
         let remedy = match unknown.count() {
             0 => suggest(name, known, all),
-            1 => format!("{}; 1 more field beside it is unknown", suggest(name, known, all)),
-            more => format!("{}; {more} more fields beside it are unknown", suggest(name, known, all)),
+            1 => format!("{}; 1 more field is unknown", suggest(name, known, all)),
+            more => format!("{}; {more} more fields are unknown", suggest(name, known, all)),
         };
-        let problem = Problem::UnknownField {
-            field: section.path_of(&shorten(name)),
-            value: node.shown.clone(),
-            remedy,
-        };
+        let (field, value) = (section.path_of(&shorten(name)), node.excerpt.clone());
+        let problem = Problem::value(Fault::UnknownField, field, value, remedy);
         Err(SceneError { place: node.name_place.clone(), problem })
     }
 
-    /// Opens a table whose field names have been looked at before; none if it is none.
+    /// Opens a table whose field names were checked before; returns none if the value is not a table.
     pub(crate) fn open_any(node: &'a Node, path: &str) -> Option<Self> {
         let Value::Table(table) = &node.value else { return None };
         Some(Section { path: path.to_owned(), place: node.name_place.clone(), table: Some(table) })
     }
 
-    /// Opens the table `name` inside this one; if it is absent every field has its default.
+    /// Opens the table `name` inside this one. A missing table has no fields.
     pub(crate) fn section(&self, name: &str, known: &[&str]) -> Result<Section<'a>, SceneError> {
         self.section_among(name, known, &known.join(", "))
     }
 
-    /// The same where `all` says what the known names mean.
+    /// Opens the table `name` inside this one; messages list the known names as `all`.
     pub(crate) fn section_among(
         &self,
         name: &str,
@@ -66,47 +63,47 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// The path that names the table.
+    /// Returns the path of the table.
     pub(crate) fn path(&self) -> &str {
         &self.path
     }
 
-    /// The fields that were given, in the order of their names.
+    /// Returns the given fields in the order of their names.
     pub(crate) fn fields(&self) -> impl Iterator<Item = (&'a str, Field<'a>)> {
         let given = self.table.into_iter().flatten();
         given.map(|(name, node)| (name.as_str(), Field { path: self.path_of(name), node }))
     }
 
-    /// The same in the order in which they were written.
+    /// Returns the given fields in the order of the text.
     pub(crate) fn fields_as_written(&self) -> Vec<(&'a str, Field<'a>)> {
         let mut fields: Vec<_> = self.fields().collect();
         fields.sort_by_key(|(_, field)| field.node.name_place.line_and_column());
         fields
     }
 
-    /// Whether the table was written at all.
+    /// Whether the table is present.
     pub(crate) fn is_present(&self) -> bool {
         self.table.is_some()
     }
 
-    /// The field `name`, if it was given.
+    /// Returns the field `name`, if it is given.
     pub(crate) fn get(&self, name: &str) -> Option<Field<'a>> {
         let node = self.table?.get(name)?;
         Some(Field { path: self.path_of(name), node })
     }
 
-    /// The field `name`, which must be given; `remedy` says what to write.
+    /// Returns the field `name`, which must be given. `remedy` says what to write.
     pub(crate) fn require(&self, name: &str, remedy: &str) -> Result<Field<'a>, SceneError> {
         self.get(name).ok_or_else(|| self.missing(name, remedy))
     }
 
-    /// The error for a field that should be here.
+    /// Builds the error for a missing field.
     pub(crate) fn missing(&self, name: &str, remedy: &str) -> SceneError {
         let problem = Problem::Missing { field: self.path_of(name), remedy: remedy.to_owned() };
         SceneError { place: self.place.clone(), problem }
     }
 
-    /// The error for a cell in which the model has no motion; `cell` is empty where there is one alone.
+    /// Builds the error for a cell in which the model has no motion. `cell` is empty if there is only one.
     pub(crate) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
         let problem = Problem::NoMotion { cell: cell.to_owned(), reason: Box::new(reason.clone()) };
         SceneError { place: self.place.clone(), problem }
@@ -120,19 +117,19 @@ impl<'a> Section<'a> {
     }
 }
 
-/// A value together with the path that names it.
+/// A value with its path.
 pub(crate) struct Field<'a> {
     pub(crate) path: String,
     pub(crate) node: &'a Node,
 }
 
 impl<'a> Field<'a> {
-    /// Whether a `--set` argument says it: that wins over the text.
+    /// Whether the value comes from a `--set` argument, which overrides the text.
     pub(crate) fn is_argument(&self) -> bool {
         matches!(self.node.place, Place::Set { .. })
     }
 
-    /// Any number, also NaN and infinities, which TOML can write: ranges are checked after.
+    /// Reads a number, which may be NaN or infinite.
     pub(crate) fn number(&self) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Integer(i) => Ok(i as f64),
@@ -141,7 +138,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// The same, where something else that is `expected` may stand in its place.
+    /// Reads a number. The error for another type says `expected`.
     pub(crate) fn number_or(&self, expected: &str) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Integer(_) | Value::Float(_) => self.number(),
@@ -149,7 +146,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// A whole number within `range`.
+    /// Reads a whole number within `range`.
     pub(crate) fn whole(&self, range: RangeInclusive<u32>) -> Result<u32, SceneError> {
         let requirement = format!("a whole number from {} to {}", range.start(), range.end());
         match self.node.value {
@@ -161,7 +158,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Text.
+    /// Reads text.
     pub(crate) fn text(&self) -> Result<&'a str, SceneError> {
         match &self.node.value {
             Value::Text(text) => Ok(text),
@@ -169,12 +166,12 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Text of one line that has at most so many characters.
+    /// Reads one line of text with at most `most` characters.
     pub(crate) fn line(&self, most: usize) -> Result<String, SceneError> {
         self.text_without(char::is_control, "one line of text", most)
     }
 
-    /// Text of some lines that has at most so many characters.
+    /// Reads lines of text with at most `most` characters.
     pub(crate) fn lines(&self, most: usize) -> Result<String, SceneError> {
         self.text_without(|c| c.is_control() && c != '\n', "lines of text", most)
     }
@@ -187,7 +184,10 @@ impl<'a> Field<'a> {
     ) -> Result<String, SceneError> {
         let text = self.text()?;
         match text.chars().count() {
-            0 => Err(self.out_of_range(&format!("{what}; leave it out where there is nothing to say"))),
+            0 => {
+                Err(self
+                    .out_of_range(&format!("{what}; it must not be empty; write some text, or remove it")))
+            }
             count if count > most => {
                 Err(self.out_of_range(&format!("at most {most} characters long; it has {count}, shorten it")))
             }
@@ -198,7 +198,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// An expression in `names`, such as `example`, or a number; `all` says what the names mean.
+    /// Reads a number or an expression in `names`. Messages show `example`, and list the names as `all`.
     pub(crate) fn expression(
         &self,
         names: &[&str],
@@ -207,17 +207,20 @@ impl<'a> Field<'a> {
     ) -> Result<Expression, SceneError> {
         let text = match &self.node.value {
             Value::Text(text) => text.clone(),
-            // A number is an expression, too.
+            // A number is also an expression.
             Value::Integer(_) | Value::Float(_) => format!("{:?}", self.number()?),
             _ => return Err(self.wrong_type(&format!("an expression in quotes, such as {example}"))),
         };
         Expression::parse(&text, names).map_err(|error| match &error {
-            ExpressionError::Unknown { name } => self.unknown_in(name, names, all),
+            ExpressionError::Unknown { name } => {
+                let remedy = format!("`{}`: {}", shorten(name), suggest(name, names, all));
+                self.refuse(Fault::UnknownWithin, remedy)
+            }
             _ => self.unreadable(&error.to_string()),
         })
     }
 
-    /// `true` or `false`.
+    /// Reads `true` or `false`.
     pub(crate) fn flag(&self) -> Result<bool, SceneError> {
         match self.node.value {
             Value::Flag(flag) => Ok(flag),
@@ -225,7 +228,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// One of the names in `choices`.
+    /// Reads one of the names in `choices`.
     pub(crate) fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, SceneError> {
         let names: Vec<&str> = choices.iter().map(|&(name, _)| name).collect();
         let Value::Text(name) = &self.node.value else {
@@ -233,18 +236,18 @@ impl<'a> Field<'a> {
         };
         match choices.iter().find(|(known, _)| known == name) {
             Some(&(_, choice)) => Ok(choice),
-            None => Err(self.unknown_name(name, &names)),
+            None => Err(self.unknown_name(name, &names, &names.join(", "))),
         }
     }
 
-    /// The elements of a list, each with the path `field.index`.
+    /// Returns the elements of a list, each with the path `field.index`.
     pub(crate) fn list(&self, expected: &str) -> Result<Vec<Field<'a>>, SceneError> {
         let Value::List(items) = &self.node.value else { return Err(self.wrong_type(expected)) };
         let element = |(i, node)| Field { path: format!("{}.{i}", self.path), node };
         Ok(items.iter().enumerate().map(element).collect())
     }
 
-    /// A list of names from `choices` without repetition, at least one of them.
+    /// Reads a list of one or more names from `choices`. Repeated names are ignored.
     pub(crate) fn choices<T: Copy + PartialEq>(&self, choices: &[(&str, T)]) -> Result<Vec<T>, SceneError> {
         let names = choices.iter().map(|&(name, _)| name).collect::<Vec<_>>().join(", ");
         let mut chosen = Vec::new();
@@ -260,57 +263,43 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// Builds the error for a value of the wrong type.
     pub(crate) fn wrong_type(&self, expected: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::WrongType { field, value, expected: expected.to_owned() })
+        self.refuse(Fault::WrongType, expected.to_owned())
     }
 
+    /// Builds the error for a value outside its range.
     pub(crate) fn out_of_range(&self, requirement: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::OutOfRange { field, value, requirement: requirement.to_owned() })
+        self.refuse(Fault::OutOfRange, requirement.to_owned())
     }
 
-    /// The error for a list of so many `things`.
-    pub(crate) fn counted(&self, count: usize, things: &str, requirement: &str) -> SceneError {
-        let (field, value) = (self.path.clone(), format!("{count} {things}"));
-        self.error(Problem::OutOfRange { field, value, requirement: requirement.to_owned() })
+    /// Builds the error for a list with `count` elements, such as `tables`, where another number is required.
+    pub(crate) fn wrong_count(&self, count: usize, things: &str, requirement: &str) -> SceneError {
+        self.error(Problem::value(Fault::OutOfRange, &self.path, format!("{count} {things}"), requirement))
     }
 
-    pub(crate) fn conflict(&self, remedy: String) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::Conflict { field, value, remedy })
+    /// Builds the error for a value that contradicts another field.
+    pub(crate) fn conflict(&self, remedy: impl Into<String>) -> SceneError {
+        self.refuse(Fault::Conflict, remedy.into())
     }
 
-    pub(crate) fn unknown_name(&self, name: &str, known: &[&str]) -> SceneError {
-        self.unknown_among(name, known, &known.join(", "))
+    /// Builds the error for a value that is none of the `known` names; the message lists them as `list`.
+    pub(crate) fn unknown_name(&self, name: &str, known: &[&str], list: &str) -> SceneError {
+        self.refuse(Fault::UnknownName, suggest(name, known, list))
     }
 
-    /// The same where `all` says what the known names mean.
-    pub(crate) fn unknown_among(&self, name: &str, known: &[&str], all: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::UnknownName { field, value, remedy: suggest(name, known, all) })
-    }
-
-    /// The error for a cell in which the field's value leaves no motion.
+    /// Builds the error for a cell in which this field's value leaves no motion.
     pub(crate) fn no_motion(&self, cell: &str, reason: &ModelError) -> SceneError {
         self.error(Problem::NoMotion { cell: cell.to_owned(), reason: Box::new(reason.clone()) })
     }
 
-    /// The error for text that cannot be read as what it should be; `reason` says why, and how to mend it.
+    /// Builds the error for text that cannot be read; `reason` says why and names the remedy.
     pub(crate) fn unreadable(&self, reason: &str) -> SceneError {
-        let (field, value) = self.named();
-        self.error(Problem::UnreadableValue { field, value, reason: reason.to_owned() })
+        self.refuse(Fault::Unreadable, reason.to_owned())
     }
 
-    /// The error for a name within text that is none of the known ones.
-    pub(crate) fn unknown_in(&self, name: &str, known: &[&str], all: &str) -> SceneError {
-        let (field, value) = self.named();
-        let remedy = format!("`{}`: {}", shorten(name), suggest(name, known, all));
-        self.error(Problem::UnknownWithin { field, value, remedy })
-    }
-
-    fn named(&self) -> (String, String) {
-        (self.path.clone(), self.node.shown.clone())
+    fn refuse(&self, fault: Fault, detail: String) -> SceneError {
+        self.error(Problem::value(fault, &self.path, &self.node.excerpt, detail))
     }
 
     fn error(&self, problem: Problem) -> SceneError {

@@ -1,16 +1,16 @@
-//! Commands to be pasted into a shell.
+//! Quoting of arguments in commands that users paste into a shell.
 
 use super::printable::is_printable;
 
-/// A word as a POSIX shell takes it: plain where it means itself, else in apostrophes, within
-/// which only the apostrophe means anything; by `printf` where a terminal would not show it as it is.
+/// Quotes a word for a POSIX shell. Plain words stay as they are, others are put in apostrophes. Words with unprintable
+/// characters are written as a call of `printf`.
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         return word.to_owned();
     }
     if !word.chars().all(is_printable) {
-        // What no terminal shows is spelled out byte by byte, for `printf` to make it again.
+        // `printf` builds unprintable characters from octal numbers.
         let spelled = word.bytes().map(|byte| match byte {
             b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'_' | b'=' | b'.' | b'/' => {
                 char::from(byte).to_string()

@@ -11,7 +11,7 @@ use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Class, Status};
-use rattlemap_dynamics::reference::{Allowance, Happening, Trajectory};
+use rattlemap_dynamics::reference::{Allowance, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 /// A record of a cycle as it would be on the cycle, if the reference confirms its exponent where it stands; none
@@ -26,7 +26,7 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<Record> {
         .allowing(Allowance::UNLIMITED.until(cell.halt));
     let cycle = refine(&seed, StrobeMap::Periods(period))?;
     let is_slow = status(record) == Status::Slow;
-    let reach = if is_slow { rules::near() } else { rules::ON_CYCLE };
+    let reach = if is_slow { rules::recurrence_distance() } else { rules::ON_CYCLE };
     let is_there = cell.apart(&record.strobe, &cycle.state) <= FACTOR * reach;
     let time = f64::from(period) * cell.flow.period;
     let status = if is_slow { Status::Ok.code() } else { record.status };
@@ -62,7 +62,7 @@ fn may_be_read(cell: &Cell<'_>, state: State, said: f64, period: u32) -> bool {
 pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
     let mut trajectory =
         Trajectory::<0>::new(&cell.flow, cell.law, state).allowing(Allowance::UNLIMITED.until(cell.halt));
-    let mut met: Vec<Happening> = Vec::new();
+    let mut met: Vec<GapEvent> = Vec::new();
     if (0..period).any(|_| trajectory.advance_period(&mut met).is_err()) {
         return false;
     }

@@ -242,7 +242,7 @@ impl<'a> Cell<'a> {
             let mut trajectory = begun.carrying(tangents);
             for _ in 0..periods {
                 trajectory.advance_period(&mut ()).ok()?;
-                trajectory.shake(shares(&mut random, self.resolution));
+                trajectory.perturb(shares(&mut random, self.resolution));
             }
             Some(trajectory)
         })
@@ -294,7 +294,7 @@ impl Moved<'_> {
             .allowing(Allowance::UNLIMITED.until(self.halt));
         for _ in 0..periods {
             trajectory.advance_period(&mut ()).ok()?;
-            trajectory.shake(shares(&mut self.random, self.resolution));
+            trajectory.perturb(shares(&mut self.random, self.resolution));
         }
         Some(trajectory.state())
     }

@@ -6,7 +6,7 @@ use super::Subject;
 use super::sample::Sample;
 use super::states::HORIZON;
 use crate::gpu::{self, Gpu, GpuError, Lane, LaneSettings};
-use crate::map::engine::{keep, lane_settings};
+use crate::map::engine::{drop_unrequested, lane_settings};
 use crate::map::plan::Plan;
 use crate::record::Record;
 use rattlemap_dynamics::model::State;
@@ -48,7 +48,7 @@ impl Lanes {
         if let Some(gpu) = single {
             lanes.device = Some(gpu::describe(gpu.adapter()));
             let mut again = run_lanes(gpu, plan, records, &ids, &own).await?;
-            again.iter_mut().for_each(|record| keep(record, plan.needs()));
+            again.iter_mut().for_each(|record| drop_unrequested(record, plan.needs()));
             lanes.again = ids.iter().copied().zip(again).collect();
             if double.is_some() {
                 let records = run_lanes(gpu, plan, records, &ids, &whole).await?;

@@ -12,6 +12,7 @@ mod compare;
 mod faults;
 #[cfg(unix)]
 mod interrupts;
+mod known_faults;
 mod map;
 #[cfg(target_os = "linux")]
 mod measure_gpu;

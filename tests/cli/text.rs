@@ -141,5 +141,6 @@ fn arguments_and_the_environment_are_quoted_without_controls() {
     }
     // Help and version are the program's own.
     assert!(folder.says(0, &[], &["--help"]).contains("Usage: rattlemap"), "no help");
-    folder.says(0, &[], &["--version"]);
+    let version = folder.says(0, &[], &["--version"]);
+    assert!(version.starts_with(concat!("rattlemap ", env!("CARGO_PKG_VERSION"), " (")), "{version}");
 }

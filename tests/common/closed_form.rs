@@ -1,10 +1,10 @@
-//! One coordinate between walls, in closed form: `m x'' + c x' + k x = F cos(omega t) + load` from event to event, where
-//! only the instants of events are searched for, by bisection. Written from the equations of motion for tests alone.
+//! One coordinate between walls in closed form: `m x'' + c x' + k x = F cos(omega t) + load` from event to event.
+//! Only the times of events are searched for, by bisection. Written from the equations of motion, for tests alone.
 
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator};
 use rattlemap_dynamics::reference::EventKind;
 
-/// A linear oscillator that is driven by `force cos(omega t) + load`.
+/// A linear oscillator under `force cos(omega t) + load`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Linear {
     pub(crate) m: f64,
@@ -20,7 +20,7 @@ impl Linear {
         std::f64::consts::TAU / self.omega
     }
 
-    /// The steady state at a time; without a spring and damping the part that does not grow.
+    /// Returns the steady state at a time; without spring and damping, its bounded part.
     pub(crate) fn steady(&self, t: f64) -> [f64; 2] {
         let (re, im) = (self.k - self.m * self.omega * self.omega, self.c * self.omega);
         let (sin, cos) = (self.omega * t).sin_cos();
@@ -29,7 +29,7 @@ impl Linear {
         [gain * (re * cos + im * sin) + middle, gain * self.omega * (im * cos - re * sin)]
     }
 
-    /// The propagator of the unforced oscillator.
+    /// Returns the propagator of the unforced oscillator.
     pub(crate) fn propagator(&self, tau: f64) -> [[f64; 2]; 2] {
         let (decay, square) = (self.c / (2.0 * self.m), self.k / self.m);
         let discriminant = square - decay * decay;
@@ -43,7 +43,7 @@ impl Linear {
         [[e * (cos + decay * sin), e * sin], [-e * square * sin, e * (cos - decay * sin)]]
     }
 
-    /// The state a time `tau` after the state `y` at time `t`.
+    /// Returns the state a time `tau` after the state `y` at time `t`.
     pub(crate) fn after(&self, t: f64, y: [f64; 2], tau: f64) -> [f64; 2] {
         let (from, to) = (self.steady(t), self.steady(t + tau));
         let [[a, b], [c, d]] = self.propagator(tau);
@@ -52,7 +52,7 @@ impl Linear {
         [a * q[0] + b * q[1] + to[0] + fallen, c * q[0] + d * q[1] + to[1] + speed]
     }
 
-    /// What a load does from rest where there is no spring: a parabola, or a fall that a damper slows down.
+    /// Returns the effect of a load, from rest and without a spring: a parabola, or a fall with a damper.
     fn fall(&self, tau: f64) -> [f64; 2] {
         match (self.k == 0.0, self.c == 0.0) {
             (false, _) => [0.0; 2],
@@ -72,19 +72,19 @@ impl Linear {
         (self.force * (self.omega * t).cos() + self.load - self.c * v - self.k * x) / self.m
     }
 
-    /// As the first displacement of a domain.
+    /// Returns the equation as the first displacement of a domain.
     pub(crate) fn domain(&self) -> Domain {
         let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
         Domain { damping: first(self.c), stiffness: first(self.k), load: [self.load, 0.0] }
     }
 }
 
-/// What a wall is.
+/// A wall.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Wall {
-    /// An impact with this restitution; a contact that leaves no faster than 0 and is pressed sticks.
+    /// A wall with this restitution. A gap that is at rest on it and pressed sticks.
     Rigid { at: f64, e: f64 },
-    /// A spring and a damper.
+    /// A wall of a spring and a damper.
     Elastic { at: f64, k: f64, c: f64 },
 }
 
@@ -103,11 +103,11 @@ enum Mode {
 }
 
 const SIGNS: [f64; 2] = [1.0, -1.0];
-/// Places per period at which signs are looked at.
+/// Points per period at which signs are compared.
 const PLACES: usize = 4000;
 
 impl Walled {
-    /// The same for the library.
+    /// Returns the oscillator and its law for the library.
     pub(crate) fn oscillator(&self) -> (Oscillator, Law) {
         let at = |i: usize| self.walls[i].map_or(SIGNS[i] * f64::INFINITY, |wall| wall.at());
         let contact = |i: usize| match self.walls[i] {
@@ -133,7 +133,7 @@ impl Walled {
         (oscillator, Law { restitution: [restitution(0), restitution(1)], mesh_speed: [0.0; 2] })
     }
 
-    /// Motion behind an elastic wall; free motion where there is none.
+    /// Returns the motion behind an elastic wall; free motion if there is no wall.
     fn behind(&self, i: usize) -> Linear {
         match self.walls[i] {
             Some(Wall::Elastic { at, k, c }) => {
@@ -143,8 +143,8 @@ impl Walled {
         }
     }
 
-    /// Where a motion is after so many periods, and what happened, at which wall and when since phase 0 of the first. It
-    /// starts between the walls, behind an elastic one, or at rest on a rigid one.
+    /// Returns the state after so many periods, and the events with wall and time since phase 0 of the first period.
+    /// The start lies between the walls, behind an elastic one, or at rest on a rigid one.
     pub(crate) fn run(&self, start: [f64; 2], periods: u32) -> ([f64; 2], Vec<(f64, EventKind, usize)>) {
         let period = std::f64::consts::TAU / self.free.omega;
         let beyond = |i: usize, x: f64| self.walls[i].map_or(-1.0, |wall| SIGNS[i] * (x - wall.at()));
@@ -161,7 +161,7 @@ impl Walled {
                     (if let Mode::Behind(i) = mode { self.behind(i) } else { self.free }, period - t);
                 let is_stuck = matches!(mode, Mode::Stuck(_));
                 let state = |tau: f64| if is_stuck { y } else { field.after(t, y, tau) };
-                // Positive before the end of the motion in this mode.
+                // Positive until the motion in this mode ends.
                 let left = |i: usize, tau: f64| match mode {
                     Mode::Free => -beyond(i, state(tau)[0]),
                     Mode::Behind(_) => beyond(i, state(tau)[0]),
@@ -173,8 +173,8 @@ impl Walled {
                     _ => &[1],
                 };
                 let steps = (1..).map(|j| h * f64::from(j)).take_while(|&tau| tau < rest).chain([rest]);
-                let seen = |tau: f64| watched.iter().find(|&&i| left(i, tau) < 0.0).map(|&i| (i, tau));
-                let Some((i, mut hi)) = steps.into_iter().find_map(seen) else {
+                let first = |tau: f64| watched.iter().find(|&&i| left(i, tau) < 0.0).map(|&i| (i, tau));
+                let Some((i, mut hi)) = steps.into_iter().find_map(first) else {
                     y = state(rest);
                     break;
                 };
@@ -188,20 +188,20 @@ impl Walled {
                 let s = SIGNS[i];
                 assert!(events.len() < 1000, "infinitely many impacts");
                 let wall = self.walls[i].expect("reached");
-                let mut tell = |kind| events.push((f64::from(n) * period + t, kind, i));
+                let mut record = |kind| events.push((f64::from(n) * period + t, kind, i));
                 mode = match (mode, wall) {
                     (Mode::Free, Wall::Elastic { .. }) => {
-                        tell(EventKind::MeshStart);
+                        record(EventKind::MeshStart);
                         Mode::Behind(i)
                     }
                     (Mode::Free, Wall::Rigid { at, e }) => {
                         y = [at, -e * y[1]];
                         let sticks = y[1] == 0.0 && s * self.free.acceleration(t, y) > 0.0;
-                        tell(if sticks { EventKind::MeshStart } else { EventKind::Impact });
+                        record(if sticks { EventKind::MeshStart } else { EventKind::Impact });
                         if sticks { Mode::Stuck(i) } else { Mode::Free }
                     }
                     _ => {
-                        tell(EventKind::MeshEnd);
+                        record(EventKind::MeshEnd);
                         Mode::Free
                     }
                 };

@@ -1,4 +1,4 @@
-//! Lanes on a device. No adapter is a failure: install a software driver (see `scripts/test.sh`).
+//! Lanes on a device. Without an adapter the tests fail: install a software driver (see `scripts/test.sh`).
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Mutex;
@@ -11,23 +11,23 @@ use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 
 use super::REST;
 
-/// Devices that nobody uses. To compile their shaders takes longer than to run most lanes.
+/// Devices that no test uses at present. Compiling their shaders takes longer than running most lanes.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
-/// A device for one caller at a time; the next gets it with what it has compiled, unless it was changed.
+/// A device for one test at a time. The next test gets it with its compiled shaders, unless it was modified.
 pub(crate) struct Device {
     gpu: Option<Gpu>,
     is_changed: bool,
 }
 
 impl Device {
-    /// As [`Gpu::rewrite_shaders`]; nobody else gets the device afterwards.
+    /// Calls [`Gpu::rewrite_shaders`]; no other test gets the device afterwards.
     pub(crate) fn rewrite_shaders(&mut self, rewrite: fn(String) -> String) {
         self.is_changed = true;
         (**self).rewrite_shaders(rewrite);
     }
 
-    /// As [`Gpu::drive_as_dedicated`]; nobody else gets the device afterwards.
+    /// Calls [`Gpu::drive_as_dedicated`]; no other test gets the device afterwards.
     pub(crate) fn drive_as_dedicated(&mut self) {
         self.is_changed = true;
         (**self).drive_as_dedicated();
@@ -56,7 +56,7 @@ impl Drop for Device {
     }
 }
 
-/// A device that nobody else uses meanwhile.
+/// Returns a device that no other test uses at the same time.
 pub(crate) fn open(precision: Precision) -> Device {
     let mut idle = IDLE.lock().unwrap();
     let found = idle.iter().position(|gpu| gpu.precision() == precision).map(|i| idle.swap_remove(i));
@@ -64,17 +64,17 @@ pub(crate) fn open(precision: Precision) -> Device {
     Device { gpu: Some(found.unwrap_or_else(|| fresh(precision))), is_changed: false }
 }
 
-/// A device of its own.
+/// Opens a new device.
 pub(crate) fn fresh(precision: Precision) -> Gpu {
     pollster::block_on(Gpu::open(precision, &AdapterChoice::default())).unwrap()
 }
 
-/// The engine of a plan's lanes.
+/// Returns the engine of a plan's lanes.
 pub(crate) fn engine(plan: &Plan, precision: Precision) -> Engine<'_> {
     Engine::Gpu(Box::new(pollster::block_on(engine::Gpu::new(plan, fresh(precision))).unwrap()))
 }
 
-/// A flow, a law and a lane for every cell and its start.
+/// Returns a flow, a law and a lane for each cell and its start.
 pub(crate) fn lanes(cells: &[(GearPair, State)]) -> (Vec<Oscillator>, Vec<Law>, Vec<Lane>) {
     let flows = cells.iter().map(|(pair, _)| pair.oscillator().unwrap()).collect();
     let laws = cells.iter().map(|(pair, _)| pair.law()).collect();
@@ -82,13 +82,13 @@ pub(crate) fn lanes(cells: &[(GearPair, State)]) -> (Vec<Oscillator>, Vec<Law>, 
     (flows, laws, lanes)
 }
 
-/// One record per cell and start.
+/// Returns one record for each cell and start.
 pub(crate) fn run(gpu: &mut Gpu, cells: &[(GearPair, State)], settings: &LaneSettings) -> Vec<Record> {
     let (flows, laws, lanes) = lanes(cells);
     pollster::block_on(gpu.run(&flows, &laws, &lanes, settings)).unwrap()
 }
 
-/// One record per pair, from rest.
+/// Returns one record for each pair, from rest.
 pub(crate) fn run_from_rest(gpu: &mut Gpu, pairs: &[GearPair], settings: &LaneSettings) -> Vec<Record> {
     let cells: Vec<_> = pairs.iter().map(|&pair| (pair, REST)).collect();
     run(gpu, &cells, settings)

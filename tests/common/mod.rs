@@ -1,4 +1,4 @@
-//! What tests of several layers share: fixtures of one motion, and lanes on a device.
+//! Helpers that tests of several layers share: fixtures of one motion, and lanes on a device.
 #![allow(dead_code, unused_imports, reason = "every test binary compiles this module and uses a part of it")]
 
 #[path = "../../dynamics/tests/common/mod.rs"]
@@ -9,7 +9,7 @@ pub(crate) use motion::*;
 pub(crate) mod closed_form;
 pub(crate) mod gpu;
 
-/// The gear pair of a run.
+/// Returns the gear pair of a run.
 pub(crate) fn pair_at(plan: &rattlemap::map::plan::Plan, id: u32) -> rattlemap_dynamics::model::GearPair {
     use rattlemap_dynamics::model::Model;
     let model = plan.model(id);

@@ -1,12 +1,22 @@
-//! What people read: links lead somewhere, and the two first texts stay short.
+//! Checks of the documents: links have targets, tables agree with the code, and named tests exist.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Every Markdown file of the repository that is its own.
+/// Returns the Markdown files of the repository.
 fn texts() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = ["", "docs", "results", "benches", "benches/peers", "fuzz"];
+    let folders = [
+        "",
+        "docs",
+        "docs/decisions",
+        "results",
+        "results/gallery",
+        "results/reliability",
+        "benches",
+        "benches/peers",
+        "fuzz",
+    ];
     let mut texts = Vec::new();
     for folder in folders.map(|folder| root.join(folder)) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -20,23 +30,23 @@ fn texts() -> Vec<PathBuf> {
     texts
 }
 
-/// Targets of `[text](target)` in a text, code blocks left out.
+/// Returns the targets of `[text](target)` in a text, without code blocks.
 fn links(text: &str) -> Vec<&str> {
     let prose = text.split("\n```").step_by(2);
     let starts = prose.flat_map(|part| part.split("](").skip(1));
     starts.filter_map(|rest| rest.split_once(')')).map(|(target, _)| target).collect()
 }
 
-/// The anchor that a heading gets: lower case, spaces as hyphens, without punctuation.
+/// Returns the anchor of a heading: lower case, spaces as hyphens, without punctuation.
 fn anchor(heading: &str) -> String {
-    let kept = heading.trim_start_matches('#').trim().chars();
-    let kept = kept.filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
-    kept.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
+    let characters = heading.trim_start_matches('#').trim().chars();
+    let characters = characters.filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    characters.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
 }
 
 #[test]
-fn links_lead_somewhere() {
-    let mut seen = 0;
+fn links_have_targets() {
+    let mut checked = 0;
     for path in texts() {
         let text = fs::read_to_string(&path).unwrap();
         for link in links(&text).into_iter().filter(|link| !link.starts_with("https://")) {
@@ -48,22 +58,70 @@ fn links_lead_somewhere() {
                 let has = there.lines().any(|line| line.starts_with('#') && anchor(line) == fragment);
                 assert!(has, "{}: no heading for {link}", path.display());
             }
-            seen += 1;
+            checked += 1;
         }
     }
-    assert!(seen > 50, "{seen} links");
+    assert!(checked > 50, "{checked} links");
+}
+
+/// Code spans that begin with a folder of the repository are paths of it.
+#[test]
+fn paths_in_documents_for_developers_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let is_for_developers = |path: &PathBuf| {
+        path.ends_with("ARCHITECTURE.md")
+            || path.ends_with("CONTRIBUTING.md")
+            || path.parent().is_some_and(|folder| folder.ends_with("docs/decisions"))
+    };
+    let mut found = 0;
+    for document in texts().into_iter().filter(is_for_developers) {
+        let text = fs::read_to_string(&document).unwrap();
+        for span in text.split('`').skip(1).step_by(2).filter(|span| !span.contains([' ', '\n'])) {
+            let is_path = span.split_once('/').is_some_and(|(folder, _)| root.join(folder).is_dir());
+            if is_path {
+                assert!(root.join(span).exists(), "{}: no {span}", document.display());
+                found += 1;
+            }
+        }
+    }
+    assert!(found > 80, "{found} paths");
 }
 
 #[test]
-fn readme_and_map_of_the_code_stay_short() {
-    for name in ["README.md", "ARCHITECTURE.md"] {
+fn readme_and_architecture_are_short() {
+    for (name, limit) in [("README.md", 1000), ("ARCHITECTURE.md", 1300)] {
         let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
-        assert!(text.lines().count() <= 150, "{name} has more than 150 lines");
+        let words = text.split_whitespace().count();
+        assert!(words <= limit, "{name} has {words} words; the limit is {limit}");
     }
 }
 
+/// Each row of docs/conformance.md names a test or a command, and each test exists.
 #[test]
-fn anchors_are_as_readers_of_markdown_make_them() {
+fn tests_that_conformance_names_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(root.join("docs/conformance.md")).unwrap();
+    let mut tests = 0;
+    for row in text.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| claim")) {
+        let Some((_, shown_by)) = row.trim_end_matches(" |").rsplit_once(" | ") else { continue };
+        if shown_by == "---" {
+            continue;
+        }
+        let spans: Vec<&str> = shown_by.split('`').skip(1).step_by(2).collect();
+        assert!(!spans.is_empty(), "no test or command in: {row}");
+        for (file, name) in spans.iter().filter_map(|span| span.split_once(": ")) {
+            let source = fs::read_to_string(root.join(file))
+                .unwrap_or_else(|error| panic!("{file}: {error}; row: {row}"));
+            let has = |keyword| source.contains(&format!("{keyword} {name}("));
+            assert!(has("fn") || has("def"), "{file} has no test {name}; row: {row}");
+            tests += 1;
+        }
+    }
+    assert!(tests > 40, "{tests} tests");
+}
+
+#[test]
+fn anchors_and_links_are_parsed() {
     assert_eq!(
         anchor("## Where the attractor changes, omega = 5.6"),
         "where-the-attractor-changes-omega--56"
@@ -71,7 +129,7 @@ fn anchors_are_as_readers_of_markdown_make_them() {
     assert_eq!(links("[a](b) c\n```\n[d](e)\n```\n[f](g#h)"), ["b", "g#h"]);
 }
 
-/// Fonts are under licences of their own, which go where the program goes.
+/// The program contains fonts, whose licences NOTICE must contain.
 #[test]
 fn every_font_in_the_program_has_its_notice() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -97,14 +155,14 @@ fn every_font_in_the_program_has_its_notice() {
     }
 }
 
-/// What is made of the code's tables stands in the model's page word by word.
+/// docs/model.md lists the parameters, classes and statuses of the code.
 #[test]
-fn the_page_of_the_model_has_the_tables_of_the_code() {
+fn model_page_agrees_with_the_code() {
     use rattlemap::model::GearPair;
     use rattlemap_dynamics::orbit::{Class, Status};
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(root.join("docs/model.md")).unwrap();
-    // From the code's tables to the rows of the page's: first cells, in order.
+    // Rows of the table with this head.
     let rows = |head: &str| -> Vec<String> {
         let table = text.split_once(&format!("\n| {head} |")).unwrap_or_else(|| panic!("no table {head}")).1;
         table.lines().skip(2).take_while(|line| line.starts_with('|')).map(str::to_owned).collect()
@@ -116,7 +174,7 @@ fn the_page_of_the_model_has_the_tables_of_the_code() {
     assert_eq!(
         rows("symbol | default"),
         parameters.collect::<Vec<_>>(),
-        "docs/model.md: take the lines on the right"
+        "docs/model.md differs from the code; replace its rows with the lines on the right"
     );
     let firsts = |head| -> Vec<String> {
         rows(head).iter().map(|row| row.split('|').nth(1).unwrap().trim().to_owned()).collect()
@@ -125,7 +183,7 @@ fn the_page_of_the_model_has_the_tables_of_the_code() {
     assert_eq!(firsts("status | meaning"), Status::ALL.map(|status| status.name().to_owned()));
 }
 
-/// `docs/scenes.md` lists the parser's own table of keys. With REGENERATE set the list is written anew.
+/// docs/scenes.md lists the parser's table of keys. With REGENERATE set, the test writes the list.
 #[test]
 fn the_keys_of_scenes_are_those_of_the_parser() {
     use rattlemap::map::scene::KEYS;
@@ -143,15 +201,15 @@ fn the_keys_of_scenes_are_those_of_the_parser() {
         let (default, range) = (key.default.in_words(), key.takes.in_words());
         format!("| {table} | {} | {default} | {range} | {} |\n", key.name, key.meaning)
     };
-    let made: String = KEYS.iter().map(row).collect();
+    let expected: String = KEYS.iter().map(row).collect();
     if std::env::var_os("REGENERATE").is_some() {
-        fs::write(&path, format!("{before}{head}{made}{}", &rest[end..])).unwrap();
+        fs::write(&path, format!("{before}{head}{expected}{}", &rest[end..])).unwrap();
     } else {
         assert_eq!(
             &rest[..end],
-            made,
+            expected,
             "docs/scenes.md differs from src/map/scene/keys.rs; \
-             `REGENERATE=1 cargo test --test core the_keys_of_scenes` writes it anew"
+             `REGENERATE=1 cargo test --test core the_keys_of_scenes` writes it again"
         );
     }
 }

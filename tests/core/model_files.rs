@@ -1,4 +1,4 @@
-//! Models as files: the gear pair's is the gear pair, and no text makes reading panic.
+//! Model files: the gear pair's file equals the Rust model, and no text makes the reader panic.
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -8,7 +8,7 @@ use rattlemap::model_file::{BUILT_IN, FileModel};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Model};
 
-/// A number of any size, and zero of both signs.
+/// Positive numbers of any size, and zero.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => (-3.0..3.0_f64).prop_map(|x| 10_f64.powf(x)),
@@ -39,7 +39,7 @@ fn pair() -> impl Strategy<Value = GearPair> {
 }
 
 #[test]
-fn the_gear_pair_of_the_file_is_that_of_the_library() {
+fn the_file_of_the_gear_pair_equals_the_rust_model() {
     let file = FileModel::built_in("gear-pair").unwrap();
     let paper = GearPair::paper(0.605);
     assert_eq!(file.parameters(), GearPair::PARAMETERS);
@@ -47,15 +47,15 @@ fn the_gear_pair_of_the_file_is_that_of_the_library() {
     assert_eq!((file.state_names(), file.bodies()), (paper.state_names(), paper.bodies()));
     assert_eq!(file.frequency(), paper.frequency());
     let has_value = |index| file.value(index) == paper.value(index);
-    assert!((0..file.parameters().len()).all(has_value), "the values before any is set are `orbit`'s");
+    assert!((0..file.parameters().len()).all(has_value), "the defaults are those of `orbit`");
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// To the bit: the debug text of a number tells also the sign of a zero.
+    /// Both are compared bit by bit: the debug text of a number also shows the sign of zero.
     #[test]
-    fn both_gear_pairs_make_the_same_oscillator_and_law(pair in pair()) {
+    fn both_gear_pairs_have_equal_oscillators_and_laws(pair in pair()) {
         let mut file = FileModel::built_in("gear-pair").unwrap();
         (0..file.parameters().len()).for_each(|index| file.assign(index, pair.value(index)));
         prop_assert_eq!(format!("{:?}", Model::oscillator(&file)), format!("{:?}", pair.oscillator()));
@@ -63,49 +63,23 @@ proptest! {
     }
 }
 
-/// Values of every type, most of them out of place.
+/// Values of every type, most of them invalid.
+#[rustfmt::skip]
 const VALUES: [&str; 32] = [
-    "0",
-    "-0.0",
-    "1e308",
-    "1e400",
-    "inf",
-    "nan",
-    "99999999999999999999",
-    "true",
-    "\"e\"",
-    "\"x\"",
-    "\"t\"",
-    "\"sqrt\"",
-    "\"2*omega^\"",
-    "\"-k^(e - \"",
-    "\"1/0\"",
-    "\"log(-1)\"",
-    "\"right\"",
-    "\"left\"",
-    "\"elastic\"",
-    "\"impact\"",
-    "[]",
-    "[1]",
-    "[\"x\", \"y\"]",
-    "[[1]]",
-    "[[1, 0], [0, 1]]",
-    "[[1, 2], [2, 1]]",
-    "[[1, 2], [3]]",
-    "{ default = 1, min = 2 }",
-    "{ default = 1.0, min = 0, open = true }",
-    "{ min = nan }",
-    "1979-05-27",
-    "\"\u{fffd}\\u0000\"",
+    "0", "-0.0", "1e308", "1e400", "inf", "nan", "99999999999999999999", "true", "\"e\"", "\"x\"", "\"t\"",
+    "\"sqrt\"", "\"2*omega^\"", "\"-k^(e - \"", "\"1/0\"", "\"log(-1)\"", "\"right\"", "\"left\"",
+    "\"elastic\"", "\"impact\"", "[]", "[1]", "[\"x\", \"y\"]", "[[1]]", "[[1, 0], [0, 1]]",
+    "[[1, 2], [2, 1]]", "[[1, 2], [3]]", "{ default = 1, min = 2 }",
+    "{ default = 1.0, min = 0, open = true }", "{ min = nan }", "1979-05-27", "\"\u{fffd}\\u0000\"",
 ];
 
-/// What becomes of one line of a text.
+/// A change of one line.
 #[derive(Clone, Debug)]
 enum Change {
     Drop,
     Repeat,
     Value(&'static str),
-    /// Of one entry alone, in a list or in quotes.
+    /// Replaces the first text in quotes.
     Entry(&'static str),
     Character(prop::sample::Index, char),
     Cut,
@@ -159,7 +133,7 @@ fn changed(text: &str, changes: &[(prop::sample::Index, Change)]) -> String {
     lines.join("\n")
 }
 
-/// What is accepted has a motion, and reads back as the same; what is refused is told where, in one line.
+/// Checks that an accepted text has a motion and reads back as equal, and that an error has one line and a place.
 fn check(text: &str) -> bool {
     match FileModel::parse(text, "m.toml") {
         Ok(model) => {
@@ -184,7 +158,7 @@ fn check(text: &str) -> bool {
 }
 
 #[test]
-fn no_text_makes_reading_a_model_panic() {
+fn no_text_makes_the_model_reader_panic() {
     let mut runner = TestRunner::new(ProptestConfig::with_cases(3000));
     let texts: Vec<&str> = BUILT_IN.iter().map(|(_, text)| *text).collect();
     let [accepted, refused] = [std::cell::Cell::new(0), std::cell::Cell::new(0)];
@@ -195,6 +169,6 @@ fn no_text_makes_reading_a_model_panic() {
         Ok(())
     });
     verdict.unwrap();
-    // Both happen, so that both are looked at.
+    // Both results must be frequent.
     assert!(accepted.get() > 150 && refused.get() > 750, "{accepted:?} {refused:?}");
 }

@@ -1,10 +1,10 @@
-//! Scenes at random: mutated, and made up of what scenes can say. None makes the parser panic,
-//! what is accepted is valid, and what is refused is told where, what and how to mend it.
+//! Random scenes: mutated ones and arbitrary text. None makes the reader panic; accepted scenes are valid, and errors have a
+//! place, a cause and a remedy.
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use rattlemap::map::printable::line;
-use rattlemap::map::scene::{Axis, FileText, Place, Problem, Purpose, Scene, SceneError, Steps};
+use rattlemap::map::scene::{Axis, Fault, FileText, Place, Problem, Purpose, Scene, SceneError, Steps};
 use rattlemap_dynamics::model::{GearPair, Parameter};
 
 const SCENES: [&str; 5] = [
@@ -15,47 +15,17 @@ const SCENES: [&str; 5] = [
     include_str!("../../scenes/k_F.toml"),
 ];
 
-/// Values of every type, most of them out of place.
+/// Values of every type, most of them invalid.
+#[rustfmt::skip]
 const VALUES: [&str; 36] = [
-    "0",
-    "-0.0",
-    "1",
-    "2",
-    "64",
-    "0.5",
-    "1e-300",
-    "1e308",
-    "-1e308",
-    "1e400",
-    "inf",
-    "-inf",
-    "nan",
-    "1_000_000_000",
-    "9223372036854775807",
-    "99999999999999999999",
-    "0x7f",
-    "true",
-    "false",
-    "\"auto\"",
-    "\"e\"",
-    "\"omega\"",
-    "'state'",
-    "[]",
-    "[1, 2, 3, 4]",
-    "[0.25, 0.5]",
-    "[0.5, 1e400, nan]",
-    "\"log\"",
-    "\"0.5*k1\"",
-    "\"-2^k^(r - \"",
-    "\"min(m1, 1/m2)\"",
-    "\"k2\"",
-    "\"points.csv\"",
-    "{ a = 1 }",
-    "1979-05-27",
-    "\"\u{fffd}\\u0000\"",
+    "0", "-0.0", "1", "2", "64", "0.5", "1e-300", "1e308", "-1e308", "1e400", "inf", "-inf", "nan",
+    "1_000_000_000", "9223372036854775807", "99999999999999999999", "0x7f", "true", "false", "\"auto\"",
+    "\"e\"", "\"omega\"", "'state'", "[]", "[1, 2, 3, 4]", "[0.25, 0.5]", "[0.5, 1e400, nan]", "\"log\"",
+    "\"0.5*k1\"", "\"-2^k^(r - \"", "\"min(m1, 1/m2)\"", "\"k2\"", "\"points.csv\"", "{ a = 1 }",
+    "1979-05-27", "\"\u{fffd}\\u0000\"",
 ];
 
-/// Names that scenes know, and some that they do not.
+/// Known names, and some unknown ones.
 fn names() -> Vec<&'static str> {
     let fields = "title model parameters axis integration start refine outputs parameter min max count \
                   steps_per_period transient_periods observed_periods early_stop undecided_periods max_period policy \
@@ -127,7 +97,7 @@ fn mutated(scene: &str, mutations: &[Mutation]) -> String {
     lines.join("\n")
 }
 
-/// What an accepted scene promises.
+/// Checks an accepted scene.
 fn check_scene(scene: &Scene, purpose: Purpose) -> Result<(), TestCaseError> {
     let axes = scene.axes();
     if let Some(list) = scene.list() {
@@ -161,9 +131,9 @@ fn check_scene(scene: &Scene, purpose: Purpose) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Tables of cells at random: none makes the reader panic, and what is refused is told where.
+/// Random tables of cells: none makes the reader panic, and errors have a place.
 #[test]
-fn any_table_is_refused_with_a_remedy_or_valid() {
+fn any_table_is_valid_or_has_an_error_with_a_place() {
     let scene = "[parameters]\ne = 0.5\n[cells]\nfile = \"t\"\n[derived]\nk2 = \"2*k1\"\n";
     let field = prop_oneof![
         3 => "[0-9]{1,3}(\\.[0-9]{1,2})?(e[0-9])?",
@@ -176,25 +146,26 @@ fn any_table_is_refused_with_a_remedy_or_valid() {
         .prop_map(|(header, rows)| format!("{header}\n{}", rows.join("\n")));
     torture(&table, |table| {
         let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: table.clone() });
-        match Scene::parse_beside(scene, "scene.toml", &[], Purpose::Map, &find) {
+        match Scene::parse_with_files(scene, "scene.toml", &[], Purpose::Map, None, &find) {
             Ok(scene) => {
                 let list = scene.list().unwrap();
                 prop_assert!(!list.is_empty() && scene.cell_count() == list.len() as u64);
                 let again = list.to_csv();
                 let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: again.clone() });
-                let again = Scene::parse_beside(scene.text(), "s", &[], Purpose::Map, &find).unwrap();
+                let again =
+                    Scene::parse_with_files(scene.text(), "s", &[], Purpose::Map, None, &find).unwrap();
                 prop_assert_eq!(again.identity(), scene.identity());
             }
             Err(error) => {
-                let said = error.to_string();
-                prop_assert!(!said.contains('\n') && said.len() > 20, "{:?}", said);
+                let message = error.to_string();
+                prop_assert!(!message.contains('\n') && message.len() > 20, "{:?}", message);
                 if let Place::Text { line, column, file } = &error.place
                     && &**file == LIST.0
                 {
                     prop_assert!(
                         *line >= 1 && *line <= table.lines().count().max(1) && *column >= 1,
                         "{}",
-                        said
+                        message
                     );
                 }
             }
@@ -203,48 +174,47 @@ fn any_table_is_refused_with_a_remedy_or_valid() {
     });
 }
 
-/// A refusal is one line, lies in the text (or names its argument), and says how to go on.
+/// Checks that an error is one line, has a place in the text or names its argument, and has a remedy.
 fn check_refusal(error: &SceneError, text: &str, sets: &[String]) -> Result<(), TestCaseError> {
-    let said = error.to_string();
-    prop_assert!(!said.contains('\n'), "more than a line: {said:?}");
+    let message = error.to_string();
+    prop_assert!(!message.contains('\n'), "more than a line: {message:?}");
     match &error.place {
         Place::Text { line, column, file } if &**file == LIST.0 => {
-            prop_assert!(*line <= LIST.1.lines().count() && *column >= 1, "{}", said);
+            prop_assert!(*line <= LIST.1.lines().count() && *column >= 1, "{}", message);
         }
         Place::Text { line, column, .. } => {
-            prop_assert!(*line >= 1 && *line <= text.lines().count().max(1) + 1, "{}", said);
-            prop_assert!(*column >= 1, "{}", said);
+            prop_assert!(*line >= 1 && *line <= text.lines().count().max(1) + 1, "{}", message);
+            prop_assert!(*column >= 1, "{}", message);
         }
-        Place::Set { argument } => prop_assert!(sets.iter().any(|set| **set == **argument), "{}", said),
-        Place::Option { .. } => return Err(TestCaseError::fail(format!("no such option was given: {said}"))),
-        Place::Builder => return Err(TestCaseError::fail(format!("nothing was built: {said}"))),
-        Place::File { .. } => return Err(TestCaseError::fail(format!("no file was read: {said}"))),
+        Place::Set { argument } => prop_assert!(sets.iter().any(|set| **set == **argument), "{}", message),
+        Place::Option { .. } => {
+            return Err(TestCaseError::fail(format!("no such option was given: {message}")));
+        }
+        Place::Builder => return Err(TestCaseError::fail(format!("nothing was built: {message}"))),
+        Place::File { .. } => return Err(TestCaseError::fail(format!("no file was read: {message}"))),
     }
     let remedy = match &error.problem {
         Problem::Syntax { message, .. } => message,
         Problem::NoMotion { reason, .. } => &reason.to_string(),
         Problem::NotAnAssignment => return Ok(()),
-        Problem::UnreadableValue { reason, .. } => &line(reason).into_owned(),
+        Problem::Value { fault: Fault::Unreadable, detail, .. } => &line(detail).into_owned(),
+        Problem::Value { detail, .. } => detail,
         Problem::Table { message } => message,
-        Problem::UnknownWithin { remedy, .. }
-        | Problem::UnknownField { remedy, .. }
-        | Problem::UnknownName { remedy, .. }
-        | Problem::Missing { remedy, .. }
-        | Problem::Conflict { remedy, .. } => remedy,
-        Problem::WrongType { expected, .. } => expected,
-        Problem::OutOfRange { requirement, .. } => requirement,
-        Problem::Unreadable { .. } => return Err(TestCaseError::fail(format!("no file was read: {said}"))),
+        Problem::Missing { remedy, .. } => remedy,
+        Problem::Unreadable { .. } => {
+            return Err(TestCaseError::fail(format!("no file was read: {message}")));
+        }
     };
-    prop_assert!(remedy.len() > 3 && said.contains(remedy.as_str()), "no remedy: {said:?}");
+    prop_assert!(remedy.len() > 3 && message.contains(remedy.as_str()), "no remedy: {message:?}");
     Ok(())
 }
 
-/// What every file of cells is said to hold.
+/// Name and contents of every file of cells.
 const LIST: (&str, &str) = ("points.csv", "omega,k\n5.6,900\n7,1e4\n");
 
 fn parse(text: &str, sets: &[String], purpose: Purpose) -> Result<Scene, SceneError> {
     let find = |_, _: &str| Ok(FileText { name: LIST.0.to_owned(), text: LIST.1.to_owned() });
-    Scene::parse_beside(text, "scene.toml", sets, purpose, &find)
+    Scene::parse_with_files(text, "scene.toml", sets, purpose, None, &find)
 }
 
 fn check(text: &str, sets: &[String]) -> Result<(), TestCaseError> {
@@ -257,19 +227,19 @@ fn check(text: &str, sets: &[String]) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Some `NAME=VALUE` arguments, and some that are none.
+/// Some `NAME=VALUE` arguments, and some other texts.
 fn arguments() -> impl Strategy<Value = Vec<String>> {
     let known = (prop::sample::select(names()), prop::sample::select(VALUES.to_vec()));
     let one = prop_oneof![6 => known.prop_map(|(name, value)| format!("{name}={value}")), 1 => "\\PC{0,12}".boxed()];
     prop::collection::vec(one, 0..2)
 }
 
-/// Tries values of a strategy, 20,000 of them unless `RATTLEMAP_TORTURE` in the environment asks for others, and says so
-/// in a line that scripts read.
+/// Tests values of a strategy: 20,000, or the number in the environment variable `RATTLEMAP_TORTURE`. Prints a line that
+/// scripts read.
 fn torture<S: Strategy>(strategy: &S, test: impl Fn(S::Value) -> Result<(), TestCaseError>) {
-    let asked = std::env::var("RATTLEMAP_TORTURE").ok().and_then(|count| count.parse().ok());
+    let requested = std::env::var("RATTLEMAP_TORTURE").ok().and_then(|count| count.parse().ok());
     let config = ProptestConfig {
-        cases: asked.unwrap_or(20_000),
+        cases: requested.unwrap_or(20_000),
         failure_persistence: None,
         ..ProptestConfig::default()
     };
@@ -282,7 +252,7 @@ fn torture<S: Strategy>(strategy: &S, test: impl Fn(S::Value) -> Result<(), Test
 }
 
 #[test]
-fn mutated_scenes_are_refused_with_a_remedy_or_valid() {
+fn mutated_scenes_are_valid_or_have_an_error_with_a_remedy() {
     let scene = prop::sample::select(SCENES.to_vec());
     torture(&(scene, mutations(), arguments()), |(scene, mutations, sets)| {
         check(&mutated(scene, &mutations), &sets)
@@ -290,13 +260,13 @@ fn mutated_scenes_are_refused_with_a_remedy_or_valid() {
 }
 
 #[test]
-fn any_text_is_refused_with_a_remedy() {
+fn any_text_has_an_error_with_a_remedy() {
     torture(&"\\PC{0,80}(\\n\\PC{0,40}){0,6}", |text| check(&text, &[]));
 }
 
-/// Enough of the mutants are accepted, and every kind of refusal is met.
+/// Many mutated scenes are accepted, and all kinds of errors occur.
 #[test]
-fn mutants_reach_both_sides() {
+fn mutated_scenes_reach_all_kinds_of_errors() {
     use proptest::strategy::ValueTree;
     let mut runner = TestRunner::deterministic();
     let (mut accepted, mut kinds) = (0, std::collections::BTreeSet::new());
@@ -306,8 +276,10 @@ fn mutants_reach_both_sides() {
         match parse(&mutated(scene, &mutations), &sets, Purpose::Map) {
             Ok(_) => accepted += 1,
             Err(error) => {
-                let kind = format!("{:?}", error.problem);
-                kinds.insert(kind.split([' ', '{']).next().unwrap_or_default().to_owned());
+                kinds.insert(match &error.problem {
+                    Problem::Value { fault, .. } => format!("{fault:?}"),
+                    problem => format!("{problem:?}").split([' ', '{']).next().unwrap_or_default().to_owned(),
+                });
             }
         }
     }

@@ -1,9 +1,9 @@
 //! A ball on a shaking table, in the table's frame: `z'' = -1 + G cos(omega t)`, `z >= 0`, with G the table's acceleration in
 //! units of gravity (Luck and Mehta, Phys. Rev. E 48 (1993) 3988-3997; Tufillaro, ibid. 50 (1994) 4509).
 //!
-//! One bounce per period leaves with `w+ = T e/(1 + e)`; where it bounces, `-G sin(phi) = pi (1 - e)/(1 + e)`. Its
-//! multipliers have the product `e^2` and the sum `-2 e - (1 + e)^2 (G cos(phi) - 1)`: it is born in a fold at
-//! `G = pi (1 - e)/(1 + e)` and its period doubles at `G^2 = (pi (1 - e)/(1 + e))^2 + (2 (1 + e^2)/(1 + e)^2)^2`.
+//! The orbit of one bounce per period leaves the table with `w+ = T e/(1 + e)` at a phase with `-G sin(phi) = pi (1 - e)/(1 + e)`.
+//! Its multipliers have the product `e^2` and the sum `-2 e - (1 + e)^2 (G cos(phi) - 1)`. It begins in a fold at
+//! `G = pi (1 - e)/(1 + e)`, and its period doubles at `G^2 = (pi (1 - e)/(1 + e))^2 + (2 (1 + e^2)/(1 + e)^2)^2`.
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
@@ -18,13 +18,13 @@ pub(crate) fn ball(shaking: f64, e: f64) -> Walled {
     Walled { free, walls: [None, Some(Wall::Rigid { at: 0.0, e })] }
 }
 
-/// Where the bounce of period 1 is born and where its period doubles.
+/// Returns the accelerations of the fold and of the period doubling of period 1.
 pub(crate) fn window(e: f64) -> [f64; 2] {
-    let born = std::f64::consts::PI * (1.0 - e) / (1.0 + e);
-    [born, born.hypot(2.0 * (1.0 + e * e) / (1.0 + e).powi(2))]
+    let fold = std::f64::consts::PI * (1.0 - e) / (1.0 + e);
+    [fold, fold.hypot(2.0 * (1.0 + e * e) / (1.0 + e).powi(2))]
 }
 
-/// The state at phase 0 of one bounce per period, and a matrix with its multipliers.
+/// Returns the state at phase 0 of the orbit of one bounce per period, and a matrix with its multipliers.
 pub(crate) fn bounce(shaking: f64, e: f64) -> (State, [[f64; 2]; 2]) {
     let sin = -window(e)[0] / shaking;
     let phase = (-(-sin).asin()).rem_euclid(T);
@@ -35,11 +35,11 @@ pub(crate) fn bounce(shaking: f64, e: f64) -> (State, [[f64; 2]; 2]) {
 }
 
 #[test]
-fn one_bounce_per_period() {
+fn the_orbit_of_one_bounce_agrees_with_the_closed_form() {
     for e in [0.3, 0.5, 0.8] {
-        let [born, doubles] = window(e);
+        let [fold, doubles] = window(e);
         for share in [0.1, 0.5, 0.9] {
-            let shaking = born + share * (doubles - born);
+            let shaking = fold + share * (doubles - fold);
             let (start, theirs) = bounce(shaking, e);
             let (oscillator, law) = ball(shaking, e).oscillator();
             let found = followed(&oscillator, law, start, 1);
@@ -60,17 +60,17 @@ fn one_bounce_per_period() {
         };
         let [trace, det] = at(doubles);
         assert!((1.0 + trace + det).abs() < 1e-12, "a multiplier of -1: {trace} {det}");
-        let [trace, det] = at(born * (1.0 + 1e-12));
+        let [trace, det] = at(fold * (1.0 + 1e-12));
         assert!((1.0 - trace + det).abs() < 1e-5, "a multiplier of 1: {trace} {det}");
     }
 }
 
-/// It sticks until the table falls faster than it: `G cos(omega t) = 1`.
+/// The ball sticks until the table's downward acceleration is that of gravity: `G cos(omega t) = 1`.
 #[test]
-fn the_table_throws_it_off_at_one_gravity() {
+fn sticking_ends_at_the_acceleration_of_gravity() {
     for shaking in [1.2, 1.5, 1.9] {
         let (oscillator, law) = ball(shaking, 0.0).oscillator();
-        // From rest where the table holds it.
+        // The ball starts at rest on the table.
         let found = followed(&oscillator, law, [0.0; 4], 3);
         let ends: Vec<_> = found.events.iter().filter(|event| event.kind == EventKind::MeshEnd).collect();
         assert!(ends.len() >= 2, "{:?}", found.events);
@@ -79,14 +79,14 @@ fn the_table_throws_it_off_at_one_gravity() {
             assert!(off < 1e-12 && end.after[..2] == [0.0; 2], "G = {shaking}: {end:?}");
         }
         assert!(off_the_integrator(&oscillator, law, [0.0; 4], 3) < 1e-10);
-        // Whoever sticks forgets.
+        // Sticking removes all perturbations.
         assert!(found.monodromy.iter().all(|&x| x == 0.0));
     }
 }
 
-/// Bouncing on a table at rest is over after `2 w/(1 - e)`.
+/// Bouncing on a table at rest ends after the time `2 w/(1 - e)`.
 #[test]
-fn infinitely_many_bounces_end_in_time() {
+fn infinitely_many_bounces_end_at_the_computed_time() {
     for (e, w) in [(0.3, 1.4), (0.6, 0.9), (0.9, 0.2)] {
         let (oscillator, law) = ball(0.0, e).oscillator();
         let found = followed(&oscillator, law, [0.0, w, 0.0, 0.0], 1);

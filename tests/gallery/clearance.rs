@@ -1,9 +1,9 @@
-//! Two masses with a clearance between them: the linear case of the impact Duffing oscillator of PWSDDE-cont (Nonlinear
-//! Dynamics 2024, doi 10.1007/s11071-024-10188-8; eta = 0 in its definition, the other numbers are its demo's).
+//! Two masses with a clearance between them: the linear case (eta = 0) of the impact Duffing oscillator of PWSDDE-cont (Nonlinear
+//! Dynamics 2024, doi 10.1007/s11071-024-10188-8), with the other numbers of its demo.
 //!
-//! A symmetric orbit impacts on both sides half a period apart. With the impact law R, the propagator E of half a period
-//! and the steady state s at the impact, `E (R y - s) = -y + s`: the state before it is `y = (E R + 1)^-1 (E + 1) s`, linear
-//! in the cosine and sine of its phase, and the gap is closed where `g . y = delta`.
+//! A symmetric orbit has impacts on both sides half a period apart. With the impact law R, the propagator E of half a period
+//! and the steady state s at the impact, `E (R y - s) = -y + s`. So the state before the impact is `y = (E R + 1)^-1 (E + 1) s`,
+//! which is linear in the cosine and sine of the phase of the impact. The phase follows from `g . y = delta`.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2, Vector4};
 
@@ -46,17 +46,17 @@ pub(crate) fn pair(omega: f64) -> (Oscillator, Law) {
 pub(crate) struct Symmetric {
     /// Phase of the impact on the right.
     phase: f64,
-    /// Before it.
+    /// State before that impact.
     before: Vector4<f64>,
     /// The state at phase 0.
     pub(crate) strobe: State,
-    /// Of half a period and the mirror image.
+    /// Monodromy matrix of half a period with the mirror image.
     pub(crate) half: Matrix4<f64>,
-    /// Whether it passes through no wall on its way.
+    /// Whether the orbit stays between the walls between its impacts.
     pub(crate) is_free_between: bool,
 }
 
-/// Matrices on `(x1, v1, x2, v2)`, and the steady state's cosine and sine parts.
+/// Matrices for `(x1, v1, x2, v2)`, and the cosine and sine parts of the steady state.
 struct Linear {
     generator: Matrix4<f64>,
     impact: Matrix4<f64>,
@@ -94,7 +94,7 @@ fn linear(omega: f64) -> Linear {
     Linear { generator, impact, steady: [part(|x| x.re, |x| -x.im), part(|x| -x.im, |x| -x.re)] }
 }
 
-/// The symmetric orbits that close in on the right wall where they reach it.
+/// Returns the symmetric orbits that approach the right wall at the impact.
 pub(crate) fn symmetric(omega: f64) -> Vec<Symmetric> {
     let Linear { generator, impact, steady } = linear(omega);
     let half = std::f64::consts::PI / omega;
@@ -111,14 +111,14 @@ pub(crate) fn symmetric(omega: f64) -> Vec<Symmetric> {
     let orbit = |phase: f64| {
         let s = steady[0] * phase.cos() + steady[1] * phase.sin();
         let before = to_before * s;
-        // Half a turn after a state comes its mirror image: on to phase pi, if that is before the other wall.
+        // Half a period after a state follows its mirror image, so the motion is continued to phase pi or 2 pi.
         let (until, sign) = match phase < std::f64::consts::PI {
             true => (std::f64::consts::PI, -1.0),
             false => (std::f64::consts::TAU, 1.0),
         };
         let after = (generator * ((until - phase) / omega)).exp() * (impact * before - s);
         let strobe = steady[0] + after * sign;
-        // Saltation: S = R + (f+ - R f-) n^T / (n . f-), with the field beside the steady one.
+        // Saltation matrix: S = R + (f+ - R f-) n^T / (n . f-), with the vector field f.
         let field = |y: Vector4<f64>| {
             generator * (y - s) + (steady[1] * phase.cos() - steady[0] * phase.sin()) * omega
         };
@@ -142,7 +142,7 @@ pub(crate) fn symmetric(omega: f64) -> Vec<Symmetric> {
 }
 
 #[test]
-fn symmetric_orbits_of_two_impacts() {
+fn symmetric_orbits_agree_with_the_closed_form() {
     let mut stable = 0;
     for omega in [0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.5, 1.8] {
         for orbit in symmetric(omega) {

@@ -1,4 +1,4 @@
-//! What the reference says of motion that is known to close, and what the independent integrator says of it.
+//! Motions computed by the reference and by the independent integrator.
 
 use nalgebra::{Complex, Matrix4, Vector4};
 
@@ -6,22 +6,22 @@ use rattlemap::validate::independent::dop853::Solver;
 use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Oscillator, State};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 use rattlemap_dynamics::stability::UNIT;
 
 use crate::common::apart;
 
 /// A motion over some periods.
 pub(crate) struct Followed {
-    /// Where it ends.
+    /// Last state.
     pub(crate) end: State,
-    pub(crate) events: Vec<Happening>,
-    /// What differences beside it become.
+    pub(crate) events: Vec<GapEvent>,
+    /// Monodromy matrix.
     pub(crate) monodromy: Matrix4<f64>,
     pub(crate) meshing_time: f64,
 }
 
-/// The reference's motion from a start at phase 0.
+/// Computes the reference's motion from a start at phase 0.
 pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> Followed {
     let flow = Flow::new(oscillator);
     let mut trajectory = Trajectory::with_tangents(&flow, law, start, UNIT);
@@ -38,7 +38,8 @@ pub(crate) fn followed(oscillator: &Oscillator, law: Law, start: State, periods:
     }
 }
 
-/// How far the independent integrator ends from where the reference does, and whether it meets as many events.
+/// Returns the distance of the last states of the reference and of the independent integrator. Both must find the same number
+/// of events.
 pub(crate) fn off_the_integrator(oscillator: &Oscillator, law: Law, start: State, periods: u32) -> f64 {
     let solver = Solver { omega: oscillator.omega, tolerance: 1e-12 };
     let mut flight = Flight::new(oscillator, law, start);
@@ -50,7 +51,7 @@ pub(crate) fn off_the_integrator(oscillator: &Oscillator, law: Law, start: State
     apart(flight.state(), ours.end)
 }
 
-/// Eigenvalues of a matrix of two rows, the larger first.
+/// Returns the eigenvalues of a 2 x 2 matrix, the larger first.
 pub(crate) fn eigenvalues([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
     let (trace, det) = (a + d, a * d - b * c);
     let root = Complex::new(0.25 * trace * trace - det, 0.0).sqrt();
@@ -58,12 +59,12 @@ pub(crate) fn eigenvalues([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] 
     if first.norm() >= second.norm() { [first, second] } else { [second, first] }
 }
 
-/// The block of the first displacement.
+/// Returns the block of the first displacement and its velocity.
 pub(crate) fn first_block(m: &Matrix4<f64>) -> [[f64; 2]; 2] {
     [[m[(0, 0)], m[(0, 1)]], [m[(1, 0)], m[(1, 1)]]]
 }
 
-/// How far two pairs of multipliers are apart, by trace and determinant: no root is taken.
+/// Returns the difference of two pairs of multipliers in trace and determinant, which needs no roots.
 pub(crate) fn multipliers_apart(ours: [[f64; 2]; 2], theirs: [[f64; 2]; 2]) -> f64 {
     let trace = |m: [[f64; 2]; 2]| m[0][0] + m[1][1];
     let det = |m: [[f64; 2]; 2]| m[0][0] * m[1][1] - m[0][1] * m[1][0];

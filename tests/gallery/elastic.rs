@@ -1,5 +1,5 @@
-//! Springs that a coordinate meets and leaves without a jump: the bilinear oscillator, the soft impact oscillator, elastic
-//! backlash with a mean load. Between crossings all of them are known in closed form.
+//! Contact with springs, without jumps: the bilinear oscillator, the soft impact oscillator, elastic backlash with a mean
+//! load. Between crossings, all motions have closed forms.
 
 use crate::common::apart;
 use crate::common::closed_form::{Linear, Wall, Walled};
@@ -7,7 +7,7 @@ use crate::cycle::{first_block, followed, off_the_integrator};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::reference::EventKind;
 
-/// The bilinear oscillator: `k` on the left of 0, `k + stiffer` on the right.
+/// Builds the bilinear oscillator with stiffness 1 for negative and 4 for positive displacements.
 pub(crate) fn bilinear(omega: f64, force: f64) -> Walled {
     let free = Linear { m: 1.0, c: 0.1, k: 1.0, force, omega, load: 0.0 };
     Walled { free, walls: [Some(Wall::Elastic { at: 0.0, k: 3.0, c: 0.0 }), None] }
@@ -42,7 +42,7 @@ fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) {
     let kinds: Vec<_> = found.events.iter().map(|event| (event.kind, event.side.index())).collect();
     assert_eq!(kinds, events.iter().map(|&(_, kind, side)| (kind, side)).collect::<Vec<_>>(), "{what}");
     assert!(kinds.iter().all(|&(kind, _)| kind != EventKind::Impact), "{what}");
-    // Liouville: what a damper takes, a crossing takes nothing.
+    // Liouville's theorem: only dampers reduce the phase volume, crossings do not.
     let [[a, b], [c, d]] = first_block(&found.monodromy);
     let mut behind = [0.0; 2];
     for (i, &(t, kind, side)) in events.iter().enumerate() {
@@ -70,7 +70,7 @@ fn agrees(walled: &Walled, start: [f64; 2], periods: u32, what: &str) {
 }
 
 #[test]
-fn motion_is_that_of_the_closed_forms() {
+fn motions_agree_with_closed_forms() {
     agrees(&bilinear(1.7, 1.0), [-0.3, 0.4], 3, "bilinear");
     let damped = |mut walled: Walled| {
         if let Some(Wall::Elastic { c, .. }) = &mut walled.walls[0] {
@@ -83,9 +83,9 @@ fn motion_is_that_of_the_closed_forms() {
     agrees(&damped(soft(0.8, 0.9)), [1.3, 0.2], 3, "soft impacts on a damper");
 }
 
-/// Undamped and unforced, a bilinear oscillator swings with `2 w1 w2 / (w1 + w2)`.
+/// An undamped and unforced bilinear oscillator has the frequency `2 w1 w2 / (w1 + w2)`.
 #[test]
-fn the_bilinear_frequency() {
+fn a_free_bilinear_oscillator_has_the_bilinear_frequency() {
     let (slow, fast) = (1.0f64, 2.0f64);
     let natural = 2.0 * slow * fast / (slow + fast);
     let mut walled = bilinear(natural, 0.0);
@@ -99,10 +99,10 @@ fn the_bilinear_frequency() {
     }
 }
 
-/// Teeth that never part are a linear oscillator about the mean deflection. They part where its swing reaches F_m:
+/// Teeth in permanent contact are a linear oscillator about the mean deflection. They separate if its amplitude reaches F_m:
 /// `F_a w^2 = F_m |1 - w^2 + 2 i zeta w|`.
 #[test]
-fn teeth_part_where_the_swing_reaches_the_mean_load() {
+fn teeth_separate_when_the_amplitude_reaches_the_mean_load() {
     let (zeta, mean, alternating) = BACKLASH;
     // (1 - r^2) u^2 + (4 zeta^2 - 2) u + 1 = 0 in u = w^2, r = F_a / F_m.
     let (square, p) = (1.0 - (alternating / mean).powi(2), 4.0 * zeta * zeta - 2.0);
@@ -127,9 +127,9 @@ fn teeth_part_where_the_swing_reaches_the_mean_load() {
     }
 }
 
-/// The grazing frequency of the soft oscillator: `a w^2 = e |1 - w^2 + 2 i zeta w|`.
+/// The soft oscillator grazes the spring at the frequency with `a w^2 = e |1 - w^2 + 2 i zeta w|`.
 #[test]
-fn the_soft_stop_is_reached_where_the_response_is() {
+fn grazing_of_the_soft_stop_agrees_with_the_response() {
     let (zeta, e, a) = (0.01f64, 1.26f64, 0.7f64);
     let (square, p) = (1.0 - (a / e).powi(2), 4.0 * zeta * zeta - 2.0);
     let grazing = ((0.5 * (-p - (p * p - 4.0 * square).sqrt())) / square).sqrt();
@@ -150,21 +150,21 @@ fn the_soft_stop_is_reached_where_the_response_is() {
     assert!((high - grazing).abs() < 1e-12);
 }
 
-/// A point of the frequency response by harmonic balance, `benches/peers/harmonic_balance.py`: 40 harmonics of the periodic
-/// motion, which know no events.
-struct Balanced {
+/// A point of the frequency response computed by harmonic balance (`benches/peers/harmonic_balance.py`) with 40 harmonics, which
+/// needs no events.
+struct ResponsePoint {
     kind: String,
     omega: f64,
     state: [f64; 2],
     largest: f64,
 }
 
-fn balanced() -> Vec<Balanced> {
+fn response_points() -> Vec<ResponsePoint> {
     let text = include_str!("data/backlash.csv");
     let row = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
         let number = |i: usize| cells[i].parse::<f64>().unwrap();
-        Balanced {
+        ResponsePoint {
             kind: cells[0].to_owned(),
             omega: number(1),
             state: [number(2), number(3)],
@@ -174,7 +174,7 @@ fn balanced() -> Vec<Balanced> {
     text.lines().skip(1).map(row).collect()
 }
 
-/// The cycle near a state by Newton's method on the reference's strobe map, and its monodromy matrix.
+/// Returns the cycle near a state, found by Newton's method on the reference's strobe map, and its monodromy matrix.
 fn cycle_near(omega: f64, mut state: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
     let (oscillator, law) = backlash(omega).oscillator();
     for _ in 0..30 {
@@ -191,15 +191,15 @@ fn cycle_near(omega: f64, mut state: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
     panic!("no cycle at omega = {omega}");
 }
 
-/// What a multiplier of 1 makes zero.
+/// Returns a number that is zero at a fold, where a multiplier is 1.
 fn from_fold([[a, b], [c, d]]: [[f64; 2]; 2]) -> f64 {
     1.0 - (a + d) + (a * d - b * c)
 }
 
-/// The jumps of the frequency response: its three branches, and the folds where they end, by another method.
+/// The branches of the frequency response and the folds at which they end agree with harmonic balance.
 #[test]
-fn the_response_jumps_where_harmonic_balance_turns() {
-    let points = balanced();
+fn the_frequency_response_agrees_with_harmonic_balance() {
+    let points = response_points();
     let mut worst = 0.0f64;
     for point in points.iter().filter(|point| point.kind != "fold") {
         let (state, monodromy) = cycle_near(point.omega, point.state);
@@ -212,36 +212,36 @@ fn the_response_jumps_where_harmonic_balance_turns() {
     assert!(swings("stable").len() > 20 && swings("unstable").len() > 2);
     println!("{} points of harmonic balance, off by {worst:.1e}", points.len());
     assert!(worst < 5e-5);
-    let folds: Vec<&Balanced> = points.iter().filter(|point| point.kind == "fold").collect();
-    // The branch of small swings ends going up, that of large ones going down.
+    let folds: Vec<&ResponsePoint> = points.iter().filter(|point| point.kind == "fold").collect();
+    // The branch of small amplitudes ends at its largest frequency, the other at its smallest.
     for (fold, inwards) in folds.iter().zip([-1.0, 1.0]) {
-        // Near its end the square of what makes a multiplier 1 is a parabola in omega: its root, by three points.
+        // Near the fold, the square of `from_fold` is smooth in omega. Its root follows from three points.
         let at = |share: f64| {
             let omega = fold.omega * (1.0 + inwards * share);
             let stable = points.iter().filter(|p| p.kind == "stable" && (p.omega - omega) * inwards > 0.0);
-            let side = |p: &&Balanced| {
+            let side = |p: &&ResponsePoint| {
                 if inwards < 0.0 { p.largest < fold.largest } else { p.largest > fold.largest }
             };
             let nearest = stable
                 .filter(side)
                 .min_by(|a, b| (a.omega - omega).abs().total_cmp(&(b.omega - omega).abs()));
-            // From there on in steps that Newton's method can follow.
+            // The cycle is continued in small steps.
             let from = nearest.unwrap();
             let (mut state, mut monodromy) = (from.state, [[0.0; 2]; 2]);
             for k in 1..=200 {
                 let share = f64::from(k) / 200.0;
-                let gone = 1.0 - (1.0 - share) * (1.0 - share);
-                (state, monodromy) = cycle_near(from.omega + gone * (omega - from.omega), state);
+                let progress = 1.0 - (1.0 - share) * (1.0 - share);
+                (state, monodromy) = cycle_near(from.omega + progress * (omega - from.omega), state);
             }
             [omega, from_fold(monodromy).powi(2)]
         };
         let [[x0, y0], [x1, y1], [x2, y2]] = [1e-5, 2e-5, 4e-5].map(at);
-        // Inverse interpolation by Lagrange's polynomial.
+        // Inverse interpolation with Lagrange's polynomial.
         let root = x0 * y1 * y2 / ((y0 - y1) * (y0 - y2))
             + x1 * y0 * y2 / ((y1 - y0) * (y1 - y2))
             + x2 * y0 * y1 / ((y2 - y0) * (y2 - y1));
         println!("a branch ends at {root}; by harmonic balance at {}", fold.omega);
-        // What 40 harmonics leave out; 120 have the first at 0.828463989.
+        // The tolerance is the error of 40 harmonics; with 120 harmonics the first fold is at 0.828463989.
         assert!((root - fold.omega).abs() < 5e-6, "{root} {}", fold.omega);
     }
 }

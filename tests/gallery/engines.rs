@@ -1,4 +1,4 @@
-//! Cycles in closed form, as the engines find them: the reference, and lanes in f32 and f64.
+//! Cycles with closed forms, computed by the reference and by lanes in f32 and f64.
 
 use nalgebra::Matrix4;
 
@@ -19,35 +19,35 @@ use rattlemap_dynamics::model::{Law, Oscillator, State};
 use rattlemap_dynamics::orbit::{Budget, Settings, measure};
 use rattlemap_dynamics::stability::multipliers;
 
-/// A stable cycle that is known.
-struct Truth {
+/// A stable cycle with a closed form.
+struct Known {
     what: String,
     oscillator: Oscillator,
     law: Law,
     period: u32,
-    /// At phase 0.
+    /// State at phase 0.
     strobe: State,
-    /// Of the largest multiplier.
+    /// Modulus of the largest multiplier.
     radius: f64,
     impacts: f64,
 }
 
-fn truths() -> Vec<Truth> {
+fn known_cycles() -> Vec<Known> {
     let mut list = Vec::new();
     for (stop, period) in stable() {
         let (orbit, (oscillator, law)) = (stop.orbits(period)[0], stop.walled().oscillator());
         let radius = eigenvalues(orbit.monodromy)[0].norm();
         let what = format!("one stop, omega = {}, n = {period}", stop.omega);
-        list.push(Truth { what, oscillator, law, period, strobe: orbit.strobe, radius, impacts: 1.0 });
+        list.push(Known { what, oscillator, law, period, strobe: orbit.strobe, radius, impacts: 1.0 });
     }
     for e in [0.3, 0.5, 0.8] {
         let [born, doubles] = window(e);
         for share in [0.2, 0.5, 0.8] {
             let shaking = born + share * (doubles - born);
-            // From 1 on the table alone throws the ball off; below, only its bounce keeps it off.
+            // Below G = 1 a ball that sticks is never released.
             let ((strobe, matrix), (oscillator, law)) = (bounce(shaking, e), ball(shaking, e).oscillator());
             let (radius, what) = (eigenvalues(matrix)[0].norm(), format!("ball, e = {e}, G = {shaking:.3}"));
-            list.push(Truth { what, oscillator, law, period: 1, strobe, radius, impacts: 1.0 });
+            list.push(Known { what, oscillator, law, period: 1, strobe, radius, impacts: 1.0 });
         }
     }
     for omega in [0.7, 0.8, 1.5] {
@@ -58,7 +58,7 @@ fn truths() -> Vec<Truth> {
             let radius = re.hypot(im);
             if orbit.is_free_between && radius < 1.0 {
                 let what = format!("two masses, omega = {omega}");
-                list.push(Truth {
+                list.push(Known {
                     what,
                     oscillator,
                     law,
@@ -73,7 +73,7 @@ fn truths() -> Vec<Truth> {
     let springs = [
         ("bilinear", bilinear(1.7, 1.0), [0.0, 0.0]),
         ("soft impacts", soft(0.85, 0.7), [0.0, 0.0]),
-        // Between the folds teeth stay together or part.
+        // Between the folds there are two cycles, with and without separation.
         ("backlash, together", backlash(0.78), [1.1, 0.0]),
         ("backlash, parting", backlash(0.78), [0.8, 0.0]),
         ("backlash", backlash(1.1), [0.8, 0.0]),
@@ -81,15 +81,15 @@ fn truths() -> Vec<Truth> {
     for (what, walled, start) in springs {
         let ([x, v], period) = settled(&walled, start);
         let (oscillator, law) = walled.oscillator();
-        // Both multipliers are one pair, and their product is what the damper takes of the phase volume.
+        // The multipliers are a complex pair. Their product is the change of the phase volume, which the damper determines.
         let radius = (-0.5 * walled.free.c * f64::from(period) * walled.free.period()).exp();
         let (what, strobe) = (what.to_owned(), [x, v, 0.0, 0.0]);
-        list.push(Truth { what, oscillator, law, period, strobe, radius, impacts: 0.0 });
+        list.push(Known { what, oscillator, law, period, strobe, radius, impacts: 0.0 });
     }
     list
 }
 
-/// A state to which the closed forms come back, and after how many periods; the reference says where to look.
+/// Returns a state and a period of a cycle of the closed forms, near the last state of the reference.
 fn settled(walled: &Walled, [x, v]: [f64; 2]) -> ([f64; 2], u32) {
     let (oscillator, law) = walled.oscillator();
     let [x, v, ..] = followed(&oscillator, law, [x, v, 0.0, 0.0], 1200).end;
@@ -111,64 +111,64 @@ fn budget() -> Budget {
     }
 }
 
-/// Near the cycle, not on it.
-fn start(truth: &Truth) -> State {
-    truth.strobe.map(|x| 1.001 * x)
+/// Returns a start near the cycle.
+fn start(known: &Known) -> State {
+    known.strobe.map(|x| 1.001 * x)
 }
 
-/// How far a record's state and the logarithm of its multiplier are from the truth's, relative to the motion.
-fn off(truth: &Truth, record: &Record) -> [f64; 2] {
-    assert_eq!(record.period, truth.period, "{}: {record:?}", truth.what);
-    let impacts = truth.impacts / f64::from(truth.period);
-    assert!((record.impacts_per_period - impacts).abs() < 1e-9, "{}: {record:?}", truth.what);
-    let at = |n: u32| followed(&truth.oscillator, truth.law, truth.strobe, n).end;
-    let near = (0..truth.period).map(|n| apart(record.strobe, at(n))).fold(f64::INFINITY, f64::min);
-    let scale = truth.strobe.iter().fold(1.0f64, |m, x| m.max(x.abs()));
-    let span = f64::from(truth.period) * truth.oscillator.period();
-    [near / scale, (record.lyapunov * span - truth.radius.ln()).abs()]
+/// Returns the errors of a record: that of the state, relative to the motion, and that of the logarithm of the multiplier.
+fn off(known: &Known, record: &Record) -> [f64; 2] {
+    assert_eq!(record.period, known.period, "{}: {record:?}", known.what);
+    let impacts = known.impacts / f64::from(known.period);
+    assert!((record.impacts_per_period - impacts).abs() < 1e-9, "{}: {record:?}", known.what);
+    let at = |n: u32| followed(&known.oscillator, known.law, known.strobe, n).end;
+    let near = (0..known.period).map(|n| apart(record.strobe, at(n))).fold(f64::INFINITY, f64::min);
+    let scale = known.strobe.iter().fold(1.0f64, |m, x| m.max(x.abs()));
+    let span = f64::from(known.period) * known.oscillator.period();
+    [near / scale, (record.lyapunov * span - known.radius.ln()).abs()]
 }
 
-fn worst(truths: &[Truth], records: &[Record], who: &str) -> [f64; 2] {
+fn worst(known_cycles: &[Known], records: &[Record], engine: &str) -> [f64; 2] {
     let mut worst = [0.0f64; 2];
-    for (truth, record) in truths.iter().zip(records) {
-        let off = off(truth, record);
-        println!("{who}, {}: state {:.1e}, ln |mu| {:.1e}", truth.what, off[0], off[1]);
+    for (known, record) in known_cycles.iter().zip(records) {
+        let off = off(known, record);
+        println!("{engine}, {}: state {:.1e}, ln |mu| {:.1e}", known.what, off[0], off[1]);
         worst = [worst[0].max(off[0]), worst[1].max(off[1])];
     }
     worst
 }
 
 #[test]
-fn the_reference_finds_them() {
-    let truths = truths();
-    let record = |truth: &Truth| {
-        let flow = Flow::new(&truth.oscillator);
-        measured_record(&measure(&flow, truth.law, start(truth), &budget()), &Needs::EVERYTHING)
+fn the_reference_finds_known_cycles() {
+    let known_cycles = known_cycles();
+    let record = |known: &Known| {
+        let flow = Flow::new(&known.oscillator);
+        measured_record(&measure(&flow, known.law, start(known), &budget()), &Needs::EVERYTHING)
     };
-    let records: Vec<Record> = truths.iter().map(record).collect();
-    let [state, multiplier] = worst(&truths, &records, "reference");
+    let records: Vec<Record> = known_cycles.iter().map(record).collect();
+    let [state, multiplier] = worst(&known_cycles, &records, "reference");
     assert!(state < 1e-12 && multiplier < 1e-12, "{state:e} {multiplier:e}");
 }
 
-fn lanes_find_them(precision: Precision, bars: [f64; 2]) {
-    let truths = truths();
-    let flows: Vec<Oscillator> = truths.iter().map(|truth| truth.oscillator).collect();
-    let laws: Vec<Law> = truths.iter().map(|truth| truth.law).collect();
+fn check_lanes(precision: Precision, bars: [f64; 2]) {
+    let known_cycles = known_cycles();
+    let flows: Vec<Oscillator> = known_cycles.iter().map(|known| known.oscillator).collect();
+    let laws: Vec<Law> = known_cycles.iter().map(|known| known.law).collect();
     let lanes: Vec<Lane> =
-        (0..).zip(&truths).map(|(i, truth)| Lane { flow: i, law: i, start: start(truth) }).collect();
+        (0..).zip(&known_cycles).map(|(i, known)| Lane { flow: i, law: i, start: start(known) }).collect();
     let mut gpu = open(precision);
     let records =
         pollster::block_on(gpu.run(&flows, &laws, &lanes, &LaneSettings::within(&budget()))).unwrap();
-    let [state, multiplier] = worst(&truths, &records, precision.name());
+    let [state, multiplier] = worst(&known_cycles, &records, precision.name());
     assert!(state < bars[0] && multiplier < bars[1], "{state:e} {multiplier:e}");
 }
 
 #[test]
-fn lanes_in_f32_find_them() {
-    lanes_find_them(Precision::F32, [1e-6, 1e-5]);
+fn lanes_in_f32_find_known_cycles() {
+    check_lanes(Precision::F32, [1e-6, 1e-5]);
 }
 
 #[test]
-fn lanes_in_f64_find_them() {
-    lanes_find_them(Precision::F64, [1e-10, 1e-10]);
+fn lanes_in_f64_find_known_cycles() {
+    check_lanes(Precision::F64, [1e-10, 1e-10]);
 }

@@ -1,4 +1,4 @@
-//! The files in `models/` say what the truths were written down for.
+//! The files in `models/` define the models of the closed forms.
 
 use crate::ball::ball;
 use crate::clearance;
@@ -42,7 +42,7 @@ fn agrees(name: &str, sets: &[(&str, f64)], (ours, law): (Oscillator, Law)) {
 }
 
 #[test]
-fn models_are_what_their_truths_are_of() {
+fn model_files_define_the_models_of_the_closed_forms() {
     let walled = |walled: Walled| walled.oscillator();
     agrees("impact-oscillator", &[], walled(STOP.walled()));
     agrees("coco-impact", &[], walled(COCO.walled()));
@@ -51,6 +51,6 @@ fn models_are_what_their_truths_are_of() {
     agrees("kahraman-singh", &[("omega", 0.9)], walled(backlash(0.9)));
     agrees("shaking-table", &[("A", 1.2), ("e", 0.3)], walled(ball(1.2, 0.3)));
     agrees("two-masses", &[("omega", 0.8)], clearance::pair(0.8));
-    // Every built-in model but the gear pair, whose truth is the paper, is among them.
+    // These are all built-in models except the gear pair, which is compared with the paper.
     assert_eq!(FileModel::all_built_in().len(), 8);
 }

@@ -1,7 +1,6 @@
-//! Models whose truth is not ours: closed forms, published numbers, and an integrator that shares nothing with the engines.
+//! Models with independent solutions: closed forms, published numbers, and an integrator that shares no code with the engines.
 //!
-//! Each file has one kind of model. The equations are written down anew there; that the files in `models/` say the same is a
-//! test of its own.
+//! Each file contains one kind of model, with equations of its own. A test compares them with the files in `models/`.
 
 #[path = "../common/mod.rs"]
 mod common;

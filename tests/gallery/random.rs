@@ -1,5 +1,5 @@
-//! Models drawn at random: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written
-//! as a file and read like anybody's.
+//! Random models: masses, damping, stiffness, gap rows, walls, laws, loads, one or two coordinates. Each is written as a model
+//! file and read.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -19,16 +19,16 @@ use rattlemap::validate::independent::flight::Flight;
 use rattlemap::validate::{Draw, Kind, Lanes, Rate, Sample, Stratum, Subject, differences, replay};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Law, Model, Oscillator, State};
-use rattlemap_dynamics::orbit::{Budget, Class, Measured, Settings, Status, measure};
+use rattlemap_dynamics::orbit::{Budget, Class, Measurement, Settings, Status, measure};
 use rattlemap_dynamics::reference::Trajectory;
 
 use crate::common::apart;
 use crate::common::gpu::open;
 
-/// A cell that takes longer hangs.
-const HANGS: Duration = Duration::from_secs(60);
+/// Longest time for one cell.
+const LONGEST_TIME: Duration = Duration::from_secs(60);
 
-pub(crate) struct Drawn {
+pub(crate) struct RandomCell {
     pub(crate) model: FileModel,
     pub(crate) oscillator: Oscillator,
     pub(crate) law: Law,
@@ -47,7 +47,7 @@ fn even(random: &mut Random, reach: f64) -> f64 {
     reach * (2.0 * random.unit() - 1.0)
 }
 
-/// A symmetric matrix with the given diagonal, definite where that is positive; coupled as often as not.
+/// Returns a symmetric matrix with the given diagonal, definite if the diagonal is positive, and coupled with probability 1/2.
 fn matrix(random: &mut Random, degrees: usize, diagonal: [f64; 2]) -> String {
     let [a, b] = diagonal;
     let coupling = even(random, 0.9);
@@ -87,8 +87,8 @@ fn contact(random: &mut Random, side: &str, at: f64) -> String {
     text
 }
 
-/// The model of a seed, and where its motion starts.
-pub(crate) fn drawn(seed: u64) -> Drawn {
+/// Returns the random model of a seed, and its start.
+pub(crate) fn random_cell(seed: u64) -> RandomCell {
     let mut random = Random::new(seed);
     let random = &mut random;
     let degrees = if random.unit() < 0.5 { 1 } else { 2 };
@@ -120,7 +120,7 @@ pub(crate) fn drawn(seed: u64) -> Drawn {
     };
     let names = if degrees == 1 { "[\"x\"]" } else { "[\"x1\", \"x2\"]" };
     let text = format!(
-        "name = \"drawn\"\ntitle = \"Drawn\"\n[parameters]\nomega = {{ default = {omega:?}, min = 0.0, open = true }}\n\
+        "name = \"drawn\"\ntitle = \"RandomCell\"\n[parameters]\nomega = {{ default = {omega:?}, min = 0.0, open = true }}\n\
          [motion]\ncoordinates = {names}\nmass = {mass}\ndamping = {damping}\nstiffness = {stiffness}\nforce = {force}\n\
          load = {load}\nfrequency = \"omega\"\ngap = {gap}\n{walls}"
     );
@@ -129,7 +129,7 @@ pub(crate) fn drawn(seed: u64) -> Drawn {
     if random.unit() < 0.5 {
         (0..2 * degrees).for_each(|i| start[i] = even(random, 2.0));
     }
-    Drawn { oscillator: model.oscillator().expect("valid"), law: model.law(), model, start }
+    RandomCell { oscillator: model.oscillator().expect("valid"), law: model.law(), model, start }
 }
 
 pub(crate) const SETTINGS: Settings =
@@ -145,19 +145,19 @@ pub(crate) fn budget() -> Budget {
     }
 }
 
-/// What the reference says, and how long it took.
-fn measured(cell: &Drawn) -> (Measured, Duration) {
+/// Computes a cell with the reference and measures the time.
+fn measured(cell: &RandomCell) -> (Measurement, Duration) {
     let clock = Instant::now();
     (measure(&Flow::new(&cell.oscillator), cell.law, cell.start, &budget()), clock.elapsed())
 }
 
-/// Every one ends in a named status, after bounded work, with numbers.
-fn end_well(seeds: std::ops::Range<u32>) {
+/// Checks that every cell ends within bounded time, with finite numbers.
+fn check_ends(seeds: std::ops::Range<u32>) {
     let ends: Vec<(u32, Status, bool, Duration)> = seeds
         .into_par_iter()
         .with_max_len(1)
         .map(|seed| {
-            let cell = drawn(u64::from(seed));
+            let cell = random_cell(u64::from(seed));
             let (measured, time) = measured(&cell);
             let record = measured_record(&measured, &Needs::EVERYTHING);
             let superstable = record.lyapunov == f64::NEG_INFINITY && record.period > 0;
@@ -179,35 +179,35 @@ fn end_well(seeds: std::ops::Range<u32>) {
     println!("the slowest: seed {} in {:.2} s", slowest.0, slowest.3.as_secs_f64());
     let wrong: Vec<u32> = ends.iter().filter(|end| !end.2).map(|end| end.0).collect();
     assert!(wrong.is_empty(), "not finite: {wrong:?}");
-    assert!(slowest.3 < HANGS);
-    // They move: most are decided within so few periods.
+    assert!(slowest.3 < LONGEST_TIME);
+    // Many cells are decided within few periods.
     let ok = ends.iter().filter(|end| end.1 == Status::Ok).count();
     assert!(3 * ok > ends.len(), "{ok} of {}", ends.len());
 }
 
 #[test]
-fn four_hundred_models_end_well() {
-    end_well(0..400);
+fn four_hundred_models_end_with_finite_numbers() {
+    check_ends(0..400);
 }
 
 #[test]
 #[ignore = "minutes"]
-fn twenty_thousand_models_end_well() {
-    end_well(0..20_000);
+fn twenty_thousand_models_end_with_finite_numbers() {
+    check_ends(0..20_000);
 }
 
-/// After a period the reference is where the independent integrator is, with as many events.
-fn agree(seeds: std::ops::Range<u32>) {
+/// Compares state and number of events of the reference and of the independent integrator after one period.
+fn check_integrator(seeds: std::ops::Range<u32>) {
     let off: Vec<(u32, f64, [usize; 2])> = seeds
         .into_par_iter()
         .with_max_len(1)
         .filter_map(|seed| {
-            let cell = drawn(u64::from(seed));
+            let cell = random_cell(u64::from(seed));
             let flow = Flow::new(&cell.oscillator);
             let mut trajectory = Trajectory::new(&flow, cell.law, cell.start);
             let mut events = Vec::new();
             trajectory.advance_period(&mut events).ok()?;
-            // Many impacts forget where they began, and infinitely many are told by each side as far as it goes.
+            // Many impacts amplify rounding errors.
             if events.len() > 20 {
                 return None;
             }
@@ -216,11 +216,11 @@ fn agree(seeds: std::ops::Range<u32>) {
             solver.advance(&mut flight, 0.0, cell.oscillator.period())?;
             let state = trajectory.state();
             let scale = state.iter().fold(cell.oscillator.length_scale(), |m, x| m.max(x.abs()));
-            let told = match flight.events.iter().any(|ended| ended.after_series) {
+            let counts = match flight.events.iter().any(|ended| ended.after_series) {
                 true => [0; 2],
                 false => [events.len(), flight.events.len()],
             };
-            Some((seed, apart(flight.state(), state) / scale, told))
+            Some((seed, apart(flight.state(), state) / scale, counts))
         })
         .collect();
     let differ: Vec<_> = off
@@ -234,23 +234,23 @@ fn agree(seeds: std::ops::Range<u32>) {
 }
 
 #[test]
-fn random_models_are_where_the_independent_integrator_is() {
-    agree(0..200);
+fn random_models_agree_with_the_independent_integrator() {
+    check_integrator(0..200);
 }
 
-/// Steps per forcing period beyond which a lane is left to the reference.
+/// Largest number of steps per forcing period of tested lanes.
 const MOST_STEPS: f64 = 2000.0;
 
-/// Whether a lane has little enough to do.
-fn is_bounded(cell: &Drawn) -> bool {
+/// Whether a lane needs few enough steps.
+fn is_bounded(cell: &RandomCell) -> bool {
     let Some(constants) = Constants::new(&cell.oscillator, None) else { return false };
     let finest = constants.flow.domains.iter().map(|domain| domain.substeps).fold(1.0, f64::max);
     f64::from(constants.steps) * finest < MOST_STEPS
 }
 
-/// A cell and its record as a map of one.
-fn examined(
-    cell: &Drawn,
+/// Validates the record of a cell as a map of one cell. Returns the kind of the mismatch, if there is one.
+fn validate(
+    cell: &RandomCell,
     precision: Precision,
     record: Record,
     lanes: impl FnOnce(&Subject<'_>, &Sample) -> Lanes,
@@ -284,9 +284,9 @@ fn examined(
     validation.mismatches.first().map(|mismatch| mismatch.kind)
 }
 
-/// Lanes say what the reference says, or `validate` finds out why not.
+/// Compares lanes with the reference. `validate` must explain the differences.
 fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
-    let cells: Vec<Drawn> = seeds.map(|seed| drawn(u64::from(seed))).filter(is_bounded).collect();
+    let cells: Vec<RandomCell> = seeds.map(|seed| random_cell(u64::from(seed))).filter(is_bounded).collect();
     let flows: Vec<Oscillator> = cells.iter().map(|cell| cell.oscillator).collect();
     let laws: Vec<Law> = cells.iter().map(|cell| cell.law).collect();
     let lanes: Vec<Lane> =
@@ -302,22 +302,22 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
         .enumerate()
         .filter_map(|(i, cell)| {
             let record = records[i];
-            let truth = measured_record(&measured(cell).0, &Needs::EVERYTHING);
-            let [ours, theirs] = [record, truth].map(|record| classify(&record));
+            let reference = measured_record(&measured(cell).0, &Needs::EVERYTHING);
+            let [ours, theirs] = [record, reference].map(|record| classify(&record));
             let is_silent = ours == Class::Undecided || ours == Class::Failed;
-            // It claims nothing.
+            // Undecided and failed records are not compared.
             if is_silent || theirs == Class::Undecided && ours == Class::Undecided {
                 return None;
             }
             let differs =
-                !differences(&record, &truth, precision, cell.oscillator.period(), &budget()).is_empty();
-            differs.then(|| (i, examined(cell, precision, record, |_, _| Lanes::default())))
+                !differences(&record, &reference, precision, cell.oscillator.period(), &budget()).is_empty();
+            differs.then(|| (i, validate(cell, precision, record, |_, _| Lanes::default())))
         })
         .collect();
-    // What the reference alone does not explain, lanes that are run again may, those in f64 above all.
+    // Differences that the reference does not explain are examined with further lanes, also in f64.
     let mut double = (precision == Precision::F32).then(|| open(Precision::F64));
     for (i, kind) in kinds.iter_mut().filter(|(_, kind)| *kind == Some(Kind::Unexplained)) {
-        *kind = examined(&cells[*i], precision, records[*i], |subject, sample| {
+        *kind = validate(&cells[*i], precision, records[*i], |subject, sample| {
             pollster::block_on(Lanes::run(subject, sample, Some(&mut gpu), double.as_deref_mut())).unwrap()
         });
     }
@@ -335,36 +335,36 @@ fn lanes_agree(precision: Precision, seeds: std::ops::Range<u32>) {
     }
     let unexplained: Vec<_> = kinds.iter().filter(|(_, kind)| *kind == Some(Kind::Unexplained)).collect();
     for (i, _) in &unexplained {
-        let truth = measured_record(&measured(&cells[*i]).0, &Needs::EVERYTHING);
+        let reference = measured_record(&measured(&cells[*i]).0, &Needs::EVERYTHING);
         println!("{}\nfrom {:?}", cells[*i].model.definition().text, cells[*i].start);
         println!(
             "{i}: {:?}",
-            differences(&records[*i], &truth, precision, cells[*i].oscillator.period(), &budget())
+            differences(&records[*i], &reference, precision, cells[*i].oscillator.period(), &budget())
         );
-        println!("{:?}\n{:?}", records[*i], truth);
+        println!("{:?}\n{:?}", records[*i], reference);
     }
     assert!(!Rate::new(unexplained.len(), cells.len()).is_too_many(), "unexplained: {unexplained:?}");
 }
 
 #[test]
-fn lanes_in_f32_say_what_the_reference_says_of_random_models() {
+fn lanes_in_f32_agree_on_random_models() {
     lanes_agree(Precision::F32, 0..400);
 }
 
 #[test]
-fn lanes_in_f64_say_what_the_reference_says_of_random_models() {
+fn lanes_in_f64_agree_on_random_models() {
     lanes_agree(Precision::F64, 0..400);
 }
 
-// Not green: what is left unexplained of them is told in results/gallery/README.md.
+// This test fails: results/gallery/README.md lists the unexplained cells.
 #[test]
 #[ignore = "two minutes"]
-fn lanes_in_f32_say_what_the_reference_says_of_twenty_thousand_models() {
+fn lanes_in_f32_agree_on_twenty_thousand_models() {
     lanes_agree(Precision::F32, 0..20_000);
 }
 
 #[test]
 #[ignore = "two minutes"]
-fn lanes_in_f64_say_what_the_reference_says_of_twenty_thousand_models() {
+fn lanes_in_f64_agree_on_twenty_thousand_models() {
     lanes_agree(Precision::F64, 0..20_000);
 }

@@ -1,14 +1,15 @@
 //! One rigid stop on the right: orbits of one impact in n periods, in closed form.
 //!
-//! `x'' + c x' + x = F cos(omega t)`, `x <= sigma`, `v+ = -e v-`. Beside the steady response `x_s` the state obeys the
-//! unforced equation with the propagator `E`. An orbit leaves the stop with `V` and comes back after `n T` with `-V/e`:
+//! `x'' + c x' + x = F cos(omega t)`, `x <= sigma`, `v+ = -e v-`. The difference of the state from the steady response
+//! `(x_s, v_s)` follows the unforced equation with the propagator `E`. An orbit leaves the stop with velocity `V` and returns
+//! after `n T` with `-V/e`:
 //!
 //! ```text
 //! E (sigma - x_s, V - v_s) = (sigma - x_s, -V/e - v_s)
 //! ```
 //!
-//! is linear: `sigma - x_s = a V`, `v_s = b V`. Since `x_s^2 + (v_s/omega)^2 = P^2` with the amplitude `P` of the steady
-//! response, `(sigma - a V)^2 + (b V/omega)^2 = P^2`: V against sigma is an ellipse, whose ends are folds (Budd and Dux,
+//! This is linear: `sigma - x_s = a V`, `v_s = b V`. Since `x_s^2 + (v_s/omega)^2 = P^2` with the amplitude `P` of the steady
+//! response, `(sigma - a V)^2 + (b V/omega)^2 = P^2`. So V and sigma are on an ellipse, whose ends are folds (Budd and Dux,
 //! Phil. Trans. R. Soc. A 347 (1994) 365-389, for c = 0; Shaw and Holmes, J. Sound Vib. 90 (1983) 129-155).
 
 use crate::common::apart;
@@ -18,7 +19,7 @@ use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{NonImpacting, State};
 use rattlemap_dynamics::reference::{EventKind, Trajectory};
 
-/// A forced oscillator with a stop.
+/// A forced oscillator with one stop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
     pub(crate) c: f64,
@@ -49,13 +50,13 @@ impl Stop {
         Walled { free: self.linear(), walls: [Some(stop), None] }
     }
 
-    /// Amplitude and phase lag of the steady response.
+    /// Returns amplitude and phase lag of the steady response.
     fn response(&self) -> [f64; 2] {
         let [x, v] = self.linear().steady(0.0);
         [x.hypot(v / self.omega), (v / self.omega).atan2(x)]
     }
 
-    /// `a`, `b` and the coefficients of the quadratic equation in V.
+    /// Returns `a`, `b` and the coefficients of the quadratic equation in V.
     fn ellipse(&self, n: u32) -> ([f64; 2], [f64; 3]) {
         let [[e11, e12], [e21, e22]] = self.linear().propagator(f64::from(n) * self.linear().period());
         let right = [-e12, -1.0 / self.e - e22];
@@ -67,11 +68,11 @@ impl Stop {
         ([a, b], [square, -2.0 * a * self.sigma, self.sigma * self.sigma - amplitude * amplitude])
     }
 
-    /// The orbits of one impact in n periods that leave the stop, the faster one first; they may pass through it later.
+    /// Returns the orbits of one impact in n periods, the faster one first. It is not checked whether they cross the stop later.
     pub(crate) fn orbits(&self, n: u32) -> Vec<Orbit> {
         let ([a, b], [square, linear, constant]) = self.ellipse(n);
         let root = (linear * linear - 4.0 * square * constant).sqrt();
-        // Without cancellation.
+        // Avoids cancellation.
         let q = -0.5 * (linear + root.copysign(linear));
         let mut speeds = [q / square, constant / q];
         speeds.sort_by(f64::total_cmp);
@@ -95,7 +96,7 @@ impl Stop {
         Orbit { leaving, phase, strobe: [x, v, 0.0, 0.0], monodromy }
     }
 
-    /// The stop at which both orbits of one impact become one.
+    /// Returns the position of the stop at which both orbits of one impact coincide.
     fn fold(&self, n: u32) -> f64 {
         let ([_, b], [square, ..]) = self.ellipse(n);
         let [amplitude, _] = self.response();
@@ -110,7 +111,7 @@ pub(crate) const STOP: Stop = Stop { c: 0.04, force: 1.0, omega: 2.0, sigma: 0.2
 /// COCO's impact demo: Recipes for Continuation, Example 15.2.
 pub(crate) const COCO: Stop = Stop { c: 0.1, force: 1.0, omega: 1.0, sigma: 1.0, e: 0.8 };
 
-/// Cells with stable orbits that do not pass through the stop.
+/// Returns oscillators and periods with stable orbits that do not cross the stop.
 pub(crate) fn stable() -> Vec<(Stop, u32)> {
     let at = |omega: f64| Stop { omega, ..STOP };
     let mut cells: Vec<(Stop, u32)> = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0].map(|omega| (at(omega), 1)).into();
@@ -121,7 +122,7 @@ pub(crate) fn stable() -> Vec<(Stop, u32)> {
 }
 
 #[test]
-fn states_and_multipliers_of_the_closed_form() {
+fn states_and_multipliers_agree_with_the_closed_form() {
     for (stop, n) in stable() {
         let orbit = stop.orbits(n)[0];
         assert!(eigenvalues(orbit.monodromy)[0].norm() < 1.0, "{stop:?}");
@@ -142,10 +143,10 @@ fn states_and_multipliers_of_the_closed_form() {
     }
 }
 
-/// The start of the demo's first continuation, as printed there: velocity and phase after the impact, and the state half a
-/// period later.
+/// Compares with the printed start of the demo's first continuation: velocity and phase after the impact, and the state half
+/// a period later.
 #[test]
-fn coco_prints_this_orbit() {
+fn the_orbit_agrees_with_the_coco_demo() {
     let orbit = COCO.orbits(1)[0];
     assert!((orbit.leaving + 1.36).abs() < 0.005 && (orbit.phase - 0.076).abs() < 0.0005, "{orbit:?}");
     let (oscillator, law) = COCO.walled().oscillator();
@@ -158,12 +159,12 @@ fn coco_prints_this_orbit() {
 
 /// The steady response grazes the stop where its amplitude is sigma: `F^2 = sigma^2 ((1 - w^2)^2 + c^2 w^2)`.
 #[test]
-fn it_grazes_where_the_response_reaches_the_stop() {
+fn grazing_agrees_with_the_response() {
     for stop in [STOP, COCO, Stop { force: 0.3, c: 0.2, ..STOP }] {
         let ratio = (stop.force / stop.sigma).powi(2);
         let p = stop.c * stop.c - 2.0;
         let grazing = (0.5 * (-p + (p * p - 4.0 * (1.0 - ratio)).sqrt())).sqrt();
-        // The reference's motion on the steady response meets the stop on one side alone.
+        // The steady response reaches the stop only on one side of the grazing frequency.
         let meets = |omega: f64| {
             let stop = Stop { omega, ..stop };
             let (oscillator, law) = stop.walled().oscillator();
@@ -186,7 +187,7 @@ fn it_grazes_where_the_response_reaches_the_stop() {
     }
 }
 
-/// Without damping: Budd and Dux. At the ends of the ellipse both orbits are one, and a multiplier is 1.
+/// Without damping (Budd and Dux), both orbits coincide at the ends of the ellipse, where a multiplier is 1.
 #[test]
 fn the_ends_of_the_ellipse_are_folds() {
     for (omega, n) in [(1.3, 1), (1.6, 1), (1.9, 1), (3.4, 2), (3.7, 2)] {
@@ -206,7 +207,7 @@ fn the_ends_of_the_ellipse_are_folds() {
         let off = multipliers_apart(ours, orbit.monodromy);
         println!("n = {n}, omega = {omega}: fold at {fold}, {:.1e} from 1, off by {off:.1e}", from_one(ours));
         assert!(off < 1e-11 && from_one(ours) < 1e-4);
-        // The other multiplier there is e^2, all that an impact loses.
+        // The other multiplier is e^2, from the impact.
         assert!((ours[0][0] + ours[1][1] - 1.64).abs() < 1e-4);
     }
 }

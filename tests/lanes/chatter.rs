@@ -1,5 +1,5 @@
-//! Chatter on lanes: ever shorter flights are followed by shorter series, impact by impact. That
-//! changes nothing beyond rounding, and errs as `shaders/chatter.wgsl` says.
+//! Chatter on lanes: short flights are followed with short series, impact by impact. The results differ by rounding
+//! alone, within the bound that `shaders/chatter.wgsl` states.
 
 use crate::common::gpu::{open, run_from_rest as run};
 use crate::common::{REST, apart, flow_of, paper};
@@ -12,19 +12,19 @@ use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
 use rattlemap_dynamics::reference::{Stop, Trajectory};
 use rayon::prelude::*;
 
-/// Forcing periods from rest: chaos has not yet amplified rounding.
+/// Forcing periods from rest, so few that chaos has not yet amplified rounding.
 const HORIZON: u32 = 3;
 
 const MESH_SPEEDS: [f64; 6] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0];
 
-/// Where impacts pile up: restitution by frequency by meshing speed.
+/// Returns cells in which impacts accumulate: restitution by frequency by meshing speed.
 fn cells() -> Vec<GearPair> {
     let plane = [0.3, 0.5, 0.7, 0.9].map(|e| [1.0, 1.5, 2.7].map(|omega| paper(e, omega)));
     let at = |pair: GearPair| MESH_SPEEDS.map(|mesh_speed| GearPair { mesh_speed, ..pair });
     plane.into_iter().flatten().flat_map(at).collect()
 }
 
-/// The reference after the horizon, and its impacts.
+/// Returns the state of the reference after the horizon, and its impacts.
 fn reference(pair: &GearPair) -> Result<(State, u64), Stop> {
     let flow = flow_of(pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
@@ -34,8 +34,8 @@ fn reference(pair: &GearPair) -> Result<(State, u64), Stop> {
     Ok((trajectory.state(), trajectory.work().impacts))
 }
 
-/// How far the reference ends from where it does if the speed that every impact leaves, the
-/// force, a stiffness or the walls change by a share; at least that share.
+/// Returns the change of the reference's final state if restitution, force, a stiffness or the walls change by a
+/// share; at least that share.
 fn sensitivity(pair: &GearPair, share: f64) -> f64 {
     let (end, _) = reference(pair).unwrap();
     let moved = |name: &str, by: f64| {
@@ -55,21 +55,20 @@ fn ulp(precision: Precision) -> f64 {
     }
 }
 
-/// Roundings of every constant and at every impact that may add up: without short flights lanes
-/// come to 20 of them.
+/// Rounding errors, at every constant and impact, that may add up. Without short flights lanes have 20 of them.
 const ROUNDINGS: f64 = 32.0;
 
-/// What rounding may do to a cell.
+/// Returns the largest error by rounding.
 fn bar(pair: &GearPair, precision: Precision) -> f64 {
-    // The reference itself is right to about 1e-13.
+    // The reference is accurate to about 1e-13.
     sensitivity(pair, (ROUNDINGS * ulp(precision)).max(1e-13))
 }
 
-/// The same impacts, and states within rounding: no farther off than without short flights.
+/// Lanes have the reference's impacts, and states within rounding: as accurate as without short flights.
 #[test]
-fn chatter_is_that_of_the_reference() {
+fn chatter_agrees_with_the_reference() {
     let cells = cells();
-    let truth: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap()).collect();
+    let expected: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap()).collect();
     for precision in Precision::ALL {
         let mut gpu = open(precision);
         let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
@@ -82,7 +81,7 @@ fn chatter_is_that_of_the_reference() {
         for (i, pair) in cells.iter().enumerate() {
             let (e, omega, mesh_speed) = (pair.e, pair.omega, pair.mesh_speed);
             let at = format!("{precision:?}, e = {e}, omega = {omega}, mesh_speed = {mesh_speed}");
-            let (record, (end, impacts)) = (&records[i], truth[i]);
+            let (record, (end, impacts)) = (&records[i], expected[i]);
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             let counted = (record.impacts_per_period * f64::from(HORIZON)).round() as u64;
             assert_eq!(counted, impacts, "{at}: impacts");
@@ -113,10 +112,9 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Cells that chatter: class, word, impacts and exponent; tangent vectors go through every short
-/// flight.
+/// Cells that chatter: class, word, impacts and exponent. Tangent vectors pass every short flight.
 #[test]
-fn classes_words_and_exponents_agree() {
+fn chattering_cells_agree_with_the_reference() {
     let plane = [(0.3, 1.3), (0.5, 1.0), (0.56, 1.5), (0.72, 1.5), (0.2, 2.0), (0.5, 2.4), (0.8, 1.2)];
     let cells: Vec<_> = plane
         .into_iter()
@@ -124,9 +122,9 @@ fn classes_words_and_exponents_agree() {
         .collect();
     let pairs: Vec<_> =
         cells.iter().map(|&(e, omega, mesh_speed)| GearPair { mesh_speed, ..paper(e, omega) }).collect();
-    let truth: Vec<_> =
+    let expected: Vec<_> =
         pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
-    let periodic = truth.iter().filter(|orbit| matches!(orbit.class, Class::Periodic { .. })).count();
+    let periodic = expected.iter().filter(|orbit| matches!(orbit.class, Class::Periodic { .. })).count();
     assert!(periodic >= 20 && periodic < cells.len(), "{periodic} cycles, and chaos");
     for precision in Precision::ALL {
         let exponent_bar = match precision {
@@ -135,7 +133,7 @@ fn classes_words_and_exponents_agree() {
         };
         let records = run(&mut open(precision), &pairs, &LaneSettings::default());
         let mut collapsed = 0;
-        for ((record, orbit), cell) in records.iter().zip(&truth).zip(&cells) {
+        for ((record, orbit), cell) in records.iter().zip(&expected).zip(&cells) {
             let at = format!("{precision:?}, e, omega, mesh_speed = {cell:?}");
             assert_eq!(classify(record), orbit.class, "{at}");
             let apart = (record.lyapunov - orbit.lyapunov).abs();
@@ -162,22 +160,22 @@ fn classes_words_and_exponents_agree() {
     }
 }
 
-/// Patterns of more symbols than a record spells out: the lane's hash is that of the reference, wherever phase 0 cuts the
-/// cycle, in the midst of a run or between two.
+/// Patterns of more symbols than a record stores: the lane's hash is the reference's, wherever phase 0 divides the
+/// cycle, within a run or between two.
 #[test]
-fn patterns_that_are_too_long_are_hashed_alike() {
+fn hashes_of_long_patterns_agree() {
     let plane = [(114, 3), (94, 6), (109, 8), (45, 9), (111, 15), (72, 20), (101, 23), (77, 44), (52, 65)];
     let on = |(i, j): (u32, u32)| paper(0.6 + 0.2 * f64::from(i) / 119.0, 1.0 + 0.4 * f64::from(j) / 79.0);
     let pairs = plane.map(on).to_vec();
-    let truth: Vec<_> =
+    let expected: Vec<_> =
         pairs.par_iter().map(|pair| analyse(pair, REST, &Settings::default()).unwrap()).collect();
     for precision in Precision::ALL {
         let records = run(&mut open(precision), &pairs, &LaneSettings::default());
         let mut alike = 0;
-        for ((record, orbit), place) in records.iter().zip(&truth).zip(plane) {
+        for ((record, orbit), place) in records.iter().zip(&expected).zip(plane) {
             let pattern = orbit.word.pattern();
             assert!(pattern.len() > WORD_SYMBOLS && pattern.len() < orbit.word.len() / 3, "{place:?}");
-            // In single precision a few end elsewhere.
+            // In single precision a few motions end elsewhere.
             if record.spelling() == Some(Spelling::new(&orbit.word)) {
                 assert_eq!(record.pattern(), Some(Spelling::new(&pattern)), "{precision:?}, {place:?}");
                 alike += 1;
@@ -187,24 +185,24 @@ fn patterns_that_are_too_long_are_hashed_alike() {
     }
 }
 
-/// The shader with another number where it says what is short.
+/// Returns the shader with another length of short flights.
 fn short_to(source: &str, short: f64) -> String {
     let (before, rest) = source.split_once("const SHORT: Real = ").expect("the shader says what is short");
     let (_, after) = rest.split_once(';').expect("a declaration ends");
     format!("{before}const SHORT: Real = {short};{after}")
 }
 
-/// Flights of up to 0.8 steps taken for short.
+/// Follows flights of up to 0.8 steps.
 fn too_long(source: String) -> String {
     short_to(&source, 0.8)
 }
 
-/// Where flights are followed that are longer than precision allows, errors stay below the bound
-/// that the shader states.
+/// If flights are followed that are longer than the precision allows, errors stay below the bound that the shader
+/// states.
 #[test]
 fn errors_stay_below_the_stated_bound() {
     let cells: Vec<_> = cells().into_iter().filter(|pair| pair.mesh_speed == 1e-3).collect();
-    // ULP is left out at this length; the terms, less two, are the power with which it grows.
+    // At the length `short` the omitted terms are ULP. They grow with this power of the length.
     for (precision, short, power) in [(Precision::F32, 0.198, 6), (Precision::F64, 0.191, 11)] {
         let mut gpu = open(precision);
         let shipped = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
@@ -222,11 +220,11 @@ fn errors_stay_below_the_stated_bound() {
             assert!(error < bound, "{at}: off by {error:.2e}, bound {bound:.2e}");
             beyond += u32::from(error > 10.0 * usual);
         }
-        assert!(beyond > 0, "{precision:?}: nothing but rounding was seen");
+        assert!(beyond > 0, "{precision:?}: all errors are rounding errors");
     }
 }
 
-/// A form of the lane whose short flights keep `TERMS` terms, up to `HUNDREDTHS / 100` of a step.
+/// Returns the shader with `TERMS` terms for short flights of up to `HUNDREDTHS / 100` of a step.
 fn cut<const TERMS: usize, const HUNDREDTHS: u32>(source: String) -> String {
     let call = "        expand_short();\n";
     assert!(source.contains(call), "short flights are expanded");
@@ -236,30 +234,30 @@ fn cut<const TERMS: usize, const HUNDREDTHS: u32>(source: String) -> String {
     short_to(&source.replace(call, &format!("{call}{dropped}")), f64::from(HUNDREDTHS) / 100.0)
 }
 
-/// With fewer terms than it takes, errors fall with the length of flights by the order of the
-/// series: n terms beyond the start leave out a share `t^(n-1)` of a speed that is itself in
-/// proportion to t. With e = 0.5 half the length leaves out exactly the longest flight.
+/// With fewer terms than rounding needs, errors fall with the length of flights by the order of the series: n terms
+/// beyond the start omit a share `t^(n-1)` of a speed that is proportional to t. With e = 0.5, half the length
+/// excludes exactly the longest flight.
 #[test]
 fn errors_fall_by_the_order_of_the_series() {
     errors_fall_by(5.0, [cut::<6, 16>, cut::<6, 4>]);
 }
 
-/// The same with fewer terms.
+/// With fewer terms the order is lower.
 #[test]
 #[ignore = "compiles two shaders more; scripts/test.sh --all"]
 fn errors_fall_by_a_lower_order_of_the_series() {
     errors_fall_by(3.0, [cut::<4, 16>, cut::<4, 4>]);
 }
 
-/// With flights of up to 16 and of up to 4 hundredths of a step.
+/// Compares flights of up to 16 and up to 4 hundredths of a step.
 fn errors_fall_by(order: f64, forms: [fn(String) -> String; 2]) {
     let cells = [1.0, 1.2, 1.4, 1.6, 1.8].map(|omega| GearPair { mesh_speed: 1e-3, ..paper(0.5, omega) });
-    let truth: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap().0).collect();
+    let expected: Vec<_> = cells.par_iter().map(|pair| reference(pair).unwrap().0).collect();
     let mut gpu = open(Precision::F64);
     let errors = forms.map(|form| {
         gpu.rewrite_shaders(form);
         let records = run(&mut gpu, &cells, &LaneSettings::only(HORIZON));
-        records.iter().zip(&truth).map(|(r, truth)| apart(r.strobe, *truth)).collect::<Vec<_>>()
+        records.iter().zip(&expected).map(|(r, expected)| apart(r.strobe, *expected)).collect::<Vec<_>>()
     });
     let slopes: Vec<f64> =
         errors[0].iter().zip(&errors[1]).map(|(long, short)| 0.5 * (long / short).log2()).collect();

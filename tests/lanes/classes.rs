@@ -1,19 +1,19 @@
-//! Cycles of the main plane that lanes once did not find.
+//! Cycles of the main plane that earlier lanes did not find.
 //!
-//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+//! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::gpu::{open, run, run_from_rest};
-use crate::common::paper as pair;
+use crate::common::{REST, paper as pair};
+use crate::kinds;
 use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::orbit::{Class, Status};
 
-/// Seven points within a thousandth of the motion: shorter lags recur, and Newton's method leaves the motion's
-/// branch from there. Lanes that set out from the same point again, as if nothing had happened, did so for ever.
+/// The points lie within a thousandth of the motion, so that shorter lags recur, and Newton's method leaves the
+/// motion's branch. Lanes once repeated the same search for ever.
 #[test]
-fn a_cycle_of_close_points_is_found_where_newton_leads_elsewhere() {
+fn a_cycle_of_close_points_is_found_although_newton_leaves_its_branch() {
     let pairs = [pair(5.0 / 9.0, 17.0 / 9.0), pair(238.0 / 511.0, 1.0 + 11.0 * 44.0 / 511.0)];
     for (precision, pairs) in [(Precision::F64, &pairs[..]), (Precision::F32, &pairs[..1])] {
         for record in run_from_rest(&mut open(precision), pairs, &LaneSettings::default()) {
@@ -22,10 +22,11 @@ fn a_cycle_of_close_points_is_found_where_newton_leads_elsewhere() {
     }
 }
 
-/// Motion that takes thousands of periods to its cycle recurs, and the cycle is read again and again on the way. With a
-/// fresh tangent vector after each reading the exponent was 0.17, by 25 standard errors, and the motion chaos.
+/// Motion that approaches its cycle for thousands of periods recurs, and the cycle is read again and again. With a
+/// new tangent vector after each reading, the exponent was 0.17 by 25 standard errors, and the motion was called
+/// chaotic.
 #[test]
-fn cycles_read_on_the_way_leave_the_exponent_alone() {
+fn the_exponent_does_not_depend_on_cycles_that_are_read() {
     let slow = [pair(441.0 / 511.0, 1.0 + 11.0 * 155.0 / 511.0)];
     for precision in Precision::ALL {
         let with =
@@ -34,7 +35,7 @@ fn cycles_read_on_the_way_leave_the_exponent_alone() {
         let [on_the_way, undisturbed] =
             [true, false].map(|early_stop| run_from_rest(&mut gpu, &slow, &with(early_stop))[0]);
         assert_eq!(classify(&on_the_way), Class::Undecided, "{precision:?}: {on_the_way:?}");
-        // Both decrease with time: 2,112 periods and 528.
+        // Both decrease with time: after 2,112 periods and after 528.
         for (record, least) in [(on_the_way, -0.0007), (undisturbed, -0.0011)] {
             assert!((least..-0.0005).contains(&record.lyapunov), "{precision:?}: {record:?}");
             assert!(record.lyapunov_error < 1e-4, "{precision:?}: {record:?}");
@@ -42,11 +43,11 @@ fn cycles_read_on_the_way_leave_the_exponent_alone() {
     }
 }
 
-/// A cycle of period 3 with a multiplier of -0.9985, at the end of long chaos that comes close to other cycles of period
-/// 3. Motion that comes to it from either side in turn recurs best after six, and one of the others, which repels, made
-/// that its period.
+/// A cycle of period 3 with a multiplier of -0.9985, at the end of long chaos that comes close to other cycles of
+/// period 3. Motion that approaches it from alternating sides recurs best after six periods. Lanes once reported
+/// period 6: they had rejected period 3 after reading another cycle, which is unstable.
 #[test]
-fn a_cycle_approached_from_either_side_in_turn_is_not_its_double() {
+fn a_cycle_that_is_approached_from_both_sides_is_not_doubled() {
     let cell = pair(0.948, 5.64);
     let starts = [
         [-0.053144306447458156, 2.713737059448592, -0.24326969921312358, -2.0849732837656756],
@@ -58,16 +59,16 @@ fn a_cycle_approached_from_either_side_in_turn_is_not_its_double() {
     for precision in Precision::ALL {
         for record in run(&mut open(precision), &starts.map(|start| (cell, start)), &settings) {
             let class = classify(&record);
-            // Chaos amplifies rounding: not every lane gets there in time.
+            // Chaos amplifies rounding: not every lane reaches the cycle in time.
             let is_known = matches!(class, Class::Periodic { period: 3 } | Class::Chaotic | Class::Undecided);
             assert!(is_known, "{precision:?}: {record:?}");
         }
     }
 }
 
-/// A cycle of period 15 whose points lie closer together than single precision tells apart.
+/// The points of a cycle of period 15 lie closer together than the resolution of single precision.
 #[test]
-fn a_cycle_below_the_resolution_says_so() {
+fn a_cycle_below_the_resolution_has_that_status() {
     let cell = [pair(0.4637964774951076, 1.7749510763209393)];
     let settings = LaneSettings { undecided_periods: 1584, ..LaneSettings::default() };
     for (precision, status) in [(Precision::F32, Status::BelowResolution), (Precision::F64, Status::Ok)] {
@@ -77,39 +78,20 @@ fn a_cycle_below_the_resolution_says_so() {
     }
 }
 
-/// The same motion in other units: of length `2^length`, of time `2^time`.
-fn in_units(pair: GearPair, length: i32, time: i32) -> GearPair {
-    let (length, time) = (f64::from(length).exp2(), f64::from(time).exp2());
-    GearPair {
-        r1: pair.r1 / time,
-        r2: pair.r2 / time,
-        k1: pair.k1 / (time * time),
-        k2: pair.k2 / (time * time),
-        r: pair.r / time,
-        k: pair.k / (time * time),
-        force: pair.force * length / (time * time),
-        omega: pair.omega / time,
-        b: pair.b * length,
-        mesh_speed: pair.mesh_speed * length / time,
-        ..pair
-    }
-}
-
-/// Powers of two are exact: in another unit of length lanes do the same to the last bit. The flow's series is cut by
-/// a norm that adds rates to displacements, so that another unit of time may round differently, and no more.
+/// Powers of two are exact: another unit of length changes no bit. The series of the flow is truncated by a norm that
+/// adds rates to displacements, so that another unit of time may round differently.
 #[test]
-fn answers_do_not_depend_on_the_units_of_length_and_time() {
-    let plane: Vec<_> =
-        (0..24 * 24).map(|n| pair(f64::from(n % 24) / 23.0, 1.0 + 11.0 * f64::from(n / 24) / 23.0)).collect();
+fn classes_do_not_depend_on_the_units_of_length_and_time() {
+    let pairs = (0..24 * 24).map(|n| pair(f64::from(n % 24) / 23.0, 1.0 + 11.0 * f64::from(n / 24) / 23.0));
+    let plane: Vec<_> = pairs.map(|pair| (pair.oscillator().unwrap(), pair.law(), REST)).collect();
+    // Whether lanes follow chatter depends on speeds, too.
+    let settings = LaneSettings::default();
     for precision in Precision::ALL {
-        let mut gpu = open(precision);
-        // Which lanes follow chatter is a question of speeds, too.
-        let settings = LaneSettings::default();
-        let expected = run_from_rest(&mut gpu, &plane, &settings);
+        let expected = kinds::run(precision, &plane, &settings).unwrap();
         for (length, time) in [(-20, 0), (20, 0), (0, -10), (0, 10), (-10, 10)] {
             let (far, long) = (f64::from(length).exp2(), f64::from(time).exp2());
-            let pairs: Vec<_> = plane.iter().map(|&pair| in_units(pair, length, time)).collect();
-            let records = run_from_rest(&mut gpu, &pairs, &settings);
+            let cells: Vec<_> = plane.iter().map(|cell| kinds::in_units(cell, length, time)).collect();
+            let records = kinds::run(precision, &cells, &settings).unwrap();
             let differ = expected.iter().zip(records).filter(|&(&expected, mut record)| {
                 record.strobe =
                     [0, 1, 2, 3].map(|i| record.strobe[i] / if i % 2 == 0 { far } else { far / long });
@@ -123,19 +105,19 @@ fn answers_do_not_depend_on_the_units_of_length_and_time() {
     }
 }
 
-/// Newton's method leads to a stable cycle that the motion does not approach: there is a fold of the strobe
-/// map or another cycle's basin between them. What the start reaches was computed with 80 bits by an independent program.
+/// Newton's method leads to a stable cycle that the motion does not approach: a fold of the strobe map or another
+/// basin lies between them. An independent program computed the motion's own cycle with 80 bits.
 #[test]
-fn a_stable_cycle_that_the_motion_leaves_is_not_its_cycle() {
+fn a_stable_cycle_that_is_not_approached_is_not_reported() {
     let settings = LaneSettings { undecided_periods: 1584, ..LaneSettings::default() };
     let named = [
         (0.8, 5.745098039215686, 2, 2.5),
         (0.3254901960784314, 3.2, 1, 16.0),
-        // Across a threshold of meshing lies a cycle of period 1 that the motion nears for twenty periods.
+        // Beyond a threshold of meshing lies a cycle of period 1, near which the motion stays for twenty periods.
         (0.5949119373776908, 3.7984344422700587, 2, 8.5),
         (0.5177257525083612, 3.6040133779264214, 3, 50.0 / 3.0),
         (0.03522504892367906, 6.9628180039138945, 1, 3.0),
-        // The approach is slow, and so bent that Newton's method led nowhere until it was searched no more.
+        // The approach is slow and curved, so that Newton's method fails until the lane makes no more searches.
         (0.5590551181102362, 5.417322834645669, 1, 2.0),
     ];
     for (e, omega, period, impacts) in named {

@@ -1,10 +1,9 @@
-//! What cells cost in work, not in time: a change in cost shows in review, however noisy the
-//! machine.
+//! Counts of work, which do not depend on the speed of the machine.
 //!
-//! A snapshot that differs is a change in cost. Where it is meant, accept it with
-//! `INSTA_UPDATE=always cargo test --test lanes counters` (or `cargo insta review`) and say why in the
-//! commit. Counts are means over 100 forcing periods of settled cycles, to three significant
-//! digits: drivers and processors that round otherwise give the same, 2 % more work does not.
+//! A snapshot that differs is a change in cost. If it is intended, accept it with `INSTA_UPDATE=always cargo test
+//! --test lanes counters` (or `cargo insta review`) and give the reason in the commit. Counts are means over 100
+//! forcing periods of settled cycles, to three significant digits. Other drivers and processors give the same counts,
+//! but 2 % more work shows.
 
 use std::fmt::Write;
 
@@ -15,7 +14,7 @@ use rattlemap::gpu::{LaneSettings, Precision};
 use rattlemap_dynamics::model::GearPair;
 use rattlemap_dynamics::reference::Trajectory;
 
-/// Stable cycles of every kind: what they are, restitution, frequency, meshing speed.
+/// Stable cycles of every kind: description, restitution, frequency, meshing speed.
 const CELLS: [(&str, f64, f64, f64); 8] = [
     ("no contact", 0.5, 11.0, 0.01),
     ("one impact a side", 0.56, 5.6, 0.01),
@@ -31,11 +30,11 @@ fn pairs() -> [GearPair; CELLS.len()] {
     CELLS.map(|(_, e, omega, mesh_speed)| GearPair { mesh_speed, ..paper(e, omega) })
 }
 
-/// Forcing periods to settle, and to count over.
+/// Forcing periods before counting, and during it.
 const SETTLING: u32 = 200;
 const COUNTED: u32 = 100;
 
-/// Three significant digits.
+/// Returns a count with three significant digits.
 fn rounded(count: f64) -> String {
     if count == 0.0 {
         return "0".to_owned();
@@ -44,7 +43,7 @@ fn rounded(count: f64) -> String {
     format!("{count:.digits$}")
 }
 
-/// A table of work per forcing period.
+/// Returns a table of work per forcing period.
 fn table(heads: &[&str], rows: impl Iterator<Item = (String, Vec<f64>)>) -> String {
     let mut text = format!("{:<28}", "");
     heads.iter().for_each(|head| write!(text, "{head:>17}").unwrap());
@@ -55,7 +54,7 @@ fn table(heads: &[&str], rows: impl Iterator<Item = (String, Vec<f64>)>) -> Stri
     text
 }
 
-/// Every step tried is judged by one certificate.
+/// One certificate judges every step that is tried.
 #[test]
 fn the_reference_does_as_much_work_as_before() {
     let rows = pairs().into_iter().zip(CELLS).map(|(pair, (name, ..))| {
@@ -74,7 +73,7 @@ fn the_reference_does_as_much_work_as_before() {
     insta::assert_snapshot!(table(&heads, rows));
 }
 
-/// Loop iterations, function by function: forms of the shader report them in place of impacts.
+/// Counts loop iterations by function. Modified shaders report them in place of impacts.
 fn work_of_lanes(precisions: &[Precision], functions: &[(&str, &str)]) -> String {
     let settings = LaneSettings { transient_periods: SETTLING, ..LaneSettings::only(SETTLING + COUNTED) };
     let mut rows = Vec::new();
@@ -95,7 +94,7 @@ fn work_of_lanes(precisions: &[Precision], functions: &[(&str, &str)]) -> String
     table(&heads, rows.into_iter())
 }
 
-/// Every count is a shader to compile: here those of scans and careful passes, nearly all of a lane's work.
+/// Each count needs one shader: here those of scans and careful passes, which are nearly all of a lane's work.
 #[test]
 fn lanes_scan_as_much_as_before() {
     insta::assert_snapshot!(work_of_lanes(&[Precision::F32], &LOOPS[..2]));

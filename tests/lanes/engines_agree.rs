@@ -1,6 +1,6 @@
-//! The same cells on the reference and on the lanes, in both precisions.
+//! The same cells on the reference and on lanes, in both precisions.
 //!
-//! No adapter is a failure: install a software driver (see `scripts/test.sh`).
+//! Without an adapter the tests fail: install a software driver (see `scripts/test.sh`).
 
 use crate::common::gpu::{open, run};
 use crate::common::table::{Row, rows};
@@ -10,10 +10,10 @@ use rattlemap::record::distance::{farther, is_within};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse};
-use rattlemap_dynamics::reference::{EventKind, Happening, Observer, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Observer, Trajectory};
 use rayon::prelude::*;
 
-/// Strobe states of the reference after `periods` and one more.
+/// Returns the strobe states of the reference after `periods` and after one more.
 fn reference(pair: &GearPair, start: State, periods: u32) -> [State; 2] {
     let flow = flow_of(pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), start);
@@ -25,10 +25,10 @@ fn reference(pair: &GearPair, start: State, periods: u32) -> [State; 2] {
     [at, trajectory.state()]
 }
 
-/// Room for devices, drivers and processors that round otherwise than those measured: llvmpipe with AVX2.
+/// Factor for other devices, drivers and processors than the measured one: llvmpipe with AVX2.
 const ROOM: f64 = 5.0;
 
-/// The error allowed where so much was measured in f32 and in f64.
+/// Returns the allowed error, from the errors measured in f32 and in f64.
 fn bar(measured: [f64; 2], precision: Precision) -> f64 {
     let [f32, f64] = measured;
     ROOM * match precision {
@@ -37,8 +37,8 @@ fn bar(measured: [f64; 2], precision: Precision) -> f64 {
     }
 }
 
-/// How far the reference itself ends from where it does, if its start is moved by about the
-/// rounding of a precision: large where a chaotic transient chooses between attractors.
+/// Returns the change of the reference's final state if its start moves by about the rounding of a precision. It is
+/// large where a chaotic transient chooses between attractors.
 fn sensitivity(pair: &GearPair, horizon: u32, precision: Precision) -> f64 {
     let perturbation = match precision {
         Precision::F32 => 1e-6,
@@ -53,26 +53,27 @@ fn sensitivity(pair: &GearPair, horizon: u32, precision: Precision) -> f64 {
     ends.fold(0.0, farther)
 }
 
-/// Compares cells after `horizon` periods; the worst were `measured` so far off the reference in f32 and in f64.
+/// Compares cells after `horizon` periods. `measured`: largest errors, relative to the reference, in f32 and in f64.
 fn check(cells: &[(GearPair, State)], horizon: u32, measured: [f64; 2]) {
-    let truth: Vec<_> = cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
+    let expected: Vec<_> =
+        cells.par_iter().map(|(pair, start)| reference(pair, *start, horizon)[0]).collect();
     for precision in Precision::ALL {
         let records = run(&mut open(precision), cells, &LaneSettings::only(horizon));
         let mut worst = 0.0f64;
-        for ((record, truth), (pair, start)) in records.iter().zip(&truth).zip(cells) {
+        for ((record, expected), (pair, start)) in records.iter().zip(&expected).zip(cells) {
             let at = format!("{precision:?}, e = {}, omega = {} from {start:?}", pair.e, pair.omega);
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             assert_eq!(record.periods_run, horizon, "{at}");
-            let error = apart(record.strobe, *truth);
+            let error = apart(record.strobe, *expected);
             let bar = bar(measured, precision);
-            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {truth:?}", record.strobe);
+            assert!(error < bar, "{at}: off by {error:.2e}: {:?} {expected:?}", record.strobe);
             worst = worst.max(error);
         }
         println!("{precision:?}: {} cells after {horizon} periods, worst {worst:.2e}", cells.len());
     }
 }
 
-/// The strobe state of stable period-1 cells over the plane.
+/// Strobe states of stable cells of period 1 over the plane.
 #[test]
 fn stable_cells_of_the_plane_agree() {
     const HORIZON: u32 = 200;
@@ -80,26 +81,27 @@ fn stable_cells_of_the_plane_agree() {
     let step = |i: u32, lo: f64, hi: f64| lo + (hi - lo) * f64::from(i) / f64::from(SIDE - 1);
     let all: Vec<_> =
         (0..SIDE * SIDE).map(|i| (pair(step(i % SIDE, 0.0, 1.0), step(i / SIDE, 1.0, 12.0)), REST)).collect();
-    let (cells, truth): (Vec<_>, Vec<State>) = all
+    let (cells, expected): (Vec<_>, Vec<State>) = all
         .into_par_iter()
         .filter_map(|cell| {
             let [at, next] = reference(&cell.0, cell.1, HORIZON);
             (apart(at, next) < 1e-10).then_some((cell, at))
         })
         .unzip();
-    // Of 484.
+    // The reference finds 484.
     assert!(cells.len() >= 470, "{} stable cells are too few", cells.len());
-    // Measured in f64: median 4.0e-15, 99 % 9.4e-14, worst 1.6e-12; in f32: 8.6e-7 and 2.3e-5, where the worst is a
-    // transient that ends on another attractor. Five times that, and a good twice the median in f32.
+    // Measured in f64: median 4.0e-15, 99 % 9.4e-14, worst 1.6e-12; in f32: median 8.6e-7, 99 % 2.3e-5, and the worst
+    // is a transient that ends on another attractor. The bars are five times these values, and twice the median in
+    // f32.
     for (precision, median_bar, bar_99, worst_bar) in
         [(Precision::F64, 2e-14, 5e-13, 8e-12), (Precision::F32, 2e-6, 1.2e-4, 1e-3)]
     {
         let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
         let mut errors: Vec<_> = records
             .iter()
-            .zip(&truth)
+            .zip(&expected)
             .zip(&cells)
-            .map(|((record, truth), (pair, _))| (apart(record.strobe, *truth), pair.e, pair.omega))
+            .map(|((record, expected), (pair, _))| (apart(record.strobe, *expected), pair.e, pair.omega))
             .collect();
         errors.sort_by(|a, b| a.0.total_cmp(&b.0));
         let at = |share: usize| errors[(errors.len() - 1) * share / 100];
@@ -122,9 +124,9 @@ fn stable_cells_of_the_plane_agree() {
     }
 }
 
-/// Every kind of motion over a horizon short enough for chaos.
+/// Every kind of motion, over a horizon short enough for chaos.
 #[test]
-fn scenarios_agree() {
+fn every_kind_of_motion_agrees() {
     let on_wall = |w: f64| [0.25, 0.5 + w, -0.25, 0.5];
     let cells = [
         (pair(0.5, 11.5), REST),                 // no contact
@@ -142,29 +144,29 @@ fn scenarios_agree() {
         (pair(0.3, 4.0), [-0.4, 0.0, 0.2, 0.0]), // starts meshing on the left
     ];
     check(&cells, 6, [5.0e-6, 1.3e-14]);
-    // No loss at the walls: errors grow twentyfold in a period.
+    // No loss at the walls: errors grow by a factor of twenty in a period.
     check(&[(pair(1.0, 3.0), REST)], 2, [1.9e-5, 1.2e-13]);
 }
 
-/// Impacts of the reference.
+/// Counts the impacts of the reference.
 struct Impacts(u32);
 
 impl Observer for Impacts {
-    fn event(&mut self, happening: &Happening) {
+    fn event(&mut self, happening: &GapEvent) {
         self.0 += u32::from(happening.kind == EventKind::Impact);
     }
 }
 
-/// Without a meshing speed infinite series of impacts are closed by their limit: the same
-/// states, and as many impacts before.
+/// Without a meshing speed, infinite sequences of impacts are closed by their limit. Lanes then have the reference's
+/// states, and its impacts before the limit.
 #[test]
-fn closed_chatter_agrees() {
+fn closed_chatter_agrees_with_the_reference() {
     const HORIZON: u32 = 4;
     let endless = |e: f64, omega: f64| GearPair { mesh_speed: 0.0, ..pair(e, omega) };
     let rows = [0.05, 0.2, 0.4, 0.6, 0.75].map(|e| [0.3, 1.0, 1.7, 2.5, 5.6].map(|omega| endless(e, omega)));
     let cells: Vec<_> = rows.into_iter().flatten().map(|pair| (pair, REST)).collect();
     check(&cells, HORIZON, [1.4e-4, 8.6e-14]);
-    let truth: Vec<u32> = cells
+    let expected: Vec<u32> = cells
         .iter()
         .map(|(pair, start)| {
             let flow = flow_of(pair);
@@ -178,7 +180,7 @@ fn closed_chatter_agrees() {
     assert!(meshing.iter().filter(|record| record.mesh_fraction > 0.0).count() > 10, "too little chatter");
     for precision in Precision::ALL {
         let records = run(&mut open(precision), &cells, &LaneSettings::only(HORIZON));
-        for ((record, &impacts), (pair, _)) in records.iter().zip(&truth).zip(&cells) {
+        for ((record, &impacts), (pair, _)) in records.iter().zip(&expected).zip(&cells) {
             let counted = record.impacts_per_period * f64::from(HORIZON);
             let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
             assert!((counted - f64::from(impacts)).abs() < 0.5, "{at}: {counted} impacts, {impacts}");
@@ -186,61 +188,61 @@ fn closed_chatter_agrees() {
     }
 }
 
-/// The exponent of cycles that mesh after infinite series: the tangent goes through the limit.
+/// Exponents of cycles that mesh after infinite sequences of impacts: tangent vectors pass the limit.
 #[test]
-fn exponents_through_closed_chatter_agree() {
+fn exponents_through_closed_chatter_agree_with_the_reference() {
     let cells: Vec<_> = [(0.3, 1.3), (0.2, 2.0), (0.1, 5.6), (0.5, 1.0)]
         .map(|(e, omega)| (GearPair { mesh_speed: 0.0, ..pair(e, omega) }, REST))
         .into();
     for precision in Precision::ALL {
         let records = run(&mut open(precision), &cells, &LaneSettings::default());
         for (record, (pair, start)) in records.iter().zip(&cells) {
-            let truth = analyse(pair, *start, &Settings::default()).unwrap();
+            let expected = analyse(pair, *start, &Settings::default()).unwrap();
             let at = format!("{precision:?}, e = {}, omega = {}", pair.e, pair.omega);
-            println!("{at}: {} {} {:?}", record.lyapunov, truth.lyapunov, truth.class);
-            assert_eq!(Class::Periodic { period: record.period }, truth.class, "{at}");
-            assert!((record.impacts_per_period - truth.impacts_per_period).abs() < 1e-9, "{at}");
-            assert_eq!(record.word().as_ref(), Some(&truth.word), "{at}");
-            let error = (record.lyapunov - truth.lyapunov).abs();
+            println!("{at}: {} {} {:?}", record.lyapunov, expected.lyapunov, expected.class);
+            assert_eq!(Class::Periodic { period: record.period }, expected.class, "{at}");
+            assert!((record.impacts_per_period - expected.impacts_per_period).abs() < 1e-9, "{at}");
+            assert_eq!(record.word().as_ref(), Some(&expected.word), "{at}");
+            let error = (record.lyapunov - expected.lyapunov).abs();
             assert!(error < bar([1.3e-7, 3.4e-13], precision), "{at}: {error:.2e}");
         }
     }
 }
 
-/// `z = A cos(omega t)` with the amplitude a hair below or above the wall: free flight that
-/// misses it by less than any grid shows, and one that touches it.
+/// `z = A cos(omega t)`, with the amplitude slightly below or above the wall: a free flight that misses the wall by
+/// less than a grid would show, and one that touches it.
 #[test]
-fn a_graze_is_neither_missed_nor_made_up() {
+fn grazing_contacts_are_found_exactly() {
     let e = 0.8;
     for hair in [1e-3, 1e-5] {
         for sign in [-1.0, 1.0] {
             let omega = 10.5;
             let stiff = GearPair { k1: 30.0, r1: 0.0, r2: 0.0, ..pair(e, omega) };
-            // The steady response of gear 1 alone; gear 2 is at rest.
+            // Steady response of gear 1 alone; gear 2 is at rest.
             let unit = 1.0 / (stiff.k1 - stiff.m1 * omega * omega);
             let amplitude = -(stiff.b + sign * hair);
             let grazing = GearPair { force: amplitude / unit, ..stiff };
             let start = [amplitude, 0.0, 0.0, 0.0];
-            // Starts a turn away from the wall in phase where it is beyond it.
+            // Where the amplitude exceeds the wall, the motion starts at rest.
             let start = if sign > 0.0 { [0.0; 4] } else { start };
-            let truth = reference(&grazing, start, 2)[0];
+            let expected = reference(&grazing, start, 2)[0];
             for precision in Precision::ALL {
                 let record = run(&mut open(precision), &[(grazing, start)], &LaneSettings::only(2))[0];
-                let error = apart(record.strobe, truth);
+                let error = apart(record.strobe, expected);
                 assert!(
                     error < bar([1.7e-6, 2.7e-15], precision),
                     "{precision:?}, {hair} {sign}: {error:.2e}"
                 );
                 if sign < 0.0 {
-                    assert_eq!(record.impacts_per_period, 0.0, "{precision:?}: an impact made up");
+                    assert_eq!(record.impacts_per_period, 0.0, "{precision:?}: a false impact");
                 }
             }
         }
     }
 }
 
-/// Every row of the independent program's table: from rest over a short horizon, and the
-/// periodic ones after a long transient.
+/// Every row of the independent program's table: from rest over a short horizon; the periodic rows also after a long
+/// transient.
 #[test]
 fn every_row_of_the_table_agrees() {
     let from_rest = |row: &Row| (row.pair(), REST);
@@ -250,9 +252,9 @@ fn every_row_of_the_table_agrees() {
     check(&periodic, 300, [2.9e-5, 1.3e-13]);
 }
 
-/// Batch size, dispatch length and workgroup size change nothing, to the bit; in f32 `independence` cuts up more.
+/// Batch size, dispatch length and workgroup size change no bit; `independence` tests more divisions in f32.
 #[test]
-fn results_do_not_depend_on_how_the_work_is_cut() {
+fn records_in_f64_do_not_depend_on_how_the_work_is_cut() {
     let cells: Vec<_> = rows().iter().map(|row| (row.pair(), REST)).collect();
     let mut gpu = open(Precision::F64);
     let everything = LaneSettings { periods: 80, transient_periods: 20, ..LaneSettings::default() };
@@ -264,9 +266,9 @@ fn results_do_not_depend_on_how_the_work_is_cut() {
     }
 }
 
-/// Hostile parameters end in a status of their own and leave their neighbours alone.
+/// Lanes with impossible parameters end in a status and do not change their neighbours.
 #[test]
-fn hostile_lanes_end_in_a_status() {
+fn impossible_parameters_end_in_a_status() {
     let ordinary: Vec<_> = (0..9).map(|i| (pair(0.1 * f64::from(i), 5.6), REST)).collect();
     let hostile = [
         (GearPair { k: 1e13, ..pair(0.2, 1.0) }, REST, Status::TooStiff),
@@ -298,9 +300,9 @@ fn hostile_lanes_end_in_a_status() {
     }
 }
 
-/// The right wall alone, and a gap that the forcing drives into it.
+/// The right wall alone, with a gap that the forcing drives into it.
 #[test]
-fn one_wall_is_enough() {
+fn one_wall_agrees_with_the_reference() {
     let pairs: Vec<GearPair> = [(0.2, 2.2), (0.5, 3.1), (0.3, 4.4), (0.6, 5.2), (0.0, 6.1), (0.4, 7.3)]
         .map(|(e, omega)| pair(e, omega))
         .to_vec();

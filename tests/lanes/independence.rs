@@ -1,16 +1,16 @@
-//! What a lane gives depends on its own cell alone: properties over random cells, batches,
-//! dispatch lengths and workgroups.
+//! Records depend on the lane's own cell alone: properties over random cells, batches, dispatch lengths and
+//! workgroups.
 
 use std::cell::RefCell;
 
 use crate::common::{REST, gpu, paper};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use rattlemap::gpu::{Ended, Gpu, Lane, LaneSettings, Precision};
+use rattlemap::gpu::{Gpu, Lane, LaneResult, LaneSettings, Precision};
 use rattlemap::record::Record;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
 
-/// A cell anywhere in the plane, stiff or soft, with a start that may lie beyond a wall.
+/// Draws a cell of the plane, stiff or soft. Its start may lie beyond a wall.
 fn cell() -> impl Strategy<Value = (GearPair, State)> {
     let pair = (0.0..=1.0, 1.0..12.0, 100.0..3000.0, prop_oneof![Just(0.0), 1e-4..0.1])
         .prop_map(|(e, omega, k, mesh_speed)| GearPair { k, mesh_speed, ..paper(e, omega) });
@@ -18,13 +18,13 @@ fn cell() -> impl Strategy<Value = (GearPair, State)> {
     (pair, start)
 }
 
-/// How the work is cut up.
+/// How the work is divided.
 #[derive(Debug)]
 struct Cut {
     batch: usize,
     iterations: u32,
     workgroup: u32,
-    /// Where the order of the lanes begins.
+    /// Rotation of the order of lanes.
     turn: usize,
 }
 
@@ -47,15 +47,15 @@ fn records_do_not_depend_on_how_the_work_is_cut() {
     check_cuts(Precision::F32);
 }
 
-/// What differs in f64 are the layouts, which `engines_agree` cuts up, too.
+/// The layout of f64 differs; `engines_agree` divides its work as well.
 #[test]
 #[ignore = "compiles a dozen shaders; scripts/test.sh --all"]
 fn records_in_f64_do_not_depend_on_how_the_work_is_cut() {
     check_cuts(Precision::F64);
 }
 
-/// Every field of every record, to the bit, whatever the batch size, the dispatch length, the
-/// workgroup size and the neighbours.
+/// Compares all fields of all records, to the bit, over batch sizes, dispatch lengths, workgroup sizes and
+/// neighbours.
 fn check_cuts(precision: Precision) {
     let mut runner = TestRunner::new(ProptestConfig { cases: 10, ..ProptestConfig::default() });
     let device = RefCell::new(gpu::open(precision));
@@ -63,7 +63,7 @@ fn check_cuts(precision: Precision) {
     runner
         .run(&cases, |(cells, cut, early_stop, exponent)| {
             let (flows, laws, mut lanes) = gpu::lanes(&cells);
-            // Long enough for chaos to be called, and for cycles to be read without success.
+            // Long enough for chaos and for cycles that are read without success.
             let budget = LaneSettings {
                 periods: 60,
                 transient_periods: 20,
@@ -84,10 +84,11 @@ fn check_cuts(precision: Precision) {
         .unwrap();
 }
 
-/// Lanes that are begun while others are under way, in slots that others have left or in a pool that has
-/// grown meanwhile, give what they give together; with short rounds and one variant, as on hardware of their own, too.
+/// Lanes that begin while others run, in slots of lanes that have ended or in a pool that has grown, have the records
+/// of lanes that run together. With the dispatch policy of dedicated hardware, rounds are short and there is one
+/// variant.
 #[test]
-fn records_do_not_depend_on_when_lanes_are_begun() {
+fn records_do_not_depend_on_when_lanes_begin() {
     let pair = |i: u32| paper(f64::from(i * 23 % 60) / 60.0, 1.0 + f64::from(i * 37 % 60) / 6.0);
     let cells: Vec<_> = (0..60).map(|i| (pair(i), REST)).collect();
     let (flows, laws, together) = gpu::lanes(&cells);
@@ -104,20 +105,20 @@ fn records_do_not_depend_on_when_lanes_are_begun() {
         let tables = pollster::block_on(device.load(&flows, &laws, None)).unwrap();
         let mut pool = pollster::block_on(device.pool(&settings)).unwrap();
         let mut ended = Vec::new();
-        // Five are begun first, then more than the pool has slots for, then as many as have ended.
+        // First five lanes begin, then more than the pool has slots for, then as many as have ended.
         for (from, to, left) in [(0, 5, 3), (5, 9, 6), (9, 40, 12), (40, 48, 10), (48, 60, 1), (60, 60, 0)] {
-            pollster::block_on(device.begin(&mut pool, &tables, &lanes[from..to])).unwrap();
-            let some = pollster::block_on(device.advance(&mut pool, &tables, left)).unwrap();
-            // Short rounds lose patience before.
+            pollster::block_on(pool.begin(&device, &tables, &lanes[from..to])).unwrap();
+            let some = pollster::block_on(pool.advance(&device, &tables, left)).unwrap();
+            // On dedicated hardware, `advance` returns after a few rounds.
             let is_enough = pool.under_way() <= left || (is_dedicated && !some.is_empty());
             assert!(is_enough, "{} of {left} are left", pool.under_way());
             ended.extend(some);
             assert_eq!(ended.len() + pool.under_way(), to);
         }
-        assert!(pollster::block_on(device.advance(&mut pool, &tables, 0)).unwrap().is_empty());
+        assert!(pollster::block_on(pool.advance(&device, &tables, 0)).unwrap().is_empty());
         assert_eq!(pool.under_way(), 0);
-        ended.sort_by_key(Ended::number);
-        let numbers: Vec<u32> = ended.iter().map(Ended::number).collect();
+        ended.sort_by_key(LaneResult::number);
+        let numbers: Vec<u32> = ended.iter().map(LaneResult::number).collect();
         assert_eq!(numbers, (1000..1060).collect::<Vec<_>>());
         for (ended, expected) in ended.iter().zip(&expected) {
             assert_eq!(ended.record(tables.constants()), *expected, "{precision:?}, lane {}", ended.number());

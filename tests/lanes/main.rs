@@ -1,4 +1,4 @@
-//! Lanes on a device, against the reference and against themselves.
+//! Lanes on a device, compared with the reference and with each other.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,7 +1,5 @@
-//! Every shader variant, without an adapter: it parses, it is valid, and its structs lie in
-//! memory as the host's do.
+//! Shader variants, without an adapter: they are valid, and their structs have the host's layout.
 
-use std::mem::{offset_of, size_of};
 use std::sync::LazyLock;
 
 use naga::back::{hlsl, msl, spv};
@@ -22,7 +20,7 @@ fn module(variant: Variant) -> (naga::Module, ModuleInfo) {
     (module, info)
 }
 
-/// Members of a struct as `(name, offset)`, and its size.
+/// Returns the members of a struct as `(name, offset)`, and its size.
 fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
     let (_, ty) = module
         .types
@@ -30,7 +28,7 @@ fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
         .find(|(_, ty)| ty.name.as_deref() == Some(name))
         .unwrap_or_else(|| panic!("the shader has no struct {name}"));
     let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
-    // A struct within a struct is read as its members.
+    // Members of an inner struct count as members of the outer one.
     let flat = members.iter().flat_map(|m| match &module.types[m.ty].inner {
         naga::TypeInner::Struct { members, .. } => {
             members.iter().map(|inner| (inner.name.clone(), m.offset + inner.offset)).collect()
@@ -40,21 +38,7 @@ fn shape(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
     (flat.map(|(name, offset)| (name.unwrap_or_default(), offset)).collect(), *span)
 }
 
-/// Compares a struct field by field; `bytes` is the size of the shader's numbers, `host` that
-/// of the host's.
-macro_rules! same_layout {
-    ($module:expr, $host:ty, $bytes:expr, $host_bytes:expr, [$($field:ident),* $(,)?]) => {{
-        let name = stringify!($host).rsplit("::").next().unwrap().trim();
-        let (members, span) = shape($module, name);
-        let scaled = |bytes: usize| (bytes / $host_bytes * $bytes) as u32;
-        let expected: Vec<(String, u32)> =
-            vec![$((stringify!($field).to_owned(), scaled(offset_of!($host, $field)))),*];
-        assert_eq!(members, expected, "{name}");
-        assert_eq!(span, scaled(size_of::<$host>()), "{name}");
-    }};
-}
-
-/// Everything, the class alone, and what lies between.
+/// Returns variants with all quantities, with the class alone, and with some quantities.
 fn variants(precision: Precision) -> [Variant; 12] {
     let everything = Variant::of(precision);
     let class = Variant { word: false, pattern: false, mesh: false, symmetry: false, ..everything };
@@ -74,7 +58,7 @@ fn variants(precision: Precision) -> [Variant; 12] {
     ]
 }
 
-/// Every variant, parsed and validated once for all tests, with the size of its numbers.
+/// All variants, parsed and validated once for all tests, with the bytes of their real numbers.
 static MODULES: LazyLock<Vec<(usize, naga::Module)>> = LazyLock::new(|| {
     let variants = Precision::ALL.map(|precision| variants(precision).map(|variant| (precision, variant)));
     variants.concat().into_iter().map(|(precision, variant)| (precision.bytes(), module(variant).0)).collect()
@@ -85,196 +69,26 @@ fn every_variant_is_valid() {
     assert_eq!(MODULES.len(), 24);
 }
 
+/// Offsets on the host are scaled by the size of the shader's numbers.
 #[test]
-fn constants_lie_as_the_host_says() {
-    for (real, module) in &*MODULES {
-        same_layout!(
-            module,
-            layout::Domain,
-            *real,
-            8,
-            [step, gap_row, x_row, energy, growth, angle, turn_half, turn_sin, share, substeps]
-        );
-        same_layout!(
-            module,
-            layout::Flow,
-            *real,
-            8,
-            [domains, walls, kick, h, speed, closing, steady, reach, decay, pressing, damper]
-        );
-        same_layout!(module, layout::Law, *real, 8, [restitution, mesh_speed]);
-        same_layout!(module, layout::FlowShape, 4, 4, [steps, phasors, degrees, contacts]);
-        same_layout!(module, layout::Cell, 4, 4, [flow_index, law_index, refused, mirror]);
+fn structs_have_the_same_layout_on_host_and_device() {
+    assert_eq!(layout::STRUCTS.len(), 10);
+    for (real_bytes, module) in &*MODULES {
+        for host in layout::STRUCTS {
+            let (bytes, host_bytes) = if host.is_real { (*real_bytes, 8) } else { (4, 4) };
+            let scaled = |offset: usize| (offset / host_bytes * bytes) as u32;
+            let (members, span) = shape(module, host.name);
+            let expected = host.fields.iter().map(|&(name, offset)| (name.to_owned(), scaled(offset)));
+            assert_eq!(members, expected.collect::<Vec<_>>(), "{}", host.name);
+            assert_eq!(span, scaled(host.size), "{}", host.name);
+        }
     }
 }
 
+/// wgpu translates shaders for Vulkan, Metal and DirectX 12 when a device compiles them. Metal has no double
+/// precision, and wgpu does not use that of DirectX.
 #[test]
-fn settings_lie_as_the_host_says() {
-    for (_, module) in &*MODULES {
-        same_layout!(
-            module,
-            layout::Settings,
-            4,
-            4,
-            [
-                slots,
-                active_lanes,
-                fresh,
-                periods,
-                longest,
-                chaos_from,
-                chaos_errors,
-                iterations,
-                passes_per_period,
-                events_per_period,
-                most_events,
-                row,
-                transient_periods,
-                growth_from,
-                exponent_from,
-                exponent_block,
-                max_period,
-                early_stop,
-                ended
-            ]
-        );
-    }
-}
-
-#[test]
-fn what_a_lane_carries_lies_as_the_host_says() {
-    for (real, module) in &*MODULES {
-        same_layout!(
-            module,
-            layout::Motion,
-            *real,
-            8,
-            [
-                q,
-                phasor,
-                theta,
-                bound,
-                bend,
-                mesh_part,
-                block_growth,
-                growth_sum,
-                growth_squares,
-                anchor,
-                position_scale,
-                rate_scale,
-                cycle_growth,
-                tangents,
-                vector,
-                trail
-            ]
-        );
-        same_layout!(
-            module,
-            layout::Tally,
-            4,
-            4,
-            [
-                step,
-                cut,
-                mode,
-                origin,
-                order,
-                period,
-                status,
-                passes_in_period,
-                events_in_period,
-                impacts,
-                events,
-                mesh_right,
-                mesh_left,
-                mesh_whole,
-                grazes,
-                stage,
-                candidate,
-                to_read,
-                tangent_count,
-                grows,
-                word_length,
-                hash_low,
-                hash_high,
-                recent,
-                on_strobe,
-                itinerary,
-                has_read,
-                cycle,
-                tries,
-                counted_from,
-                blocks,
-                block_periods,
-                anchor_period,
-                window,
-                streak,
-                known_lags,
-                settled,
-                mirror,
-                apart,
-                apart_before,
-                refinements,
-                branch,
-                branch_period,
-                home_mode,
-                home_origin,
-                divisor,
-                divisor_apart,
-                failed_searches,
-                asked,
-                rejected_divisor,
-                off,
-                passed,
-                shown,
-                all_events,
-                distances,
-                last_distances,
-                itineraries,
-                word,
-                pattern,
-                pattern_length,
-                pattern_hash,
-                pattern_recent
-            ]
-        );
-    }
-}
-
-#[test]
-fn what_a_lane_hands_back_lies_as_the_host_says() {
-    for (real, module) in &*MODULES {
-        same_layout!(module, layout::Reading, *real, 8, [strobe, growth, growth_error, mesh_fraction]);
-        same_layout!(
-            module,
-            layout::Finding,
-            4,
-            4,
-            [
-                valid,
-                slot,
-                status,
-                period,
-                periods_run,
-                impacts,
-                counted,
-                symmetric,
-                word_length,
-                hash_low,
-                hash_high,
-                word,
-                pattern_length,
-                pattern_hash,
-                pattern
-            ]
-        );
-    }
-}
-
-/// What Vulkan, Metal and DirectX 12 get: wgpu translates the shaders when a device compiles
-/// them. Metal has no double precision at all, and wgpu asks DirectX for none.
-#[test]
-fn every_variant_translates_for_every_kind_of_device() {
+fn variants_translate_for_every_kind_of_device() {
     for exponent in [false, true] {
         for precision in Precision::ALL {
             let variant = Variant { exponent, growth: exponent, ..Variant::of(precision) };

@@ -1,8 +1,8 @@
-//! The gear pair's records, as lanes gave them before walls could be rigid or elastic.
+//! Stored records of the gear pair, computed before walls could be rigid or elastic.
 //!
-//! `stored/` has a table per precision, which begins with the driver that it was made on. There every bit must be the
-//! same; another driver sums in another order, and only what a cell is must be, where both precisions were of one mind.
-//! `STORE_RECORDS=1` makes the tables anew.
+//! `stored/` has a table for each precision, whose first line names the driver. On this driver every bit must be the
+//! same. Another driver sums in another order; there, status, period and word must be the same in cells where both
+//! precisions agree. `STORE_RECORDS=1` writes the tables anew.
 
 use std::fs;
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ fn table(precision: Precision) -> PathBuf {
         .join(format!("tests/lanes/stored/gear_pair_{}.csv", precision.name()))
 }
 
-/// Status, period and word; then all numbers, to the bit.
+/// Returns status, period and word, then all numbers as bits.
 fn row(record: &Record) -> String {
     let word = record.spelling().map(|word| word.text()).unwrap_or_default();
     let numbers = [record.lyapunov, record.lyapunov_error, record.impacts_per_period, record.mesh_fraction];
@@ -43,12 +43,13 @@ fn row(record: &Record) -> String {
     format!("{status},{period},{word},{periods_run},{symmetric},{word_hash:016x},{pattern_hash:016x}{bits}")
 }
 
-fn what(row: &str) -> Vec<&str> {
+/// Returns status, period and word of a row.
+fn class_of(row: &str) -> Vec<&str> {
     row.split(',').take(3).collect()
 }
 
 #[test]
-fn the_gear_pair_keeps_its_records() {
+fn the_gear_pair_has_its_stored_records() {
     let plan = Plan::new(&Scene::parse(SCENE, "stored", &[], Purpose::Map).unwrap());
     let cells: Vec<Cell> = (0..plan.run_count() as u32).map(|id| plan.cell(id)).collect();
     let stored = Precision::ALL.map(|precision| fs::read_to_string(table(precision)).unwrap_or_default());
@@ -63,14 +64,14 @@ fn the_gear_pair_keeps_its_records() {
         }
         assert_eq!(rows[k].len(), now.len(), "{precision:?}");
         let is_same = stored[k].lines().next() == Some(driver.as_str());
-        let told = if is_same { "every bit" } else { "what cells are alone, on another driver" };
-        println!("{precision:?} on {driver}: {told}");
+        let compared = if is_same { "every bit" } else { "status, period and word, on another driver" };
+        println!("{precision:?} on {driver}: {compared}");
         for (i, cell) in cells.iter().enumerate() {
             let then = rows[k][i];
             if is_same {
                 assert_eq!(now[i], then, "{precision:?}, cell {}", cell.id);
-            } else if what(rows[0][i]) == what(rows[1][i]) {
-                assert_eq!(what(&now[i]), what(then), "{precision:?}, cell {}", cell.id);
+            } else if class_of(rows[0][i]) == class_of(rows[1][i]) {
+                assert_eq!(class_of(&now[i]), class_of(then), "{precision:?}, cell {}", cell.id);
             }
         }
     }

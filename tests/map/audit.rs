@@ -1,4 +1,4 @@
-//! What an adaptive map says of filled values, against a map in which every cell is integrated.
+//! Audits of an adaptive map, compared with a map in which every cell is integrated.
 
 use std::sync::LazyLock;
 
@@ -10,7 +10,7 @@ use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
-/// Cycles whose count of impacts changes from band to band, a window of the main plane.
+/// A window of the main map with bands of cycles with different numbers of impacts.
 const SCENE: &str = "[[axis]]
 parameter = 'e'
 min = 0.2
@@ -29,17 +29,13 @@ fn plan(refine: &str) -> Plan {
     Plan::new(&Scene::parse(&format!("{SCENE}{refine}"), "test", &[], Purpose::Map).unwrap())
 }
 
-/// Every cell of the map, by id.
+/// Records of the map in which every cell is integrated.
 static WHOLE: LazyLock<Vec<Record>> = LazyLock::new(|| {
     let plan = plan("");
-    let cells = plan.cells(0..plan.cell_count());
-    let computed = pollster::block_on(Engine::Cpu(Cpu::new(&plan)).run(&cells)).unwrap();
-    let mut records = vec![Record::default(); cells.len()];
-    cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
-    records
+    crate::computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), plan.cell_count())
 });
 
-/// The map in which so many filled cells are audited, and what the only audit said.
+/// Computes the adaptive map with `audited` cells in its only audit.
 fn adaptive(audited: usize) -> (Vec<Record>, Audit) {
     let whole = &*WHOLE;
     let plan = plan(&format!("[refine]\nminimum_grid = 8\nmax_error = 0.5\naudit = {audited}"));
@@ -56,10 +52,10 @@ fn adaptive(audited: usize) -> (Vec<Record>, Audit) {
     (records, audit)
 }
 
-/// An audit of all that is filled has what a table of both maps shows; beside one that looked at a single cell
-/// nearly all is still filled.
+/// An audit of all filled cells has the errors that follow from both maps. For comparison, an audit of a single cell leaves
+/// nearly all cells filled.
 #[test]
-fn the_audit_of_all_filled_cells_is_what_both_maps_show() {
+fn an_audit_of_all_filled_cells_agrees_with_both_maps() {
     let (_, audit) = adaptive(WHOLE.len());
     assert_eq!(audit.sampled, audit.filled);
     let (filled, single) = adaptive(1);
@@ -78,24 +74,23 @@ fn the_audit_of_all_filled_cells_is_what_both_maps_show() {
         let mut differences: Vec<f64> =
             with.iter().map(|(cell, own)| (field(cell) - field(own)).abs()).collect();
         differences.sort_by(f64::total_cmp);
-        // All but the one that was integrated.
+        // The single audited cell is missing.
         assert_eq!(differences.len() + without.len() + 1, audit.filled);
         assert!(deviation.compared - differences.len() <= 1, "{deviation:?}");
         assert!(deviation.empty - without.len() <= 1, "{deviation:?}");
         let off = differences.iter().filter(|&&difference| difference >= 1.0 - 1e-9).count();
         assert!(deviation.off_by_one - off <= 1, "{deviation:?}, {off}");
-        for (share, said) in [(0.5, deviation.median), (0.95, deviation.p95), (1.0, deviation.worst)] {
+        for (share, quantile) in [(0.5, deviation.median), (0.95, deviation.p95), (1.0, deviation.worst)] {
             let place = (share * differences.len() as f64).ceil() as usize - 1;
             let around = differences[place - 1]..=differences[(place + 1).min(differences.len() - 1)];
-            assert!(around.contains(&said), "{share}: {said}, {around:?}");
+            assert!(around.contains(&quantile), "{share}: {quantile}, {around:?}");
         }
     }
 }
 
-/// Impacts of cycles are whole numbers over the period, also where they were filled; where bands with other
-/// counts meet they are left empty.
+/// Filled impacts of cycles are whole numbers over the period, or empty between bands with different counts.
 #[test]
-fn filled_cycles_have_a_count_of_impacts_or_none() {
+fn filled_impacts_of_cycles_are_whole_numbers_or_empty() {
     let (records, audit) = adaptive(1);
     let (mut counted, mut empty) = (0, 0);
     for record in records.iter().filter(|record| record.valid & valid::FILLED != 0) {

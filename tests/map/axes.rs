@@ -1,6 +1,6 @@
-//! Logarithmic and listed axes, derived parameters, lists of cells: every cell is the oscillator that they say.
+//! Maps over logarithmic and listed axes, with derived parameters, and of lists of cells.
 
-use rattlemap::findings::effect::{ROUNDING, without_effect};
+use rattlemap::findings::effect;
 use rattlemap::job;
 use rattlemap::job::Processor;
 use rattlemap::map::plan::Plan;
@@ -22,7 +22,7 @@ fn built() -> SceneBuilder {
     Scene::builder(GearPair::paper(0.3)).quantities(&EVERYTHING)
 }
 
-/// The second support follows the first, by way of damping that follows it, too.
+/// The stiffness and damping of the second support are derived from those of the first.
 fn coupled() -> SceneBuilder {
     let forces = [3.0, 11.0, 12.5, 40.0, 41.0];
     built()
@@ -33,7 +33,7 @@ fn coupled() -> SceneBuilder {
 }
 
 #[test]
-fn cells_of_unequal_steps_are_what_single_orbits_are() {
+fn cells_of_uneven_axes_agree_with_single_orbits() {
     let scene = coupled().build().unwrap();
     let map = job::run(&scene, Processor::Cpu).unwrap();
     let mut decided = 0;
@@ -59,9 +59,9 @@ fn cells_of_unequal_steps_are_what_single_orbits_are() {
     assert!(firsts.windows(2).all(|pair| (pair[1] / pair[0] - 9f64.powf(0.2)).abs() < 1e-12), "{firsts:?}");
 }
 
-/// What stands beside a cell changes nothing of it: the same cells, listed in another order, twice.
+/// A record does not depend on other cells: cells of a grid are listed in another order, one of them twice.
 #[test]
-fn cells_of_a_list_are_those_of_the_grid_to_the_bit() {
+fn cells_of_a_list_equal_those_of_the_grid_bit_by_bit() {
     let grid = job::run(&coupled().build().unwrap(), Processor::Cpu).unwrap();
     let mut order: Vec<usize> = (0..30).map(|n| n * 7 % 30).collect();
     order.push(4);
@@ -82,25 +82,24 @@ fn cells_of_a_list_are_those_of_the_grid_to_the_bit() {
     assert_eq!(list.counts(), [31, 1]);
     assert!(order.iter().enumerate().all(|(row, &id)| list.records()[row] == grid.records()[id]));
     assert!(list.cells().zip(&values).all(|(cell, values)| cell.values == values));
-    // F, as k1, is of the oscillator alone.
+    // F and k1 are parameters of the oscillator, not of the law.
     assert_eq!((list.plan().flow_count(), list.plan().law_count()), (30, 1));
 }
 
-/// The force is too small for the teeth to meet, or they meet and do not mesh: how stiff they are does not count.
+/// The meshing stiffness has no effect if the force is too small for contact, or if contact does not lead to meshing.
 #[test]
 fn parameters_of_teeth_that_do_not_meet_have_no_effect() {
     let map_of = |e: f64, forces: std::ops::RangeInclusive<f64>| {
         let scene =
             built().parameter("e", e).log_axis("k", 100.0..=10000.0, 4).axis("F", forces, 5).build().unwrap();
         let map = job::run(&scene, Processor::Cpu).unwrap();
-        let named = without_effect(map.plan(), map.records(), ROUNDING[1]);
-        named.iter().map(|parameter| parameter.name.to_string()).collect::<Vec<_>>()
+        effect::names(map.plan(), map.records(), "f64")
     };
     let plan = Plan::new(&built().axis("k", 100.0..=200.0, 2).axis("F", 1.0..=2.0, 2).build().unwrap());
     assert!(Flow::new(&plan.oscillator(0)).non_impacting().is_some());
-    // All of them are the cycle about rest, of one exponent: the force, too, changes nothing of what is measured.
+    // All cells have the contact-free cycle and one exponent, so the force has no effect either.
     assert_eq!(map_of(0.3, 1.0..=4.0), ["k", "F"]);
-    // Impacts, after which the teeth are apart again.
+    // Impacts without meshing.
     assert_eq!(map_of(0.3, 1.0..=50.0), ["k"]);
     assert_eq!(map_of(0.06, 1.0..=50.0), [""; 0]);
 }

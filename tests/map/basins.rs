@@ -1,6 +1,6 @@
-//! Basins of attraction: every start gets the attractor that it leads to.
+//! Basins of attraction: every start gets its attractor.
 //!
-//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+//! The lanes need an adapter; without one the tests fail: see `scripts/test.sh`.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -24,7 +24,7 @@ fn basins(scene: &Scene) -> Basins {
     map.basins().expect("a map of basins")
 }
 
-/// Cells by label add up, larger basins come first.
+/// Checks the numbers of cells per label, and the order of the attractors.
 #[track_caller]
 fn check_counts(basins: &Basins) {
     let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
@@ -43,8 +43,8 @@ fn off(a: State, b: State) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// The fast one of the two orbits with one impact at each wall and half a period, after the second of which it is its
-/// own mirror image: its state at phase 0. Flights are those of a damped oscillator, so all of it is solved by hand.
+/// Computes the state at phase 0 of the fast symmetric orbit with one impact at each wall per period, in closed form:
+/// flights are those of a damped oscillator.
 fn impacting(stops: &Stops) -> State {
     let Stops { m, r, k, force, omega, b, e, .. } = *stops;
     let (alpha, half) = (r / (2.0 * m), std::f64::consts::PI / omega);
@@ -87,9 +87,9 @@ fn plane(stops: Stops, side: u32) -> SceneBuilder {
         .quantities(&[Quantity::Class])
 }
 
-/// Contact-free motion has a closed form, and so have impacts in turns at both walls.
+/// Both attractors have closed forms: contact-free motion, and impacts at alternating walls.
 #[test]
-fn two_attractors_are_where_they_are_by_hand() {
+fn attractors_agree_with_closed_forms() {
     let stops = rattling();
     let found = basins(&plane(stops, 48).build().unwrap());
     check_counts(&found);
@@ -107,7 +107,7 @@ fn two_attractors_are_where_they_are_by_hand() {
     assert!(off(impacts.strobe.unwrap(), impacting(&stops)) < 1e-10, "{impacts:?} {:?}", impacting(&stops));
     assert_eq!((impacts.class, impacts.symmetric), (Class::Periodic { period: 1 }, Some(true)));
     assert_eq!(impacts.word.as_ref().unwrap().time_order(), "36");
-    // Energy alone proves where the first is reached.
+    // Starts with little energy cannot reach a wall.
     let free_label = found.attractors().iter().position(|other| other == free).unwrap() as u16;
     let scene = plane(stops, 48).build().unwrap();
     let (mut proven, room) = (0, (0.5 - size).powi(2) * stops.k);
@@ -129,14 +129,14 @@ fn gears(pair: GearPair, side: u32) -> SceneBuilder {
         .quantities(&[Quantity::Class])
 }
 
-/// At (e, omega) where symmetry-conjugate orbits and contact-free motion coexist.
+/// Parameters at which symmetry-conjugate orbits and contact-free motion coexist.
 fn coexisting() -> GearPair {
     GearPair { omega: 9.2, ..GearPair::paper(0.98) }
 }
 
-/// A force that pushes the other way is that of half a period later: mirrored starts lead to mirrored attractors.
+/// The opposite force is the force half a period later, so mirrored starts lead to mirrored attractors.
 #[test]
-fn basins_of_mirrored_starts_are_each_others_mirror_image() {
+fn mirrored_starts_lead_to_mirrored_attractors() {
     const SIDE: usize = 40;
     let pair = coexisting();
     let ours = basins(&gears(pair, SIDE as u32).build().unwrap());
@@ -144,7 +144,7 @@ fn basins_of_mirrored_starts_are_each_others_mirror_image() {
     check_counts(&ours);
     let image = |attractor: &Attractor| {
         let is_image = |other: &Attractor| {
-            // The least of several strobe states is another one in the mirror.
+            // Only for period 1 is the mirror image of the smallest strobe state the smallest again.
             let both = attractor.strobe.zip(other.strobe);
             other.cells == attractor.cells
                 && other.class == attractor.class
@@ -167,13 +167,13 @@ fn refined_scene() -> Scene {
     gears(coexisting(), SIDE).refine(Refine { max_error: 0.02, ..Refine::default() }).build().unwrap()
 }
 
-/// Every cell of that map, integrated.
+/// Records of that map with every cell integrated.
 static WHOLE: LazyLock<Vec<Record>> = LazyLock::new(|| {
     let scene = gears(coexisting(), SIDE).build().unwrap();
     job::run(&scene, Processor::Cpu).unwrap().records().to_vec()
 });
 
-/// The adaptive map of these cells where they come in the order that `next` says.
+/// Computes the adaptive map. `next` removes the cell whose record arrives next from those under way.
 fn refined(plan: &Plan, mut next: impl FnMut(&mut Vec<u32>) -> u32) -> (Vec<Record>, Refined) {
     let mut schedule = Schedule::new(plan);
     let mut records = vec![Record::default(); plan.cell_count()];
@@ -188,10 +188,9 @@ fn refined(plan: &Plan, mut next: impl FnMut(&mut Vec<u32>) -> u32) -> (Vec<Reco
     (records, refined)
 }
 
-/// What is integrated, what is filled and every label follow from the records, in whatever order they come; few of the
-/// filled cells have another label than integration shows.
+/// The order of the records changes neither integrated cells nor labels, and few filled cells have a wrong label.
 #[test]
-fn adaptive_basins_depend_on_no_order_and_are_those_of_the_whole_map() {
+fn adaptive_basins_do_not_depend_on_the_order_and_agree_with_the_whole_map() {
     let plan = Plan::new(&refined_scene());
     let (records, first) = refined(&plan, |waiting| waiting.remove(0));
     let of = |records: &[Record], refined: &Refined| {
@@ -209,7 +208,7 @@ fn adaptive_basins_depend_on_no_order_and_are_those_of_the_whole_map() {
     let whole = attractors::basins(&plan, &**WHOLE, &[]).unwrap();
     let filled = first.filled;
     assert!(filled > 1000 && first.integrated + filled == WHOLE.len(), "{first:?}");
-    // The same attractors, whatever their numbers.
+    // Attractors are matched by state, because their numbers may differ.
     let by_state = |basins: &Basins| -> Vec<usize> {
         let same = |attractor: &Attractor| {
             let is_same = |other: &Attractor| {
@@ -233,36 +232,32 @@ fn adaptive_basins_depend_on_no_order_and_are_those_of_the_whole_map() {
     assert!(first.audits.last().unwrap().rate() <= 0.02, "{first:?}");
 }
 
-/// Lanes give every start the reference's label, but for starts on a border.
+/// Lanes and reference give equal labels, except at borders of basins.
 #[test]
 fn lanes_label_as_the_reference_does() {
     const SIDE: usize = 32;
     let scene = gears(coexisting(), SIDE as u32).build().unwrap();
     let plan = Plan::new(&scene);
     let reference = job::run(&scene, Processor::Cpu).unwrap();
-    let truth = reference.basins().unwrap();
+    let expected = reference.basins().unwrap();
     for precision in Precision::ALL {
-        let cells = plan.cells(0..plan.cell_count());
-        let computed = pollster::block_on(gpu::engine(&plan, precision).run(&cells)).unwrap();
-        let mut records = vec![Record::default(); cells.len()];
-        cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
+        let records = crate::computed(&plan, &mut gpu::engine(&plan, precision), plan.cell_count());
         let lanes = attractors::basins(&plan, &records, &[]).unwrap();
         check_counts(&lanes);
         let mut differing = 0;
         for (id, record) in records.iter().enumerate() {
-            // Numbers follow shares: what is compared is the attractor that a record shows.
-            let own = truth.label(id, record);
-            let label = Some(truth.labels()[id]).filter(|&label| label != NONE);
+            // Labels depend on shares, so the attractor of the record in the reference's map is compared.
+            let own = expected.label(id, record);
+            let label = Some(expected.labels()[id]).filter(|&label| label != NONE);
             if own != label {
                 let (i, j) = (id % SIDE, id / SIDE);
-                let beside = |i: usize, j: usize| truth.labels()[j.min(SIDE - 1) * SIDE + i.min(SIDE - 1)];
-                let near = [
-                    beside(i + 1, j),
-                    beside(i.saturating_sub(1), j),
-                    beside(i, j + 1),
-                    beside(i, j.saturating_sub(1)),
-                ];
-                assert!(near.iter().any(|&other| Some(other) != label), "{precision:?} {id}: no border");
+                let at = |i: usize, j: usize| expected.labels()[j.min(SIDE - 1) * SIDE + i.min(SIDE - 1)];
+                let neighbours =
+                    [at(i + 1, j), at(i.saturating_sub(1), j), at(i, j + 1), at(i, j.saturating_sub(1))];
+                assert!(
+                    neighbours.iter().any(|&other| Some(other) != label),
+                    "{precision:?} {id}: no border"
+                );
                 differing += 1;
             }
         }
@@ -270,9 +265,9 @@ fn lanes_label_as_the_reference_does() {
     }
 }
 
-/// Where a parameter is swept, too, an attractor keeps its label from value to value.
+/// If a parameter is swept, an attractor keeps its label from value to value.
 #[test]
-fn attractors_are_followed_along_a_parameter() {
+fn attractors_keep_their_labels_along_a_parameter() {
     let scene = Scene::builder(rattling())
         .axis("F", 0.8..=1.05, 6)
         .start_axis("v", -3.0..=3.0, 40)
@@ -288,7 +283,7 @@ fn attractors_are_followed_along_a_parameter() {
     for i in 0..6 {
         let labels: Vec<u16> = column(i).map(|id| found.labels()[id]).collect();
         assert!(labels.contains(&free) && labels.contains(&(1 - free)), "{i}: {labels:?}");
-        // Each column by itself says the same.
+        // A map of one column has the same basins.
         let value = scene.axes()[0].value(i);
         let line = Scene::builder(Stops { force: value, ..rattling() });
         let line = line.start_axis("v", -3.0..=3.0, 40).start_axis("x", -0.3..=-0.25, 2);
@@ -301,7 +296,7 @@ fn attractors_are_followed_along_a_parameter() {
 }
 
 #[test]
-fn what_sweeps_no_start_has_no_basins() {
+fn maps_over_parameters_have_no_basins() {
     let scene =
         Scene::builder(rattling()).axis("F", 0.5..=1.5, 3).axis("omega", 1.0..=3.0, 3).build().unwrap();
     let map = job::run(&scene, Processor::Cpu).unwrap();

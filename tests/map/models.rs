@@ -22,11 +22,10 @@ fn stops(e: f64) -> Stops {
     }
 }
 
-/// A map of another model than the gear pair, through the seam that all models take. Between
-/// elastic impacts a free particle of speed `v` comes to a wall every `2 b / v`: `2 pi v / (2 b omega)`
-/// impacts per forcing period.
+/// Between elastic impacts, a free particle of speed `v` reaches a wall every `2 b / v`: `2 pi v / (2 b omega)` impacts per
+/// forcing period.
 #[test]
-fn a_map_of_stops_has_the_impacts_of_the_closed_form() {
+fn impacts_between_stops_agree_with_the_closed_form() {
     let speed = 0.7;
     let scene = Scene::builder(stops(1.0))
         .axis("b", 0.25..=1.0, 4)
@@ -43,18 +42,18 @@ fn a_map_of_stops_has_the_impacts_of_the_closed_form() {
         let model = map.model(&cell);
         assert_eq!(*model, Stops { b, omega, ..stops(1.0) });
         assert!(cell.record.valid & valid::IMPACTS != 0 && cell.class != Class::Failed, "{cell:?}");
-        let want = std::f64::consts::PI * speed / (b * omega);
-        // One impact more or less over all the periods that were counted.
+        let expected = std::f64::consts::PI * speed / (b * omega);
+        // The count may be off by one impact over all observed periods.
         let periods = f64::from(scene.integration().observed_periods.min(cell.record.periods_run));
-        let apart = (cell.record.impacts_per_period - want).abs();
-        assert!(apart <= 1.0 / periods, "b = {b}, omega = {omega}: {apart} from {want}");
+        let apart = (cell.record.impacts_per_period - expected).abs();
+        assert!(apart <= 1.0 / periods, "b = {b}, omega = {omega}: {apart} from {expected}");
         assert_eq!(cell, map.cell(cell.indices));
     }
 }
 
-/// Cells that differ in the law alone share one flow in this model, too.
+/// Cells that differ only in the law share one flow.
 #[test]
-fn stops_share_flows_as_their_table_says() {
+fn cells_of_stops_share_flows_and_laws() {
     let builder = || Scene::builder(stops(1.0));
     let law = builder().axis("e", 0.0..=1.0, 3).axis("mesh_speed", 0.0..=1.0, 5).build().unwrap();
     let plan = rattlemap::map::plan::Plan::new(&law);

@@ -1,9 +1,8 @@
-//! Maps through the library: classes against single orbits, and independence of how the
-//! work was cut up.
+//! Maps computed through the library: comparison with single orbits, independence of batches and threads, failures.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
+use crate::{Swept, computed, swept};
 use rattlemap::map::engine::{Cpu, Engine, EngineError, Fake};
 use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{Purpose, Scene};
@@ -20,7 +19,7 @@ use rayon::prelude::*;
 const QUANTITIES: &str =
     "outputs.quantities=[\"class\",\"lyapunov\",\"impacts\",\"mesh\",\"symmetric\",\"word\"]";
 
-/// A map over restitution and frequency with as many cells along each axis.
+/// Reads a map over restitution and frequency with `count` cells along each axis.
 fn scene(count: usize, sets: &[&str]) -> Scene {
     let axis = |name, min, max| {
         format!("[[axis]]\nparameter = '{name}'\nmin = {min}\nmax = {max}\ncount = {count}\n")
@@ -30,24 +29,12 @@ fn scene(count: usize, sets: &[&str]) -> Scene {
     Scene::parse(&text, "test", &sets, Purpose::Map).unwrap()
 }
 
-/// All records by id, computed in batches of `size`.
-fn records(plan: &Plan, engine: &mut Engine<'_>, size: usize) -> Vec<Record> {
-    let mut records = vec![Record::default(); plan.cell_count()];
-    for from in (0..records.len()).step_by(size) {
-        let cells = plan.cells(from..records.len().min(from + size));
-        let computed = pollster::block_on(engine.run(&cells)).unwrap();
-        assert_eq!(computed.len(), cells.len());
-        cells.iter().zip(computed).for_each(|(cell, record)| records[cell.id as usize] = record);
-    }
-    records
-}
-
 fn on_cpu(scene: &Scene) -> Vec<Record> {
     let plan = Plan::new(scene);
-    records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), 64)
+    computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), 64)
 }
 
-/// Whether the motion from rest is still far from an orbit after `periods`.
+/// Whether the motion from rest is still far from `orbit` after `periods`.
 fn is_elsewhere(pair: &GearPair, orbit: &Orbit, periods: u32) -> bool {
     let flow = Flow::new(&pair.oscillator().unwrap());
     let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
@@ -64,7 +51,7 @@ fn is_elsewhere(pair: &GearPair, orbit: &Orbit, periods: u32) -> bool {
 }
 
 #[test]
-fn cells_are_what_single_orbits_are() {
+fn cells_agree_with_single_orbits() {
     let scene = scene(24, &[]);
     let plan = Plan::new(&scene);
     let records = on_cpu(&scene);
@@ -74,14 +61,14 @@ fn cells_are_what_single_orbits_are() {
         .filter_map(|id| {
             let (record, pair) = (&records[id as usize], crate::common::pair_at(&plan, id));
             let class = classify(record);
-            // The budget may not suffice, and says so; a single orbit goes on.
+            // A map's cell has a limited budget, a single orbit has not.
             if class == Class::Undecided {
                 return None;
             }
             let orbit = analyse(&pair, REST, &settings).unwrap();
             let at = format!("e = {}, omega = {}: {class:?}, {:?}", pair.e, pair.omega, orbit.class);
             if orbit.class != class {
-                // Transient chaos that outlives the cell; a single orbit waits for its end.
+                // Transient chaos may last longer than the cell's budget.
                 let transient = class == Class::Chaotic && is_elsewhere(&pair, &orbit, record.periods_run);
                 return (!transient).then_some(at);
             }
@@ -113,7 +100,7 @@ fn without_early_stops_every_cell_runs_its_whole_budget() {
     let same = full.iter().zip(&early).filter(|(full, early)| {
         classify(full) == classify(early) && (full.period == 0 || full.word == early.word)
     });
-    // tests/lanes/early_stops.rs looks at those that differ.
+    // tests/lanes/early_stops.rs examines the differing cells.
     assert!(same.count() >= 142);
     assert!(early.iter().filter(|record| record.periods_run < 300).count() > 130);
 }
@@ -124,81 +111,72 @@ fn records_do_not_depend_on_batches_or_threads() {
     let plan = Plan::new(&scene);
     let with = |threads: usize, size: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| records(&plan, &mut Engine::Cpu(Cpu::new(&plan)), size))
+        pool.install(|| computed(&plan, &mut Engine::Cpu(Cpu::new(&plan)), size))
     };
     let one = with(1, 1);
     for (threads, size) in [(1, 100), (2, 7), (5, 33)] {
         assert_eq!(with(threads, size), one, "{threads} threads, batches of {size}");
     }
-    let rule = |size| records(&plan, &mut Engine::Fake(Fake::new(by_id)), size);
+    let rule = |size| computed(&plan, &mut Engine::Fake(Fake::new(by_id)), size);
     assert_eq!(rule(1), rule(64));
 }
 
 #[test]
-fn nothing_is_recorded_that_nobody_asks_for() {
+fn only_requested_quantities_are_recorded() {
     let only = |quantities: &str| on_cpu(&scene(4, &[&format!("outputs.quantities=[{quantities}]")]));
     let bits = valid::STROBE | valid::PERIOD;
     for record in only("\"mesh\"") {
         assert_eq!(record.valid, bits | valid::MESH);
         assert_eq!((record.lyapunov, record.impacts_per_period, record.word), (0.0, 0.0, [0; 4]));
     }
-    // A class needs the exponent, but not the other way round.
+    // The class needs the exponent.
     assert!(only("\"class\"").iter().all(|record| record.valid == bits | valid::LYAPUNOV));
 }
 
-/// A cell's own number, so that a misplaced record shows.
+/// Computes a record with the cell's number, to detect misplaced records.
 fn by_id(cell: &Cell) -> Record {
     Record { period: cell.id + 1, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
 }
 
-/// Sweeps with a fake from where `before` ends; returns what it says and what it kept, in order.
-fn sweep(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, Vec<u32>) {
-    let (mut schedule, mut kept) = (Schedule::new(plan), Vec::new());
-    let mut records = vec![Record::default(); plan.cell_count()];
+/// Continues a map after the records of the cells `before` with a fake engine. Returns the result and the stored cells.
+fn sweep_fake(plan: &Plan, fake: Fake, before: &[u32]) -> (Result<bool, SweepError>, Vec<u32>) {
     let done: Vec<_> = before.iter().map(|&id| (id, by_id(&plan.cell(id)))).collect();
-    assert!(sweep::replay(&mut schedule, &mut records, &done));
-    let engine = &mut Engine::Fake(fake);
-    let keep = |batch: &[(u32, Record)], _| {
-        assert!(batch.iter().all(|(id, record)| record.period == id + 1));
-        kept.extend(batch.iter().map(|(id, _)| *id));
-        Ok(())
-    };
-    let end =
-        pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), keep));
-    (end, kept)
+    let Swept { end, records, stored, .. } = swept(plan, &mut Engine::Fake(fake), &done);
+    assert!(stored.iter().all(|&id| records[id as usize].period == id + 1));
+    (end, stored)
 }
 
 #[test]
-fn a_lost_engine_leaves_what_was_done_and_the_next_goes_on() {
+fn another_engine_continues_after_a_lost_engine() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, kept) = sweep(&plan, Fake::lost_after(2, by_id), &[]);
+    let (end, stored) = sweep_fake(&plan, Fake::lost_after(2, by_id), &[]);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::Lost { .. }))), "{end:?}");
-    assert!(!kept.is_empty() && kept.len() < plan.cell_count());
-    let (end, rest) = sweep(&plan, Fake::new(by_id), &kept);
+    assert!(!stored.is_empty() && stored.len() < plan.cell_count());
+    let (end, rest) = sweep_fake(&plan, Fake::new(by_id), &stored);
     assert!(end.unwrap());
-    assert_eq!([kept, rest].concat(), plan.order());
+    assert_eq!([stored, rest].concat(), plan.order());
 }
 
 #[test]
-fn batches_shrink_to_the_memory_there_is() {
+fn batches_shrink_to_the_available_memory() {
     let scene = scene(20, &[]);
     let plan = Plan::new(&scene);
-    let (end, kept) = sweep(&plan, Fake::with_memory(3, by_id), &[]);
+    let (end, stored) = sweep_fake(&plan, Fake::with_memory(3, by_id), &[]);
     assert!(end.unwrap());
-    assert_eq!(kept, plan.order());
-    let (end, kept) = sweep(&plan, Fake::with_memory(0, by_id), &[]);
+    assert_eq!(stored, plan.order());
+    let (end, stored) = sweep_fake(&plan, Fake::with_memory(0, by_id), &[]);
     assert!(matches!(end, Err(SweepError::Engine(EngineError::OutOfMemory { cells: 1, .. }))), "{end:?}");
-    assert!(kept.is_empty());
+    assert!(stored.is_empty());
 }
 
 #[test]
-fn records_that_nobody_asked_for_are_refused() {
+fn records_without_a_request_are_refused() {
     let plan = Plan::new(&scene(41, &["refine.minimum_grid=8"]));
     let replay = |ids: &[u32]| {
         let mut records = vec![Record::default(); plan.cell_count()];
-        let kept: Vec<_> = ids.iter().map(|&id| (id, Record::default())).collect();
-        sweep::replay(&mut Schedule::new(&plan), &mut records, &kept)
+        let stored: Vec<_> = ids.iter().map(|&id| (id, Record::default())).collect();
+        sweep::replay(&mut Schedule::new(&plan), &mut records, &stored)
     };
     assert!(replay(&[0, 8, 16]));
     for wrong in [&[0, 8, 8][..], &[1], &[41 * 41], &[u32::MAX]] {
@@ -206,9 +184,9 @@ fn records_that_nobody_asked_for_are_refused() {
     }
 }
 
-/// Cells whose neighbours take a hundred times as long: nobody waits for them, and the map is the same.
+/// Cells that take a hundred times as long delay only cells that depend on them, and the map is equal.
 #[test]
-fn slow_cells_hold_up_nobody() {
+fn slow_cells_do_not_delay_other_cells() {
     let adaptive = ["refine.minimum_grid=8", "refine.max_error=0.05", "refine.audit=50"];
     for sets in [&[][..], &adaptive] {
         let scene = scene(41, sets);
@@ -219,62 +197,43 @@ fn slow_cells_hold_up_nobody() {
             Record { period, valid: valid::PERIOD, periods_run: 1, ..Record::default() }
         };
         let run = |fake: Fake| {
-            let (mut schedule, mut kept) = (Schedule::new(&plan), Vec::new());
-            let mut records = vec![Record::default(); plan.cell_count()];
-            let keep = |batch: &[(u32, Record)], _| {
-                kept.extend(batch.iter().map(|(id, _)| *id));
-                Ok(())
-            };
-            let engine = &mut Engine::Fake(fake);
-            let end = pollster::block_on(sweep::run(
-                &plan,
-                &mut schedule,
-                engine,
-                &mut records,
-                &Arc::default(),
-                keep,
-            ));
+            let Swept { end, schedule, mut records, stored } = swept(&plan, &mut Engine::Fake(fake), &[]);
             assert!(end.unwrap());
             let refined = schedule.finish(&mut records);
-            (kept, records, refined)
+            (stored, records, refined)
         };
-        let (mut kept, records, refined) = run(Fake::new(disc));
+        let (mut stored, records, refined) = run(Fake::new(disc));
         let is_slow = |id: u32| id % 7 == 3;
         let fake = Fake::slow(|cell| if cell.id % 7 == 3 { 100 } else { 1 + cell.id % 2 }, disc);
         let (mut late, same_records, same_refined) = run(fake);
-        // A coarse cell that is slow comes after what its neighbours ask for.
+        // Slow cells of the coarse grid end after cells that their neighbours made necessary.
         let first_slow = late.iter().position(|&id| is_slow(id)).unwrap();
         assert!(refined.is_none() || first_slow > 36, "{first_slow}");
         assert_eq!(refined, same_refined);
         assert!(records == same_records);
-        kept.sort_unstable();
+        stored.sort_unstable();
         late.sort_unstable();
-        assert_eq!(kept, late);
+        assert_eq!(stored, late);
     }
 }
 
-/// When cells under way end, and which.
+/// End and id of the cells under way.
 type Ends = BTreeSet<(u32, u32)>;
 
-/// Periods until the last of an adaptive map's cells has ended, on a device that runs as many side by side as there
-/// are: if records are taken up one by one, once half of what is under way has ended, as the sweep does, and once
-/// all has; and if a device is checked every 64 periods, while the next 64 are under way, and what has ended is taken
-/// up after four checks at the latest, as on hardware of its own.
+/// Compares the time, in periods, until an adaptive map ends, on a device that computes all cells under way in parallel.
+/// Records are accepted one by one, after half of the cells under way has ended (as the sweep does), or after all have ended.
+/// The last variant is that of hardware: the device is checked every 64 periods while the next 64 run, and records are
+/// accepted after at most four checks.
 #[test]
-fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_often() {
+fn refinement_waits_less_for_slow_cells_than_rounds_would() {
     let sets = ["refine.minimum_grid=8", "refine.max_error=0.02", "integration.undecided_periods=1584"];
     let plan = Plan::new(&scene(256, &sets));
-    let mut measured = vec![Record::default(); plan.cell_count()];
-    let engine = &mut Engine::Cpu(Cpu::new(&plan));
-    let (halt, keep) = (Arc::default(), |_: &[(u32, Record)], _| Ok(()));
-    let mut schedule = Schedule::new(&plan);
-    assert!(
-        pollster::block_on(sweep::run(&plan, &mut schedule, engine, &mut measured, &halt, keep)).unwrap()
-    );
+    let Swept { end, schedule, records: measured, .. } = swept(&plan, &mut Engine::Cpu(Cpu::new(&plan)), &[]);
+    assert!(end.unwrap());
     let mut integrated = schedule.sequence().to_vec();
     integrated.sort_unstable();
     let slowest = integrated.iter().map(|&id| measured[id as usize].periods_run).max().unwrap();
-    // `wait` says when what has ended by then is taken up, from when each of those under way will.
+    // `wait` returns the time at which records are accepted next, from the ends of the cells under way.
     let periods = |wait: &dyn Fn(u32, &Ends) -> u32| {
         let mut schedule = Schedule::new(&plan);
         let mut records = vec![Record::default(); plan.cell_count()];
@@ -289,9 +248,9 @@ fn refinement_waits_a_few_times_for_the_slowest_cell_where_rounds_would_wait_oft
                 schedule.take(id, &records);
             }
         }
-        let mut asked = schedule.sequence().to_vec();
-        asked.sort_unstable();
-        assert_eq!(asked, integrated);
+        let mut requested = schedule.sequence().to_vec();
+        requested.sort_unstable();
+        assert_eq!(requested, integrated);
         now
     };
     let end = |under_way: &Ends, n: usize| under_way.iter().nth(n).unwrap().0;

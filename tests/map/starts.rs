@@ -1,13 +1,13 @@
-//! Where cells start: following the attractor along the last axis, and several starts per cell.
+//! Starts of cells: following the attractor along the last axis, and several starts per cell.
 //!
-//! The lanes need an adapter; none is a failure: see `scripts/test.sh`.
+//! The lanes need an adapter; without one the tests fail: see `scripts/test.sh`.
 
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use crate::common::pair_at;
-use crate::common::{REST, apart, gpu};
+use crate::common::{REST, apart, gpu, pair_at};
+use crate::swept;
 use assert_cmd::Command;
 use rattlemap::findings::coexistence::attractors;
 use rattlemap::gpu::Precision;
@@ -15,15 +15,13 @@ use rattlemap::map::bifurcation;
 use rattlemap::map::engine::{Cpu, Engine, Fake};
 use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{Purpose, Scene, Start};
-use rattlemap::map::schedule::Schedule;
-use rattlemap::map::sweep;
 use rattlemap::record::classify::classify;
 use rattlemap::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::orbit::{Class, Status, analyse};
 use rattlemap_dynamics::reference::Trajectory;
 
-/// Frequency, then restitution upwards through the range in which periods 2 and 3 coexist.
+/// A map over frequency and restitution; restitution increases through a range in which periods 2 and 3 coexist.
 const SCENE: &str = r#"title = "Hysteresis"
 
 [[axis]]
@@ -50,46 +48,39 @@ fn plan(sets: &[&str]) -> Plan {
     Plan::new(&Scene::parse(SCENE, "s", &sets, Purpose::Map).unwrap())
 }
 
-/// All records, by run.
-fn swept(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
-    let mut schedule = Schedule::new(plan);
-    let mut records = vec![Record::default(); plan.run_count()];
-    let go_on = |_: &[(u32, Record)], expected| {
-        assert_eq!(expected, plan.run_count());
-        Ok(())
-    };
-    assert!(
-        pollster::block_on(sweep::run(plan, &mut schedule, engine, &mut records, &Arc::default(), go_on))
-            .unwrap()
-    );
-    records
+/// Computes all records, by run.
+fn records(plan: &Plan, engine: &mut Engine<'_>) -> Vec<Record> {
+    let swept = swept(plan, engine, &[]);
+    assert!(swept.end.unwrap());
+    assert_eq!(swept.schedule.expected(), plan.run_count());
+    swept.records
 }
 
 fn on_cpu(plan: &Plan) -> Vec<Record> {
-    swept(plan, &mut Engine::Cpu(Cpu::new(plan)))
+    records(plan, &mut Engine::Cpu(Cpu::new(plan)))
 }
 
 fn on_lanes(plan: &Plan, precision: Precision) -> Vec<Record> {
-    swept(plan, &mut gpu::engine(plan, precision))
+    records(plan, &mut gpu::engine(plan, precision))
 }
 
-/// Period of a cell; 0 where there is none.
+/// Returns the period of a cell; 0 without one.
 fn period(record: &Record) -> u32 {
     if let Class::Periodic { period } = classify(record) { period } else { 0 }
 }
 
-/// Ends where it started, a step on: what a cell says tells where it was begun.
-fn tells_its_start(cell: &Cell) -> Record {
+/// Computes a record whose strobe state shows the start of the cell.
+fn record_of_start(cell: &Cell) -> Record {
     let [x1, _, x2, _] = cell.start;
     let strobe = [x1 + 1.0, 0.0, x2 + f64::from(cell.id), 0.5];
     Record { strobe, periods_run: 1, valid: valid::STROBE | valid::PERIOD, ..Record::default() }
 }
 
 #[test]
-fn every_cell_starts_where_its_neighbour_ended() {
+fn cells_start_in_the_last_state_of_their_neighbour() {
     for (policy, order) in [("up", [0, 1, 2, 3, 4]), ("down", [4, 3, 2, 1, 0])] {
         let plan = plan(&[&format!("start.policy={policy}"), "axis.0.count=3", "axis.1.count=5"]);
-        let records = swept(&plan, &mut Engine::Fake(Fake::new(tells_its_start)));
+        let records = records(&plan, &mut Engine::Fake(Fake::new(record_of_start)));
         for i in 0..3 {
             let mut sum = 0.0;
             for (nth, j) in order.into_iter().enumerate() {
@@ -97,28 +88,28 @@ fn every_cell_starts_where_its_neighbour_ended() {
                 sum += f64::from(id);
                 let strobe = records[id as usize].strobe;
                 assert_eq!((strobe[0], strobe[2]), (nth as f64 + 1.0, sum), "{policy}: cell {id}");
-                let began = plan.start(id, &records);
-                assert_eq!((began[0], began[2]), (nth as f64, sum - f64::from(id)), "{policy}: cell {id}");
+                let start = plan.start(id, &records);
+                assert_eq!((start[0], start[2]), (nth as f64, sum - f64::from(id)), "{policy}: cell {id}");
             }
         }
     }
 }
 
 #[test]
-fn a_neighbour_that_failed_leaves_rest() {
+fn a_cell_after_a_failed_neighbour_starts_at_rest() {
     let fails = |cell: &Cell| {
-        let failed = Record { status: Status::CapEvents.code(), ..tells_its_start(cell) };
-        if cell.id / 2 == 3 { failed } else { tells_its_start(cell) }
+        let failed = Record { status: Status::CapEvents.code(), ..record_of_start(cell) };
+        if cell.id / 2 == 3 { failed } else { record_of_start(cell) }
     };
     let plan = plan(&[]);
-    let records = swept(&plan, &mut Engine::Fake(Fake::new(fails)));
+    let records = records(&plan, &mut Engine::Fake(Fake::new(fails)));
     assert_eq!((records[8].strobe[0], records[10].strobe[0]), (1.0, 2.0));
     assert_eq!(plan.start(8, &records), REST);
 }
 
 #[test]
-fn the_way_decides_between_coexisting_attractors() {
-    // Between 0.922 and 0.927 period 2, met from below, and period 3, met from above, coexist.
+fn the_direction_decides_between_coexisting_attractors() {
+    // Between 0.922 and 0.927 period 2, reached from below, and period 3, reached from above, coexist.
     let between = |plan: &Plan, records: &[Record]| {
         let ids = (0..plan.cell_count() as u32).filter(|&id| {
             let pair = pair_at(plan, id);
@@ -136,17 +127,19 @@ fn the_way_decides_between_coexisting_attractors() {
 }
 
 #[test]
-fn a_column_is_a_bifurcation_diagram_with_the_same_policy() {
-    for (policy, way) in [("up", Start::Up), ("down", Start::Down)] {
+fn a_column_agrees_with_a_bifurcation_diagram() {
+    for (policy, start) in [("up", Start::Up), ("down", Start::Down)] {
         let sets = ["axis.1.min=0.855", "axis.1.max=0.945", "axis.1.count=91"];
         let plan = plan(&[&sets[..], &[&format!("start.policy={policy}")]].concat());
         let records = on_cpu(&plan);
         let line: Vec<_> = (0..91).map(|j| 2 * j).map(|id| (pair_at(&plan, id).e, plan.model(id))).collect();
-        let columns = bifurcation::run(&line, way, &plan.budget().settings, &|_| {}).unwrap();
+        let columns =
+            bifurcation::run_until(&line, start, &plan.budget().settings, &|_| {}, &AtomicBool::new(false));
+        let columns = columns.unwrap().unwrap();
         let mut compared = 0;
         for (j, column) in columns.iter().enumerate() {
             let class = classify(&records[2 * j]);
-            // A map's cell has a budget, a diagram's column takes the time it needs.
+            // A map's cell has a limited budget, a diagram's column has not.
             if class != Class::Undecided {
                 assert_eq!(class, column.class, "{policy} at e = {}", column.value);
                 compared += 1;
@@ -157,7 +150,7 @@ fn a_column_is_a_bifurcation_diagram_with_the_same_policy() {
 }
 
 #[test]
-fn cells_are_what_single_orbits_from_their_starts_are() {
+fn cells_agree_with_single_orbits_from_their_starts() {
     let plan = plan(&["start.policy=down"]);
     let records = on_cpu(&plan);
     let mut periodic = 0;
@@ -173,7 +166,7 @@ fn cells_are_what_single_orbits_from_their_starts_are() {
 }
 
 #[test]
-fn further_starts_find_what_coexists() {
+fn further_starts_find_coexisting_attractors() {
     let range = ["start.policy=rest", "axis.1.min=0.915", "axis.1.max=0.928", "axis.1.count=14"];
     let plan = plan(&[&range[..], &["start.count=24"]].concat());
     assert_eq!((plan.cell_count(), plan.run_count()), (28, 28 * 24));
@@ -190,14 +183,14 @@ fn further_starts_find_what_coexists() {
             assert_eq!((periods, count), (vec![2], 1), "e = {}", pair.e);
         }
     }
-    // The map itself is that of one start.
+    // The first runs are the map with one start.
     let alone = self::plan(&range);
     let one = on_cpu(&alone);
     assert_eq!(records[..28], one);
     assert_eq!(attractors(&alone, &one), None);
 }
 
-/// Records of one cell with as many starts, all other cells undecided; the number found.
+/// Counts the attractors of one cell from the records of its runs.
 fn counted(omega: f64, e: f64, runs: &[Record]) -> u8 {
     let sets = [
         "start.policy=rest".to_owned(),
@@ -220,7 +213,7 @@ fn cycle(period: u32, strobe: [f64; 4]) -> Record {
     Record { period, strobe, valid: valid::PERIOD | valid::STROBE, ..Record::default() }
 }
 
-/// States of a motion at the phase `turns` after `periods` periods.
+/// Returns the state of a motion after `periods` periods and `turns` of the next.
 fn later(omega: f64, e: f64, from: [f64; 4], periods: u32, turns: f64) -> [f64; 4] {
     let pair = rattlemap_dynamics::model::GearPair { omega, ..rattlemap_dynamics::model::GearPair::paper(e) };
     let flow = Flow::new(&pair.oscillator().unwrap());
@@ -232,9 +225,9 @@ fn later(omega: f64, e: f64, from: [f64; 4], periods: u32, turns: f64) -> [f64; 
     trajectory.state()
 }
 
-/// Slow spirals end up to twice the distance apart from which each is known to approach.
+/// The ends of two slow approaches may be twice as far apart as each is from the cycle.
 #[test]
-fn runs_on_their_way_to_one_cycle_count_once() {
+fn runs_that_approach_one_cycle_count_once() {
     let plan = plan(&[
         "m1=1.30072638416532",
         "m2=4.370754723550304",
@@ -259,7 +252,7 @@ fn runs_on_their_way_to_one_cycle_count_once() {
 }
 
 #[test]
-fn attractors_are_told_apart_by_their_states() {
+fn attractors_are_distinguished_by_their_states() {
     let (omega, e) = (5.6, 0.925);
     let settled = |start, periods| {
         let pair =
@@ -269,7 +262,7 @@ fn attractors_are_told_apart_by_their_states() {
         orbit.strobe
     };
     let two = settled(REST, 2);
-    // Period 3 as it is met from above.
+    // Period 3, reached from above.
     let plan = plan(&["start.policy=down"]);
     let records = on_cpu(&plan);
     let three = settled(records[2 * 25].strobe, 3);
@@ -294,10 +287,10 @@ fn attractors_are_told_apart_by_their_states() {
             ],
         ),
         (1, vec![cycle(2, two), cycle(2, later(omega, e, two, 1, 0.0))]),
-        // The symmetry-conjugate orbit, and the same not quite settled.
+        // The symmetry-conjugate orbit, and an unsettled run.
         (1, vec![cycle(3, three), cycle(3, mirrored(three))]),
         (1, vec![cycle(3, three), cycle(3, perturbed(three))]),
-        // Twice its period, as noise makes it.
+        // A multiple of the period, as near a period doubling.
         (1, vec![cycle(3, three), cycle(6, perturbed(three))]),
         (1, vec![chaos, chaos, failed]),
         (3, vec![chaos, cycle(2, two), chaos, cycle(3, three)]),
@@ -305,41 +298,11 @@ fn attractors_are_told_apart_by_their_states() {
     ] {
         assert_eq!(counted(omega, e, &runs), expected, "{runs:?}");
     }
-    // Contact-free motion is one attractor, however far from it a run ends.
+    // Contact-free motion is one attractor, even if a run has not reached it.
     let far = later(11.0, 0.5, REST, 6, 0.0);
     let near = later(11.0, 0.5, REST, 200, 0.0);
     assert!(apart(far, near) > 0.1, "{far:?} {near:?}");
     assert_eq!(counted(11.0, 0.5, &[cycle(1, far), cycle(1, near)]), 1);
-}
-
-#[test]
-fn starts_that_make_no_sense_are_refused() {
-    let refused = |sets: &[&str], purpose| {
-        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-        Scene::parse(SCENE, "s.toml", &sets, purpose).unwrap_err().to_string()
-    };
-    for (sets, part) in [
-        (&["refine.max_error=0.01"][..], "filled cells have no motion for their neighbours to start from"),
-        (&["start.count=4"], "cells that follow their neighbours have one start each"),
-        (
-            &["start.policy=rest", "start.count=4", "refine.max_error=0.01"],
-            "where the map is filled, attractors are not counted",
-        ),
-        (
-            &["start.policy=rest", "start.count=0"],
-            "`start.count = 0` is out of range: it must be a whole number",
-        ),
-        (&["start.policy=rest", "start.count=256"], "from 1 to 255"),
-        (&["start.policy=rest", "start.seed=3"], "it draws nothing without start.count above 1"),
-        (&["start.policy=upp"], "did you mean `up`?"),
-    ] {
-        let message = refused(sets, Purpose::Map);
-        assert!(message.contains(part), "{message}");
-    }
-    let one = SCENE.replacen("[[axis]]\nparameter = \"omega\"\nmin = 5.6\nmax = 5.61\ncount = 2\n", "", 1);
-    let sets = ["start.policy=rest".to_owned(), "start.count=2".to_owned()];
-    let message = Scene::parse(&one, "s.toml", &sets, Purpose::Bifurcation).unwrap_err().to_string();
-    assert!(message.contains("`bifurcation` follows one motion per column"), "{message}");
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
@@ -351,12 +314,12 @@ fn bytes(out: &Path, names: &[&str]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn files_say_how_cells_started_and_resume_to_the_same_bytes() {
+fn files_describe_the_starts_and_resume_to_equal_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("s.toml"), SCENE).unwrap();
     let files = ["cells.csv", "cells.npy", "words.csv", "map.png", "pattern.png", "word.png", "report.html"];
-    for (engine, sets, said) in [
+    for (engine, sets, description) in [
         (&["--engine", "cpu"][..], &[][..], "every cell from the attractor at the next lower e"),
         (&["--engine", "gpu", "--precision", "f32"], &["--set", "start.policy=down"], "at the next higher e"),
         (
@@ -365,20 +328,20 @@ fn files_say_how_cells_started_and_resume_to_the_same_bytes() {
             "every cell from rest, attractors counted with 2 random states more",
         ),
     ] {
-        let ask = [&["map", "s.toml", "--quiet", "--force", "--out", "whole"], engine, sets].concat();
-        run(at, &ask).success();
+        let request = [&["map", "s.toml", "--quiet", "--force", "--out", "whole"], engine, sets].concat();
+        run(at, &request).success();
         let whole = at.join("whole");
         let (expected, records) = (bytes(&whole, &files), fs::read(whole.join("records.bin")).unwrap());
-        assert!(String::from_utf8_lossy(&expected[6]).contains(said), "{said}");
+        assert!(String::from_utf8_lossy(&expected[6]).contains(description), "{description}");
         let head = 16 + u32::from_le_bytes(records[8..12].try_into().unwrap()) as usize;
         let lengths = [records.len() / 2, records.len() - 1, head + 400];
-        // What cuts do to a file does not depend on who computed it, and lanes compile first.
+        // Lanes are cut only once, because each run compiles the shader.
         for &length in &lengths[..if engine.contains(&"gpu") { 1 } else { 3 }] {
             let cut = at.join("cut");
             fs::create_dir_all(&cut).unwrap();
             fs::write(cut.join("records.bin"), &records[..length]).unwrap();
-            let ask = [&["map", "s.toml", "--quiet", "--resume", "--out", "cut"], engine, sets].concat();
-            run(at, &ask).success();
+            let request = [&["map", "s.toml", "--quiet", "--resume", "--out", "cut"], engine, sets].concat();
+            run(at, &request).success();
             assert!(bytes(&cut, &files) == expected, "{sets:?}: cut to {length} bytes");
         }
         run(at, &["validate", "whole", "--quiet", "--samples", "40"]).success();

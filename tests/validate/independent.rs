@@ -8,7 +8,7 @@ use crate::common::{Leg, REST, departure, flow_of, legs, paper, sign};
 use rattlemap::validate::independent::dop853::Integration;
 use rattlemap_dynamics::flow::DomainKind;
 use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::reference::{EventKind, Happening};
+use rattlemap_dynamics::reference::{EventKind, GapEvent};
 
 /// Relative and absolute tolerance of DOP853. At `1e-13` its error estimate is rounding and
 /// the step collapses, so the last digits come from a cap on the step instead.
@@ -264,7 +264,7 @@ fn events_obey_the_laws_of_contact() {
 
 #[test]
 fn flights_are_named_after_their_walls() {
-    let name = |from: &Happening, to: &Happening| match (from.kind, sign(from.side), sign(to.side)) {
+    let name = |from: &GapEvent, to: &GapEvent| match (from.kind, sign(from.side), sign(to.side)) {
         (EventKind::MeshStart, 1.0, _) => b'1',
         (EventKind::MeshStart, ..) => b'4',
         (_, 1.0, 1.0) => b'2',
@@ -275,7 +275,7 @@ fn flights_are_named_after_their_walls() {
     for &(e, omega, what) in CELLS {
         let pair = paper(e, omega);
         let flow = flow_of(&pair);
-        let events: Vec<Happening> =
+        let events: Vec<GapEvent> =
             legs(&flow, &pair, REST, 0, 10).into_iter().filter_map(|leg| leg.ends).collect();
         assert!(events.first().is_none_or(|event| event.symbol.is_none()), "{what}");
         for pair in events.windows(2) {

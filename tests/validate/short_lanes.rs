@@ -10,10 +10,10 @@ use rattlemap::record::classify::{classify, status};
 use rattlemap::record::{Record, valid};
 use rattlemap::validate::Kind;
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::orbit::{Class, Measured, Status, measure};
+use rattlemap_dynamics::orbit::{Class, Measurement, Status, measure};
 
 /// The first cell of a plan on the reference.
-fn reference(plan: &Plan) -> Measured {
+fn reference(plan: &Plan) -> Measurement {
     let cell = plan.cell(0);
     measure(&Flow::new(&plan.oscillator(cell.flow)), plan.law(cell.law), plan.start(0, &[]), plan.budget())
 }

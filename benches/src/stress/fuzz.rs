@@ -28,7 +28,7 @@ use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
 use rattlemap::validate::{Kind, Rate};
 use rattlemap_dynamics::model::GearPair;
-use rattlemap_dynamics::orbit::{Budget, Measured, Settings, Status, measure as measure_cell, status_of};
+use rattlemap_dynamics::orbit::{Budget, Measurement, Settings, Status, measure as measure_cell, status_of};
 use rattlemap_dynamics::reference::Trajectory;
 
 /// Periods of bounded cells: half of them transient.
@@ -162,7 +162,7 @@ pub(super) fn lane_settings() -> LaneSettings {
 }
 
 /// As the CPU engine does it.
-fn on_reference((pair, start): &Start) -> Measured {
+fn on_reference((pair, start): &Start) -> Measurement {
     measure_cell(&flow_of(pair), pair.law(), *start, &budget())
 }
 

@@ -24,7 +24,7 @@ use rattlemap::map::random::Random;
 use rattlemap::record::Record;
 use rattlemap::record::distance::farther;
 use rattlemap_dynamics::model::{GearPair, Side};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
 /// Roundings of the gap that an engine is allowed: a dozen steps come before the contact, and a
 /// step rounds eight times.
@@ -104,7 +104,7 @@ pub fn measure(size: Size, seed: u64, lanes: &mut Lanes) -> Result<Vec<Row>, Gpu
 fn on_reference((pair, start): &Start) -> Option<f64> {
     let flow = flow_of(pair);
     let mut trajectory = Trajectory::new(&flow, pair.law(), *start);
-    let mut events: Vec<Happening> = Vec::new();
+    let mut events: Vec<GapEvent> = Vec::new();
     trajectory.advance_period(&mut events).ok()?;
     events.first().filter(|event| event.side == Side::Right).map(|event| event.before[1])
 }

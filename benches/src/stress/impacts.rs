@@ -20,7 +20,7 @@ use rattlemap::map::random::Random;
 use rattlemap::record::distance::farther;
 use rattlemap_dynamics::flow::Gap;
 use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::reference::{Happening, Observer, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
 
 /// Restitutions, and masses of the two gears.
 const RESTITUTIONS: [f64; 7] = [0.0, 0.06, 0.3, 0.605, 0.9, 0.999, 1.0];
@@ -83,7 +83,7 @@ impl Worst<'_> {
 struct Contacts<'w, 'p>(&'w mut Worst<'p>);
 
 impl Observer for Contacts<'_, '_> {
-    fn event(&mut self, happening: &Happening) {
+    fn event(&mut self, happening: &GapEvent) {
         let rates = |q: &Gap| [q[1], q[3]];
         // An end of meshing leaves the state as it is.
         if happening.before[1] != happening.after[1] {

@@ -42,7 +42,7 @@ pub(super) fn perturbed(
         for _ in 0..periods {
             for step in 1..steps {
                 moved.advance_to(flow.period * (f64::from(step) / f64::from(steps)), &mut ())?;
-                moved.shake(std::array::from_fn(|_| unit * (2.0 * random.unit() - 1.0)));
+                moved.perturb(std::array::from_fn(|_| unit * (2.0 * random.unit() - 1.0)));
             }
             moved.advance_period(&mut ())?;
         }

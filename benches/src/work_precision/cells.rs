@@ -5,7 +5,7 @@ use super::{EVENTS, PERIODS};
 use rattlemap::validate::independent::flight::Flight;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, Law, Oscillator, State};
-use rattlemap_dynamics::reference::{Happening, Observer, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Observer, Trajectory};
 
 /// Variants of a cell, side by side as on a map: their restitution grows by [`RESTITUTION_STEP`], the
 /// distance from grazing by an eighth.
@@ -197,7 +197,7 @@ impl Latest {
 
 impl Observer for Latest {
     #[inline]
-    fn event(&mut self, happening: &Happening) {
+    fn event(&mut self, happening: &GapEvent) {
         self.note(happening.t);
     }
 }
@@ -234,13 +234,13 @@ mod tests {
     fn cells_are_what_their_kind_says() {
         for subject in subjects(5) {
             let flow = Flow::new(&subject.oscillator);
-            let mut events: Vec<Happening> = Vec::new();
+            let mut events: Vec<GapEvent> = Vec::new();
             let mut trajectory = Trajectory::new(&flow, subject.law, subject.start);
             for _ in 0..PERIODS {
                 trajectory.advance_period(&mut events).unwrap();
             }
             // Peers need not know the rarest of the rules: pressing that ceases during contact onset.
-            let ends_off_the_wall = |e: &Happening| e.kind == MeshEnd && e.before[0] != flow.wall(e.side);
+            let ends_off_the_wall = |e: &GapEvent| e.kind == MeshEnd && e.before[0] != flow.wall(e.side);
             assert!(!events.iter().any(ends_off_the_wall), "{:?}", subject.pair);
             let count = |kind| events.iter().filter(|event| event.kind == kind).count();
             let at = format!("{:?}", subject.pair);

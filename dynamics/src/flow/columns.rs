@@ -1,5 +1,5 @@
-//! A 4 x 7 matrix on `a = (z, w, x, v, cos, sin, 1)` with the phasor's rotation: the form
-//! that propagators, vector fields and Taylor terms share.
+//! The matrix type of propagators, vector fields and Taylor terms: 4 x 7, on `a = (z, w, x, v, cos, sin, 1)`, and the
+//! rotation of the phasor.
 
 use nalgebra::Matrix4;
 use wide::f64x4;
@@ -7,7 +7,7 @@ use wide::f64x4;
 use super::generator::Generator;
 use super::{Gap, Phasor};
 
-/// Seven columns of `(z, w, x, v)`, one wide register each, and the phasor's rotation.
+/// Seven columns of `(z, w, x, v)`, one wide register each, and the rotation of the phasor.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Columns {
     columns: [f64x4; 7],
@@ -17,7 +17,7 @@ pub(crate) struct Columns {
 impl Columns {
     pub(super) const ZERO: Columns = Columns { columns: [f64x4::ZERO; 7], rotation: [0.0; 2] };
 
-    /// The first four rows of a 7 x 7 matrix, and its rotation.
+    /// Takes the first four rows and the rotation of a 7 x 7 matrix.
     pub(super) fn of(matrix: &Generator) -> Columns {
         Columns {
             columns: std::array::from_fn(|j| {
@@ -27,7 +27,6 @@ impl Columns {
         }
     }
 
-    /// The 7 x 7 matrix.
     pub(super) fn matrix(&self) -> Generator {
         let mut matrix = Generator::zeros();
         for (j, column) in self.columns.iter().enumerate() {
@@ -43,12 +42,11 @@ impl Columns {
         matrix
     }
 
-    /// One row of the matrix.
     pub(super) fn row(&self, i: usize) -> [f64; 7] {
         self.columns.map(|column| column.to_array()[i])
     }
 
-    /// A row vector times the matrix.
+    /// Multiplies a row vector by the matrix.
     pub(super) fn left(&self, row: &[f64; 7]) -> [f64; 7] {
         let along = |column: &f64x4| {
             let c = column.to_array();
@@ -61,7 +59,7 @@ impl Columns {
         product
     }
 
-    /// The product of two 7 x 7 matrices whose last row is zero.
+    /// Returns the product of two 7 x 7 matrices whose last row is zero.
     pub(super) fn times(&self, other: &Columns) -> Columns {
         let b = &other.columns;
         let [c, s] = other.rotation;
@@ -80,8 +78,7 @@ impl Columns {
         }
     }
 
-    /// `(1 + A) (1 + B) - 1`: propagators less the identity, one after the other. The whole
-    /// would lose digits that the departures keep.
+    /// Returns `(1 + A) (1 + B) - 1`, the composition of two propagators that are stored minus the identity.
     pub(super) fn after(&self, first: &Columns) -> Columns {
         let product = self.times(first);
         Columns {
@@ -90,7 +87,6 @@ impl Columns {
         }
     }
 
-    /// A multiple of the matrix.
     pub(super) fn scaled(&self, factor: f64) -> Columns {
         Columns {
             columns: self.columns.map(|column| column * f64x4::splat(factor)),
@@ -98,7 +94,7 @@ impl Columns {
         }
     }
 
-    /// The rows of the matrix combined by another; the phasor is left out.
+    /// Multiplies the matrix by `weight` from the left. The rotation is dropped.
     pub(super) fn weighted(&self, weight: &Matrix4<f64>) -> Columns {
         let mut weights = Columns::ZERO;
         for (j, column) in weights.columns.iter_mut().take(4).enumerate() {
@@ -107,7 +103,7 @@ impl Columns {
         Columns { columns: self.columns.map(|c| weights.homogeneous(&c.to_array())), rotation: [0.0; 2] }
     }
 
-    /// The same matrix with a constant added to one row.
+    /// Adds a constant to the load of one row.
     pub(super) fn plus_constant(mut self, row: usize, value: f64) -> Columns {
         let mut constant = self.columns[6].to_array();
         constant[row] += value;
@@ -115,8 +111,8 @@ impl Columns {
         self
     }
 
-    /// `u (t_0 + u (t_1 + u (t_2 + ...)))`. Seven chains side by side keep both multipliers
-    /// busy; splitting even and odd terms was tried and only spilled registers.
+    /// Returns `u (t_0 + u (t_1 + u (t_2 + ...)))`. The seven independent chains keep both multipliers busy;
+    /// splitting even and odd terms was slower, because it spilled registers.
     pub(super) fn horner(terms: &[Columns], u: f64) -> Columns {
         let wide = f64x4::splat(u);
         let mut sum = terms[terms.len() - 1];
@@ -129,7 +125,7 @@ impl Columns {
         sum.scaled(u)
     }
 
-    /// The same sum, applied to tangent vectors.
+    /// Applies the propagator `1 + u (t_0 + u (t_1 + ...))` to tangent vectors.
     #[inline(always)]
     pub(super) fn carry<const N: usize>(terms: &[Columns], u: f64, tangents: [Gap; N]) -> [Gap; N] {
         let wide = f64x4::splat(u);
@@ -142,18 +138,18 @@ impl Columns {
         let sum = sum.map(|column| column * wide);
         tangents.map(|t| {
             let [t0, t1, t2, t3] = t.map(f64x4::splat);
-            let moved = sum[0].mul_add(t0, sum[1] * t1) + sum[2].mul_add(t2, sum[3] * t3);
-            (f64x4::from(t) + moved).to_array()
+            let change = sum[0].mul_add(t0, sum[1] * t1) + sum[2].mul_add(t2, sum[3] * t3);
+            (f64x4::from(t) + change).to_array()
         })
     }
 
-    /// `sum_j column_j a_j`, in two halves to shorten the chain of additions.
+    /// Returns `sum_j column_j a_j`, in two halves to shorten the chain of additions.
     #[inline(always)]
     pub(crate) fn apply(&self, q: &Gap, phasor: &Phasor) -> f64x4 {
         self.homogeneous(q) + self.forcing(phasor, self.columns[6])
     }
 
-    /// The same in the fewest products, for many matrices side by side.
+    /// Returns `sum_j column_j a_j` with the fewest products, for many matrices in parallel.
     #[inline(always)]
     pub(super) fn apply_lean(&self, q: &Gap, phasor: &Phasor) -> f64x4 {
         let c = &self.columns;
@@ -163,7 +159,7 @@ impl Columns {
         gap + c[5].mul_add(sin, c[4].mul_add(cos, c[3] * q3))
     }
 
-    /// The tangent vector after the step whose propagator, less the identity, this is.
+    /// Applies the propagator, stored minus the identity, to a tangent vector.
     #[inline(always)]
     pub(crate) fn carry_tangent(&self, u: &Gap) -> Gap {
         (f64x4::from(*u) + self.homogeneous(u)).to_array()
@@ -182,14 +178,13 @@ impl Columns {
         self.columns[4].mul_add(cos, self.columns[5].mul_add(sin, load))
     }
 
-    /// The phasor times the rotation.
     #[inline(always)]
     pub(crate) fn rotate(&self, p: &Phasor) -> Phasor {
         let [c, s] = self.rotation;
         [c * p[0] - s * p[1], s * p[0] + c * p[1]]
     }
 
-    /// The phasor after the step whose propagator, less the identity, this is.
+    /// Applies the propagator, stored minus the identity, to a phasor.
     #[inline(always)]
     pub(crate) fn carry_phasor(&self, p: &Phasor) -> Phasor {
         let [c, s] = self.rotate(p);

@@ -1,23 +1,23 @@
 //! Motion at rest on a rigid wall.
 //!
-//! The wall takes up the gap's acceleration `p`, which is linear in the state, by an impulse along the gap
-//! row: `z' = w' = 0`, and the displacement `x` beside the gap moves by `v' = v'_free + kick p`. That is the
-//! motion along `t` with `g . t = 0` and `t = 1` for `x`:
+//! The wall cancels the free acceleration `p` of the gap, which is linear in the state, by a force along the gap row:
+//! `z' = w' = 0`, and the other displacement `x` obeys `v' = v'_free + kick p`. That is motion along the direction
+//! `t` with `g . t = 0` and the component 1 for `x`:
 //!
 //! ```text
 //! m x'' + c x' + k x = f cos(omega t) + load,    m = t M t, c = t C t, k = t K t, f = t . force
 //! p = a_x x + a_v v + a_cos cos(omega t) + constant
 //! ```
 //!
-//! Its energy `2 E_5 = m x^(6)^2 + k x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of
-//! motion it bounds what the certificate asks for:
+//! Its energy `2 E_5 = m x^(6)^2 + k x^(5)^2` grows as in [`crate::flow`]. With `x^(7)` from the equation of motion,
+//! the energy bounds the derivative that the certificate needs:
 //!
 //! ```text
 //! |p^(6)| <= reach sqrt(2 E_5) + |a_cos| omega^6 + |a_v f / m| omega^5
 //! reach    = |a_x - a_v c / m| / sqrt(m) + |a_v| sqrt(k) / m
 //! ```
 //!
-//! In one degree of freedom `p` is the forcing and a constant.
+//! In one degree of freedom `p` is the sum of the forcing and a constant.
 
 use nalgebra::Matrix4;
 
@@ -26,30 +26,30 @@ use super::energy::EnergyBound;
 use super::generator::{Generator, generator};
 use crate::model::Oscillator;
 
-/// Motion at rest on a rigid wall of an oscillator.
-pub(super) struct Motion {
+/// The motion of an oscillator whose gap rests on a rigid wall.
+pub(super) struct ConstrainedMotion {
     pub(super) generator: Generator,
-    /// A bound on its rates.
+    /// Bound on all rates.
     pub(super) rate: f64,
-    /// The row of `p` on `a`, first of the matrix.
-    pub(super) watched: Generator,
+    /// A matrix whose first row is that of `p` on `a`.
+    pub(super) pressing: Generator,
     omega: f64,
     mass: f64,
     stiffness: f64,
     force: f64,
     reach: f64,
-    /// What forcing alone makes of `p^(6)`.
+    /// Bound on the part of `p^(6)` that the forcing contributes directly.
     forced: f64,
 }
 
-impl Motion {
-    /// `kick` is the change of `v` per unit of approach speed that the wall takes.
-    pub(super) fn new(oscillator: &Oscillator, kick: f64) -> Motion {
+impl ConstrainedMotion {
+    /// Derives the motion; `kick` is the change of `v` per unit of approach speed that the wall removes.
+    pub(super) fn new(oscillator: &Oscillator, kick: f64) -> ConstrainedMotion {
         let free = generator(oscillator, &oscillator.free);
         let mut generator = free;
-        let mut watched = Generator::zeros();
+        let mut pressing = Generator::zeros();
         for j in 0..7 {
-            watched[(0, j)] = free[(1, j)];
+            pressing[(0, j)] = free[(1, j)];
             generator[(0, j)] = 0.0;
             generator[(1, j)] = 0.0;
             generator[(3, j)] += kick * free[(1, j)];
@@ -62,15 +62,15 @@ impl Motion {
             row(0) * along[0] + row(1) * along[1]
         };
         let mass = square(oscillator.mass);
-        // Rounding must not make them negative.
+        // Rounding could make them negative.
         let [damping, stiffness] =
             [oscillator.free.damping, oscillator.free.stiffness].map(|m| square(m).max(0.0));
         let force = along[0] * oscillator.force[0] + along[1] * oscillator.force[1];
         let [a_x, a_v, a_cos] = [2, 3, 4].map(|j| free[(1, j)]);
-        Motion {
+        ConstrainedMotion {
             generator,
             rate: (damping / mass + (stiffness / mass).sqrt()).max(omega),
-            watched,
+            pressing,
             omega,
             mass,
             stiffness,
@@ -80,10 +80,10 @@ impl Motion {
         }
     }
 
-    /// The bound of `p^(6)`; `fifth` is `(G unit)^5 / 5!` and `unit` the Taylor step.
+    /// Returns the bound of `p^(6)`; `fifth` is `(G unit)^5 / 5!` and `unit` the Taylor step.
     pub(super) fn bound(&self, fifth: &Columns, unit: f64) -> EnergyBound {
         let scale = unit.powi(6) / 14400.0;
-        // `a + b <= sqrt(2) sqrt(a^2 + b^2)` puts both parts under one root.
+        // Both parts are put under one root by `a + b <= sqrt(2) sqrt(a^2 + b^2)`.
         let weight = 2f64.sqrt() * scale;
         let energy = weight * self.reach * 120.0 / unit.powi(5);
         let mut root = Matrix4::zeros();
@@ -100,9 +100,8 @@ mod tests {
     use crate::flow::{Flow, Gap, Phasor};
     use crate::model::{Contact, Domain, GearPair, Oscillator, Side};
 
-    /// Over a Taylor step and a share of one, from anywhere on the wall.
     #[test]
-    fn the_bound_holds_what_presses() {
+    fn the_sixth_derivative_of_pressing_stays_within_its_bound() {
         let pair = Oscillator { contacts: [Contact::Rigid; 2], ..GearPair::paper(0.0).oscillator().unwrap() };
         let free = Domain {
             damping: [[2.0, -0.7], [-0.7, 0.9]],
@@ -132,6 +131,6 @@ mod tests {
                 }
             }
         }
-        assert!(largest > 0.3, "a bound that nothing comes near: {largest}");
+        assert!(largest > 0.3, "the bound is not tight: largest share {largest}");
     }
 }

@@ -1,4 +1,4 @@
-//! Bounds on derivatives of the gap from the energy of differentiated solutions.
+//! Bounds on derivatives of the gap, from the energy of differentiated solutions.
 
 use nalgebra::{Matrix2, Matrix4};
 
@@ -7,15 +7,15 @@ use super::{Gap, Phasor, displacement_matrix};
 use crate::fused::fma;
 use crate::model::{Domain, Oscillator};
 
-/// Energies below this are not told from zero by squaring.
-const TINY: f64 = 1e-280;
+/// Energies below this may have lost digits by underflow of the squares.
+const LEAST_ENERGY: f64 = 1e-280;
 
-/// Bounds `|z^(n+1)|` over a step by the energy of `y^(n)` at its left end, scaled so that
-/// it is the remainder of a two-point Hermite quintic in Bernstein form.
+/// A bound on `|z^(n+1)|` over a step, from the energy of `y^(n)` at its left end. It is scaled to be the remainder
+/// of a two-point Hermite quintic in Bernstein form.
 ///
-/// The quintic through value, slope and curvature at both ends of a step `h` differs from
-/// the function by `u^3 (1-u)^3 h^6 f^(6) / 720`, and `u^3 (1-u)^3` is the middle Bernstein
-/// polynomial of degree 6 over 20: so `h^6 max|f^(6)| / 14400` on the middle coefficient.
+/// The quintic through value, slope and curvature at both ends of a step `h` differs from the function by
+/// `u^3 (1-u)^3 h^6 f^(6) / 720`. The factor `u^3 (1-u)^3` is a twentieth of the middle Bernstein polynomial of
+/// degree 6. So the remainder on the middle coefficient is `h^6 max|f^(6)| / 14400`.
 #[derive(Clone, Debug)]
 pub(crate) struct EnergyBound {
     columns: Columns,
@@ -23,15 +23,15 @@ pub(crate) struct EnergyBound {
 }
 
 impl EnergyBound {
-    /// Of what does not move.
+    /// The bound of a constant gap: zero.
     pub(super) const NONE: EnergyBound = EnergyBound { columns: Columns::ZERO, growth: 0.0 };
 
-    /// A bound whose squares are summed by these columns, and that grows by so much in a Taylor step.
+    /// Builds a bound: the norm of the columns' product with `a`, plus `growth` per Taylor step.
     pub(super) fn of(columns: Columns, growth: f64) -> EnergyBound {
         EnergyBound { columns, growth }
     }
 
-    /// A bound from the energy of `y^(n)`; `term` is `(G unit)^n / n!` and `unit` the Taylor step.
+    /// Builds the bound from the energy of `y^(n)`; `term` is `(G unit)^n / n!` and `unit` the Taylor step.
     pub(super) fn new(
         oscillator: &Oscillator,
         domain: &Domain,
@@ -43,7 +43,7 @@ impl EnergyBound {
         let scale = reach * unit.powi(6) / 14400.0;
         let drive = oscillator.mobility(oscillator.force).sqrt();
         let factorial: u32 = (1..=n).product();
-        // Not a number, and so nothing that certifies a step, where powers leave the range of f64.
+        // If the powers overflow, the bound is NaN and certifies no step.
         let power = scale / unit.powi(n as i32) * f64::from(factorial);
         EnergyBound {
             columns: term.weighted(&(energy_root(oscillator, domain) * power)),
@@ -51,14 +51,12 @@ impl EnergyBound {
         }
     }
 
-    /// The remainder bound per sixth power of the step: multiply by `u^6` for a step of `u`
-    /// Taylor units that starts at `(q, phasor)`.
+    /// Returns the remainder divided by `u^6`, for a step of `u` Taylor steps from `(q, phasor)`.
     #[inline]
     pub(crate) fn remainder(&self, q: &Gap, phasor: &Phasor, u: f64) -> f64 {
         let sum = self.columns.apply(q, phasor).to_array();
         let energy = fma(sum[0], sum[0], sum[1] * sum[1]) + fma(sum[2], sum[2], sum[3] * sum[3]);
-        // Squares of states this small underflow.
-        let root = if energy < TINY {
+        let root = if energy < LEAST_ENERGY {
             2.0 * sum.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
         } else {
             energy.sqrt()
@@ -67,7 +65,7 @@ impl EnergyBound {
     }
 }
 
-/// A matrix `L` with `|L q|^2 = v M v + x K x`.
+/// Returns a matrix `L` with `|L q|^2 = v M v + x K x`.
 fn energy_root(oscillator: &Oscillator, domain: &Domain) -> Matrix4<f64> {
     let back = displacement_matrix(oscillator).try_inverse().expect("the gap row is not zero");
     let k = domain.stiffness;

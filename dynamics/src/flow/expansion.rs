@@ -1,47 +1,47 @@
-//! Motion near any instant of a step, as a Taylor polynomial short enough to be cheap.
+//! The motion near any instant of a step, as a short Taylor polynomial.
 //!
-//! Propagators of every sixteenth of the Taylor step, and of whole ones, are stored. One of
-//! each leads to within a thirty-second of any instant; from there eight terms of the
-//! trajectory's own Taylor series reach rounding: `(1.6 * 0.035)^9 / 9! < 2e-17`, a little slack for
-//! rounding included. One polynomial serves the search for a root and the state there, so an event
-//! costs one.
+//! The grid stores the propagators of every sixteenth of the Taylor step, and of whole Taylor steps. One of each
+//! reaches within a thirty-second of any instant. From there eight terms of the Taylor series reach rounding, with
+//! some margin: `(1.6 * 0.035)^9 / 9! < 2e-17`. An event needs one such polynomial, both to find the root and for the
+//! state there.
 
 use wide::f64x4;
 
 use super::columns::Columns;
-use super::linear::terms;
+use super::taylor::partial_sum;
 use super::{Gap, Phasor};
 use crate::fused::fma;
 
 /// Parts of the Taylor step whose propagators are stored.
 const PARTS: usize = 16;
 
-/// The finest of them.
+/// Length of a part, in Taylor steps.
 pub(super) const FINEST_PART: f64 = 1.0 / PARTS as f64;
 
-/// Of these every fourth is summed, and the first three; the others are products.
+/// The propagators of every fourth part and of the first three are sums of the series; the others are products of two
+/// of these.
 const COARSER: usize = 4;
 
 /// Terms of the local series.
 pub(crate) const TERMS: usize = 8;
 
-/// Distance from the grid up to which the series may be used, in Taylor steps: half a part and
-/// a little, for a root beyond the middle.
-pub(crate) const REACH: f64 = 0.035;
+/// Distance from a grid point up to which the local series is valid, in Taylor steps. It exceeds half a part, for
+/// roots just beyond the middle between two grid points.
+pub(crate) const EXPANSION_REACH: f64 = 0.035;
 
-/// Added to a small number it leaves the nearest whole one in the last bits.
+/// `1.5 * 2^52`: added to a small number, it leaves the nearest integer in the last bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 const MASK: u64 = 0xffff;
 
-/// Series of `1 - sin(x) / x` and of `1 - cos(x)`, signs left out.
+/// Coefficients of the series of `1 - sin(x) / x` and of `1 - cos(x)`, without signs.
 const SIN: [f64; 3] = [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0];
 const COS: [f64; 4] = [0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40320.0];
 
-/// Their next terms, for angles up to 0.2.
+/// Next coefficients of both series, for angles up to 0.2.
 const SIN_TAIL: [f64; 2] = [1.0 / 362_880.0, 1.0 / 39_916_800.0];
 const COS_TAIL: [f64; 2] = [1.0 / 3_628_800.0, 1.0 / 479_001_600.0];
 
-/// The phasor after a turn by an angle of up to 0.2.
+/// Returns the phasor turned by an angle of up to 0.2.
 #[inline(always)]
 pub(crate) fn turned([cos, sin]: &Phasor, angle: f64) -> Phasor {
     let square = angle * angle;
@@ -56,7 +56,7 @@ pub(crate) fn turned([cos, sin]: &Phasor, angle: f64) -> Phasor {
     [cos + fma(less, *cos, -s * sin), sin + fma(s, *cos, less * sin)]
 }
 
-/// Propagators of a grid of instants, less the identity, and the terms of the Taylor series.
+/// Propagators of a grid of instants, minus the identity, and the terms of the Taylor series.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     parts: Vec<Columns>,
@@ -64,30 +64,26 @@ pub(crate) struct Grid {
     terms: [Columns; TERMS],
 }
 
-/// The motion near an instant of the grid.
+/// The motion near a grid point.
 pub(crate) struct Expansion {
-    /// The instant, in Taylor steps since the start.
+    /// Time from the start to the grid point, in Taylor steps.
     pub(crate) start: f64,
-    /// What has been added to the state by then.
-    moved: f64x4,
+    /// Change of the state from the start to the grid point.
+    change: f64x4,
     q: f64x4,
     terms: [f64x4; TERMS],
     phasor: Phasor,
 }
 
 impl Grid {
-    /// Propagators that are stored.
     pub(super) fn stored(&self) -> usize {
         self.parts.capacity() + self.wholes.capacity()
     }
 
-    /// A grid over `wholes` Taylor steps, from the table of terms.
+    /// Builds the grid over `wholes` Taylor steps from the table of terms.
     pub(super) fn new(table: &[Columns], wholes: usize) -> Grid {
-        // Products of two sums, never of more: errors do not pile up.
-        let sum = |i: usize| {
-            let u = i as f64 / PARTS as f64;
-            Columns::horner(&table[..terms(u)], u)
-        };
+        // A part is a product of at most two sums, so errors do not accumulate.
+        let sum = |i: usize| partial_sum(table, i as f64 / PARTS as f64);
         let mut parts = vec![Columns::ZERO; PARTS];
         for i in 1..PARTS {
             let fine = i % COARSER;
@@ -101,13 +97,13 @@ impl Grid {
         Grid { parts, wholes: whole, terms: std::array::from_fn(|n| table[n]) }
     }
 
-    /// The propagator, less the identity, of a multiple of the sixteenth: exact grid only.
+    /// Returns the propagator, minus the identity, of a time `u` that is a multiple of [`FINEST_PART`].
     pub(super) fn propagator(&self, u: f64) -> Columns {
         let (_, whole, part) = self.nearest(u);
         self.parts[part].after(&self.wholes[whole])
     }
 
-    /// The grid point nearest to `u`, and its whole steps and parts.
+    /// Returns the grid point nearest to `u`, and its whole steps and parts.
     #[inline(always)]
     fn nearest(&self, u: f64) -> (f64, usize, usize) {
         let rounded = fma(u, PARTS as f64, ROUNDER);
@@ -115,34 +111,34 @@ impl Grid {
         ((rounded - ROUNDER) * FINEST_PART, (i / PARTS).min(self.wholes.len() - 1), i % PARTS)
     }
 
-    /// The motion from a state near the instant `u >= 0`, in Taylor steps.
+    /// Expands the motion from a state about the grid point nearest to `u >= 0`, in Taylor steps.
     #[inline(always)]
     pub(crate) fn expansion(&self, q: &Gap, phasor: &Phasor, u: f64) -> Expansion {
         let (instant, whole, part) = self.nearest(u);
         let start = f64x4::from(*q);
-        let (mut moved, mut p) = (f64x4::ZERO, *phasor);
+        let (mut change, mut p) = (f64x4::ZERO, *phasor);
         let mut here = *q;
         if whole > 0 {
             let step = &self.wholes[whole];
-            moved = step.apply(&here, &p);
+            change = step.apply(&here, &p);
             p = step.carry_phasor(&p);
-            here = (start + moved).to_array();
+            here = (start + change).to_array();
         }
         let step = &self.parts[part];
-        moved += step.apply(&here, &p);
+        change += step.apply(&here, &p);
         p = step.carry_phasor(&p);
-        let there = start + moved;
+        let there = start + change;
         let here = there.to_array();
         Expansion {
             start: instant,
-            moved,
+            change,
             q: there,
             terms: std::array::from_fn(|n| self.terms[n].apply_lean(&here, &p)),
             phasor: p,
         }
     }
 
-    /// Tangent vectors after `u` Taylor steps.
+    /// Returns tangent vectors after `u` Taylor steps.
     #[inline(always)]
     pub(crate) fn carry<const N: usize>(&self, u: f64, tangents: [Gap; N]) -> [Gap; N] {
         let (instant, whole, part) = self.nearest(u);
@@ -157,30 +153,31 @@ impl Grid {
 }
 
 impl Expansion {
-    /// Coefficients of what is added to the gap, in powers of the Taylor step from `start`.
+    /// Returns the coefficients of the change of the gap since the start, in powers of the time from the grid point
+    /// in Taylor steps.
     #[inline(always)]
     pub(crate) fn gap(&self) -> [f64; TERMS + 1] {
-        let mut series = [self.moved.to_array()[0]; TERMS + 1];
+        let mut series = [self.change.to_array()[0]; TERMS + 1];
         for (coefficient, term) in series[1..].iter_mut().zip(&self.terms) {
             *coefficient = term.to_array()[0];
         }
         series
     }
 
-    /// The state `v` Taylor steps after `start`.
+    /// Returns the state `v` Taylor steps after the grid point.
     #[inline(always)]
     pub(crate) fn state(&self, v: f64) -> Gap {
         let t = &self.terms;
         let v = f64x4::splat(v);
         let square = v * v;
-        // In a tree: whoever needs the state has nothing else to do meanwhile.
+        // A tree has a shorter chain of operations than Horner's scheme, and the caller waits for the result.
         let pair = |i: usize| t[i + 1].mul_add(v, t[i]);
         let low = pair(2).mul_add(square, pair(0));
         let high = pair(6).mul_add(square, pair(4));
         high.mul_add(square * square, low).mul_add(v, self.q).to_array()
     }
 
-    /// The phasor after a turn by a small angle.
+    /// Returns the grid point's phasor turned by a small angle.
     #[inline(always)]
     pub(crate) fn phasor(&self, angle: f64) -> Phasor {
         let [cos, sin] = self.phasor;

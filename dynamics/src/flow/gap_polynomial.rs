@@ -1,4 +1,4 @@
-//! The gap over a step of known length, as a polynomial, from the state at its start.
+//! The gap over a step of given length as a polynomial.
 
 use wide::f64x4;
 
@@ -6,16 +6,15 @@ use super::columns::Columns;
 use super::{Gap, Phasor};
 use crate::certificate::Bernstein;
 
-/// Takes `a = (z, w, x, v, cos, sin, 1)` to the Bernstein coefficients of the Hermite quintic
-/// of the gap. Values, slopes and curvatures at both ends are linear in `a`, so the
-/// coefficients are, too: two products instead of two fields, and none of the arithmetic between.
+/// The matrix that maps `a = (z, w, x, v, cos, sin, 1)` to the Bernstein coefficients of the gap's Hermite quintic.
+/// The coefficients are linear in `a`, because values, slopes and curvatures at both ends are.
 #[derive(Clone, Debug)]
 pub(crate) struct GapPolynomial {
     columns: [[f64x4; 2]; 7],
 }
 
 impl GapPolynomial {
-    /// From the propagator of a step `h`, less the identity, and the row of `z''`.
+    /// Builds the matrix from the propagator of a step `h`, minus the identity, and the row of `z''`.
     pub(super) fn new(propagator: &Columns, curvature: &[f64; 7], h: f64) -> GapPolynomial {
         let slope = [0.0, h, 0.0, 0.0, 0.0, 0.0, 0.0];
         let bend = curvature.map(|x| h * h * x);
@@ -24,12 +23,12 @@ impl GapPolynomial {
         let bend_gained = propagator.left(&bend);
         let bend_end: [f64; 7] = std::array::from_fn(|j| bend[j] + bend_gained[j]);
         let columns = std::array::from_fn(|j| {
-            Bernstein::departures(slope[j], bend[j], rise[j], slope_end[j], bend_end[j]).wide()
+            Bernstein::from_zero(slope[j], bend[j], rise[j], slope_end[j], bend_end[j]).wide()
         });
         GapPolynomial { columns }
     }
 
-    /// The polynomial from a state.
+    /// Returns the polynomial for a start in the state `(q, phasor)`.
     #[inline(always)]
     pub(crate) fn from(&self, q: &Gap, phasor: &Phasor) -> Bernstein {
         let c = &self.columns;

@@ -5,14 +5,13 @@ use nalgebra::{Matrix2, SMatrix, Vector2};
 use super::displacement_matrix;
 use crate::model::{Domain, Oscillator};
 
-/// Generator and propagators of `a = (z, w, x, v, cos, sin, 1)`.
+/// A generator or propagator of `a = (z, w, x, v, cos, sin, 1)`.
 pub(super) type Generator = SMatrix<f64, 7, 7>;
 
-/// `a' = G a`, from the equations of motion in the coordinates of the gap.
+/// Returns the matrix `G` of `a' = G a`, from the equations of motion.
 pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
     let d = displacement_matrix(oscillator);
     let d_inverse = d.try_inverse().expect("the gap row is not zero");
-    // Symmetric: columns are rows.
     let by_mass = Matrix2::from(oscillator.inverse_mass());
     let matrix =
         |m: [[f64; 2]; 2]| d * by_mass * Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]) * d_inverse;
@@ -34,7 +33,7 @@ pub(super) fn generator(oscillator: &Oscillator, domain: &Domain) -> Generator {
     g
 }
 
-/// A bound on all rates of the domain: forcing, and the norm of the mass-scaled system.
+/// Returns a bound on all rates of the domain: of the forcing, and of the mass-scaled system by its norm.
 pub(super) fn rate(oscillator: &Oscillator, domain: &Domain) -> f64 {
     let [[first, _], [below, second]] = oscillator.mass_root();
     let root = Vector2::new(first.recip(), second.recip());

@@ -1,10 +1,9 @@
-//! Flights from a wall that are short enough for their own Taylor series to show when they end.
+//! Short flights from a wall, whose Taylor series proves when they end.
 //!
-//! A flight pressed back to its wall leaves it by `z(v) = v P(v)`, `v` in Taylor steps. Twelve
-//! terms reach rounding, in the speeds, too, up to an eighth of a Taylor step:
-//! `0.2^12 / 12! < 1e-17`. Where the second coefficient outweighs all later ones, the gap bends
-//! towards the wall all the way to the root of `P`: that is its first return, and pressing does
-//! not cease before.
+//! The distance from the wall is `z(v) = v P(v)`, `v` in Taylor steps. Up to an eighth of a Taylor step, twelve terms
+//! reach rounding, in the speeds, too: `0.2^12 / 12! < 1e-17`. If the second coefficient outweighs all later ones,
+//! the gap is accelerated towards the wall until the root of `P`. Then that root is the first return, and the contact
+//! is pressed until then.
 
 use wide::f64x4;
 
@@ -18,23 +17,23 @@ const WIDTH: usize = 3;
 /// Coefficients of one series.
 type Series = [f64x4; WIDTH];
 
-/// The longest flight, in Taylor steps.
-pub(crate) const SHORT: f64 = 0.125;
+/// Duration of the longest short flight, in Taylor steps.
+pub(crate) const LONGEST_SHORT_FLIGHT: f64 = 0.125;
 
-/// A first guess has to be this near to the root.
-const NEAR: f64 = 0.01;
+/// Largest relative distance of the first guess from the root.
+const GUESS_ERROR: f64 = 0.01;
 
-/// What powers may grow by over that distance, and a little.
+/// Bound on the growth of the powers of `v` over [`GUESS_ERROR`].
 const GROWTH: f64 = 1.2;
 
-/// What the last correction may leave of the flight.
-const LEFT: f64 = 1e-17;
+/// Largest error of the root, relative to its scale, after the last correction.
+const ROOT_ERROR: f64 = 1e-17;
 
-/// Corrections allowed; one is enough.
-const CORRECTIONS: usize = 3;
+/// Largest number of corrections of the root; one is usually enough.
+const CORRECTION_CAP: usize = 3;
 
-/// Weights of the term `m`, counted from zero: `m`, `m (m - 1) / 2`, `m (m + 1)` and `m + 1` without
-/// the terms that are taken by themselves.
+/// Weights of the term `m`, counted from zero: `m`, `m (m - 1) / 2`, `m (m + 1)` and `m + 1`, with 0 for the terms
+/// that are treated separately.
 const SLOPE: Series = weights([[0.0, 1.0, 2.0, 3.0], [4.0, 5.0, 6.0, 7.0], [8.0, 9.0, 10.0, 11.0]]);
 const BEND: Series = weights([[0.0, 0.0, 1.0, 3.0], [6.0, 10.0, 15.0, 21.0], [28.0, 36.0, 45.0, 55.0]]);
 const TURNING: Series =
@@ -45,14 +44,15 @@ const fn weights(w: [[f64; 4]; WIDTH]) -> Series {
     [f64x4::new(w[0]), f64x4::new(w[1]), f64x4::new(w[2])]
 }
 
-/// Takes `a = (z, w, x, v, cos, sin, 1)` to the Taylor coefficients of gap and second displacement.
+/// The matrix that maps `a = (z, w, x, v, cos, sin, 1)` to the Taylor coefficients of the gap and of the second
+/// displacement.
 #[derive(Clone, Debug)]
 pub(crate) struct ShortFlight {
     columns: [[f64x4; 2 * WIDTH]; 7],
 }
 
-/// What is added to gap and second displacement, in powers of the Taylor step.
-pub(crate) struct Rise {
+/// The changes of the gap and of the second displacement, in powers of the time in Taylor steps.
+pub(crate) struct FlightSeries {
     gap: Series,
     other: Series,
 }
@@ -70,7 +70,6 @@ impl Powers {
         Powers { low: f64x4::from([1.0, v, square, square * v]), fourth: f64x4::splat(square * square) }
     }
 
-    /// The sum of a series over these powers.
     #[inline(always)]
     fn sum(&self, c: &Series) -> f64 {
         let [a, b, c, d] = (c[2].mul_add(self.fourth, c[1]).mul_add(self.fourth, c[0]) * self.low).to_array();
@@ -84,7 +83,7 @@ impl Powers {
 }
 
 impl ShortFlight {
-    /// From the Taylor table.
+    /// Builds the matrix from the Taylor table.
     pub(super) fn new(table: &[Columns]) -> ShortFlight {
         let coefficient = |row: usize, n: usize, j: usize| table[n].row(row)[j];
         let quad = |row: usize, i: usize, j: usize| {
@@ -94,26 +93,26 @@ impl ShortFlight {
         ShortFlight { columns: std::array::from_fn(column) }
     }
 
-    /// The series from a state.
+    /// Returns the series of a flight from a state.
     #[inline(always)]
-    pub(crate) fn from(&self, q: &Gap, phasor: &Phasor) -> Rise {
+    pub(crate) fn from(&self, q: &Gap, phasor: &Phasor) -> FlightSeries {
         let c = &self.columns;
         let a = [q[0], q[1], q[2], q[3], phasor[0], phasor[1]].map(f64x4::splat);
         let quad = |i: usize| {
             let state = c[0][i].mul_add(a[0], c[1][i] * a[1]) + c[2][i].mul_add(a[2], c[3][i] * a[3]);
             state + c[4][i].mul_add(a[4], c[5][i].mul_add(a[5], c[6][i]))
         };
-        Rise { gap: [quad(0), quad(1), quad(2)], other: [quad(3), quad(4), quad(5)] }
+        FlightSeries { gap: [quad(0), quad(1), quad(2)], other: [quad(3), quad(4), quad(5)] }
     }
 }
 
-impl Rise {
-    /// When the gap is back where it started, in Taylor steps, if that is certain to be its first
-    /// return; none also where it goes farther than `width` from there.
+impl FlightSeries {
+    /// Returns the time of the gap's first return to its start, in Taylor steps. Returns none if the series does not
+    /// prove that, or if the gap may go farther than `width`.
     #[inline(always)]
-    pub(crate) fn back(&self, width: f64) -> Option<f64> {
+    pub(crate) fn first_return(&self, width: f64) -> Option<f64> {
         let [c1, c2, c3, c4] = self.gap[0].to_array();
-        // Reversion of the first four terms.
+        // Series reversion of the first four terms.
         let inverse = 1.0 / c2;
         let first = -c1 * inverse;
         let per = first * inverse;
@@ -127,28 +126,30 @@ impl Rise {
         let step = fma(-bend * step, step, step);
         let sizes = self.gap.map(|c| (-c).fast_max(c));
         let turning = GROWTH * powers.weighted(&sizes, &TURNING);
-        let is_certain =
-            guess > 0.0 && step.abs() < NEAR && turning < 2.0 * c2.abs() * guess && c1.abs() * SHORT < width;
+        let is_certain = guess > 0.0
+            && step.abs() < GUESS_ERROR
+            && turning < 2.0 * c2.abs() * guess
+            && c1.abs() * LONGEST_SHORT_FLIGHT < width;
         if !is_certain {
             return None;
         }
         let per_slope = per_slope * fma(-2.0 * bend, step, 1.0);
         let share = fma(8.0 * step, step, 1e-10);
         let mut root = fma(guess, step, guess);
-        for _ in 0..CORRECTIONS {
+        for _ in 0..CORRECTION_CAP {
             let correction = Powers::of(root).sum(&self.gap) * per_slope;
             root = fma(-guess, correction, root);
-            if correction.abs() * share <= LEFT {
-                return (root <= SHORT).then_some(root);
+            if correction.abs() * share <= ROOT_ERROR {
+                return (root <= LONGEST_SHORT_FLIGHT).then_some(root);
             }
         }
         None
     }
 
-    /// What is added to `(w, x, v)` by the time `v`, in Taylor steps of which a unit of time has
-    /// `per_unit`.
+    /// Returns the change of `(w, x, v)` up to the time `v` in Taylor steps; `per_unit` is the number of Taylor steps
+    /// in a unit of time.
     #[inline(always)]
-    pub(crate) fn gained(&self, v: f64, per_unit: f64) -> [f64; 3] {
+    pub(crate) fn changes(&self, v: f64, per_unit: f64) -> [f64; 3] {
         let powers = Powers::of(v);
         [
             per_unit * powers.weighted(&self.gap, &GAIN),
@@ -164,7 +165,7 @@ mod tests {
     use crate::flow::{DomainKind, Flow, turned};
     use crate::model::{GearPair, Side};
 
-    /// Starts on the right wall: free, or at the start of a contact onset.
+    /// Returns starts on the right wall, of free motion and of contact onsets.
     fn starts() -> impl Iterator<Item = (DomainKind, Gap, Phasor)> {
         (0..4000u32).map(|i| {
             let t = f64::from(i);
@@ -175,21 +176,21 @@ mod tests {
         })
     }
 
-    /// What is called a first return is one, on the exact flow, and pressing holds until then.
+    /// Compares first returns with the exact flow. The contact must be pressed until then.
     #[test]
-    fn returns_are_first_returns() {
+    fn first_returns_agree_with_the_exact_flow() {
         let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
-        let (mut found, mut refused) = (0, 0);
+        let (mut found, mut not_found) = (0, 0);
         for (kind, q, phasor) in starts() {
             let linear = flow.domain(kind);
-            let rise = linear.short_flight.from(&q, &phasor);
-            let Some(u) = rise.back(1.0) else {
-                refused += 1;
+            let series = linear.short_flight.from(&q, &phasor);
+            let Some(u) = series.first_return(1.0) else {
+                not_found += 1;
                 continue;
             };
             found += 1;
             let case = format!("{kind:?} from {q:?}, {phasor:?}");
-            let [w, x, v] = rise.gained(u, linear.per_unit);
+            let [w, x, v] = series.changes(u, linear.per_unit);
             let s = u * linear.unit;
             let end = linear.propagate(q, phasor, s);
             assert!((end[0] - q[0]).abs() <= 4.0 * f64::EPSILON, "{case}: {} off the wall", end[0] - q[0]);
@@ -202,52 +203,50 @@ mod tests {
                 let part = f64::from(part) / 64.0;
                 let between = linear.propagate(q, phasor, part * s);
                 let at = turned(&phasor, part * u * linear.turn);
-                // Short flights rise by less than an ulp of the wall.
-                let short = 4.0 * f64::EPSILON;
-                assert!(between[0] < q[0] + short, "{case}: beyond the wall on the way");
-                assert!(linear.acceleration(&between, &at) > 0.0, "{case}: not pressed on the way");
+                // The height of a short flight may be less than an ulp of the wall's position.
+                let rounding = 4.0 * f64::EPSILON;
+                assert!(between[0] < q[0] + rounding, "{case}: behind the wall before the return");
+                assert!(linear.acceleration(&between, &at) > 0.0, "{case}: not pressed before the return");
             }
         }
-        assert!(found > 500 && refused > 500, "{found} found, {refused} refused");
+        assert!(found > 500 && not_found > 500, "{found} found, {not_found} not found");
     }
 
-    /// Very short flights keep their relative accuracy: uniformly accelerated motion and a little more.
+    /// Compares very short flights with uniformly accelerated motion.
     #[test]
-    fn short_flights_keep_their_shape() {
+    fn very_short_flights_keep_their_relative_accuracy() {
         let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
         let linear = flow.domain(DomainKind::Free);
         let phasor = [1.0, 0.0];
         for leaving in [1e-3, 1e-6, 1e-9, 1e-12] {
             let q = [0.5, -leaving, 0.3, 0.1];
             let pressing = linear.acceleration(&[0.5, 0.0, 0.3, 0.1], &phasor);
-            let rise = linear.short_flight.from(&q, &phasor);
-            let s = rise.back(1.0).unwrap() * linear.unit;
+            let series = linear.short_flight.from(&q, &phasor);
+            let s = series.first_return(1.0).unwrap() * linear.unit;
             let uniform = 2.0 * leaving / pressing;
             assert!((s / uniform - 1.0).abs() < 2.0 * leaving + 1e-14, "{s} for {uniform}");
-            let [w, ..] = rise.gained(s * linear.per_unit, linear.per_unit);
+            let [w, ..] = series.changes(s * linear.per_unit, linear.per_unit);
             assert!(((w - leaving) / leaving - 1.0).abs() < 2.0 * leaving + 1e-14);
         }
     }
 
     #[test]
-    fn no_return_is_made_up() {
+    fn long_wide_and_unpressed_flights_have_no_certain_return() {
         let flow = Flow::new(&GearPair::paper(0.5).oscillator().unwrap());
         let linear = flow.domain(DomainKind::Free);
-        // Pulled away from the wall; fast; wider than allowed.
-        let pulled = linear.short_flight.from(&[0.5, -0.01, -2.0, 0.0], &[-1.0, 0.0]);
-        assert!(linear.acceleration(&[0.5, -0.01, -2.0, 0.0], &[-1.0, 0.0]) < 0.0);
-        assert_eq!(pulled.back(1.0), None);
-        let fast = linear.short_flight.from(&[0.5, -3.0, 0.3, 0.1], &[1.0, 0.0]);
-        assert_eq!(fast.back(1.0), None);
-        let near = linear.short_flight.from(&[0.5, -0.1, 0.3, 0.1], &[1.0, 0.0]);
-        assert!(near.back(1.0).is_some());
-        assert_eq!(near.back(1e-4), None);
-        let nothing = linear.short_flight.from(&[f64::NAN; 4], &[1.0, 0.0]);
-        assert_eq!(nothing.back(1.0), None);
+        let first_return =
+            |q: Gap, cos: f64, width: f64| linear.short_flight.from(&q, &[cos, 0.0]).first_return(width);
+        let away = [0.5, -0.01, -2.0, 0.0];
+        assert!(linear.acceleration(&away, &[-1.0, 0.0]) < 0.0);
+        assert_eq!(first_return(away, -1.0, 1.0), None);
+        assert_eq!(first_return([0.5, -3.0, 0.3, 0.1], 1.0, 1.0), None);
+        assert!(first_return([0.5, -0.1, 0.3, 0.1], 1.0, 1.0).is_some());
+        assert_eq!(first_return([0.5, -0.1, 0.3, 0.1], 1.0, 1e-4), None);
+        assert_eq!(first_return([f64::NAN; 4], 1.0, 1.0), None);
     }
 
     #[test]
-    fn phasors_turn_to_rounding() {
+    fn turned_phasors_are_exact_to_rounding() {
         for i in 0..=200 {
             let (from, angle) = (0.37 * f64::from(i), 0.001 * f64::from(i));
             let [cos, sin] = turned(&[from.cos(), from.sin()], angle);

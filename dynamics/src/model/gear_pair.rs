@@ -1,50 +1,23 @@
 //! The gear pair with backlash: Table 1 and equations (11) to (13), (22) of the paper.
 
-use super::parameter::parameters;
+use super::parameter::{model, model_methods};
 use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
 
-/// A pair of gears on damped elastic supports, meshing through a backlash `2b`.
-///
-/// Free motion, `|z| < b` with `z = x1 - x2` (11):
-///
-/// ```text
-/// m1 x1'' + r1 x1' + k1 x1 = F cos(omega t)
-/// m2 x2'' + r2 x2' + k2 x2 = 0
-/// ```
-///
-/// Meshing on side `s` (12), (13) adds the contact force `r w + k (z - s b)`,
-/// `w = v1 - v2`, with opposite signs to both. All quantities are dimensionless.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GearPair {
-    /// Equivalent mass of gear 1, > 0.
-    pub m1: f64,
-    /// Equivalent mass of gear 2, > 0.
-    pub m2: f64,
-    /// Support damping of gear 1, >= 0.
-    pub r1: f64,
-    /// Support damping of gear 2, >= 0.
-    pub r2: f64,
-    /// Support stiffness of gear 1, >= 0.
-    pub k1: f64,
-    /// Support stiffness of gear 2, >= 0.
-    pub k2: f64,
-    /// Meshing damping, >= 0.
-    pub r: f64,
-    /// Meshing stiffness, >= 0.
-    pub k: f64,
-    /// Force amplitude on gear 1.
-    pub force: f64,
-    /// Excitation frequency, > 0; the forcing period is `2 pi / omega`.
-    pub omega: f64,
-    /// Half backlash, > 0.
-    pub b: f64,
-    /// Coefficient of restitution, 0 to 1.
-    pub e: f64,
-    /// Leaving speed at or below which a pressed contact becomes meshing, >= 0.
-    pub mesh_speed: f64,
-}
-
-parameters! { GearPair:
+model! {
+    /// A pair of gears on damped elastic supports, meshing through a backlash `2b`.
+    ///
+    /// Free motion, `|z| < b` with `z = x1 - x2` (11):
+    ///
+    /// ```text
+    /// m1 x1'' + r1 x1' + k1 x1 = F cos(omega t)
+    /// m2 x2'' + r2 x2' + k2 x2 = 0
+    /// ```
+    ///
+    /// Meshing on side `s` (12), (13) adds the contact force `r w + k (z - s b)`, `w = v1 - v2`, with opposite signs
+    /// to both. All quantities are dimensionless.
+    GearPair,
+    /// Returns the values of Table 1 with restitution `e`, `0 <= e <= 1`.
+    paper:
     "m1" m1 Some(2.0), Positive, Oscillator, "equivalent mass of gear 1";
     "m2" m2 Some(1.0), Positive, Oscillator, "equivalent mass of gear 2";
     "r1" r1 Some(0.6), NonNegative, Oscillator, "support damping of gear 1";
@@ -61,32 +34,10 @@ parameters! { GearPair:
 }
 
 impl GearPair {
-    /// Every parameter, in the order of Table 1.
-    pub const PARAMETERS: &'static [Parameter] = TABLE;
-
-    /// Table 1 with restitution `e`. Valid if `0 <= e <= 1`.
-    pub fn paper(e: f64) -> GearPair {
-        GearPair {
-            m1: 2.0,
-            m2: 1.0,
-            r1: 0.6,
-            r2: 0.6,
-            k1: 30.0,
-            k2: 20.0,
-            r: 1.0,
-            k: 1000.0,
-            force: 50.0,
-            omega: 5.6,
-            b: 0.5,
-            e,
-            mesh_speed: 0.01,
-        }
-    }
-
-    /// As [`Model::oscillator`].
+    /// Implements [`Model::oscillator`].
     ///
     /// # Errors
-    /// [`ModelError`] if a parameter is not valid, or an entry too large for a number.
+    /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
         let free = Domain {
@@ -113,14 +64,11 @@ impl GearPair {
         oscillator.validate()?;
         Ok(oscillator)
     }
-
-    /// As [`Model::law`].
-    pub fn law(&self) -> Law {
-        Law::both(self.e, self.mesh_speed)
-    }
 }
 
 impl Model for GearPair {
+    model_methods!();
+
     fn name(&self) -> &str {
         "gear-pair"
     }
@@ -131,26 +79,6 @@ impl Model for GearPair {
 
     fn source(&self) -> Option<&str> {
         Some("Study on the Nonlinear Dynamic Behavior of Rattling Vibration in Gear Systems")
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        TABLE
-    }
-
-    fn value(&self, index: usize) -> f64 {
-        *ACCESSORS[index](&mut { *self })
-    }
-
-    fn assign(&mut self, index: usize, value: f64) {
-        *ACCESSORS[index](self) = value;
-    }
-
-    fn oscillator(&self) -> Result<Oscillator, ModelError> {
-        self.oscillator()
-    }
-
-    fn law(&self) -> Law {
-        self.law()
     }
 
     fn state_names(&self) -> Vec<&str> {
@@ -166,14 +94,6 @@ impl Model for GearPair {
 mod tests {
     use super::*;
     use crate::model::ParameterError;
-
-    #[test]
-    fn table_and_paper_agree() {
-        let mut pair = GearPair::paper(0.5);
-        for (parameter, at) in TABLE.iter().zip(ACCESSORS) {
-            assert_eq!(*at(&mut pair), parameter.default.unwrap_or(0.5), "{}", parameter.name);
-        }
-    }
 
     #[test]
     fn setting_out_of_range_changes_nothing() {

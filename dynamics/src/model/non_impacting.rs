@@ -1,47 +1,45 @@
-//! Motion that never touches a wall again.
+//! Steady motion that never touches a wall.
 //!
-//! Free motion is its steady response `x_s` and a transient `q = x - x_s`, which obeys the
-//! free equations without force or load. Its energy `2 E = q' M q' + q K q` never grows, so
-//! the gap stays within
+//! Free motion is the sum of a steady response `x_s` and a transient `q = x - x_s`, which obeys the free equations
+//! without force or load. The transient's energy `2 E = q' M q' + q K q` never grows, so the gap stays within
 //!
 //! ```text
 //! |z - z_0| <= |g . X| + sqrt(2 E g K^-1 g),   z_0 = g . K^-1 load
 //! ```
 //!
-//! for ever, with `X` the complex amplitude of the steady response (Cauchy-Schwarz in the
-//! inner product of K). Where that lies between the walls, the motion has no event to come.
+//! for all time, with `X` the complex amplitude of the steady response (Cauchy-Schwarz in the inner product of K). If
+//! that interval lies between the walls, the motion has no further event.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 
 use super::{Oscillator, State};
 
-/// Room for rounding, relative to twice the scale of length.
-const ROUNDING: f64 = 1e-9;
+/// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
+/// relative to the excitation frequency.
+const MARGIN: f64 = 1e-9;
 
-/// The contact-free motion of an oscillator, if it has stable one.
+/// The stable contact-free motion of an oscillator.
 #[derive(Clone, Debug)]
 pub struct NonImpacting {
-    /// The steady state at phase 0.
     steady: State,
     mass: [[f64; 2]; 2],
     stiffness: Matrix2<f64>,
-    /// `sqrt(2 E)` up to which a transient keeps clear of the walls.
+    /// Largest `sqrt(2 E)` of a transient that touches no wall.
     reach: f64,
     exponent: f64,
-    /// The degree of freedom that must be at rest for it.
     resting: Option<usize>,
 }
 
 impl NonImpacting {
-    /// None if there is no contact-free steady motion, or if it does not attract.
+    /// Computes the contact-free steady motion. Returns none if it touches a wall or is not stable.
     pub fn new(oscillator: &Oscillator) -> Option<NonImpacting> {
         if oscillator.degrees == 1 {
-            return NonImpacting::of_two(&beside_copy(oscillator, 1));
+            return NonImpacting::of_two_degrees(&with_copy(oscillator, 1));
         }
-        NonImpacting::of_two(oscillator)
+        NonImpacting::of_two_degrees(oscillator)
     }
 
-    fn of_two(oscillator: &Oscillator) -> Option<NonImpacting> {
+    fn of_two_degrees(oscillator: &Oscillator) -> Option<NonImpacting> {
         let Oscillator { omega, walls, mass, .. } = *oscillator;
         let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
         let (stiffness, damping) = (matrix(oscillator.free.stiffness), matrix(oscillator.free.damping));
@@ -56,9 +54,8 @@ impl NonImpacting {
         let middle = compliance * Vector2::from(oscillator.free.load);
         let swing = gap.map(Complex::from).dot(&amplitude).norm();
         let room = (walls[0] - gap.dot(&middle)).min(gap.dot(&middle) - walls[1]) - swing;
-        let reach = (room - ROUNDING * 2.0 * oscillator.length_scale()) / gap.dot(&(compliance * gap)).sqrt();
-        // Damping so weak that rounding decides is none.
-        if !(reach > 0.0 && exponent < -ROUNDING * omega) {
+        let reach = (room - MARGIN * 2.0 * oscillator.length_scale()) / gap.dot(&(compliance * gap)).sqrt();
+        if !(reach > 0.0 && exponent < -MARGIN * omega) {
             return None;
         }
         let steady = [0, 1].map(|i| [amplitude[i].re + middle[i], -omega * amplitude[i].im]);
@@ -66,9 +63,9 @@ impl NonImpacting {
         Some(NonImpacting { steady, mass, stiffness, reach, exponent, resting: None })
     }
 
-    /// The same where one degree of freedom keeps at rest: nothing moves it between the walls. Whether its
-    /// own motion would decay makes no difference then.
-    pub fn beside_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
+    /// Computes the contact-free steady motion of one degree of freedom while the other, which nothing moves between
+    /// the walls, stays at rest. The one at rest may be undamped.
+    pub fn with_one_at_rest(oscillator: &Oscillator) -> Option<NonImpacting> {
         (0..2).find_map(|resting| {
             let Oscillator { gap, force, free, mass, .. } = *oscillator;
             let moving = 1 - resting;
@@ -78,17 +75,17 @@ impl NonImpacting {
             if !stays || gap[moving] == 0.0 {
                 return None;
             }
-            let quiet = NonImpacting::of_two(&beside_copy(oscillator, resting))?;
-            Some(NonImpacting { resting: Some(resting), ..quiet })
+            let motion = NonImpacting::of_two_degrees(&with_copy(oscillator, resting))?;
+            Some(NonImpacting { resting: Some(resting), ..motion })
         })
     }
 
-    /// The degree of freedom that must be at rest for it, if one must.
+    /// Returns the index of the degree of freedom that must be at rest, if one must.
     pub fn resting(&self) -> Option<usize> {
         self.resting
     }
 
-    /// Whether free motion from `y` at phase 0 certainly has no event to come.
+    /// Whether free motion from `y` at phase 0 certainly has no further event.
     pub fn is_certain(&self, y: State) -> bool {
         if self.resting.is_some_and(|i| [y[2 * i], y[2 * i + 1]] != [0.0; 2]) {
             return false;
@@ -101,24 +98,24 @@ impl NonImpacting {
         twice_energy < self.reach * self.reach
     }
 
-    /// The steady state at phase 0.
+    /// Returns the steady state at phase 0.
     pub fn steady(&self) -> State {
         self.steady
     }
 
-    /// Energy `2 E` of a transient, as [`NonImpacting`] measures it, up to which no event will come.
+    /// Returns the energy `2 E` of a transient below which there is no further event.
     pub fn reach(&self) -> f64 {
         self.reach * self.reach
     }
 
-    /// Its Lyapunov exponent per unit time: the slowest decay of free motion.
+    /// Returns the Lyapunov exponent per unit time: the slowest decay rate of free motion.
     pub fn exponent(&self) -> f64 {
         self.exponent
     }
 }
 
-/// An oscillator with a copy of one degree of freedom in place of the other, which no wall sees.
-fn beside_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
+/// Replaces the degree of freedom `resting` by a copy of the other that does not enter the gap.
+fn with_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
     let (mut copied, moving) = (*oscillator, 1 - resting);
     let share = copied.mass[resting][resting] / copied.mass[moving][moving];
     let free = &mut copied.free;
@@ -128,7 +125,7 @@ fn beside_copy(oscillator: &Oscillator, resting: usize) -> Oscillator {
     copied
 }
 
-/// The largest real part of the eigenvalues of free motion.
+/// Returns the largest real part of the eigenvalues of free motion.
 fn exponent(stiffness: &Matrix2<f64>, damping: &Matrix2<f64>) -> f64 {
     let mut generator = Matrix4::zeros();
     generator.fixed_view_mut::<2, 2>(0, 2).fill_with_identity();
@@ -149,9 +146,9 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_has_it_above_a_frequency() {
-        // Two uncoupled supports: the force moves gear 1 alone, and gear 2 is the least damped
-        // with r / (2 m) = 0.15 for gear 1 and 0.3 for gear 2.
+    fn the_gear_pair_has_non_impacting_motion_above_a_frequency() {
+        // The supports are not coupled, and the force acts on gear 1 alone. The decay rates r / (2 m) are 0.15 for
+        // gear 1 and 0.3 for gear 2.
         let motion = NonImpacting::new(&pair(11.0).oscillator().unwrap()).unwrap();
         assert!((motion.exponent() + 0.15).abs() < 1e-12);
         let p = Complex::from(50.0) / Complex::new(30.0 - 2.0 * 121.0, 0.6 * 11.0);
@@ -168,31 +165,30 @@ mod tests {
         let undamped = GearPair { r1: 0.0, ..pair(11.0) };
         assert!(NonImpacting::new(&undamped.oscillator().unwrap()).is_none());
         assert!(
-            NonImpacting::beside_rest(&undamped.oscillator().unwrap()).is_none(),
+            NonImpacting::with_one_at_rest(&undamped.oscillator().unwrap()).is_none(),
             "the force moves gear 1"
         );
     }
 
-    /// Gear 2 is not moved between the walls: it stays at rest, damped or not, held or not.
+    /// No force acts on gear 2 between the walls, so it stays at rest with or without damping and support.
     #[test]
-    fn an_undamped_gear_may_rest_beside_it() {
+    fn the_gear_at_rest_may_be_undamped() {
         let whole = NonImpacting::new(&pair(11.0).oscillator().unwrap()).unwrap();
         for (r2, k2) in [(0.0, 20.0), (0.6, 0.0), (0.0, 0.0)] {
             let oscillator = GearPair { r2, k2, ..pair(11.0) }.oscillator().unwrap();
             assert!(NonImpacting::new(&oscillator).is_none());
-            let quiet = NonImpacting::beside_rest(&oscillator).unwrap();
-            let off = std::array::from_fn::<_, 4, _>(|i| (quiet.steady()[i] - whole.steady()[i]).abs());
-            assert!(quiet.resting() == Some(1) && off.iter().all(|&x| x < 1e-15), "{off:?}");
-            assert!((quiet.exponent() + 0.15).abs() < 1e-12);
-            assert!(quiet.is_certain(quiet.steady()));
-            let [x1, v1, ..] = quiet.steady();
-            assert!(!quiet.is_certain([x1, v1, 1e-12, 0.0]) && !quiet.is_certain([x1, v1, 0.0, 1e-12]));
+            let motion = NonImpacting::with_one_at_rest(&oscillator).unwrap();
+            let off = std::array::from_fn::<_, 4, _>(|i| (motion.steady()[i] - whole.steady()[i]).abs());
+            assert!(motion.resting() == Some(1) && off.iter().all(|&x| x < 1e-15), "{off:?}");
+            assert!((motion.exponent() + 0.15).abs() < 1e-12);
+            assert!(motion.is_certain(motion.steady()));
+            let [x1, v1, ..] = motion.steady();
+            assert!(!motion.is_certain([x1, v1, 1e-12, 0.0]) && !motion.is_certain([x1, v1, 0.0, 1e-12]));
         }
     }
 
-    /// No trajectory that is certain ever has an event, and the bound is not idle.
     #[test]
-    fn certain_motion_has_no_event() {
+    fn motion_that_is_certain_to_be_non_impacting_has_no_event() {
         let mut certain = 0;
         for step in 0..200u32 {
             let pair = pair(8.1 + 0.02 * f64::from(step));
@@ -211,7 +207,7 @@ mod tests {
             if was {
                 certain += 1;
                 assert_eq!(trajectory.work().events, 0, "{pair:?} from {start:?}");
-                assert!(motion.is_certain(trajectory.state()), "what is certain stays so");
+                assert!(motion.is_certain(trajectory.state()), "{pair:?} from {start:?}");
             }
         }
         assert!((20..190).contains(&certain), "{certain} of 200");

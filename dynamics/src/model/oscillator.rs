@@ -1,23 +1,23 @@
-//! What every model returns: masses, domains, walls.
+//! Oscillators and contact laws: masses, linear domains, walls.
 
 use thiserror::Error;
 
 use super::Side;
 
-/// How far rounding may take a semidefinite matrix from being one, relative to its entries.
-const ROUNDING: f64 = 1e-12;
+/// Rounding error that checks of a matrix allow, relative to its entries.
+const MATRIX_TOLERANCE: f64 = 1e-12;
 
-/// Why a description is no oscillator, or no contact law.
+/// An error in an oscillator or a contact law.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum OscillatorError {
-    /// A number that is not among those allowed.
+    /// A number that is out of its range.
     #[error("{quantity} = {value}: it must be {requirement}")]
     OutOfRange {
-        /// What the number is.
+        /// The quantity.
         quantity: String,
-        /// The number.
+        /// The rejected value.
         value: f64,
-        /// What it must be.
+        /// The range in words.
         requirement: &'static str,
     },
     /// Walls that leave no room between them.
@@ -26,34 +26,34 @@ pub enum OscillatorError {
         /// Positions of the right and the left wall.
         walls: [f64; 2],
     },
-    /// A damping or stiffness matrix that is not its own transpose.
+    /// A mass, damping or stiffness matrix that is not symmetric.
     #[error("{quantity} = {matrix:?}: the matrix must be symmetric")]
     NotSymmetric {
-        /// Which matrix it is.
+        /// Name of the matrix.
         quantity: String,
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
-    /// A matrix behind an elastic wall that does more than act along the gap row.
+    /// A matrix behind an elastic wall that differs from that of free motion by more than `c g g^T`.
     #[error(
         "{quantity} = {matrix:?}: behind an elastic wall it must be that of free motion and a part along the gap row"
     )]
     NotAlongGap {
-        /// Which matrix it is.
+        /// Name of the matrix.
         quantity: String,
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
-    /// A mass matrix by which some motion has no inertia.
+    /// A mass matrix that is not positive definite.
     #[error("mass = {matrix:?}: the matrix must be positive definite")]
     NotDefinite {
         /// The matrix.
         matrix: [[f64; 2]; 2],
     },
-    /// A damping or stiffness matrix by which motion gains energy.
+    /// A damping or stiffness matrix that is not positive semidefinite.
     #[error("{quantity} = {matrix:?}: the matrix must be positive semidefinite")]
     NotSemidefinite {
-        /// Which matrix it is.
+        /// Name of the matrix.
         quantity: String,
         /// The matrix.
         matrix: [[f64; 2]; 2],
@@ -62,8 +62,8 @@ pub enum OscillatorError {
 
 /// One linear domain: `M x'' + damping x' + stiffness x = force cos(omega t) + load`.
 ///
-/// Damping and stiffness are symmetric and positive semidefinite: the energy bounds of
-/// the event certificate rest on that (see [`crate::flow`]).
+/// Damping and stiffness are symmetric and positive semidefinite. The energy bounds of the event certificate need
+/// that (see [`crate::flow`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
     /// Damping matrix.
@@ -74,37 +74,35 @@ pub struct Domain {
     pub load: [f64; 2],
 }
 
-/// The least scale of length: what acts on nothing and reaches nowhere still gets one above zero.
+/// Lower bound of [`Oscillator::length_scale`], which must not be zero.
 const LEAST_LENGTH: f64 = 1e-150;
 
-/// What a wall is to a motion that reaches it.
+/// The contact type of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contact {
-    /// An impact, `w+ = -e w-`; a pressed contact that leaves slowly enough lasts, and moves on a
-    /// spring and a damper behind the wall.
+    /// An impact, `w+ = -e w-`. A pressed contact with a low leaving speed lasts, and then moves on a spring and a
+    /// damper behind the wall.
     Impact,
-    /// An impact on a wall that does not yield: a pressed contact that has come to rest sticks to it
-    /// until the load pulls it off. The motion behind it is not asked for.
+    /// An impact on a rigid wall. A pressed contact that has come to rest sticks to the wall until the load pulls it
+    /// off.
     Rigid,
-    /// No impact: the motion goes on behind the wall at once, its state continuous.
+    /// No impact: the motion continues behind the wall, and the state is continuous.
     Elastic,
 }
 
-/// A forced piecewise-linear oscillator of up to two degrees of freedom between two walls, of which
-/// either may be missing.
+/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillator {
-    /// Degrees of freedom: 2, or 1 where the second displacement does not exist. Then it has a mass of 1,
-    /// nothing acts on it, no gap sees it, and its state is 0.
+    /// Degrees of freedom: 1 or 2. With 1, the second displacement has a mass of 1, no forces and no part in the gap,
+    /// and its state is 0.
     pub degrees: usize,
     /// Mass matrix, symmetric and positive definite.
     pub mass: [[f64; 2]; 2],
     /// Row `g` of the gap `z = g . x`; not zero.
     pub gap: [f64; 2],
-    /// Positions `z` of the right (upper) and left (lower) wall; `+inf` or `-inf` where there is none,
-    /// and then nothing asks for the motion behind it.
+    /// Positions `z` of the right (upper) and left (lower) wall; `+inf` or `-inf` for a missing wall.
     pub walls: [f64; 2],
-    /// What the right and the left wall are; of no meaning where there is none.
+    /// Contact types of the right and the left wall; ignored for a missing wall.
     pub contacts: [Contact; 2],
     /// Excitation frequency, > 0.
     pub omega: f64,
@@ -112,28 +110,27 @@ pub struct Oscillator {
     pub force: [f64; 2],
     /// Motion between the walls.
     pub free: Domain,
-    /// Motion in lasting contact with the right and with the left wall; of no meaning behind a rigid one.
+    /// Motion in lasting contact with the right and the left wall; ignored for rigid and missing walls.
     pub meshing: [Domain; 2],
 }
 
 impl Oscillator {
-    /// The forcing period `2 pi / omega`.
+    /// Returns the forcing period `2 pi / omega`.
     pub fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
     }
 
-    /// Position of a wall.
     pub(crate) fn wall(&self, side: Side) -> f64 {
         self.walls[side.index()]
     }
 
-    /// Index of the displacement that goes with the gap as a coordinate: the one that the gap row weighs
-    /// less, the second if both weigh alike.
+    /// Returns the index of the displacement that is a coordinate together with the gap: the one with the smaller
+    /// entry in the gap row, the second if both are equal.
     pub fn other(&self) -> usize {
         usize::from(self.gap[0].abs() >= self.gap[1].abs())
     }
 
-    /// `M^-1 force`: the accelerations that a force gives.
+    /// Returns `M^-1 force`, the accelerations due to a force.
     pub fn accelerations(&self, force: [f64; 2]) -> [f64; 2] {
         let ([[m1, m], [_, m2]], [f1, f2]) = (self.mass, force);
         if m == 0.0 {
@@ -144,7 +141,7 @@ impl Oscillator {
         [(f1 - m * second) / m1, second]
     }
 
-    /// The inverse of the mass matrix.
+    /// Returns the inverse of the mass matrix.
     pub fn inverse_mass(&self) -> [[f64; 2]; 2] {
         let [[m1, m], [_, m2]] = self.mass;
         if m == 0.0 {
@@ -154,7 +151,7 @@ impl Oscillator {
         [[a, c], [c, d]]
     }
 
-    /// `row M^-1 row`: what an impulse along a row changes of that row's velocity.
+    /// Returns `row M^-1 row`, the change of the velocity `row . v` by a unit impulse along the row.
     pub fn mobility(&self, row: [f64; 2]) -> f64 {
         let ([[m1, m], [_, m2]], [r1, r2]) = (self.mass, row);
         if m == 0.0 {
@@ -165,17 +162,17 @@ impl Oscillator {
         r1 * r1 / m1 + rest * rest / (m2 - share * m)
     }
 
-    /// Lower factor `L` of the mass matrix `L L^T`.
+    /// Returns the lower factor `L` of the mass matrix `L L^T`.
     pub(crate) fn mass_root(&self) -> [[f64; 2]; 2] {
         let [[m1, m], [_, m2]] = self.mass;
         let first = m1.sqrt();
         [[first, 0.0], [m / first, (m2 - m / m1 * m).sqrt()]]
     }
 
-    /// Checks everything that flow and reference rest on.
+    /// Checks everything that [`crate::flow`] and [`mod@crate::reference`] assume.
     ///
     /// # Errors
-    /// [`OscillatorError`] for the first thing that is wrong.
+    /// [`OscillatorError`] for the first check that fails.
     pub fn validate(&self) -> Result<(), OscillatorError> {
         let is_known = matches!(self.degrees, 1 | 2);
         require(is_known, || "degrees of freedom".to_owned(), self.degrees as f64, "1 or 2")?;
@@ -195,11 +192,15 @@ impl Oscillator {
             finite(|| format!("entry {} of the gap row", i + 1), entry)?;
         }
         let largest = self.gap[1 - self.other()];
-        require(largest != 0.0, || "the largest entry of the gap row".to_owned(), largest, "not 0")?;
+        require(
+            largest != 0.0,
+            || "the largest entry of the gap row".to_owned(),
+            largest,
+            "different from 0",
+        )?;
         for (i, force) in self.force.into_iter().enumerate() {
             finite(|| format!("force {}", i + 1), force)?;
         }
-        // A wall at infinity is none.
         let [right, left] = self.walls;
         let are_apart = right > left && right > f64::NEG_INFINITY && left < f64::INFINITY;
         if !are_apart {
@@ -219,18 +220,18 @@ impl Oscillator {
         if self.degrees == 1 { self.validate_single() } else { Ok(()) }
     }
 
-    /// Whether motion may go on behind a wall: there is one, and it yields.
-    pub(crate) fn has_motion_behind(&self, side: Side) -> bool {
+    /// Whether a wall exists and motion can continue behind it.
+    fn has_motion_behind(&self, side: Side) -> bool {
         self.wall(side).is_finite() && self.contacts[side.index()] != Contact::Rigid
     }
 
-    /// Whether there is a wall that motion goes through without a jump.
+    /// Whether a wall exists and is elastic.
     pub(crate) fn is_elastic(&self, side: Side) -> bool {
         self.wall(side).is_finite() && self.contacts[side.index()] == Contact::Elastic
     }
 
-    /// Stiffness and damping that a wall adds along the gap row; 0 where no motion goes on behind it.
-    pub fn added(&self, side: Side) -> [f64; 2] {
+    /// Returns the stiffness and damping that a wall adds along the gap row; 0 if no motion continues behind it.
+    pub fn wall_stiffness_and_damping(&self, side: Side) -> [f64; 2] {
         if !self.has_motion_behind(side) {
             return [0.0; 2];
         }
@@ -241,10 +242,10 @@ impl Oscillator {
         ]
     }
 
-    /// An elastic wall acts along the gap row, and from its position on: motion has no jump there.
+    /// Checks that an elastic wall acts along the gap row only, and that the force is continuous at the wall.
     fn validate_elastic(&self, side: Side, place: &str) -> Result<(), OscillatorError> {
         let (behind, free, g) = (&self.meshing[side.index()], &self.free, self.gap);
-        let [stiffness, damping] = self.added(side);
+        let [stiffness, damping] = self.wall_stiffness_and_damping(side);
         let matrices = [
             ("stiffness", behind.stiffness, free.stiffness, stiffness),
             ("damping", behind.damping, free.damping, damping),
@@ -253,11 +254,10 @@ impl Oscillator {
             let size = matrix.iter().chain(&before).flatten().fold(0.0f64, |size, x| size.max(x.abs()));
             let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
             let is_along = |(i, j): (usize, usize)| {
-                (matrix[i][j] - before[i][j] - added * g[i] * g[j]).abs() <= ROUNDING * size
+                (matrix[i][j] - before[i][j] - added * g[i] * g[j]).abs() <= MATRIX_TOLERANCE * size
             };
-            // An inverse spring, or a damper that drives.
             let quantity = || format!("{name} added in {place}");
-            let least = -ROUNDING * size / (g[0] * g[0] + g[1] * g[1]);
+            let least = -MATRIX_TOLERANCE * size / (g[0] * g[0] + g[1] * g[1]);
             require(added >= least, quantity, added, "at least 0 where the wall is elastic")?;
             if !(added >= 0.0 && pairs.into_iter().all(is_along)) {
                 let quantity = format!("{name} in {place}");
@@ -265,20 +265,20 @@ impl Oscillator {
             }
         }
         let wall = self.wall(side);
-        // The spring is known to the rounding of the matrix that it is a part of.
+        // The stiffness is a difference of matrices, and has the rounding error of their largest entry.
         let largest = behind.stiffness.as_flattened().iter().fold(0.0f64, |size, x| size.max(x.abs()));
         let least = largest / (g[0] * g[0] + g[1] * g[1]);
         for (i, g) in g.into_iter().enumerate() {
             let expected = free.load[i] + stiffness * wall * g;
             let size = free.load[i].abs() + (stiffness.max(least) * wall * g).abs();
-            let is_continuous = (behind.load[i] - expected).abs() <= ROUNDING * size;
+            let is_continuous = (behind.load[i] - expected).abs() <= MATRIX_TOLERANCE * size;
             let requirement = "the load of free motion and the spring's at the wall";
             require(is_continuous, || format!("load {} in {place}", i + 1), behind.load[i], requirement)?;
         }
         Ok(())
     }
 
-    /// The second displacement of one degree of freedom is there in name only.
+    /// Checks that the unused second displacement of one degree of freedom has no coupling and no forces.
     fn validate_single(&self) -> Result<(), OscillatorError> {
         let none = |what: &str, value: f64| {
             let requirement = "0, since one degree of freedom has no second displacement";
@@ -301,20 +301,21 @@ impl Oscillator {
         Ok(())
     }
 
-    /// What distances are measured by, > 0: half the walls' distance, or where a wall is missing or
-    /// both coincide
+    /// Returns the length, > 0, that tolerances on distances are relative to.
+    ///
+    /// It is half the distance of the walls. If a wall is missing or both coincide, it is
     ///
     /// ```text
     /// max(|wall|, |D force|, |D load|),   D = (K + omega^2 M)^-1
     /// ```
     ///
-    /// over the walls there are and both displacements, with `K` and `load` of free motion. `D force`
-    /// is the size of the forced deflection without what resonance or damping make of it, and `D load`
-    /// that of the static deflection, or of how far the load moves a soft spring or none in a radian of
-    /// the forcing. So it is finite for any oscillator.
+    /// over the existing walls and both displacements, with `K` and `load` of free motion. `D force` is the forced
+    /// deflection without the effects of resonance and damping. `D load` is the static deflection; for a soft spring
+    /// or none it is the distance that the load moves a mass in a radian of the forcing. The scale is finite for
+    /// every oscillator.
     ///
-    /// It follows every change of units: `walls`, `force` and `load` times a power of two multiply it
-    /// by that number to the bit, and a change of the unit of time leaves it alone.
+    /// A factor on `walls`, `force` and `load` that is a power of two multiplies the scale exactly. A change of the
+    /// unit of time does not change it.
     pub fn length_scale(&self) -> f64 {
         let [right, left] = self.walls;
         let half = 0.5 * (right - left);
@@ -326,7 +327,6 @@ impl Oscillator {
         walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
     }
 
-    /// The largest displacement of `(K + omega^2 M)^-1 force`.
     fn deflection(&self, force: [f64; 2]) -> f64 {
         let [[k1, k], [_, k2]] = self.free.stiffness;
         let [[m1, m], [_, m2]] = self.mass;
@@ -337,8 +337,8 @@ impl Oscillator {
         ((b * f1 - k * f2) / determinant).abs().max(((a * f2 - k * f1) / determinant).abs())
     }
 
-    /// Whether the walls and what lies behind them are mirror images of each other, so that
-    /// `(y, t) -> (-y, t + T/2)` takes solutions to solutions.
+    /// Whether the walls and the domains behind them are mirror images, so that `(y, t) -> (-y, t + T/2)` maps
+    /// solutions to solutions.
     pub fn mirror_symmetric(&self) -> bool {
         let mirrored = |domain: &Domain| Domain { load: domain.load.map(|value| -value), ..*domain };
         self.walls[0] == -self.walls[1]
@@ -357,8 +357,8 @@ impl Domain {
             if b != c {
                 return Err(OscillatorError::NotSymmetric { quantity: quantity(), matrix });
             }
-            // Products may overflow, which is no harm.
-            if !(a >= 0.0 && d >= 0.0 && a * d * (1.0 + ROUNDING) >= b * b) {
+            // An overflow of the products passes the check, which is harmless.
+            if !(a >= 0.0 && d >= 0.0 && a * d * (1.0 + MATRIX_TOLERANCE) >= b * b) {
                 return Err(OscillatorError::NotSemidefinite { quantity: quantity(), matrix });
             }
         }
@@ -366,7 +366,7 @@ impl Domain {
     }
 }
 
-/// What one matrix has more than another along a row: `c` where the difference is `c row row^T`.
+/// Returns `c` if the difference of two matrices is `c row row^T`.
 fn along(row: [f64; 2], matrix: [[f64; 2]; 2], less: [[f64; 2]; 2]) -> f64 {
     let square = row[0] * row[0] + row[1] * row[1];
     let product = |i: usize, j: usize| row[i] * (matrix[i][j] - less[i][j]) * row[j];
@@ -393,31 +393,30 @@ fn require(
     }
 }
 
-/// What happens at a wall: all that a cell needs beside its flow.
+/// The contact law: the parameters of a cell that its flow does not depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
-    /// Coefficient of restitution `e`, 0 to 1, of the right and of the left wall: `w+ = -e w-`.
-    /// Elastic contact has none.
+    /// Coefficient of restitution `e`, 0 to 1, of the right and the left wall: `w+ = -e w-`. Elastic walls ignore it.
     pub restitution: [f64; 2],
-    /// Leaving speed `e |w-|` at or below which a pressed contact lasts, >= 0, likewise.
+    /// Leaving speed `e |w-|`, >= 0, at or below which a pressed contact with the right or left wall lasts.
     pub mesh_speed: [f64; 2],
 }
 
 impl Law {
-    /// The same law at both walls.
+    /// Builds a law that is the same at both walls.
     pub fn both(restitution: f64, mesh_speed: f64) -> Law {
         Law { restitution: [restitution; 2], mesh_speed: [mesh_speed; 2] }
     }
 
-    /// Whether both walls have the same.
+    /// Whether both walls have the same law.
     pub fn is_symmetric(&self) -> bool {
         self.restitution[0] == self.restitution[1] && self.mesh_speed[0] == self.mesh_speed[1]
     }
 
-    /// Checks both numbers.
+    /// Checks the ranges of restitution and mesh speed.
     ///
     /// # Errors
-    /// [`OscillatorError::OutOfRange`] for the first that is wrong.
+    /// [`OscillatorError::OutOfRange`] for the first check that fails.
     pub fn validate(&self) -> Result<(), OscillatorError> {
         for restitution in self.restitution {
             let is_allowed = (0.0..=1.0).contains(&restitution);
@@ -435,9 +434,9 @@ mod tests {
     use super::*;
     use crate::model::GearPair;
 
-    /// Each of these is one slip away from a valid description.
+    /// Each oscillator differs from a valid one in one entry.
     #[test]
-    fn what_is_wrong_is_named_with_its_value() {
+    fn errors_name_the_quantity_and_its_value() {
         let good = GearPair::paper(0.5).oscillator().unwrap();
         assert_eq!(good.validate(), Ok(()));
         let one_wall = Oscillator { walls: [0.5, f64::NEG_INFINITY], ..good };
@@ -449,7 +448,10 @@ mod tests {
         };
         assert_eq!(slip(|o| o.mass[1][1] = 0.0), "mass 2 = 0: it must be finite and greater than 0");
         assert_eq!(slip(|o| o.omega = f64::NAN), "omega = NaN: it must be finite and greater than 0");
-        assert_eq!(slip(|o| o.gap = [0.0; 2]), "the largest entry of the gap row = 0: it must be not 0");
+        assert_eq!(
+            slip(|o| o.gap = [0.0; 2]),
+            "the largest entry of the gap row = 0: it must be different from 0"
+        );
         assert_eq!(slip(|o| o.gap[1] = f64::NAN), "entry 2 of the gap row = NaN: it must be a finite number");
         assert_eq!(slip(|o| o.degrees = 3), "degrees of freedom = 3: it must be 1 or 2");
         assert_eq!(
@@ -476,9 +478,9 @@ mod tests {
         );
     }
 
-    /// Matrices without support are singular, and rounding must not make them wrong.
+    /// Without supports the meshing matrices are singular, and rounding may make a determinant negative.
     #[test]
-    fn singular_matrices_are_allowed_at_every_size() {
+    fn singular_matrices_are_valid_at_every_size() {
         for scale in [1e-300, 1e-160, 1.0, 1e160, 1e300] {
             let pair = GearPair {
                 r1: 0.0,
@@ -494,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn laws_are_checked() {
+    fn law_checks_its_ranges() {
         let law = GearPair::paper(0.5).law();
         assert_eq!(law.validate(), Ok(()));
         let error = Law { restitution: [0.5, 1.5], ..law }.validate().unwrap_err();
@@ -503,15 +505,15 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_measured_by_half_its_width() {
+    fn length_scale_of_two_walls_is_half_their_distance() {
         let pair = GearPair::paper(0.5).oscillator().unwrap();
         assert_eq!(pair.length_scale(), 0.5);
         assert_eq!(Oscillator { walls: [0.7, 0.2], ..pair }.length_scale(), 0.5 * (0.7 - 0.2));
     }
 
-    /// Supports of 30 and 20 on masses of 2 and 1: with `omega = 1`, 32 and 21.
+    /// With `omega = 1` the supports of 30 and 20 on masses of 2 and 1 give `K + omega^2 M` of 32 and 21.
     #[test]
-    fn one_wall_is_measured_by_where_it_is_and_what_acts() {
+    fn length_scale_of_one_wall_is_the_largest_of_position_and_deflections() {
         let pair = Oscillator { omega: 1.0, ..GearPair::paper(0.5).oscillator().unwrap() };
         let with = |walls: [f64; 2], force: [f64; 2], load: [f64; 2]| {
             Oscillator { walls, force, free: Domain { load, ..pair.free }, ..pair }.length_scale()

@@ -15,19 +15,19 @@ pub enum Range {
     Unit,
     /// any finite number
     Finite,
-    /// Any other: `min <= value <= max`, where infinite ends bound nothing.
+    /// `min <= value <= max`; an infinite end is no bound
     Between {
         /// The least value, below `max`.
         min: f64,
         /// The greatest value.
         max: f64,
-        /// Whether `min` itself is left out.
+        /// Whether `min` itself is excluded.
         open: bool,
     },
 }
 
 impl Range {
-    /// The range with these ends, each infinite where there is none; `open` leaves `min` itself out.
+    /// Builds the range with these ends. An infinite end is no bound; `open` excludes `min` itself.
     pub fn new(min: f64, max: f64, open: bool) -> Range {
         match (min, max, open) {
             (0.0, f64::INFINITY, true) => Range::Positive,
@@ -50,7 +50,7 @@ impl Range {
             }
     }
 
-    /// The range in words, to end the sentence "it must be ...".
+    /// Returns the range in words that complete the sentence "it must be ...".
     pub fn requirement(self) -> Cow<'static, str> {
         Cow::Borrowed(match self {
             Range::Positive => "finite and greater than 0",
@@ -70,21 +70,21 @@ impl Range {
     }
 }
 
-/// What a parameter shapes: cells that differ in parameters of the law alone share their flow.
+/// What depends on a parameter. Cells that differ only in parameters of the law share one flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shapes {
-    /// The oscillator, and nothing of the contact law.
+    /// The oscillator, and not the contact law.
     Oscillator,
-    /// The contact law, and nothing of the oscillator.
+    /// The contact law, and not the oscillator.
     Law,
-    /// Both of them.
+    /// The oscillator and the contact law.
     Both,
-    /// Neither: only what is derived from it may.
+    /// Neither directly; parameters derived from it may.
     Neither,
 }
 
 impl Shapes {
-    /// What a parameter shapes that the oscillator and the law depend on or not.
+    /// Returns the variant for these two dependencies.
     pub fn new(oscillator: bool, law: bool) -> Shapes {
         match (oscillator, law) {
             (true, true) => Shapes::Both,
@@ -105,14 +105,14 @@ impl Shapes {
     }
 }
 
-/// One parameter of a model: a line of its table.
+/// One parameter of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// The name in scenes, on the command line and in column headers.
     pub name: Cow<'static, str>,
     /// One phrase for `--help` and axis labels.
     pub meaning: Cow<'static, str>,
-    /// The value where nothing is said; none where a choice is required.
+    /// The default value; none if the user must choose one.
     pub default: Option<f64>,
     /// The values it may take.
     pub range: Range,
@@ -121,10 +121,10 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// A value, if it is one that the parameter may take.
+    /// Returns the value if it lies in the parameter's range.
     ///
     /// # Errors
-    /// [`ParameterError::OutOfRange`] if it is not.
+    /// [`ParameterError::OutOfRange`] if it does not.
     pub fn check(&self, value: f64) -> Result<f64, ParameterError> {
         if self.range.contains(value) {
             return Ok(value);
@@ -134,30 +134,81 @@ impl Parameter {
     }
 }
 
-/// A model that is a struct of numbers: its table of parameters, and how each is reached.
-macro_rules! parameters {
-    ($model:ident: $($name:literal $field:ident $default:expr, $range:ident, $shapes:ident, $meaning:literal;)*) => {
-        const TABLE: &[Parameter] = &[$(Parameter {
-            name: std::borrow::Cow::Borrowed($name),
-            meaning: std::borrow::Cow::Borrowed($meaning),
-            default: $default,
-            range: Range::$range,
-            shapes: Shapes::$shapes,
-        }),*];
-        const ACCESSORS: &[fn(&mut $model) -> &mut f64] = &[$(|model| &mut model.$field),*];
+/// Defines a model that is a struct of numbers: the struct, its table `PARAMETERS`, its contact law, and a
+/// constructor that takes the restitution `e` and uses the defaults of all other parameters.
+macro_rules! model {
+    ($(#[$doc:meta])* $model:ident, $(#[$new_doc:meta])* $new:ident:
+     $($name:literal $field:ident $default:expr, $range:ident, $shapes:ident, $meaning:literal;)*) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $model {
+            $(#[doc = $meaning] pub $field: f64,)*
+        }
+
+        impl $model {
+            /// All parameters.
+            pub const PARAMETERS: &'static [Parameter] = &[$(Parameter {
+                name: std::borrow::Cow::Borrowed($name),
+                meaning: std::borrow::Cow::Borrowed($meaning),
+                default: $default,
+                range: Range::$range,
+                shapes: Shapes::$shapes,
+            }),*];
+
+            $(#[$new_doc])*
+            pub fn $new(e: f64) -> $model {
+                $(let $field = Option::<f64>::unwrap_or($default, e);)*
+                $model { $($field),* }
+            }
+
+            /// Implements [`Model::law`].
+            pub fn law(&self) -> Law {
+                Law::both(self.e, self.mesh_speed)
+            }
+
+            fn field(&mut self, index: usize) -> &mut f64 {
+                [$(&mut self.$field),*].into_iter().nth(index).expect("the index of a parameter")
+            }
+        }
     };
 }
-pub(super) use parameters;
+pub(super) use model;
 
-/// Why a parameter could not be set.
+/// The methods of [`Model`](super::Model) that are the same for all models which [`model`] defines.
+macro_rules! model_methods {
+    () => {
+        fn parameters(&self) -> &[Parameter] {
+            Self::PARAMETERS
+        }
+
+        fn value(&self, index: usize) -> f64 {
+            *{ *self }.field(index)
+        }
+
+        fn assign(&mut self, index: usize, value: f64) {
+            *self.field(index) = value;
+        }
+
+        fn oscillator(&self) -> Result<Oscillator, ModelError> {
+            self.oscillator()
+        }
+
+        fn law(&self) -> Law {
+            self.law()
+        }
+    };
+}
+pub(super) use model_methods;
+
+/// An error in setting a parameter.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ParameterError {
-    /// No parameter of this name.
+    /// The model has no parameter of this name.
     #[error("unknown parameter `{name}`; the model has {known}")]
     Unknown {
-        /// The name that was asked for.
+        /// The unknown name.
         name: String,
-        /// All the names there are, comma-separated.
+        /// The names of all parameters, comma-separated.
         known: String,
     },
     /// The value lies outside the parameter's range.
@@ -167,7 +218,7 @@ pub enum ParameterError {
         name: String,
         /// The rejected value.
         value: f64,
-        /// What it must be.
+        /// The range, as returned by [`Range::requirement`].
         requirement: Cow<'static, str>,
     },
 }
@@ -177,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_say_what_they_hold() {
+    fn ranges_contain_what_their_requirement_says() {
         let (none, least) = (f64::INFINITY, f64::NEG_INFINITY);
         for (range, inside, outside, words) in [
             (Range::new(0.0, none, true), 1e-300, 0.0, "finite and greater than 0"),

@@ -1,37 +1,15 @@
-//! A 1-DOF oscillator between stops: the second model, small enough to solve by hand.
+//! An oscillator of one degree of freedom between stops, which can be solved by hand.
 
-use super::parameter::parameters;
+use super::parameter::{model, model_methods};
 use super::{Contact, Domain, Law, Model, ModelError, Oscillator, Parameter, Range, Shapes};
 
-/// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
-///
-/// With `r = k = F = 0` flights are straight lines and every event is known in closed
-/// form, which is what the tests use it for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stops {
-    /// Mass, > 0.
-    pub m: f64,
-    /// Damping, >= 0.
-    pub r: f64,
-    /// Stiffness, >= 0.
-    pub k: f64,
-    /// Damping of a stop in lasting contact, >= 0.
-    pub stop_damping: f64,
-    /// Stiffness of a stop in lasting contact, >= 0.
-    pub stop_stiffness: f64,
-    /// Force amplitude.
-    pub force: f64,
-    /// Excitation frequency, > 0.
-    pub omega: f64,
-    /// Half distance of the stops, > 0.
-    pub b: f64,
-    /// Coefficient of restitution, 0 to 1.
-    pub e: f64,
-    /// Leaving speed at or below which a pressed contact lasts, >= 0.
-    pub mesh_speed: f64,
-}
-
-parameters! { Stops:
+model! {
+    /// `m x'' + r x' + k x = F cos(omega t)` between elastic stops at `x = +b` and `x = -b`.
+    ///
+    /// With `r = k = F = 0` flights are straight lines and every event is known in closed form. Tests use that.
+    Stops,
+    /// Returns the model with all parameters at their defaults and restitution `e`, `0 <= e <= 1`.
+    with_restitution:
     "m" m Some(1.0), Positive, Oscillator, "mass";
     "r" r Some(0.0), NonNegative, Oscillator, "damping";
     "k" k Some(0.0), NonNegative, Oscillator, "stiffness";
@@ -45,29 +23,10 @@ parameters! { Stops:
 }
 
 impl Stops {
-    /// Every parameter.
-    pub const PARAMETERS: &'static [Parameter] = TABLE;
-
-    /// Every parameter at its default, with restitution `e`. Valid if `0 <= e <= 1`.
-    pub fn with_restitution(e: f64) -> Stops {
-        Stops {
-            m: 1.0,
-            r: 0.0,
-            k: 0.0,
-            stop_damping: 1.0,
-            stop_stiffness: 1000.0,
-            force: 1.0,
-            omega: 1.0,
-            b: 0.5,
-            e,
-            mesh_speed: 0.01,
-        }
-    }
-
-    /// As [`Model::oscillator`]; the second degree of freedom is a unit mass that nothing acts on.
+    /// Implements [`Model::oscillator`]. The second degree of freedom is a unit mass without forces.
     ///
     /// # Errors
-    /// [`ModelError`] if a parameter is not valid, or an entry too large for a number.
+    /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
         let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
@@ -90,14 +49,11 @@ impl Stops {
         oscillator.validate()?;
         Ok(oscillator)
     }
-
-    /// As [`Model::law`].
-    pub fn law(&self) -> Law {
-        Law::both(self.e, self.mesh_speed)
-    }
 }
 
 impl Model for Stops {
+    model_methods!();
+
     fn name(&self) -> &str {
         "stops"
     }
@@ -106,40 +62,7 @@ impl Model for Stops {
         "Oscillator between stops"
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        TABLE
-    }
-
-    fn value(&self, index: usize) -> f64 {
-        *ACCESSORS[index](&mut { *self })
-    }
-
-    fn assign(&mut self, index: usize, value: f64) {
-        *ACCESSORS[index](self) = value;
-    }
-
-    fn oscillator(&self) -> Result<Oscillator, ModelError> {
-        self.oscillator()
-    }
-
-    fn law(&self) -> Law {
-        self.law()
-    }
-
     fn state_names(&self) -> Vec<&str> {
         vec!["x", "v"]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn table_and_defaults_agree() {
-        let stops = Stops::with_restitution(0.5);
-        for (i, parameter) in TABLE.iter().enumerate() {
-            assert_eq!(stops.value(i), parameter.default.unwrap_or(0.5), "{}", parameter.name);
-        }
     }
 }

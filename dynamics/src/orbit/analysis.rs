@@ -1,8 +1,8 @@
-//! Deciding what a cell's motion is.
+//! Classification of a motion with an extensible number of periods.
 
 use std::sync::atomic::AtomicBool;
 
-use super::approach::{HULL_CYCLES, LINEAR, SHOWN_CYCLES, stays};
+use super::approach::{BRANCH_CYCLES, HULL_CYCLES, LINEAR_TOLERANCE, stays};
 use super::itinerary::Recorder;
 use super::reading::Reading;
 use super::recurrence::{Candidate, Metric, candidates};
@@ -13,95 +13,83 @@ use crate::reference::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap};
 use crate::word::Word;
 
-/// Forcing periods whose events are shown where the motion is not periodic.
-pub const SHOWN_PERIODS: u32 = 8;
+/// Default number of last periods whose events are listed for aperiodic motion.
+pub const EVENT_PERIODS: u32 = 8;
 
-/// Standard errors by which an exponent must exceed zero to be called chaos.
+/// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
 
-/// An undecided motion is observed again, twice as long each time, until a window has this
-/// many forcing periods (or as many as were asked for, if that is more).
+/// Forcing periods of the longest window, unless more are requested. An undecided motion is observed in windows that
+/// double in length.
 const LONGEST_WINDOW: u32 = 32_768;
 
-/// Growth of a tangent vector, as a natural logarithm, that no escape from an unstable cycle lasts through: beyond the
+/// Logarithm of the growth of a tangent vector that is too large for an escape from an unstable cycle: more than the
 /// ratio of the size of the motion to rounding.
 pub const ESCAPE_GROWTH: f64 = 40.0;
 
-/// Periods over which a fresh tangent vector turns to its direction.
+/// Periods in which a new tangent vector turns to the most expanding direction.
 pub(super) const TANGENT_PERIODS: u32 = 50;
 
-/// A trajectory this close to a cycle, relative to the motion, is on it.
+/// Largest distance of a trajectory that is on a cycle, relative to the size of the motion.
 pub(super) const ON_CYCLE: f64 = 1e-8;
 
-/// Share of its distance by which a trajectory must have come closer to be seen to approach.
-pub(super) const APPROACH: f64 = 0.7;
+/// Largest ratio of the distances after and before, for a trajectory that approaches a cycle.
+pub(super) const APPROACH_RATIO: f64 = 0.7;
 
-/// A trajectory farther from a cycle than this, relative to the motion, is elsewhere.
-const WITHIN_REACH: f64 = 0.3;
+/// Largest distance from which a trajectory is tested for approach, relative to the size of the motion.
+const APPROACH_DISTANCE: f64 = 0.3;
 
-/// Checks of an approach on the way; at each the trajectory must have come nearer.
+/// Number of checks of an approach. At each the trajectory must be closer than before.
 const APPROACH_CHECKS: u32 = 4;
 
 /// Work that one motion may take: about a minute.
 pub(super) const ALLOWANCE: Allowance<'static> =
     Allowance { steps: 1_000_000_000, events: 200_000_000, ..Allowance::UNLIMITED };
 
-/// An undecided motion that has taken this many steps is not observed for longer.
+/// Number of steps after which the window of an undecided motion is not extended.
 const EXTENSION_STEPS: u64 = 100_000_000;
 
-/// Most cycles that an approach is watched for.
-const APPROACH_CYCLES: f64 = 4000.0;
+/// Largest number of cycles in a test for approach.
+const APPROACH_CYCLE_CAP: f64 = 4000.0;
 
-/// Integrates one cell from `start` at phase 0 and reads its orbit.
+/// Integrates one cell from `start` at phase 0 and classifies its motion.
 ///
-/// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is
-/// confirmed, `chaotic` if the exponent exceeds zero by three standard errors and nearby
-/// motions have separated by `e^40` or more. Where neither holds after the observed periods,
-/// windows of twice the length follow, up to 32,768 periods, before it is called undecided.
+/// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is confirmed. It is `chaotic`
+/// if the exponent exceeds zero by three standard errors and nearby motions have separated by a factor of `e^40` or
+/// more. If neither holds after the observed periods, windows of twice the length follow, up to 32,768 periods; after
+/// that it is undecided.
 ///
 /// # Errors
-/// [`ModelError`] if the model is not valid: it has no motion.
+/// [`ModelError`] if the model is not valid.
 pub fn analyse(model: &dyn Model, start: State, settings: &Settings) -> Result<Orbit, ModelError> {
-    analyse_over(model, start, settings, SHOWN_PERIODS)
+    Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, EVENT_PERIODS))
 }
 
-/// [`analyse`], showing the events of the last `shown_periods` of a motion that is not
-/// periodic.
+/// Classifies a motion like [`analyse`], and lists the events of the last `event_periods` of aperiodic motion.
+/// Returns none if `halt` was raised.
 ///
 /// # Errors
-/// As [`analyse`].
-pub fn analyse_over(
-    model: &dyn Model,
-    start: State,
-    settings: &Settings,
-    shown_periods: u32,
-) -> Result<Orbit, ModelError> {
-    Ok(analyse_flow(&Flow::of(model)?, model.law(), start, settings, shown_periods))
-}
-
-/// [`analyse_over`] until a flag is raised; none if it was by then.
-///
-/// # Errors
-/// As [`analyse`].
+/// [`ModelError`] if the model is not valid.
 pub fn analyse_until(
     model: &dyn Model,
     start: State,
     settings: &Settings,
-    shown_periods: u32,
+    event_periods: u32,
     halt: &AtomicBool,
 ) -> Result<Option<Orbit>, ModelError> {
     let (flow, allowance) = (Flow::of(model)?, ALLOWANCE.until(halt));
-    let analysis = Analysis { flow: &flow, law: model.law(), settings, shown_periods, allowance };
+    let analysis = Analysis { flow: &flow, law: model.law(), settings, event_periods, allowance };
     let orbit = analysis.orbit(start);
     Ok((!allowance.is_halted()).then_some(orbit))
 }
 
-/// [`analyse_over`] on a flow that is at hand: maps share one among many cells.
-pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, shown_periods: u32) -> Orbit {
-    Analysis { flow, law, settings, shown_periods, allowance: ALLOWANCE }.orbit(start)
+/// Classifies a motion like [`analyse`], with a flow that the caller has computed, and lists the events of the last
+/// `event_periods` of aperiodic motion.
+pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, event_periods: u32) -> Orbit {
+    Analysis { flow, law, settings, event_periods, allowance: ALLOWANCE }.orbit(start)
 }
 
-/// The status that a stop gives a motion.
+/// Returns the status of a motion that a stop has ended.
 pub fn status_of(stop: Stop) -> Status {
     match stop {
         Stop::CapEvents => Status::CapEvents,
@@ -131,7 +119,7 @@ fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
     }
 }
 
-/// What one window of observation showed.
+/// The results of one window of observation.
 struct Window {
     strobes: Vec<State>,
     metric: Metric,
@@ -145,8 +133,8 @@ pub(super) struct Analysis<'a> {
     pub(super) flow: &'a Flow,
     pub(super) law: Law,
     pub(super) settings: &'a Settings,
-    pub(super) shown_periods: u32,
-    /// What the motion may take.
+    pub(super) event_periods: u32,
+    /// Work that the motion may take.
     pub(super) allowance: Allowance<'a>,
 }
 
@@ -158,7 +146,7 @@ impl Analysis<'_> {
         Orbit { periods_run, ..orbit }
     }
 
-    /// Counts in `periods_run` how long the motion is followed.
+    /// Classifies the motion and counts its forcing periods in `periods_run`.
     fn run(&self, start: State, periods_run: &mut u64) -> Result<Orbit, Stop> {
         let mut trajectory = Trajectory::new(self.flow, self.law, start).allowing(self.allowance);
         for _ in 0..self.settings.transient_periods {
@@ -181,7 +169,6 @@ impl Analysis<'_> {
             if self.is_chaotic(&window) {
                 return self.aperiodic(trajectory, &window, Class::Chaotic, Status::Ok);
             }
-            // Neither yet: a slow approach, a slow escape, or an average too short.
             if length >= last || trajectory.work().steps > EXTENSION_STEPS {
                 return self.aperiodic(trajectory, &window, Class::Undecided, Status::Slow);
             }
@@ -189,8 +176,7 @@ impl Analysis<'_> {
         }
     }
 
-    /// Contact-free motion that has no event to come: its steady response, which is known, where the
-    /// forcing is so fast that little of the transient is gone after a period.
+    /// Returns the orbit of motion that certainly has no further event, without waiting for its transient to decay.
     fn non_impacting(&self, trajectory: &Trajectory<'_, 0>) -> Result<Option<Orbit>, Stop> {
         let is_certain =
             |motion: &&NonImpacting| trajectory.meshing().is_none() && motion.is_certain(trajectory.state());
@@ -200,7 +186,7 @@ impl Analysis<'_> {
         let cycle = self.maps(1).into_iter().find_map(|map| newton.refine(&steady, map));
         let of = |cycle: Cycle| {
             let cycle = match motion.resting() {
-                Some(resting) => cycle.beside_rest(resting).unwrap_or(cycle),
+                Some(resting) => cycle.without_resting(resting).unwrap_or(cycle),
                 None => cycle,
             };
             Ok(self.periodic(&self.read(&steady, &cycle)?, &cycle, 0.0))
@@ -208,15 +194,14 @@ impl Analysis<'_> {
         cycle.map(of).transpose()
     }
 
-    /// Whether nearby motions separate for good: by more than an escape from an unstable
-    /// cycle could last through, and by far more than the growth in proportion to time that
-    /// neutral motion shows.
+    /// Whether nearby motions separate by more than in an escape from an unstable cycle, and by far more than in
+    /// neutral motion, where they separate in proportion to time.
     fn is_chaotic(&self, window: &Window) -> bool {
-        let surely = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;
-        surely * window.strobes.len() as f64 * self.flow.period > ESCAPE_GROWTH
+        let least = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;
+        least * window.strobes.len() as f64 * self.flow.period > ESCAPE_GROWTH
     }
 
-    /// Watches strobe states, the exponent and the averages for `length` periods.
+    /// Integrates `length` periods and computes strobe states, exponent and averages.
     fn observe(
         &self,
         trajectory: &mut Trajectory<'_, 0>,
@@ -230,7 +215,7 @@ impl Analysis<'_> {
             *periods_run += 1;
             exponent.renormalise(&mut carrier);
         }
-        exponent.forget();
+        exponent.reset();
         let (mesh_start, impacts_start) = (carrier.meshing_time(), carrier.work().impacts);
         let mut strobes = vec![carrier.state()];
         for _ in 0..length {
@@ -252,8 +237,7 @@ impl Analysis<'_> {
         })
     }
 
-    /// The orbit of a candidate, if Newton finds a stable cycle there that the trajectory is
-    /// seen to approach.
+    /// Returns the orbit of a candidate, if Newton's method finds a stable cycle that the trajectory approaches.
     fn confirm(
         &self,
         trajectory: &Trajectory<'_, 0>,
@@ -274,8 +258,8 @@ impl Analysis<'_> {
         Ok(None)
     }
 
-    /// The maps that a cycle of this period may be a fixed point of. Only cycles of odd
-    /// period can be symmetric; those are found more surely by the half-period map.
+    /// Returns the maps of which a cycle of this period may be a fixed point. Only cycles of odd period can be
+    /// symmetric; for these the half-period map is tried first, because it is more reliable.
     pub(super) fn maps(&self, period: u32) -> Vec<StrobeMap> {
         let whole = StrobeMap::Periods(period);
         if period % 2 == 1 && self.flow.mirror_symmetric(&self.law) {
@@ -285,7 +269,7 @@ impl Analysis<'_> {
         }
     }
 
-    /// The same orbit with its smallest period, and its symmetry tested.
+    /// Returns the cycle with its smallest period, and with its symmetry tested.
     pub(super) fn smallest(
         &self,
         newton: &mut Newton,
@@ -296,12 +280,12 @@ impl Analysis<'_> {
         let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
         for period in divisors {
             for map in self.maps(period) {
-                // It closes after its own period, and need not be refined again.
+                // The cycle is already known to be a fixed point of this map.
                 if period == cycle.period && (cycle.symmetric || map == StrobeMap::Periods(period)) {
                     return Some(cycle);
                 }
                 let image = newton.apply(map, seed, cycle.state)?;
-                // What rounding leaves of the residual, the map amplifies.
+                // The map amplifies the rounding error of the fixed point.
                 let close = ON_CYCLE * image.balanced().norm().max(1.0);
                 if metric.distance(&image.state, &cycle.state) < close
                     && let Some(shorter) = newton.refine(&seed.at(cycle.state, []), map)
@@ -313,7 +297,7 @@ impl Analysis<'_> {
         Some(cycle)
     }
 
-    /// The distance at which the trajectory is seen to approach the cycle, if it is.
+    /// Returns the last distance of the trajectory from the cycle, if it approaches the cycle.
     fn approach(
         &self,
         trajectory: &Trajectory<'_, 0>,
@@ -324,11 +308,11 @@ impl Analysis<'_> {
         if before < ON_CYCLE {
             return Ok(Some(before));
         }
-        if before > WITHIN_REACH {
+        if before > APPROACH_DISTANCE {
             return Ok(None);
         }
-        // Long enough for the slowest direction to shrink to half.
-        let cycles = (0.5f64.ln() / cycle.spectral_radius().max(0.1).ln()).ceil().min(APPROACH_CYCLES);
+        // The number of cycles in which the slowest direction decays to half.
+        let cycles = (0.5f64.ln() / cycle.spectral_radius().max(0.1).ln()).ceil().min(APPROACH_CYCLE_CAP);
         let mut ahead = trajectory.clone();
         let mut last = before;
         for _ in 0..APPROACH_CHECKS {
@@ -344,14 +328,14 @@ impl Analysis<'_> {
         if last < ON_CYCLE {
             return Ok(Some(last));
         }
-        // A multiplier near 1 shrinks little; half of what it promises must be seen.
-        let promised = 1.0 - 0.5 * (1.0 - cycle.spectral_radius().powf(cycles));
-        let is_nearer = last < APPROACH.max(promised) * before;
+        // For a multiplier near 1, half of the predicted decrease is enough.
+        let predicted = 1.0 - 0.5 * (1.0 - cycle.spectral_radius().powf(cycles));
+        let is_nearer = last < APPROACH_RATIO.max(predicted) * before;
         Ok((is_nearer && self.stays(trajectory, &mut ahead, cycle, metric)?).then_some(last))
     }
 
-    /// Whether a trajectory that has come near a cycle stays there: a band of chaos beside one comes nearer by
-    /// chance. It is followed until that shows.
+    /// Whether a trajectory near a cycle stays there. A chaotic motion can come closer by chance, so the trajectory
+    /// is integrated until [`stays`] holds.
     fn stays(
         &self,
         seed: &Trajectory<'_>,
@@ -359,7 +343,7 @@ impl Analysis<'_> {
         cycle: &Cycle,
         metric: &Metric,
     ) -> Result<bool, Stop> {
-        let Reading { itineraries: shown, closes, .. } = self.read(seed, cycle)?;
+        let Reading { itineraries, closes, .. } = self.read(seed, cycle)?;
         if !closes {
             return Ok(false);
         }
@@ -367,36 +351,37 @@ impl Analysis<'_> {
         let mut are_alike = Vec::new();
         for n in 1..=HULL_CYCLES {
             let mut is_alike = true;
-            for itinerary in &shown {
+            for itinerary in &itineraries {
                 let mut recorder = Recorder::new(self.flow);
                 ahead.advance_period(&mut recorder)?;
                 is_alike &= recorder.itinerary == *itinerary;
             }
             strobes.push(ahead.state());
             are_alike.push(is_alike);
-            let beside = |back: usize| n.checked_sub(back).map(|at| strobes[at]);
+            let strobe = |back: usize| n.checked_sub(back).map(|at| strobes[at]);
             let is_on_branch = |back: usize| are_alike[n - back];
-            if n >= SHOWN_CYCLES && stays(cycle, beside, is_on_branch, metric, LINEAR) {
+            if n >= BRANCH_CYCLES && stays(cycle, strobe, is_on_branch, metric, LINEAR_TOLERANCE) {
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// Reads a cycle off a turn around it.
+    /// Integrates a cycle once and collects its events.
     pub(super) fn read(&self, seed: &Trajectory<'_>, cycle: &Cycle) -> Result<Reading, Stop> {
         let mut trajectory = seed.at(cycle.state, []);
-        let begun = trajectory.clone();
+        let first = trajectory.clone();
         let mut reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
-        let closes = trajectory.is_in_domain_of(&begun) || reading.on_strobe;
-        // The first flight has its symbol from where `seed` came from: right if the cycle comes from there, too.
-        if !trajectory.stands_as(&begun) || reading.near_grazing || reading.on_strobe {
+        let closes = trajectory.is_in_domain_of(&first) || reading.on_strobe;
+        // The symbol of the first flight depends on the wall that `seed` came from. If the cycle comes from another
+        // wall, a second turn has the right symbol.
+        if !trajectory.has_mode_and_origin_of(&first) || reading.near_grazing || reading.on_strobe {
             reading = Reading::take(self.flow, &mut trajectory, cycle.period)?;
         }
         Ok(Reading { closes, ..reading })
     }
 
-    /// The orbit of a cycle that was read, at a distance from it.
+    /// Builds the orbit of a cycle; `distance` is that of the motion from the cycle.
     pub(super) fn periodic(&self, reading: &Reading, cycle: &Cycle, distance: f64) -> Orbit {
         let status = if reading.near_grazing || cycle.near_grazing {
             Status::NearGrazing
@@ -426,6 +411,7 @@ impl Analysis<'_> {
         }
     }
 
+    /// Builds the orbit of aperiodic motion.
     fn aperiodic(
         &self,
         mut trajectory: Trajectory<'_, 0>,
@@ -433,7 +419,7 @@ impl Analysis<'_> {
         class: Class,
         status: Status,
     ) -> Result<Orbit, Stop> {
-        let reading = Reading::take(self.flow, &mut trajectory, self.shown_periods)?;
+        let reading = Reading::take(self.flow, &mut trajectory, self.event_periods)?;
         Ok(Orbit {
             class,
             status: if status == Status::Ok && reading.on_strobe { Status::StrobeOnEvent } else { status },
@@ -447,7 +433,7 @@ impl Analysis<'_> {
             strobe: reading.strobe,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events,
-            cycle_periods: self.shown_periods,
+            cycle_periods: self.event_periods,
             forcing_period: self.flow.period,
             periods_run: 0,
         })

@@ -1,93 +1,97 @@
-//! How long a cell of a map is integrated, and how sure one must be to stop before.
+//! Integration time of a cell of a map, and the conditions of early stops.
 
 use super::Settings;
 use super::analysis::TANGENT_PERIODS;
 use crate::reference::Allowance;
 
-/// An exponent that is shown accumulates from this period on, or from the end of a shorter
-/// transient.
-const SHOWN_EXPONENT_FROM: u32 = 100;
+/// Period from which a reported exponent accumulates; a shorter transient makes it earlier.
+const EXPONENT_FROM: u32 = 100;
 
-/// One that only tells chaos from the rest may contain more of the transient, and its tangent
-/// vector may take fewer periods to turn: by then nearly all cycles have been found.
-const EXPONENT_FROM: u32 = 50;
-const HASTY_TANGENT_PERIODS: u32 = 18;
+/// Period from which an exponent accumulates that only distinguishes chaos. It may contain more of the transient.
+const CLASS_EXPONENT_FROM: u32 = 50;
 
-/// With early stops chaos is called before the budget is spent if the exponent exceeds zero by
-/// this many standard errors (five, where an exponent is shown, save 3 % of the periods, and call a
-/// transient chaos in one cell of 20,000 more) ...
+/// Periods in which the tangent vector of such an exponent turns to the most expanding direction.
+const CLASS_TANGENT_PERIODS: u32 = 18;
+
+/// Standard errors by which a reported exponent must exceed zero for an early stop. With five, 3 % of the periods
+/// would be saved, and one cell more in 20,000 with transient chaos would count as chaotic.
 const EARLY_CHAOS_ERRORS: f64 = 6.0;
-const HASTY_CHAOS_ERRORS: f64 = 5.0;
 
-/// ... after this fraction of the budget, in eighths: of 20,000 cells 38 transients are taken
-/// for chaos so, 33 if it is half, 17 if all of it is spent. Without an exponent to show, 46.
-const EARLY_CHAOS_FROM: u32 = 3;
-const HASTY_CHAOS_FROM: u32 = 2;
+/// Standard errors by which an exponent that only distinguishes chaos must exceed zero for an early stop.
+const CLASS_CHAOS_ERRORS: f64 = 5.0;
 
-/// Periods, at least, over which an exponent is averaged before chaos is called early.
-const LEAST_AVERAGED: u32 = 32;
+/// Share of the budget, in eighths, after which a cell may stop early as chaotic. Of 20,000 cells, 38 with transient
+/// chaos count as chaotic; with half of the budget 33, with all of it 17.
+const EARLY_CHAOS_EIGHTHS: u32 = 3;
 
-/// Steps and events that a cell may take for each of the periods that it may take: a thousand times what gears take in
-/// one. Of 528 periods' worth, a core takes some tenths of a second.
+/// Share of the budget, in eighths, after which a cell may stop early as chaotic if its exponent is not reported.
+/// Then 46 cells of 20,000 with transient chaos count as chaotic.
+const CLASS_CHAOS_EIGHTHS: u32 = 2;
+
+/// Least number of periods that an exponent is averaged over before an early stop.
+const LEAST_AVERAGE_PERIODS: u32 = 32;
+
+/// Steps and events that a cell may take per period of its budget, about a thousand times those of a gear pair. The
+/// total of 528 periods takes a processor core some tenths of a second.
 const STEPS_PER_PERIOD: u64 = 20_000;
 const EVENTS_PER_PERIOD: u64 = 2_000;
 
-/// How long one cell is integrated, and what for.
+/// The integration time of a cell and the quantities to compute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Budget {
     /// Periods of transient and observation, and the longest cycle.
     pub settings: Settings,
-    /// Whether the cell may stop as soon as its class is certain; otherwise exactly
+    /// Whether the cell may stop as soon as its class is certain. Otherwise exactly
     /// `transient_periods + observed_periods` are integrated.
     pub early_stop: bool,
-    /// Periods beyond these for cells that are undecided by then; with early stops alone.
+    /// Additional periods for cells that are still undecided; used only with early stops.
     pub undecided_periods: u32,
-    /// Whether motion that is not periodic gets an exponent. It costs a tangent vector.
+    /// Whether aperiodic motion gets an exponent, which costs a tangent vector.
     pub exponent: bool,
-    /// Whether that exponent is shown; otherwise it need only be sure that it is positive.
+    /// Whether the exponent is reported. Otherwise it only distinguishes chaos, and may be less accurate.
     pub shows_exponent: bool,
 }
 
 impl Budget {
-    /// Forcing periods of a cell that is decided by then.
+    /// Returns the forcing periods of transient and observation.
     pub fn periods(&self) -> u32 {
         self.settings.transient_periods.saturating_add(self.settings.observed_periods)
     }
 
-    /// Forcing periods of a cell that takes longest.
+    /// Returns the largest number of forcing periods, including those for undecided cells.
     pub fn longest(&self) -> u32 {
         let more = if self.early_stop { self.undecided_periods } else { 0 };
         self.periods().saturating_add(more)
     }
 
-    /// Work that one cell may take, searches for cycles included.
+    /// Returns the work that one cell may take, including searches for cycles.
     pub fn allowance(&self) -> Allowance<'static> {
         let longest = u64::from(self.longest());
         let [steps, events] = [STEPS_PER_PERIOD, EVENTS_PER_PERIOD].map(|share| share * longest);
         Allowance { steps, events, ..Allowance::UNLIMITED }
     }
 
-    /// The period from which the exponent accumulates.
+    /// Returns the period from which the exponent accumulates.
     pub fn exponent_from(&self) -> u32 {
-        let from = if self.shows_exponent { SHOWN_EXPONENT_FROM } else { EXPONENT_FROM };
+        let from = if self.shows_exponent { EXPONENT_FROM } else { CLASS_EXPONENT_FROM };
         from.min(self.settings.transient_periods)
     }
 
-    /// The period from which a tangent vector is carried.
+    /// Returns the period from which a tangent vector is integrated.
     pub(super) fn tangent_from(&self) -> u32 {
-        let turning = if self.shows_exponent { TANGENT_PERIODS } else { HASTY_TANGENT_PERIODS };
+        let turning = if self.shows_exponent { TANGENT_PERIODS } else { CLASS_TANGENT_PERIODS };
         self.exponent_from().saturating_sub(turning)
     }
 
-    /// The first period at which chaos may be called, with early stops.
+    /// Returns the first period at which a cell may stop early as chaotic.
     pub fn chaos_from(&self) -> u32 {
-        let eighths = if self.shows_exponent { EARLY_CHAOS_FROM } else { HASTY_CHAOS_FROM };
+        let eighths = if self.shows_exponent { EARLY_CHAOS_EIGHTHS } else { CLASS_CHAOS_EIGHTHS };
         let from = (self.periods() / 8 * eighths).max(self.settings.observed_periods);
-        from.max(self.exponent_from() + LEAST_AVERAGED)
+        from.max(self.exponent_from() + LEAST_AVERAGE_PERIODS)
     }
 
-    /// Standard errors by which the exponent must exceed zero then.
+    /// Returns the standard errors by which the exponent must exceed zero for an early stop as chaotic.
     pub fn chaos_errors(&self) -> f64 {
-        if self.shows_exponent { EARLY_CHAOS_ERRORS } else { HASTY_CHAOS_ERRORS }
+        if self.shows_exponent { EARLY_CHAOS_ERRORS } else { CLASS_CHAOS_ERRORS }
     }
 }

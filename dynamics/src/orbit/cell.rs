@@ -1,19 +1,18 @@
-//! One cell of a map: the same decisions within a fixed number of forcing periods.
+//! Classification of a cell of a map within a fixed number of forcing periods.
 //!
-//! [`analyse`](super::analyse) goes on until it knows; a map cannot. Here a cell has
-//! `transient_periods + observed_periods` and no more, and an approach is searched in the
-//! strobe states that have passed, so that nothing is integrated ahead of the budget.
+//! Unlike [`analyse`](super::analyse), a cell of a map cannot be integrated until its class is known. The number of
+//! periods is limited by its [`Budget`], and an approach to a cycle is searched in the strobe states so far.
 
 use std::cell::{Cell, OnceCell};
 use std::sync::atomic::AtomicBool;
 
 use super::CHAOS_ERRORS;
-use super::analysis::{APPROACH, Analysis, ESCAPE_GROWTH, ON_CYCLE, status_of};
-use super::approach::{BENT, LINEAR, stays};
+use super::analysis::{APPROACH_RATIO, Analysis, ESCAPE_GROWTH, ON_CYCLE, status_of};
+use super::approach::{CLOSE_TOLERANCE, LINEAR_TOLERANCE, stays};
 use super::itinerary::{Itinerary, Recorder};
-use super::prospects::{Searched, contraction, escapes, swings};
 use super::reading::Reading;
-use super::recurrence::{Metric, NEAR, candidates, near_saddle};
+use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle};
+use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
 use super::{Budget, Orbit, Status};
 use crate::flow::Flow;
 use crate::model::{Law, State};
@@ -21,73 +20,73 @@ use crate::reference::{Allowance, Stop, Trajectory};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton};
 use crate::word::Word;
 
-/// Periods after which an early stop is first considered; then every sixth as many more.
+/// Period of the first check for an early stop.
 const FIRST_CHECK: u32 = 16;
-const CHECKS: u32 = 6;
 
-/// A cell stops early only inside the region where the multipliers tell what happens next: this
-/// close to its cycle, relative to the motion, or within `NEAR` where it is seen to move as they
-/// say. A leaving speed near `mesh_speed` makes that region small: unseen, at 2e-3 one cell of
-/// 4,000 over restitution and frequency was taken for a period that it then left.
-const SETTLED: f64 = 5e-4;
+/// Divisor of the interval between checks: the next check is a sixth of the periods so far later.
+const CHECK_DIVISOR: u32 = 6;
 
-/// The power of time that chaos has to outgrow, since tangents of neutral motion grow, too: those of a free body, of a
-/// torus or of an undamped swing in proportion to time, at a double root to its square.
+/// Largest distance from a cycle, relative to the size of the motion, at which a cell stops early without the test of
+/// [`LINEAR_TOLERANCE`]. The region in which the multipliers predict the motion is small if a leaving speed is near
+/// `mesh_speed`: with 2e-3, one cell of 4,000 over restitution and frequency got a period that it then left.
+const EARLY_STOP_DISTANCE: f64 = 5e-4;
+
+/// Growth of tangents that is not chaos, as a power of time. Tangents of neutral motion grow in proportion to time (a
+/// free body, a torus, an undamped oscillation), and at a double root to its square.
 pub const NEUTRAL_ORDER: f64 = 2.0;
 
-/// Cycles, at least, over which an approach must have been seen.
-const APPROACH_CYCLES: usize = 4;
+/// Least number of cycles of an approach.
+const LEAST_APPROACH_CYCLES: usize = 4;
 
-/// Newton's method searches for a cycle this many times as far off as it may lie.
-const AIM: f64 = 3.0;
+/// Largest distance of the states in a Newton search, in units of [`RECURRENCE_DISTANCE`].
+const SEARCH_DISTANCE: f64 = 3.0;
 
-/// What one cell showed.
+/// The results of one cell.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Measured {
+pub struct Measurement {
     /// Confirmed period, in forcing periods.
     pub period: Option<u32>,
-    /// How the integration ended; `Slow` without a period says that the motion stays near
-    /// some cycle, or grows by less than three standard errors: no chaos.
+    /// How the integration ended. `Slow` without a period means that the motion stays near some cycle, or that the
+    /// exponent does not exceed zero by three standard errors: it is undecided.
     pub status: Status,
-    /// Largest Lyapunov exponent per unit time and its standard error, zero for a cycle.
+    /// Largest Lyapunov exponent per unit time, and its standard error, which is zero for a cycle.
     pub lyapunov: Option<[f64; 2]>,
     /// Impacts per forcing period, over the cycle or the observed periods.
     pub impacts_per_period: f64,
-    /// Fraction of time spent meshing, over the same.
+    /// Fraction of time spent meshing, over the cycle or the observed periods.
     pub mesh_fraction: f64,
     /// Whether the cycle is its own mirror image.
     pub symmetric: Option<bool>,
-    /// The cycle's word.
+    /// Word of the cycle.
     pub word: Option<Word>,
-    /// The last strobe state; one of the cycle's where the cell stopped early on the way to it.
+    /// The last strobe state; a state of the cycle if the cell stopped early.
     pub strobe: State,
-    /// Forcing periods integrated.
+    /// Forcing periods of the motion itself.
     pub periods_run: u32,
-    /// Forcing periods integrated beside them: by Newton's method, with four tangent vectors, and
-    /// to read the cycle that it found.
-    pub periods_beside: u32,
+    /// Forcing periods of searches: of Newton's method, with four tangent vectors, and of the readings of cycles.
+    pub search_periods: u32,
 }
 
-impl Measured {
-    /// Whether motion that is at no cycle surely is chaos.
+impl Measurement {
+    /// Whether aperiodic motion is certainly chaotic.
     fn is_decided(&self) -> bool {
         self.status != Status::Slow && self.lyapunov.is_some()
     }
 }
 
 /// Integrates one cell from `start` at phase 0 within its budget.
-pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measured {
+pub fn measure(flow: &Flow, law: Law, start: State, budget: &Budget) -> Measurement {
     measure_within(flow, law, start, budget, budget.allowance())
 }
 
-/// [`measure`] until a flag is raised; none if it was by then.
+/// Integrates one cell like [`measure`]; returns none if `halt` was raised.
 pub fn measure_until(
     flow: &Flow,
     law: Law,
     start: State,
     budget: &Budget,
     halt: &AtomicBool,
-) -> Option<Measured> {
+) -> Option<Measurement> {
     let allowance = budget.allowance().until(halt);
     let measured = measure_within(flow, law, start, budget, allowance);
     (!allowance.is_halted()).then_some(measured)
@@ -99,10 +98,10 @@ fn measure_within(
     start: State,
     budget: &Budget,
     allowance: Allowance<'_>,
-) -> Measured {
+) -> Measurement {
     let settings = &budget.settings;
-    let analysis = Analysis { flow, law, settings, shown_periods: 0, allowance };
-    let mut watch = Watch {
+    let analysis = Analysis { flow, law, settings, event_periods: 0, allowance };
+    let mut run = CellRun {
         analysis: &analysis,
         budget,
         allowance,
@@ -112,46 +111,49 @@ fn measure_within(
         approaches: false,
         counts: vec![[0.0; 2]],
         itineraries: Vec::new(),
-        searched: Searched::default(),
+        history: SearchHistory::default(),
         newton: Newton::default(),
-        read: Cell::new(0),
+        reading_periods: Cell::new(0),
     };
-    watch.run(start).unwrap_or_else(|stop| watch.stopped(stop))
+    run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)))
 }
 
-/// A cycle that Newton found, and the strobe at which it was found.
-struct Found<'a> {
+/// A cycle that Newton's method has found.
+struct FoundCycle<'a> {
     cycle: Cycle,
-    /// The trajectory there: a state alone does not tell its domain.
+    /// The trajectory at that strobe, which determines the domain.
     seed: Trajectory<'a>,
+    /// Index of the strobe at which the cycle was found.
     at: usize,
+    /// Distance of the motion from the cycle at that strobe.
     distance: f64,
     reading: OnceCell<Reading>,
 }
 
-struct Watch<'a> {
+/// The state of the computation of one cell.
+struct CellRun<'a> {
     analysis: &'a Analysis<'a>,
     budget: &'a Budget,
-    /// What the motion and Newton's searches may take together.
+    /// Work that the motion and Newton's searches may take together.
     allowance: Allowance<'a>,
-    /// Strobe states from the start on; entry `n` after `n` periods.
+    /// Strobe states; entry `n` is the state after `n` periods.
     strobes: Vec<State>,
     exponent: Exponent,
-    cycle: Option<Found<'a>>,
-    /// Whether the last check found it, or saw the motion nearer to it than then.
+    cycle: Option<FoundCycle<'a>>,
+    /// Whether the last check found `cycle`, or the motion was closer to it than when it was found.
     approaches: bool,
-    /// Impacts and meshing time so far at every strobe.
+    /// Impacts and meshing time up to each strobe.
     counts: Vec<[f64; 2]>,
-    /// What happened in each period.
+    /// Itinerary of each period.
     itineraries: Vec<Itinerary>,
-    searched: Searched,
+    history: SearchHistory,
     newton: Newton,
-    /// Periods that were integrated to read cycles.
-    read: Cell<u32>,
+    /// Periods of the readings of cycles.
+    reading_periods: Cell<u32>,
 }
 
-impl<'a> Watch<'a> {
-    fn run(&mut self, start: State) -> Result<Measured, Stop> {
+impl<'a> CellRun<'a> {
+    fn run(&mut self, start: State) -> Result<Measurement, Stop> {
         let budget = self.budget.periods();
         let last = self.budget.longest();
         let exponent_from = self.budget.exponent_from();
@@ -166,7 +168,7 @@ impl<'a> Watch<'a> {
         let mut carrier = bare.carrying([FRESH_TANGENT]);
         while carrier.period() < u64::from(last) {
             if carrier.period() == u64::from(exponent_from) {
-                self.exponent.forget();
+                self.exponent.reset();
             }
             if let Some(measured) = self.period(&mut carrier, &mut next_check, last)? {
                 return Ok(measured);
@@ -175,13 +177,13 @@ impl<'a> Watch<'a> {
         unreachable!("the last period is checked")
     }
 
-    /// One forcing period, and a check of what has passed where one is due.
+    /// Integrates one forcing period. Checks the class if a check is due, and returns the results if it is decided.
     fn period<const N: usize>(
         &mut self,
         trajectory: &mut Trajectory<'a, N>,
         next_check: &mut u32,
         last: u32,
-    ) -> Result<Option<Measured>, Stop> {
+    ) -> Result<Option<Measurement>, Stop> {
         let mut recorder = Recorder::new(self.analysis.flow);
         trajectory.advance_period(&mut recorder)?;
         self.itineraries.push(recorder.itinerary);
@@ -196,11 +198,11 @@ impl<'a> Watch<'a> {
             return Ok(None);
         }
         let (budget, chaos_from) = (self.budget.periods(), self.budget.chaos_from());
-        let next = now + now.div_ceil(CHECKS);
+        let next = now + now.div_ceil(CHECK_DIVISOR);
         let stages = [chaos_from, budget, last].into_iter().filter(|&stage| now < stage && stage <= last);
         *next_check = next.min(stages.min().unwrap_or(last));
         let is_last = now == budget || now == last;
-        if let Some(orbit) = self.settled(&trajectory.carrying([]), is_last)? {
+        if let Some(orbit) = self.confirmed_orbit(&trajectory.carrying([]), is_last)? {
             let strobe = if is_last { trajectory.state() } else { orbit.strobe };
             return Ok(Some(self.periodic(orbit, strobe)));
         }
@@ -208,57 +210,53 @@ impl<'a> Watch<'a> {
         work += self.newton.work();
         self.allowance.covers(work)?;
         Ok(match now {
-            // Its search fails where a degree of freedom at rest would not decay.
+            // Newton's method does not find this cycle if the degree of freedom at rest is undamped.
             _ if now == last && self.is_non_impacting(trajectory) => Some(self.non_impacting()),
             _ if now == last => Some(self.aperiodic(CHAOS_ERRORS)),
-            _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measured::is_decided),
+            _ if now >= budget => Some(self.aperiodic(CHAOS_ERRORS)).filter(Measurement::is_decided),
             _ if now >= chaos_from && !self.approaches => {
-                Some(self.aperiodic(self.budget.chaos_errors())).filter(Measured::is_decided)
+                Some(self.aperiodic(self.budget.chaos_errors())).filter(Measurement::is_decided)
             }
             _ => None,
         })
     }
 
-    /// Whether the motion certainly has no event to come.
+    /// Whether the motion certainly has no further event.
     fn is_non_impacting<const N: usize>(&self, trajectory: &Trajectory<'a, N>) -> bool {
         let free = self.analysis.flow.non_impacting();
         trajectory.meshing().is_none() && free.is_some_and(|free| free.is_certain(trajectory.state()))
     }
 
-    /// Contact-free motion: the steady response attracts it, and has no event.
-    fn non_impacting(&self) -> Measured {
+    /// Builds the results of contact-free motion, which converges to its steady response.
+    fn non_impacting(&self) -> Measurement {
         let flow = self.analysis.flow;
-        Measured {
+        Measurement {
             period: Some(1),
             status: Status::Ok,
             lyapunov: flow.non_impacting().map(|motion| [motion.exponent(), 0.0]),
-            impacts_per_period: 0.0,
-            mesh_fraction: 0.0,
             symmetric: flow.mirror_symmetric(&self.analysis.law).then_some(true),
             word: Some(Word::default()),
-            strobe: self.strobes[self.strobes.len() - 1],
-            periods_run: self.strobes.len() as u32 - 1,
-            periods_beside: self.periods_beside(),
+            ..self.without_results(Status::Ok)
         }
     }
 
-    /// The orbit of a cycle that the strobe states are seen to approach.
-    fn settled(&mut self, seed: &Trajectory<'a>, is_last: bool) -> Result<Option<Orbit>, Stop> {
+    /// Returns the orbit of a cycle that the strobe states approach.
+    fn confirmed_orbit(&mut self, seed: &Trajectory<'a>, is_last: bool) -> Result<Option<Orbit>, Stop> {
         let max_period = self.budget.settings.max_period;
         let window = &self.strobes[self.strobes.len().saturating_sub(2 * max_period as usize + 1)..];
         let metric = Metric::of(window, self.analysis.flow);
-        let near = if is_last { NEAR } else { SETTLED };
+        let near = if is_last { RECURRENCE_DISTANCE } else { EARLY_STOP_DISTANCE };
         if is_last {
-            // Judged as if it were the only next_check: a cell that runs its whole budget has the
-            // same class with and without early stops.
+            // The last check ignores the others, so that a cell which uses its whole budget has the same class with
+            // and without early stops.
             self.cycle = None;
         }
-        if let Some(orbit) = self.approached(&metric, near)? {
+        if let Some(orbit) = self.orbit_of_last_cycle(&metric, near)? {
             return Ok(Some(orbit));
         }
-        // One that is being approached needs no second check.
+        // While the motion approaches a cycle, no other one is searched.
         self.approaches =
-            self.cycle.as_ref().is_some_and(|found| self.present(found, &metric) < found.distance);
+            self.cycle.as_ref().is_some_and(|found| self.distance_now(found, &metric) < found.distance);
         if !is_last && self.approaches {
             return Ok(None);
         }
@@ -267,39 +265,39 @@ impl<'a> Watch<'a> {
             if escapes(&self.exponent, candidate.period, is_last) {
                 continue;
             }
-            let apart = contraction(window, candidate.period as usize, &metric);
+            let contracting = contraction(window, candidate.period as usize, &metric);
             for map in self.analysis.maps(candidate.period) {
-                let passes = |apart| self.searched.account_for(map, &state, apart, &metric);
-                if !is_last && apart.is_none_or(passes) {
+                let is_explained = |distance| self.history.explains(map, &state, distance, &metric);
+                if !is_last && contracting.is_none_or(is_explained) {
                     continue;
                 }
-                let is_near = |y: &State| metric.distance(&state, y) < AIM * NEAR;
+                let is_near = |y: &State| metric.distance(&state, y) < SEARCH_DISTANCE * RECURRENCE_DISTANCE;
                 let newton = &mut self.newton;
                 let found =
                     if is_last { newton.refine(seed, map) } else { newton.refine_nearby(seed, map, is_near) };
                 let Some(cycle) = found else {
-                    self.searched.note_failed(map, state);
+                    self.history.add_failure(map, state);
                     continue;
                 };
-                // An unstable one is so at any of its periods.
+                // An unstable cycle is unstable at its smallest period, too.
                 if !cycle.is_stable() {
-                    self.searched.note(map, &cycle);
+                    self.history.add_unstable(map, &cycle);
                     continue;
                 }
                 let Some(cycle) = self.analysis.smallest(newton, seed, cycle, &metric) else { continue };
                 let distance = metric.distance(&state, &cycle.state);
-                if cycle.is_stable() && distance < NEAR {
+                if cycle.is_stable() && distance < RECURRENCE_DISTANCE {
                     let at = self.strobes.len() - 1;
-                    let found = Found { cycle, seed: seed.clone(), at, distance, reading: OnceCell::new() };
-                    // A fixed point that lies in another domain than the motion now is no cycle.
+                    let found =
+                        FoundCycle { cycle, seed: seed.clone(), at, distance, reading: OnceCell::new() };
+                    // A fixed point in another domain than the motion is no cycle.
                     if !is_last && !self.reading(&found).is_ok_and(|reading| reading.closes) {
                         continue;
                     }
-                    // The next check will tell whether it is being approached.
+                    // The next check shows whether the motion approaches it.
                     self.approaches = true;
                     self.cycle = Some(found);
-                    let orbit = self.approached(&metric, near)?;
-                    // One find is enough for now.
+                    let orbit = self.orbit_of_last_cycle(&metric, near)?;
                     if orbit.is_some() || !is_last {
                         return Ok(orbit);
                     }
@@ -309,99 +307,98 @@ impl<'a> Watch<'a> {
         Ok(None)
     }
 
-    /// The orbit of the cycle found last, if the strobe states have come within `near` of it
-    /// and nearer all the time.
-    fn approached(&self, metric: &Metric, near: f64) -> Result<Option<Orbit>, Stop> {
+    /// Returns the orbit of the last cycle that was found, if the strobe states approach it and [`stays`] holds.
+    /// Within the distance `near` a larger tolerance applies.
+    fn orbit_of_last_cycle(&self, metric: &Metric, near: f64) -> Result<Option<Orbit>, Stop> {
         let Some(found) = &self.cycle else { return Ok(None) };
-        let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_beside(found));
+        let (cycle, period, now) = (&found.cycle, found.cycle.period as usize, self.last_strobe_of(found));
         let distance = |back: usize| metric.distance(&self.strobes[now - back * period], &cycle.state);
         let present = distance(0);
         let left = f64::from(self.budget.periods()) - (self.strobes.len() - 1) as f64;
-        // Where it would stand at the end of the budget: the same status for early stops.
+        // The predicted distance at the end of the budget gives the same status with and without early stops.
         let radius = cycle.spectral_radius();
         let at_last = present * radius.powf(left / f64::from(cycle.period));
         if present < ON_CYCLE {
             return Ok(Some(self.analysis.periodic(self.reading(found)?, cycle, at_last)));
         }
         let halving = (0.5f64.ln() / radius.max(0.1).ln()).ceil();
-        let back = (halving.min(1e6) as usize).max(APPROACH_CYCLES).min(now / 2 / period);
-        if back < 2 || present > NEAR {
+        let back = (halving.min(1e6) as usize).max(LEAST_APPROACH_CYCLES).min(now / 2 / period);
+        if back < 2 || present > RECURRENCE_DISTANCE {
             return Ok(None);
         }
-        // A multiplier near 1 shrinks little; half of what it promises must be seen.
-        let promised = 1.0 - 0.5 * (1.0 - radius.powf(back as f64));
+        // For a multiplier near 1, half of the predicted decrease is enough.
+        let predicted = 1.0 - 0.5 * (1.0 - radius.powf(back as f64));
         let before = distance(back);
-        let nearer = present < APPROACH.max(promised) * before;
+        let nearer = present < APPROACH_RATIO.max(predicted) * before;
         let steady = (1..back).all(|k| distance(k) < 2.0 * before);
         if !(nearer && steady) {
             return Ok(None);
         }
         let reading = self.reading(found)?;
-        let stays = |bend| reading.closes && self.stays(found, &reading.itineraries, metric, bend);
-        let stays = stays(LINEAR) || present < near && stays(BENT) && !self.grows_beside(found, metric);
+        let stays = |tolerance| reading.closes && self.stays(found, &reading.itineraries, metric, tolerance);
+        let stays = stays(LINEAR_TOLERANCE)
+            || present < near && stays(CLOSE_TOLERANCE) && !self.tangent_grows_near(found, metric);
         Ok(stays.then(|| self.analysis.periodic(reading, cycle, at_last)))
     }
 
-    /// The cycle, read once.
-    fn reading<'f>(&self, found: &'f Found) -> Result<&'f Reading, Stop> {
+    /// Returns the reading of a cycle, which is integrated on the first call.
+    fn reading<'f>(&self, found: &'f FoundCycle) -> Result<&'f Reading, Stop> {
         if let Some(reading) = found.reading.get() {
             return Ok(reading);
         }
-        self.read.set(self.read.get() + found.cycle.period);
+        self.reading_periods.set(self.reading_periods.get() + found.cycle.period);
         let reading = self.analysis.read(&found.seed, &found.cycle)?;
         Ok(found.reading.get_or_init(|| reading))
     }
 
-    /// Whether the motion stays by a cycle that has these itineraries.
-    fn stays(&self, found: &Found, shown: &[Itinerary], metric: &Metric, bend: f64) -> bool {
-        let (period, now) = (found.cycle.period as usize, self.last_beside(found));
-        let beside = |back: usize| now.checked_sub(back * period).map(|at| self.strobes[at]);
-        let is_on_branch = |back: usize| self.itineraries[now - back * period..][..period] == *shown;
-        stays(&found.cycle, beside, is_on_branch, metric, bend)
+    /// Whether the motion stays near a cycle that has these itineraries.
+    fn stays(&self, found: &FoundCycle, itineraries: &[Itinerary], metric: &Metric, tolerance: f64) -> bool {
+        let (period, now) = (found.cycle.period as usize, self.last_strobe_of(found));
+        let strobe = |back: usize| now.checked_sub(back * period).map(|at| self.strobes[at]);
+        let is_on_branch = |back: usize| self.itineraries[now - back * period..][..period] == *itineraries;
+        stays(&found.cycle, strobe, is_on_branch, metric, tolerance)
     }
 
-    /// Whether a tangent vector has grown, while the motion was near the cycle, by more than it would about one
-    /// that the motion tends to: a band of chaos may lie beside a cycle, and come nearer to it by chance.
-    fn grows_beside(&self, found: &Found, metric: &Metric) -> bool {
-        let (period, now) = (found.cycle.period as usize, self.last_beside(found));
-        let is_near = |n: &usize| metric.distance(&self.strobes[now - n * period], &found.cycle.state) < NEAR;
+    /// Whether a tangent vector has grown by more than is possible near a stable cycle, while the motion was near the
+    /// cycle. Then the motion is chaotic and came closer to the cycle by chance.
+    fn tangent_grows_near(&self, found: &FoundCycle, metric: &Metric) -> bool {
+        let (period, now) = (found.cycle.period as usize, self.last_strobe_of(found));
+        let is_near = |n: &usize| {
+            metric.distance(&self.strobes[now - n * period], &found.cycle.state) < RECURRENCE_DISTANCE
+        };
         let cycles = (0..=now / period).take_while(is_near).count();
-        swings(self.exponent.lately((cycles * period).min(self.exponent.periods())))
+        exceeds_stretch(self.exponent.recent_growth((cycles * period).min(self.exponent.periods())))
     }
 
-    /// The last strobe that the cycle's state belongs to: the others, unless the period is 1,
-    /// are other points of the cycle.
-    fn last_beside(&self, found: &Found) -> usize {
+    /// Returns the index of the last strobe that corresponds to the cycle's state, and not to another point of the
+    /// cycle.
+    fn last_strobe_of(&self, found: &FoundCycle) -> usize {
         let period = found.cycle.period as usize;
         found.at + (self.strobes.len() - 1 - found.at) / period * period
     }
 
-    fn periods_beside(&self) -> u32 {
-        self.newton.periods() + self.read.get()
+    /// Returns the distance of the motion from a cycle.
+    fn distance_now(&self, found: &FoundCycle, metric: &Metric) -> f64 {
+        metric.distance(&self.strobes[self.last_strobe_of(found)], &found.cycle.state)
     }
 
-    /// How far the motion is from a cycle.
-    fn present(&self, found: &Found, metric: &Metric) -> f64 {
-        metric.distance(&self.strobes[self.last_beside(found)], &found.cycle.state)
-    }
-
-    fn periodic(&self, orbit: Orbit, strobe: State) -> Measured {
-        Measured {
+    /// Builds the results of motion on a cycle.
+    fn periodic(&self, orbit: Orbit, strobe: State) -> Measurement {
+        Measurement {
             period: Some(orbit.cycle_periods),
-            status: orbit.status,
             lyapunov: Some([orbit.lyapunov, 0.0]),
             impacts_per_period: orbit.impacts_per_period,
             mesh_fraction: orbit.mesh_fraction,
             symmetric: orbit.symmetric,
             word: Some(orbit.word),
             strobe,
-            periods_run: self.strobes.len() as u32 - 1,
-            periods_beside: self.periods_beside(),
+            ..self.without_results(orbit.status)
         }
     }
 
-    /// What there is to say of motion that is at no cycle, over the last observed periods.
-    fn aperiodic(&self, errors: f64) -> Measured {
+    /// Builds the results of aperiodic motion over the last observed periods. For chaos the exponent must exceed zero
+    /// by `errors` standard errors.
+    fn aperiodic(&self, errors: f64) -> Measurement {
         let settings = &self.budget.settings;
         let from = self.strobes.len() - 1 - settings.observed_periods as usize;
         let (window, max_period) = (&self.strobes[from..], settings.max_period);
@@ -410,41 +407,34 @@ impl<'a> Watch<'a> {
         let [impacts, meshing_time] =
             [0, 1].map(|i| self.counts[self.counts.len() - 1][i] - self.counts[from][i]);
         let lyapunov = self.budget.exponent.then(|| self.exponent.estimate(period));
-        let surely = lyapunov.map(|(mean, error)| mean - errors * error);
-        // Banded chaos stays near a cycle for ever, but no escape lasts through such growth.
+        let least = lyapunov.map(|(mean, error)| mean - errors * error);
+        // Chaos in narrow bands may stay near a cycle for ever, but an escape does not last through such growth.
         let averaged = &self.strobes[self.budget.exponent_from() as usize..];
         let near_saddle_periods = near_saddle(averaged, &Metric::of(window, self.analysis.flow), max_period);
         let is_escape = |rate: f64| rate * near_saddle_periods as f64 * period < ESCAPE_GROWTH;
         let is_neutral =
             |rate: f64| rate * averaged.len().saturating_sub(1) as f64 * period <= self.neutral_growth();
-        let slow = surely.is_some_and(is_neutral)
-            || 2.0 * near_saddle_periods as f64 >= span && surely.is_none_or(is_escape);
-        Measured {
-            period: None,
-            status: if slow { Status::Slow } else { Status::Ok },
+        let slow = least.is_some_and(is_neutral)
+            || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);
+        Measurement {
             lyapunov: lyapunov.map(|(mean, error)| [mean, error]),
             impacts_per_period: impacts / span,
             mesh_fraction: meshing_time / (span * period),
-            symmetric: None,
-            word: None,
-            strobe: self.strobes[self.strobes.len() - 1],
-            periods_run: self.strobes.len() as u32 - 1,
-            periods_beside: self.periods_beside(),
+            ..self.without_results(if slow { Status::Slow } else { Status::Ok })
         }
     }
 
-    /// What tangents of neutral motion may grow by, as a logarithm: those of a free body, of a
-    /// torus or of an undamped swing in proportion to time, at a double root to its square.
+    /// Returns the logarithm of the largest growth of tangents in neutral motion; see [`NEUTRAL_ORDER`].
     fn neutral_growth(&self) -> f64 {
         let from = f64::from(self.budget.exponent_from().max(1));
         NEUTRAL_ORDER * ((self.strobes.len() - 1) as f64 / from).ln()
     }
 
-    /// A cell that could not be continued: nothing was measured but how far it came.
-    fn stopped(&self, stop: Stop) -> Measured {
-        Measured {
+    /// Builds a measurement with the last strobe state and the numbers of periods only.
+    fn without_results(&self, status: Status) -> Measurement {
+        Measurement {
             period: None,
-            status: status_of(stop),
+            status,
             lyapunov: None,
             impacts_per_period: 0.0,
             mesh_fraction: 0.0,
@@ -452,7 +442,7 @@ impl<'a> Watch<'a> {
             word: None,
             strobe: self.strobes[self.strobes.len() - 1],
             periods_run: self.strobes.len() as u32 - 1,
-            periods_beside: self.periods_beside(),
+            search_periods: self.newton.periods() + self.reading_periods.get(),
         }
     }
 }

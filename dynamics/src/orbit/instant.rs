@@ -1,4 +1,4 @@
-//! Where a motion is at one instant.
+//! The state of a motion at one instant.
 
 use std::sync::atomic::AtomicBool;
 
@@ -7,14 +7,14 @@ use crate::flow::Flow;
 use crate::model::{Law, State};
 use crate::reference::{Stop, Trajectory};
 
-/// Forcing periods that a minute is enough for, where the motion is not stiff.
+/// Forcing periods that take about a minute if the motion is not stiff.
 pub const LONGEST_TIME: f64 = 3e7;
 
-/// The state at `time` of the motion that is in `start` at phase 0 of the forcing, time 0; none if `halt` was raised
-/// meanwhile. Whole periods are counted, so that no phase is lost to rounding; the rest is taken at once.
+/// Returns the state at `time` of the motion that starts from `start` at phase 0 and time 0, or none if `halt` was
+/// raised. Whole periods are integrated one by one, so that the phase has no rounding error.
 ///
 /// # Errors
-/// A [`Stop`] if the motion cannot be continued as far, or takes more than about a minute.
+/// A [`Stop`] if the motion cannot be continued up to `time`, or needs more than about a minute.
 ///
 /// # Panics
 /// If `time` is negative or not finite.
@@ -25,7 +25,7 @@ pub fn state_at(
     time: f64,
     halt: &AtomicBool,
 ) -> Result<Option<State>, Stop> {
-    assert!(time.is_finite() && time >= 0.0, "a time since the start");
+    assert!(time.is_finite() && time >= 0.0, "time = {time}: it must be finite and at least 0");
     let (periods, rest) = split(time, flow.period);
     let allowance = ALLOWANCE.until(halt);
     let mut trajectory = Trajectory::<0>::new(flow, law, start).allowing(allowance);
@@ -40,11 +40,11 @@ pub fn state_at(
     if allowance.is_halted() { Ok(None) } else { state.map(Some) }
 }
 
-/// Whole periods, and what is left, to one rounding.
+/// Splits a time into whole periods and a remainder, to one rounding.
 fn split(time: f64, period: f64) -> (u64, f64) {
     let whole = (time / period).floor();
     let rest = (-whole).mul_add(period, time);
-    // The quotient may be rounded over the next whole number.
+    // The quotient may be rounded up to the next integer.
     if rest < 0.0 {
         ((whole - 1.0).max(0.0) as u64, (rest + period).max(0.0))
     } else if rest >= period {
@@ -59,24 +59,23 @@ mod tests {
     use super::*;
     use crate::model::{GearPair, REST};
 
-    /// As a trajectory that is followed by hand; and whole periods end exactly at the strobe.
     #[test]
-    fn a_time_is_whole_periods_and_a_rest() {
+    fn state_at_agrees_with_a_trajectory() {
         let pair = GearPair::paper(0.06);
         let flow = Flow::of(&pair).unwrap();
         let at = |time| state_at(&flow, pair.law(), REST, time, &AtomicBool::new(false)).unwrap().unwrap();
         assert_eq!(at(0.0), REST);
         let mut trajectory = Trajectory::<0>::new(&flow, pair.law(), REST);
         (0..1000).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
-        let apart = |a: State, b: State| (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
-        assert!(apart(at(1000.0 * flow.period), trajectory.state()) < 1e-10);
+        let distance = |a: State, b: State| (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
+        assert!(distance(at(1000.0 * flow.period), trajectory.state()) < 1e-10);
         trajectory.advance_to(0.25 * flow.period, &mut ()).unwrap();
-        assert!(apart(at(1000.25 * flow.period), trajectory.state()) < 1e-10);
+        assert!(distance(at(1000.25 * flow.period), trajectory.state()) < 1e-10);
         assert_eq!(state_at(&flow, pair.law(), REST, 1.0, &AtomicBool::new(true)), Ok(None));
     }
 
     #[test]
-    fn no_time_is_lost_by_splitting_it() {
+    fn periods_and_remainder_add_up_to_the_time() {
         for period in [std::f64::consts::TAU / 5.6, 0.1, 3.0, std::f64::consts::TAU] {
             for n in [0_u32, 1, 2, 3, 7, 10, 49, 1000, 12_345_678] {
                 let time = f64::from(n) * period;

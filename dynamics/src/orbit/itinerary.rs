@@ -1,17 +1,17 @@
-//! What happened in a forcing period, as a number.
+//! The sequence of events in a forcing period, as a number.
 //!
-//! The strobe map is smooth as long as the same events follow one another: its branches are told
-//! apart by their itineraries.
+//! The strobe map is smooth as long as the sequence of events does not change. So the itinerary identifies a branch
+//! of the strobe map.
 
 use crate::flow::Flow;
 use crate::model::Side;
-use crate::reference::{Happening, Observer};
+use crate::reference::{GapEvent, Observer};
 
-/// The events of one forcing period in their order, with their walls.
+/// A hash of the events of one forcing period in their order, with their walls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Itinerary(u64);
 
-/// Takes down the itinerary of a period.
+/// Computes the itinerary of a period.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Recorder {
     walls: [f64; 2],
@@ -23,26 +23,24 @@ impl Recorder {
         Recorder { walls: flow.walls, itinerary: Itinerary::default() }
     }
 
-    /// The itineraries of consecutive periods.
-    pub(super) fn list(flow: &Flow, met: &[Happening], start: u64, periods: u32) -> Vec<Itinerary> {
+    /// Returns the itineraries of `periods` consecutive periods, of which `start` is the first.
+    pub(super) fn list(flow: &Flow, events: &[GapEvent], start: u64, periods: u32) -> Vec<Itinerary> {
         let mut list = vec![Recorder::new(flow); periods as usize];
-        met.iter().for_each(|happening| list[(happening.period - start) as usize].event(happening));
+        events.iter().for_each(|event| list[(event.period - start) as usize].event(event));
         list.into_iter().map(|recorder| recorder.itinerary).collect()
     }
 }
 
 impl Observer for Recorder {
     #[inline]
-    fn event(&mut self, happening: &Happening) {
-        let wall = self.walls[usize::from(happening.side == Side::Left)];
-        // Meshing that ends before the wall is reached is another branch.
-        let is_on_wall = happening.before[0] == wall;
-        let code = 1
-            + u64::from(happening.side == Side::Right)
-            + 2 * u64::from(is_on_wall)
-            + 4 * happening.kind as u64;
+    fn event(&mut self, event: &GapEvent) {
+        let wall = self.walls[usize::from(event.side == Side::Left)];
+        // If meshing ends before the gap reaches the wall, the branch is another one.
+        let is_on_wall = event.before[0] == wall;
+        let code =
+            1 + u64::from(event.side == Side::Right) + 2 * u64::from(is_on_wall) + 4 * event.kind as u64;
         let Itinerary(before) = self.itinerary;
-        // An odd factor and a rotation: order matters, and no event is lost.
+        // Multiplication by an odd number and rotation are invertible, and they make the order count.
         self.itinerary = Itinerary((before ^ code).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23));
     }
 }

@@ -1,34 +1,34 @@
-//! Reading events off a stretch of a trajectory.
+//! The events of a trajectory over a number of forcing periods, and averages over them.
 
 use super::Event;
 use super::itinerary::{Itinerary, Recorder};
 use crate::flow::Flow;
 use crate::model::{Side, State};
-use crate::reference::{EventKind, Happening, Stop, Trajectory};
+use crate::reference::{EventKind, GapEvent, Stop, Trajectory};
 use crate::word::Word;
 
-/// Events closer to phase 0 than this, in turns, count as lying on the strobe.
+/// Largest distance from phase 0, in turns, of an event that lies on the strobe.
 pub const ON_STROBE_TURNS: f64 = 1e-9;
 
-/// Everything that happens over a number of forcing periods.
+/// The events of a trajectory over a number of forcing periods, and averages over them.
 #[derive(Clone, Debug)]
 pub(super) struct Reading {
     pub(super) strobe: State,
     pub(super) strobe_meshing: Option<Side>,
     pub(super) events: Vec<Event>,
-    /// Of each period.
+    /// The itinerary of each period.
     pub(super) itineraries: Vec<Itinerary>,
     pub(super) word: Word,
     pub(super) impacts_per_period: f64,
     pub(super) mesh_fraction: f64,
-    /// Whether it ends in the domain that it began in: a cycle's state may recur in another.
+    /// Whether the motion ends in the domain in which it started. The state alone may recur in another domain.
     pub(super) closes: bool,
     pub(super) near_grazing: bool,
     pub(super) on_strobe: bool,
 }
 
 impl Reading {
-    /// Reads `periods` forcing periods from here on.
+    /// Advances the trajectory by `periods` forcing periods and collects the events.
     ///
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
@@ -38,15 +38,15 @@ impl Reading {
         periods: u32,
     ) -> Result<Reading, Stop> {
         let (strobe, strobe_meshing) = (trajectory.state(), trajectory.meshing());
-        let begun = trajectory.clone();
+        let first = trajectory.clone();
         let start = trajectory.period();
         let (mesh_start, impacts_start) = (trajectory.meshing_time(), trajectory.work().impacts);
         trajectory.clear_near_grazing();
-        let mut met: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         for _ in 0..periods {
-            trajectory.advance_period(&mut met)?;
+            trajectory.advance_period(&mut events)?;
         }
-        let symbols: Vec<u8> = met.iter().filter_map(|happening| happening.symbol).collect();
+        let symbols: Vec<u8> = events.iter().filter_map(|event| event.symbol).collect();
         let span = f64::from(periods);
         Ok(Reading {
             strobe,
@@ -54,31 +54,29 @@ impl Reading {
             word: Word::cyclic(&symbols),
             impacts_per_period: (trajectory.work().impacts - impacts_start) as f64 / span,
             mesh_fraction: (trajectory.meshing_time() - mesh_start) / (span * flow.period),
-            itineraries: Recorder::list(flow, &met, start, periods),
-            closes: trajectory.is_in_domain_of(&begun),
+            itineraries: Recorder::list(flow, &events, start, periods),
+            closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
-            on_strobe: met.iter().any(|happening| {
-                let turns = happening.t / flow.period;
+            on_strobe: events.iter().any(|event| {
+                let turns = event.t / flow.period;
                 turns < ON_STROBE_TURNS || 1.0 - turns < ON_STROBE_TURNS
             }),
-            events: met.iter().map(|happening| event(flow, happening, start)).collect(),
+            events: events.iter().map(|event| in_states(flow, event, start)).collect(),
         })
     }
 }
 
-fn event(flow: &Flow, happening: &Happening, start: u64) -> Event {
-    // An event within rounding of the next phase 0 belongs to that one.
-    let within = if happening.t < flow.period { happening.t } else { 0.0 };
+/// Converts an event to states; `start` is the first period.
+fn in_states(flow: &Flow, event: &GapEvent, start: u64) -> Event {
+    // An event at the end of a period, by rounding, is at phase 0 of the next one.
+    let within = if event.t < flow.period { event.t } else { 0.0 };
+    let after = if event.kind == EventKind::MeshEnd { event.before } else { event.after };
     Event {
-        kind: happening.kind,
-        side: happening.side,
-        t: (happening.period - start) as f64 * flow.period + happening.t,
+        kind: event.kind,
+        side: event.side,
+        t: (event.period - start) as f64 * flow.period + event.t,
         t_mod_period: within,
-        before: flow.to_state(happening.before),
-        after: flow.to_state(if happening.kind == EventKind::MeshEnd {
-            happening.before
-        } else {
-            happening.after
-        }),
+        before: flow.to_state(event.before),
+        after: flow.to_state(after),
     }
 }

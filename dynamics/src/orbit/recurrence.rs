@@ -1,15 +1,14 @@
-//! Recurrence of strobe states: which periods are worth a search.
+//! Recurrence of strobe states: candidates for the period of a motion.
 
 use nalgebra::Vector4;
 
 use crate::flow::Flow;
 use crate::model::State;
 
-/// Recurrences farther apart than this, relative to the motion's size, are no candidates.
-pub(super) const NEAR: f64 = 3e-2;
+/// Largest distance of a recurrence, relative to the size of the motion.
+pub(super) const RECURRENCE_DISTANCE: f64 = 3e-2;
 
-/// Distances between strobe states in units of the motion's own size, positions and
-/// velocities apart.
+/// A metric of strobe states: positions and velocities are divided by their sizes in the motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Metric {
     position: f64,
@@ -17,9 +16,8 @@ pub(super) struct Metric {
 }
 
 impl Metric {
-    /// The metric of a set of strobe states: the largest entries of each kind, but never
-    /// less than the flow's scale of length and what that is as a velocity. Where
-    /// the strobe catches the motion at its turning point, velocities are all rounding.
+    /// Builds the metric of a set of strobe states from the largest position and the largest velocity. The flow's
+    /// scale of length, and that as a velocity, are lower bounds: at a turning point, velocities are rounding errors.
     pub(super) fn of(strobes: &[State], flow: &Flow) -> Metric {
         let largest =
             |a: usize, b: usize| strobes.iter().flat_map(|y| [y[a].abs(), y[b].abs()]).fold(0.0, f64::max);
@@ -27,18 +25,19 @@ impl Metric {
         Metric { position, velocity: largest(1, 3).max(flow.omega * position) }
     }
 
-    /// The distance of two states.
+    /// Returns the distance of two states.
     pub(super) fn distance(&self, a: &State, b: &State) -> f64 {
-        let apart = |i: usize| (a[i] - b[i]).abs();
-        (apart(0).max(apart(2)) / self.position).max(apart(1).max(apart(3)) / self.velocity)
+        let difference = |i: usize| (a[i] - b[i]).abs();
+        (difference(0).max(difference(2)) / self.position)
+            .max(difference(1).max(difference(3)) / self.velocity)
     }
 
-    /// The size of a difference of states.
+    /// Returns the size of a difference of states.
     pub(super) fn size(&self, difference: &Vector4<f64>) -> f64 {
         self.scaled(difference).amax()
     }
 
-    /// A difference of states in these units.
+    /// Returns a difference of states in the units of the metric.
     pub(super) fn scaled(&self, difference: &Vector4<f64>) -> Vector4<f64> {
         let units = [self.position, self.velocity, self.position, self.velocity];
         difference.component_div(&Vector4::from(units))
@@ -50,34 +49,35 @@ impl Metric {
 pub(super) struct Candidate {
     /// The lag, in forcing periods.
     pub(super) period: u32,
-    /// How far apart the states are.
+    /// The largest distance of two states at this lag.
     pub(super) distance: f64,
 }
 
-/// For how many of the last periods the states have kept close to those of some lag: they
-/// stay near a periodic orbit, stable or not.
+/// Returns the number of last periods over which the states recur at some lag: the motion stays near a periodic
+/// orbit, stable or unstable.
 pub(super) fn near_saddle(strobes: &[State], metric: &Metric, max_period: u32) -> usize {
     let n = strobes.len();
-    let is_near = |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < NEAR;
-    let lasted = |lag: usize| (lag..n).rev().take_while(|&i| is_near(i, lag)).count();
+    let is_near =
+        |i: usize, lag: usize| metric.distance(&strobes[i], &strobes[i - lag]) < RECURRENCE_DISTANCE;
+    let duration = |lag: usize| (lag..n).rev().take_while(|&i| is_near(i, lag)).count();
     (1..=(max_period as usize).min(n / 2)).fold(0, |most, lag| {
-        // Multiples of a lag stay near about as long: where the longest ended, most end as well.
-        if lag + most < n && is_near(n - 1 - most, lag) { most.max(lasted(lag)) } else { most }
+        // A lag that is not near where the longest recurrence ended is not longer.
+        if lag + most < n && is_near(n - 1 - most, lag) { most.max(duration(lag)) } else { most }
     })
 }
 
-/// Lags up to `max_period` at which the last states recur, the most promising first: the
-/// smallest lag among those that come about as close as any.
+/// Returns lags up to `max_period` at which the last states recur, in order of distance. A lag is left out if a
+/// smaller one recurs about as well.
 pub(super) fn candidates(strobes: &[State], metric: &Metric, max_period: u32) -> Vec<Candidate> {
     let n = strobes.len();
-    let mut best = NEAR;
+    let mut best = RECURRENCE_DISTANCE;
     let mut list = Vec::new();
     for lag in (1..=max_period as usize).take_while(|lag| 2 * lag <= n) {
         let mut distances = (n - lag..n).map(|i| metric.distance(&strobes[i], &strobes[i - lag]));
-        // Most lags end here after a few strobes: no better than the best.
-        let found = distances.try_fold(0.0f64, |most, d| (d < best).then(|| most.max(d)));
-        let Some(distance) = found else { continue };
-        // One that recurs ten times as well as all shorter ones is worth its own search.
+        // For most lags this ends after a few strobes, because they are no better than the best.
+        let largest = distances.try_fold(0.0f64, |most, d| (d < best).then(|| most.max(d)));
+        let Some(distance) = largest else { continue };
+        // A lag must recur ten times as well as all shorter ones.
         if list.is_empty() || distance < 0.1 * best {
             list.push(Candidate { period: lag as u32, distance });
         }
@@ -92,8 +92,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_decaying_spiral_offers_its_fixed_point_too() {
-        // Multipliers 0.9 exp(+- 2 pi i / 3.02): lag 3 comes closest at any time.
+    fn a_decaying_spiral_has_its_fixed_point_among_the_candidates() {
+        // Multipliers 0.9 exp(+- 2 pi i / 3.02): lag 3 is always closest.
         let strobes: Vec<State> = (0..100)
             .map(|n| {
                 let (r, phi) = (0.9f64.powi(n), f64::from(n) * std::f64::consts::TAU / 3.02);
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_three_cycle_is_found_at_lag_three_alone() {
+    fn a_three_cycle_has_lag_three_as_its_only_candidate() {
         let strobes: Vec<State> = (0..60).map(|n| [f64::from(n % 3), 0.0, 0.0, 1.0]).collect();
         let found = candidates(&strobes, &Metric { position: 2.0, velocity: 1.0 }, 16);
         assert_eq!(found, [Candidate { period: 3, distance: 0.0 }]);

@@ -1,16 +1,16 @@
-//! Densely sampled trajectories, for figures.
+//! Densely sampled trajectories for figures.
 
 use super::Sample;
 use crate::flow::Flow;
 use crate::model::{Model, ModelError, Side, State};
 use crate::reference::Trajectory;
 
-/// Samples a trajectory from `start` at phase 0 over `periods` forcing periods, evenly, first
-/// and last instant included. `meshing` says whether the teeth mesh at the start, which a gap
-/// just short of a wall does not tell. Ends early where the trajectory cannot be continued.
+/// Samples a trajectory evenly over `periods` forcing periods, including the first and the last instant. It starts
+/// from `start` at phase 0, in lasting contact with the wall `meshing` or in free motion. If the trajectory cannot be
+/// continued, the samples up to that point are returned.
 ///
 /// # Errors
-/// [`ModelError`] if the model is not valid: it has no motion.
+/// [`ModelError`] if the model is not valid.
 pub fn trace(
     model: &dyn Model,
     start: State,

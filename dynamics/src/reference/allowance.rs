@@ -1,33 +1,32 @@
-//! How much a motion may still take.
+//! The work that a motion may take.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{Stop, Work};
 
-/// Work that a motion may take in all, and a flag that ends it before.
+/// Upper limits of the work of a motion, and a flag that stops it.
 ///
-/// Work is counted, not timed: a motion ends at the same place on every machine. Whoever raises the flag throws the
-/// answer away, which may be that of a motion cut short.
+/// Work is counted, not timed, so that a motion ends at the same place on every machine. A caller that raises the
+/// flag must discard the result.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowance<'a> {
-    /// Steps, halved ones included.
+    /// Steps, including those that are halved.
     pub steps: u64,
     /// Events.
     pub events: u64,
-    /// Looked at once a forcing period.
+    /// The stop flag, read once in a forcing period.
     pub halt: Option<&'a AtomicBool>,
 }
 
 impl<'a> Allowance<'a> {
-    /// As much as it takes.
+    /// No limits.
     pub const UNLIMITED: Allowance<'static> = Allowance { steps: u64::MAX, events: u64::MAX, halt: None };
 
-    /// The same until a flag is raised.
+    /// Adds a stop flag.
     pub fn until(self, halt: &'a AtomicBool) -> Allowance<'a> {
         Allowance { halt: Some(halt), ..self }
     }
 
-    /// What is left of it after some work.
     pub(crate) fn after(self, work: Work) -> Allowance<'a> {
         Allowance {
             steps: self.steps.saturating_sub(work.steps),
@@ -36,15 +35,14 @@ impl<'a> Allowance<'a> {
         }
     }
 
-    /// Whether its flag is raised.
     pub(crate) fn is_halted(&self) -> bool {
         self.halt.is_some_and(|halt| halt.load(Ordering::Relaxed))
     }
 
-    /// Whether some work is within it.
+    /// Checks that work is within the limits.
     ///
     /// # Errors
-    /// The [`Stop`] of a motion that took as much.
+    /// The [`Stop`] of the exceeded limit.
     pub(crate) fn covers(&self, work: Work) -> Result<(), Stop> {
         if work.steps > self.steps || self.is_halted() {
             Err(Stop::TooStiff)

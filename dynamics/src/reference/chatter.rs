@@ -1,32 +1,33 @@
-//! Infinite chatter: the whole series of ever smaller impacts in one jump.
+//! Infinite chatter: one jump over a convergent series of impacts.
 
 use super::{EventKind, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow, Phasor, RADIUS};
 use crate::model::{Contact, Side};
 
-/// A series is closed once its whole duration, in units of the fastest rate of free
-/// motion, is this short: what the closed form leaves out is of third order in it.
+/// Longest duration of a series that is replaced by its closed form, in Taylor steps of free motion. The error of the
+/// closed form is of third order in the duration.
 const CLOSING_DURATION: f64 = 1e-4;
 
-/// The same as an angle, in radians of that rate.
+/// The closing duration as an angle, in radians of the fastest rate of free motion.
 pub const CLOSING_ANGLE: f64 = CLOSING_DURATION * RADIUS;
 
-/// A threshold below this, relative to the scale of length and the rate of free motion, is
-/// none: the series is infinite for all that f64 can tell.
+/// Mesh speeds below this, relative to the scale of length and the rate of free motion, count as zero: in f64 the
+/// series does not end.
 pub const NO_THRESHOLD: f64 = 1e-10;
 
-/// Motion with the gap held closed: the wall takes up the relative acceleration.
+/// Motion with the gap closed, while the wall cancels the relative acceleration.
 struct Sliding {
-    /// Relative acceleration that the wall takes up, and its rate of change.
+    /// Relative acceleration that the wall cancels, and its time derivative.
     acceleration: f64,
     acceleration_rate: f64,
-    /// What it changes by with the second displacement and its rate.
+    /// Derivatives of `acceleration` with respect to the second displacement and its rate.
     gradient: [f64; 2],
-    /// Acceleration of the second displacement, its rate of change, and what it changes by likewise.
+    /// Acceleration of the second displacement, its time derivative, and its derivatives with respect to that
+    /// displacement and its rate.
     v_rate: f64,
     v_jerk: f64,
     v_gradient: [f64; 2],
-    /// Damping of the relative motion at fixed momentum, and what the momentum has of it.
+    /// Damping of the relative motion at fixed momentum, and the damping force on the momentum by the gap's rate.
     damping: f64,
     drag: f64,
 }
@@ -54,14 +55,13 @@ impl Sliding {
 }
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Closes an infinite series of impacts (`mesh_speed = 0`, or so small that it makes no
-    /// difference; `0 < e < 1`): one jump to the moment at which the gap rests on the wall and meshing starts.
+    /// Jumps over an infinite series of impacts (`mesh_speed` of about 0, `0 < e < 1`) to the instant at which the
+    /// gap rests on the wall and meshing starts.
     ///
-    /// With the leaving speed `u`, the pressing acceleration `G`, its rate of change `J`
-    /// while the gap stays closed, and the relative damping `gamma`, the series lasts
-    /// `T0 (1 - J T0 / (3 G) - gamma T0 / 6)`, `T0 = 2 u / (G (1 - e))`, up to third order.
-    /// Meanwhile the centre of mass moves as it does with the gap closed. Tangents are those of
-    /// these formulas, up to second order.
+    /// With the leaving speed `u`, the pressing acceleration `G`, its time derivative `J` with the gap closed, and
+    /// the relative damping `gamma`, the series lasts `T0 (1 - J T0 / (3 G) - gamma T0 / 6)`,
+    /// `T0 = 2 u / (G (1 - e))`, up to third order. Meanwhile the centre of mass moves as with the gap closed.
+    /// Tangents follow from these formulas, up to second order.
     pub(super) fn close_chatter(&mut self, side: Side, leaving: f64, observer: &mut impl Observer) {
         let e = self.law.restitution[side.index()];
         if self.law.mesh_speed[side.index()] > NO_THRESHOLD * self.flow.speed || leaving == 0.0 || e >= 1.0 {
@@ -79,7 +79,7 @@ impl<const N: usize> Trajectory<'_, N> {
         }
         let bend = side.sign() * sliding.acceleration_rate / (3.0 * pressing) + sliding.damping / 6.0;
         let duration = whole * (1.0 - bend * whole);
-        // A series cut by the strobe goes on bouncing until it lies within one stretch.
+        // A series that the strobe would interrupt is not replaced: its impacts are computed one by one.
         if duration <= 0.0 || duration >= self.clock.remaining(self.goal) {
             return;
         }
@@ -94,9 +94,9 @@ impl<const N: usize> Trajectory<'_, N> {
         let pressing_at_end = pressing + duration * pressing_rate;
         let is_rigid = flow.contacts[side.index()] == Contact::Rigid;
         self.tangents = self.tangents.map(|[dz, dw, dx, dv]| {
-            // A neighbour leaves the wall `later`, and so at another speed and under another pressing
-            // acceleration; its series ends `late`. Until then it misses what presses it at the end.
-            // The centre of mass feels the way of the gap alone. On a rigid wall it comes to rest, too.
+            // A neighbouring motion leaves the wall `later`, at another speed and under another pressing
+            // acceleration, and its series ends `late`. `behind` is the difference of its gap's rate at the end of
+            // this series. It is 0 on a rigid wall, where the neighbour comes to rest, too.
             let (dx, dv) = (dx + kick * dz, dv + kick * dw);
             let later = s * dz / leaving;
             let leaves = -s * dw - (pressing + sliding.damping * leaving) * later;

@@ -1,44 +1,42 @@
 //! Time since the last phase 0, summed over many steps without loss.
 
-/// A sum of steps that keeps what rounding takes from it.
+/// A compensated sum of steps.
 ///
-/// A stiff oscillator takes thousands of steps in a period; added up plainly, each would lose
-/// half a unit in the last place of the sum, and the strobe would fall that far from its phase.
+/// A stiff oscillator takes thousands of steps in a period. Simple addition would lose up to half a unit in the last
+/// place in each step, and the strobe would not be at phase 0.
 ///
 /// W. Kahan, Further remarks on reducing truncation errors, Commun. ACM 8 (1965) 40.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
     time: f64,
-    /// What `time` is short of, at most half a unit in its last place.
-    short: f64,
+    /// Rounding error of `time`, at most half a unit in its last place.
+    error: f64,
 }
 
 impl Clock {
-    /// The time, to rounding.
+    /// Returns the time, rounded.
     #[inline(always)]
     pub(super) fn time(&self) -> f64 {
         self.time
     }
 
-    /// Exactly `time`.
     #[inline(always)]
     pub(super) fn set(&mut self, time: f64) {
-        *self = Self { time, short: 0.0 };
+        *self = Self { time, error: 0.0 };
     }
 
-    /// A step later.
     #[inline(always)]
     pub(super) fn advance(&mut self, step: f64) {
-        let step = step + self.short;
+        let step = step + self.error;
         let later = self.time + step;
-        self.short = step - (later - self.time);
+        self.error = step - (later - self.time);
         self.time = later;
     }
 
-    /// From now to `until`.
+    /// Returns the time from now to `until`.
     #[inline(always)]
     pub(super) fn remaining(&self, until: f64) -> f64 {
-        (until - self.time) - self.short
+        (until - self.time) - self.error
     }
 }
 
@@ -54,10 +52,9 @@ mod tests {
             clock.advance(step);
             sum + step
         });
-        // 0.1 as a double, times a million, to the nearest double.
         let exact = step * f64::from(steps);
         assert!((clock.time() - exact).abs() <= f64::EPSILON * exact, "{} of {exact}", clock.time());
-        assert!((plain - exact).abs() > 1e4 * f64::EPSILON, "plain sums have no need of this");
+        assert!((plain - exact).abs() > 1e4 * f64::EPSILON, "a simple sum is as accurate: {plain}");
         assert!((clock.remaining(2.0 * exact) - exact).abs() <= f64::EPSILON * exact);
     }
 }

@@ -1,20 +1,19 @@
-//! What happens at a wall: impact, meshing, grazing, and the end of meshing.
+//! Events at a wall: impact, start and end of meshing, grazing.
 
-use super::sticking::LET_GO;
-use super::{Crossing, EventKind, Happening, Mode, Observer, Trajectory};
+use super::sticking::RELEASE_ORDER;
+use super::{Crossing, EventKind, GapEvent, Mode, Observer, Trajectory};
 use crate::flow::{DomainKind, Gap, LinearFlow};
 use crate::model::{Contact, Side};
 
-/// Approach speeds below this, relative to the scale of length and the rate of free motion
-/// and with the load pulling away, count as near grazing: the saltation matrix grows like
-/// its inverse.
+/// Approach speeds below this, relative to the scale of length and the rate of free motion, count as near grazing if
+/// the load pulls away from the wall. The saltation matrix is proportional to the inverse of the approach speed.
 pub const GRAZING_SPEED: f64 = 4e-5;
 
 /// The gradient of the gap in gap coordinates.
 const ALONG_GAP: Gap = [1.0, 0.0, 0.0, 0.0];
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Finds out where the start lies.
+    /// Determines the mode of the start.
     pub(super) fn enter(&mut self) {
         for side in Side::BOTH {
             let mut beyond = side.sign() * (self.q[0] - self.flow.wall(side));
@@ -38,7 +37,7 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Acts on a crossing at the present state.
+    /// Processes a crossing at the present state.
     #[inline(always)]
     pub(super) fn act(&mut self, crossing: Crossing, observer: &mut impl Observer) {
         match crossing {
@@ -58,13 +57,12 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.leave(side);
             }
             Crossing::Through(side) => {
-                // Meshing ends at a contact with the opposite wall.
                 self.q[0] = self.flow.wall(side.mirrored());
                 let rate = self.q[1];
                 self.end_meshing(side, &ALONG_GAP, rate, observer);
                 self.contact(side.mirrored(), observer);
             }
-            Crossing::PressingEnds(side) if self.mode == Mode::Stuck(side) => self.let_go(side, observer),
+            Crossing::PressingEnds(side) if self.mode == Mode::Stuck(side) => self.release(side, observer),
             Crossing::PressingEnds(side) => {
                 let linear = self.flow.domain(DomainKind::Meshing(side));
                 let row = linear.acceleration_row();
@@ -76,18 +74,24 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Free motion reaches a wall.
+    /// Processes a contact: free motion has reached a wall.
     #[inline(always)]
     pub(super) fn contact(&mut self, side: Side, observer: &mut impl Observer) {
         let contact = self.flow.contacts[side.index()];
-        if contact == Contact::Impact || !self.goes_on_otherwise(contact, side, observer) {
+        if contact == Contact::Impact || !self.continues_without_impact(contact, side, observer) {
             self.impact(side, observer);
         }
     }
 
-    /// What does not follow from an impact: motion behind an elastic wall, rest on a rigid one.
+    /// Processes a contact without an impact: motion behind an elastic wall, or rest on a rigid one. Returns false if
+    /// there is an impact.
     #[inline(never)]
-    fn goes_on_otherwise(&mut self, contact: Contact, side: Side, observer: &mut impl Observer) -> bool {
+    fn continues_without_impact(
+        &mut self,
+        contact: Contact,
+        side: Side,
+        observer: &mut impl Observer,
+    ) -> bool {
         match contact {
             Contact::Elastic => self.go_behind(side, observer),
             Contact::Rigid if self.sticks(side) => self.stick(side, observer),
@@ -96,7 +100,7 @@ impl<const N: usize> Trajectory<'_, N> {
         true
     }
 
-    /// The impact law, then meshing or not (22), (37).
+    /// Applies the impact law, and decides whether meshing follows (22), (37).
     #[inline(always)]
     fn impact(&mut self, side: Side, observer: &mut impl Observer) {
         let e = self.law.restitution[side.index()];
@@ -134,11 +138,11 @@ impl<const N: usize> Trajectory<'_, N> {
             self.start_meshing(side, leaving);
             let meshing = self.flow.domain(DomainKind::Meshing(side));
             let pressing = side.sign() * meshing.acceleration(&after, &self.phasor);
-            self.short_flight = self.promises_short_flight(meshing, leaving, pressing);
+            self.short_flight = self.expects_short_flight(meshing, leaving, pressing);
         } else {
             self.work.impacts += 1;
             self.leave(side);
-            self.short_flight = self.promises_short_flight(free, leaving, pressing);
+            self.short_flight = self.expects_short_flight(free, leaving, pressing);
             if pressed {
                 self.close_chatter(side, leaving, observer);
             }
@@ -146,7 +150,7 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 
     pub(super) fn start_meshing(&mut self, side: Side, leaving: f64) {
-        // Both sides share one length of step, and one may have fewer.
+        // Both walls share one step level, and may have different numbers of levels.
         self.level[1] = self.level[1].min(self.flow.domain(DomainKind::Meshing(side)).levels - 1);
         if leaving > 0.0 {
             self.mode = Mode::Onset(side);
@@ -167,20 +171,20 @@ impl<const N: usize> Trajectory<'_, N> {
         self.mode = Mode::Free;
     }
 
-    /// Free motion starts on a wall.
+    /// Starts free motion on a wall.
     pub(super) fn leave(&mut self, side: Side) {
         self.mode = Mode::Free;
         let order = if self.q[1] == 0.0 { self.rest_order(DomainKind::Free) } else { 1 };
         self.from_wall = Some((side, order));
     }
 
-    /// Order of the root of the distance for a gap that rests on the wall.
+    /// Returns the order of the root of the distance for a gap at rest on the wall.
     pub(super) fn rest_order(&self, kind: DomainKind) -> usize {
         if self.flow.domain(kind).acceleration(&self.q, &self.phasor) == 0.0 { 3 } else { 2 }
     }
 
-    /// Whether the relative acceleration, or else the first of its rates that is not zero,
-    /// points into the wall.
+    /// Whether the relative acceleration points into the wall. If it is zero, its first derivative that is not zero
+    /// decides.
     pub(super) fn presses(&self, kind: DomainKind, side: Side, q: &Gap) -> bool {
         let linear = self.flow.domain(kind);
         let a = linear.acceleration(q, &self.phasor);
@@ -191,7 +195,7 @@ impl<const N: usize> Trajectory<'_, N> {
         rates.iter().find(|&&rate| rate != 0.0).is_some_and(|rate| side.sign() * rate > 0.0)
     }
 
-    /// The first flight of all comes from no wall and has no symbol.
+    /// Counts and reports an event. The first flight comes from no wall, so it has no symbol.
     pub(super) fn record(&mut self, kind: EventKind, side: Side, before: Gap, observer: &mut impl Observer) {
         let symbol = match (self.mode, self.origin) {
             (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => {
@@ -204,7 +208,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.origin = Some(side);
         self.work.events += 1;
         self.events_in_period += 1;
-        observer.event(&Happening {
+        observer.event(&GapEvent {
             kind,
             side,
             symbol,
@@ -215,8 +219,8 @@ impl<const N: usize> Trajectory<'_, N> {
         });
     }
 
-    /// Mends a start of a step that rounding has put on or beyond its boundary: a strobe
-    /// taken within rounding of an event. True if there was something to mend.
+    /// Corrects a start of a step that rounding has put on or beyond its boundary, as when an event lies within
+    /// rounding of the strobe. Returns whether there was anything to correct.
     pub(super) fn settle_start(&mut self, observer: &mut impl Observer) -> bool {
         if self.from_wall.is_some() {
             return false;
@@ -256,13 +260,13 @@ impl<const N: usize> Trajectory<'_, N> {
                 if self.presses(DomainKind::Meshing(side), side, &self.q) {
                     return false;
                 }
-                self.let_go(side, observer);
+                self.release(side, observer);
             }
         }
         true
     }
 
-    /// The gap is on or beyond a wall by rounding: a contact if it closes, else a start
+    /// Processes a gap that is on a wall, or beyond it by rounding: a contact if the gap closes, otherwise a start
     /// from the wall.
     fn touch(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
@@ -278,20 +282,21 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Something touches a wall within rounding. Elastic ones it may go through or not: the linearisation is
-    /// as good. A gap that a rigid wall lets go parts so slowly that it seems to rest.
+    /// Sets the near-grazing flag for a gap that touches a wall within rounding. There are two exceptions: an elastic
+    /// wall, where the linearisation is valid with and without contact, and a gap that has just left a rigid wall,
+    /// which moves very slowly at first.
     #[cold]
     pub(super) fn note_grazing(&mut self) {
         let [right, left] = self.flow.walls.map(|wall| (self.q[0] - wall).abs());
         let nearer = if right <= left { Side::Right } else { Side::Left };
-        let is_let_go = self.from_wall == Some((nearer, LET_GO));
+        let is_let_go = self.from_wall == Some((nearer, RELEASE_ORDER));
         if self.flow.contacts[nearer.index()] != Contact::Elastic && !is_let_go {
             self.near_grazing = true;
         }
     }
 
-    /// The shortest step is still undecided: whatever touches here does so within rounding.
-    /// Take the step; what it ends beyond is a contact, else the graze is no event.
+    /// Takes the shortest step although it is undecided: a contact on it is within rounding of grazing. If the step
+    /// ends beyond a wall there is a contact, otherwise no event.
     pub(super) fn settle_graze(
         &mut self,
         linear: &LinearFlow,
@@ -317,18 +322,18 @@ impl<const N: usize> Trajectory<'_, N> {
 mod tests {
     use crate::flow::Flow;
     use crate::model::{GearPair, Side};
-    use crate::reference::{EventKind, Happening, Trajectory};
+    use crate::reference::{EventKind, GapEvent, Trajectory};
 
-    /// With so small a backlash what starts meshing may reach the opposite wall first: it meets it.
+    /// With a very small backlash, a contact onset may reach the opposite wall. A contact there must follow.
     #[test]
-    fn a_dip_does_not_go_through_the_opposite_wall() {
-        let mut met = 0;
+    fn a_contact_onset_stops_at_the_opposite_wall() {
+        let mut reached = 0;
         for (b, mesh_speed) in [(1e-6, 0.01), (1e-5, 0.01), (1e-4, 0.05), (3e-4, 0.05)] {
             for (e, omega) in [(0.3, 5.6), (0.6, 3.2), (0.8, 2.0)] {
                 let pair = GearPair { b, mesh_speed, omega, ..GearPair::paper(e) };
                 let flow = Flow::new(&pair.oscillator().unwrap());
                 let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0; 4]);
-                let mut events: Vec<Happening> = Vec::new();
+                let mut events: Vec<GapEvent> = Vec::new();
                 for _ in 0..20 {
                     trajectory.advance_period(&mut events).unwrap();
                 }
@@ -340,12 +345,12 @@ mod tests {
                         assert!(short >= 0.0, "through the opposite wall by {short:e} at {end:?}");
                         if short == 0.0 {
                             assert_eq!((contact.side, contact.t), (end.side.mirrored(), end.t));
-                            met += 1;
+                            reached += 1;
                         }
                     }
                 }
             }
         }
-        assert!(met > 10, "{met}");
+        assert!(reached > 10, "{reached} contacts with the opposite wall");
     }
 }

@@ -1,17 +1,17 @@
-//! Elastic walls: the motion goes through them without a jump.
+//! Elastic walls: the state is continuous there.
 //!
-//! On the wall both fields agree but for the damper `c` behind it, `f+ - f- = -(c w) M^-1 g`. In the saltation
-//! matrix `w` cancels: `S = I - c M^-1 g n^T` on the way in, `S = I + c M^-1 g n^T` on the way out, exactly and
-//! at any speed. So no crossing of an elastic wall is too near to grazing, and without a damper the strobe map
-//! is continuously differentiable there.
+//! On the wall both vector fields differ only by the damper `c` behind it, `f+ - f- = -(c w) M^-1 g`. In the
+//! saltation matrix `w` cancels: it is `S = I - c M^-1 g n^T` on the way in and `S = I + c M^-1 g n^T` on the way
+//! out, exactly and at any speed. So a crossing of an elastic wall is never too near to grazing, and without a damper
+//! the strobe map is continuously differentiable there.
 
 use super::{EventKind, Observer, Trajectory};
 use crate::flow::DomainKind;
 use crate::model::Side;
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Free motion reaches an elastic wall. At no speed the first rate of the gap that is not zero decides
-    /// whether it goes on behind it.
+    /// Processes free motion that reaches an elastic wall. If the speed is zero, the gap's first derivative that is
+    /// not zero decides whether the motion continues behind the wall.
     #[inline(never)]
     pub(super) fn go_behind(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
@@ -29,7 +29,7 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// The gap comes back to an elastic wall from behind.
+    /// Processes motion that reaches an elastic wall from behind.
     #[inline(never)]
     pub(super) fn come_out(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
@@ -42,7 +42,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.leave(side);
     }
 
-    /// `S u = u + sign c M^-1 g (n . u)` on the velocities of every tangent vector.
+    /// Applies `S u = u + sign c M^-1 g (n . u)` to every tangent vector.
     fn cross_damper(&mut self, side: Side, sign: f64) {
         let [on_gap, on_other] = self.flow.dampers[side.index()].map(|damper| sign * damper);
         self.tangents = self.tangents.map(|[z, w, x, v]| [z, w + on_gap * z, x, v + on_other * z]);

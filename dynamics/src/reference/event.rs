@@ -1,34 +1,37 @@
-//! What a trajectory reports: its events, why it ended, and the work it took.
+//! Events of a trajectory, reasons for its end, and counters of its work.
 
 use std::ops::AddAssign;
 
 use crate::flow::Gap;
 use crate::model::Side;
 
-/// Events allowed in one forcing period.
+/// Largest number of events in one forcing period.
 pub const EVENTS_PER_PERIOD_CAP: u64 = 1_000_000;
 
-/// Steps allowed in one forcing period, halved ones included: some tenths of a second.
+/// Largest number of steps in one forcing period, including those that are halved: some tenths of a second.
 pub const STEPS_PER_PERIOD_CAP: u64 = 20_000_000;
 
-/// Why a trajectory could not be continued.
+/// The reason why a trajectory cannot be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Stop {
-    /// More than [`EVENTS_PER_PERIOD_CAP`] events in one period, or than the [`Allowance`](super::Allowance) has.
-    #[error("more than {EVENTS_PER_PERIOD_CAP} events in one forcing period, or than one cell is allowed")]
+    /// More than [`EVENTS_PER_PERIOD_CAP`] events in one period, or more events than the
+    /// [`Allowance`](super::Allowance).
+    #[error(
+        "more than {EVENTS_PER_PERIOD_CAP} events in one forcing period, or more events than one cell may take"
+    )]
     CapEvents,
     /// A root that does not converge, or more than [`STEPS_PER_PERIOD_CAP`] steps in one period.
     #[error("more than {STEPS_PER_PERIOD_CAP} steps in one forcing period, or a root that does not converge")]
     CapRoot,
-    /// More steps in all than the [`Allowance`](super::Allowance) has.
-    #[error("too stiff: more steps than one cell is allowed")]
+    /// More steps in total than the [`Allowance`](super::Allowance).
+    #[error("too stiff: more steps than one cell may take")]
     TooStiff,
-    /// The state is not finite any more.
-    #[error("the state is not finite any more")]
+    /// The state is not finite.
+    #[error("the state is not finite")]
     NonFinite,
 }
 
-/// What an event is.
+/// The kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EventKind {
     /// A contact after which motion stays free.
@@ -39,55 +42,54 @@ pub enum EventKind {
     MeshEnd,
 }
 
-/// An event as the integrator meets it, in gap coordinates.
+/// An event in gap coordinates.
 #[derive(Clone, Copy, Debug)]
-pub struct Happening {
+pub struct GapEvent {
     /// What happened.
     pub kind: EventKind,
-    /// At which wall.
+    /// The wall at which it happened.
     pub side: Side,
-    /// Symbol `b'1'..=b'6'` of the flight that ends here; none for the first flight of all,
-    /// which comes from no wall.
+    /// Symbol `b'1'..=b'6'` of the flight that ends here; none for the first flight, which comes from no wall.
     pub symbol: Option<u8>,
-    /// Forcing periods completed before.
+    /// Number of completed forcing periods.
     pub period: u64,
     /// Time since the last phase 0, in `[0, T]`.
     pub t: f64,
-    /// Gap coordinates just before.
+    /// Gap coordinates just before the event.
     pub before: Gap,
-    /// Gap coordinates just after.
+    /// Gap coordinates just after the event.
     pub after: Gap,
 }
 
-/// Is told of every event. `()` ignores them.
+/// Receives the events of a trajectory. `()` ignores them, a vector stores them.
 pub trait Observer {
-    /// Called once per event, in order of time.
-    fn event(&mut self, happening: &Happening);
+    /// Receives one event. Events come in order of time.
+    fn event(&mut self, event: &GapEvent);
 }
 
 impl Observer for () {
     #[inline]
-    fn event(&mut self, _: &Happening) {}
+    fn event(&mut self, _: &GapEvent) {}
 }
 
-impl Observer for Vec<Happening> {
-    fn event(&mut self, happening: &Happening) {
-        self.push(*happening);
+impl Observer for Vec<GapEvent> {
+    fn event(&mut self, event: &GapEvent) {
+        self.push(*event);
     }
 }
 
-/// Work done so far: what a change in cost shows up in first.
+/// Counters of the work of a trajectory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Steps tried, halved ones included.
+    /// Trial steps, including those that were halved.
     pub steps: u64,
-    /// Steps that had to be halved.
+    /// Steps that were halved.
     pub halvings: u64,
     /// Events: impacts, starts and ends of meshing.
     pub events: u64,
-    /// Impacts among them.
+    /// Impacts alone.
     pub impacts: u64,
-    /// Iterations on exact Taylor polynomials.
+    /// Iterations of root searches on Taylor polynomials.
     pub root_iterations: u64,
 }
 

@@ -2,27 +2,26 @@
 
 use super::{Crossing, Observer, Stop, Trajectory};
 use crate::certificate::Bracket;
-use crate::flow::{Expansion, Gap, LinearFlow, Phasor, REACH, TERMS};
+use crate::flow::{EXPANSION_REACH, Expansion, Gap, LinearFlow, Phasor, TERMS};
 use crate::fused::fma;
 
-/// Evaluations of the exact flow allowed for one root; one or two are needed, and bisection ends
-/// after 110.
+/// Largest number of expansions for one root. Usually one or two are needed; bisection needs at most 110.
 const ROOT_CAP: u32 = 120;
 
-/// Newton's method may choose the next point so many times; then bisection does.
+/// Number of expansions whose centres Newton's method chooses; further ones are chosen by bisection.
 const NEWTON_CAP: u32 = 8;
 
-/// A root this close to an end of its bracket, relatively, is there.
-const ENDS: f64 = 4.0 * f64::EPSILON;
+/// Relative rounding error of a root at an end of its bracket.
+const BRACKET_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Newton steps allowed on one expansion.
+/// Largest number of Newton steps on one expansion.
 const POLISH_CAP: u32 = 8;
 
-/// The last correction may leave this much of the flight behind.
-const LEFT: f64 = 1e-17;
+/// Largest error of a root after the last correction, relative to the time of flight.
+const ROOT_TOLERANCE: f64 = 1e-17;
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Goes to the crossing of a step of `h` Taylor units, or to `until` if that comes first.
+    /// Moves to the crossing of a step of `h` Taylor steps, or to `until` if that comes first.
     #[inline(always)]
     pub(super) fn cross(
         &mut self,
@@ -35,12 +34,12 @@ impl<const N: usize> Trajectory<'_, N> {
     ) -> Result<(), Stop> {
         let remaining = self.clock.remaining(until);
         if bracket.guess * h * linear.unit > remaining {
-            // Probably after `until`. It is if what lies there is still before the one root.
+            // The root is probably after `until`. This is certain if the state at `until` is before the only root.
             let u = remaining * linear.per_unit;
             let expansion = linear.grid.expansion(&self.q, &self.phasor, u);
             let v = u - expansion.start;
             if self.before(crossing, linear, &expansion.state(v), &expansion.phasor(linear.turn * v)) {
-                self.arrive(linear, &expansion, u);
+                self.move_along(linear, &expansion, u);
                 self.count_meshing(remaining);
                 self.from_wall = None;
                 self.clock.set(until);
@@ -53,7 +52,7 @@ impl<const N: usize> Trajectory<'_, N> {
             self.move_to(linear, remaining, until);
             return Ok(());
         }
-        self.arrive(linear, &expansion, u);
+        self.move_along(linear, &expansion, u);
         self.clock.advance(s);
         self.count_meshing(s);
         self.from_wall = None;
@@ -61,7 +60,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.check_events()
     }
 
-    /// Whether a point lies clearly before a crossing, given that there is only one.
+    /// Whether a point lies before the only crossing.
     #[inline(always)]
     fn before(&self, crossing: Crossing, linear: &LinearFlow, q: &Gap, phasor: &Phasor) -> bool {
         match crossing {
@@ -74,11 +73,11 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// The one root in a bracket, converged to rounding: an expansion near it, and its instant in
-    /// Taylor steps from here.
+    /// Finds the only root in a bracket to rounding. Returns an expansion near it and its time from here in Taylor
+    /// steps.
     ///
-    /// What is added to the gap is summed by itself, so that a flight from the wall keeps its
-    /// relative accuracy however short it is.
+    /// The series is of the change of the gap, so that flights from a wall keep their relative accuracy at any
+    /// length.
     #[inline(always)]
     fn locate(
         &mut self,
@@ -106,9 +105,8 @@ impl<const N: usize> Trajectory<'_, N> {
                 Crossing::PressingEnds(_) => self.pressing_root(linear, &expansion, u),
             };
             let next = expansion.start + root.unwrap_or(f64::NAN);
-            // Rounding may put a root at the step's end beyond it.
-            let is_within = next >= lo * (1.0 - ENDS) && next <= hi * (1.0 + ENDS);
-            if root.is_some_and(|v| v.abs() <= REACH) && is_within {
+            let is_within = next >= lo * (1.0 - BRACKET_ROUNDING) && next <= hi * (1.0 + BRACKET_ROUNDING);
+            if root.is_some_and(|v| v.abs() <= EXPANSION_REACH) && is_within {
                 return Some((expansion, next.clamp(lo, hi)));
             }
             let v = u - expansion.start;
@@ -117,9 +115,9 @@ impl<const N: usize> Trajectory<'_, N> {
             } else {
                 hi = u;
             }
-            // Where the slope is so small that the root hangs on rounding, Newton's steps go on
-            // for ever; bisection ends.
-            if hi - lo <= ENDS * hi.max(ENDS * h) {
+            // If the slope is so small that rounding moves the root, Newton's method does not converge, but bisection
+            // ends.
+            if hi - lo <= BRACKET_ROUNDING * hi.max(BRACKET_ROUNDING * h) {
                 return Some((expansion, u));
             }
             u = if n < NEWTON_CAP && next > lo && next < hi { next } else { 0.5 * (lo + hi) };
@@ -127,7 +125,7 @@ impl<const N: usize> Trajectory<'_, N> {
         None
     }
 
-    /// Where on an expansion pressing ceases, by Newton's method on the exact flow from `u`.
+    /// Finds the time on an expansion at which the pressing acceleration vanishes, by Newton's method from `u`.
     #[inline(never)]
     fn pressing_root(&self, linear: &LinearFlow, expansion: &Expansion, u: f64) -> Option<f64> {
         let mut v = u - expansion.start;
@@ -136,10 +134,10 @@ impl<const N: usize> Trajectory<'_, N> {
                 linear.acceleration_rates(&expansion.state(v), &expansion.phasor(linear.turn * v));
             let delta = -pressing / (rate * linear.unit);
             v += delta;
-            if v.is_nan() || v.abs() > REACH {
+            if v.is_nan() || v.abs() > EXPANSION_REACH {
                 return None;
             }
-            if delta * delta * (bend * linear.unit).abs() <= LEFT * rate.abs() * u {
+            if delta * delta * (bend * linear.unit).abs() <= ROOT_TOLERANCE * rate.abs() * u {
                 return Some(v);
             }
         }
@@ -147,14 +145,14 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 }
 
-/// The root of a series near `v`: reversion of the series there, then Newton's steps until what
-/// they leave is below rounding. `u` is the time of flight that it is measured by.
+/// Finds the root of a series near `v`, by reversion of the series there and then Newton steps to rounding. The
+/// tolerance is relative to the time of flight `u`.
 ///
-/// Few divisions and trees instead of chains: the next flight waits for this number.
+/// The next flight waits for the result, so there are few divisions, and sums are trees.
 #[inline(always)]
 fn root_near(c: &[f64; TERMS + 1], v: f64, u: f64) -> Option<f64> {
     let value = sum(c, v);
-    // What follows need not be exact: the last terms of the series are below 1e-8 of the slope.
+    // The derivatives may be inexact: the omitted last terms are below 1e-8 of the slope.
     let square = v * v;
     let tail = fma(square, fma(6.0 * c[6], v, 5.0 * c[5]), fma(4.0 * c[4], v, 3.0 * c[3]));
     let slope = fma(square, tail, fma(2.0 * c[2], v, c[1]));
@@ -167,21 +165,20 @@ fn root_near(c: &[f64; TERMS + 1], v: f64, u: f64) -> Option<f64> {
     let delta = fma(first, curve - curl, first);
     let flatter = fma(-delta, fma(delta, fma(-4.0 * bend, bend, 3.0 * twist), 2.0 * bend), 1.0);
     let inverse = inverse * flatter;
-    // The share of a correction that the slope's own error leaves.
+    // The share of a correction that remains because of the error of the slope.
     let steepness = bend.abs() * delta.abs();
     let share = steepness * steepness * steepness + (twist * delta * delta * delta).abs() * 64.0 + 1e-6;
     let mut v = v + delta;
     for _ in 0..POLISH_CAP {
         let correction = sum(c, v) * inverse;
         v -= correction;
-        if (correction * share).abs() <= LEFT * u {
+        if (correction * share).abs() <= ROOT_TOLERANCE * u {
             return Some(v);
         }
     }
     None
 }
 
-/// The sum of a series.
 #[inline(always)]
 fn sum(c: &[f64; TERMS + 1], v: f64) -> f64 {
     let square = v * v;

@@ -1,27 +1,29 @@
-//! Flights pressed back to their wall before they have gone far: chatter, and the contact onset
-//! of meshing. Half of all flights are such where impacts are dense.
+//! Short flights from a wall and back to it: chatter, and contact onsets. They are half of all flights if impacts are
+//! dense.
 
 use super::{Crossing, Mode, Observer, Stop, Trajectory};
-use crate::flow::{LinearFlow, SHORT, turned};
+use crate::flow::{LONGEST_SHORT_FLIGHT, LinearFlow, turned};
 use crate::model::Side;
 
-/// Flights that promise to last no more than this share of the longest are tried.
-const PROMISE: f64 = 0.9;
+/// Longest expected flight for which the short-flight series is tried, as a share of the longest short flight.
+const TRIED_SHARE: f64 = 0.9;
 
-/// Speeds gained in a Taylor step below this, relative to the scale of length and the rate of free
-/// motion, may be rounding: the certificate judges such flights.
-const PRESSING: f64 = 1e-6;
+/// Least change of speed by the pressing acceleration in a Taylor step, relative to the scale of length and the rate
+/// of free motion. Below it the acceleration may be rounding error, and the certificate is used instead.
+const LEAST_PRESSING: f64 = 1e-6;
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Whether a flight that leaves a wall at a speed, under an acceleration back to it, promises
-    /// to be short.
+    /// Whether a flight that leaves a wall at the speed `leaving` under the acceleration `pressing` back to it is
+    /// probably a short flight.
     #[inline(always)]
-    pub(super) fn promises_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
-        let gained = pressing * linear.unit;
-        2.0 * leaving < PROMISE * SHORT * gained && gained > PRESSING * self.flow.speed && leaving > 0.0
+    pub(super) fn expects_short_flight(&self, linear: &LinearFlow, leaving: f64, pressing: f64) -> bool {
+        let speed_change = pressing * linear.unit;
+        2.0 * leaving < TRIED_SHARE * LONGEST_SHORT_FLIGHT * speed_change
+            && speed_change > LEAST_PRESSING * self.flow.speed
+            && leaving > 0.0
     }
 
-    /// Flies back to the wall just left, if that is certain to be what comes next. False if not.
+    /// Moves to the return to the wall that the gap has just left, if the series proves it. Returns whether it did.
     #[inline(always)]
     pub(super) fn fly_back(
         &mut self,
@@ -34,9 +36,9 @@ impl<const N: usize> Trajectory<'_, N> {
             (Mode::Onset(side), Some((_, 1))) => (side, Crossing::OnsetEnds(side)),
             _ => return Ok(false),
         };
-        let rise = linear.short_flight.from(&self.q, &self.phasor);
+        let series = linear.short_flight.from(&self.q, &self.phasor);
         let [right, left] = self.flow.walls;
-        let Some(u) = rise.back(right - left) else { return Ok(false) };
+        let Some(u) = series.first_return(right - left) else { return Ok(false) };
         let s = u * linear.unit;
         if s >= self.clock.remaining(until) {
             return Ok(false);
@@ -44,7 +46,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.work.steps += 1;
         self.work.root_iterations += 1;
         self.steps_in_period += 1;
-        let [w, x, v] = rise.gained(u, linear.per_unit);
+        let [w, x, v] = series.changes(u, linear.per_unit);
         self.q = [self.flow.wall(side), self.q[1] + w, self.q[2] + x, self.q[3] + v];
         self.phasor = turned(&self.phasor, linear.turn * u);
         if N > 0 {

@@ -1,24 +1,24 @@
-//! Where a trajectory begins: free, in contact or meshing.
+//! Starts of trajectories: free, in contact or meshing.
 
 use super::clock::Clock;
 use super::{Allowance, Mode, Trajectory, Work};
 use crate::flow::{DomainKind, Flow};
 use crate::model::{Contact, Law, Side, State};
 
-/// A gap this near to a wall, relative to its position or the scale of length, lies on it.
+/// Distance of a gap that lies on a wall, relative to the wall's position or the scale of length.
 const ON_WALL: f64 = 1e-9;
 
 impl<'f> Trajectory<'f, 0> {
-    /// A trajectory that starts at phase 0 in the state `y`.
+    /// Starts a trajectory at phase 0 in the state `y`.
     ///
-    /// A start beyond a wall is meshing on it, beyond a rigid one it begins on it; on a wall and closing it is
-    /// a contact.
+    /// A gap behind a wall means meshing. A gap behind a rigid wall is moved onto the wall. A closing gap on a wall
+    /// is a contact.
     pub fn new(flow: &'f Flow, law: Law, y: State) -> Self {
         Self::with_tangents(flow, law, y, [])
     }
 
-    /// The same where the teeth are known to mesh, or not: a gap just short of a wall may be
-    /// in the contact onset.
+    /// Starts a trajectory in lasting contact with the wall `meshing`, or in free motion. The state alone does not
+    /// determine this: a gap just in front of a wall may be free or in contact onset.
     pub fn meshing_from(flow: &'f Flow, law: Law, y: State, meshing: Option<Side>) -> Self {
         let mut trajectory = Self::new(flow, law, y);
         let contact = meshing.map(|side| flow.contacts[side.index()]);
@@ -35,7 +35,7 @@ impl<'f> Trajectory<'f, 0> {
 }
 
 impl<'f, const N: usize> Trajectory<'f, N> {
-    /// A trajectory that carries tangent vectors, given in the coordinates of [`State`].
+    /// Starts a trajectory with tangent vectors in the coordinates of [`State`].
     pub fn with_tangents(flow: &'f Flow, law: Law, y: State, tangents: [State; N]) -> Self {
         let levels =
             [DomainKind::Free, DomainKind::Meshing(Side::Right)].map(|d| flow.domain(d).taylor_level);
@@ -66,7 +66,7 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         trajectory
     }
 
-    /// The same trajectory from here on with other tangent vectors.
+    /// Copies the trajectory and replaces its tangent vectors, whose number may change.
     pub fn carrying<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         Trajectory {
             flow: self.flow,
@@ -93,52 +93,50 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// A trajectory from another state at phase 0, in the domain that this one is in.
+    /// Starts a trajectory from another state at phase 0, in the domain of this one and with its remaining allowance.
     ///
-    /// A state alone does not say whether a gap just short of a wall is free or in the contact onset
-    /// at the start of meshing; neighbours of a motion that is have to be told. It is allowed what is left of this
-    /// one's work.
+    /// The state alone does not determine the domain: a gap just in front of a wall may be free or in contact onset.
     pub fn at<const M: usize>(&self, y: State, tangents: [State; M]) -> Trajectory<'f, M> {
-        self.placed(self.mode, self.origin, y, tangents)
+        self.start_in(self.mode, self.origin, y, tangents)
     }
 
-    /// The same in a domain that need not be this one's.
-    fn placed<const M: usize>(
+    /// Starts a trajectory in a given mode.
+    fn start_in<const M: usize>(
         &self,
         mode: Mode,
         origin: Option<Side>,
         y: State,
         tangents: [State; M],
     ) -> Trajectory<'f, M> {
-        let mut placed = Trajectory::with_tangents(self.flow, self.law, y, tangents);
-        placed.allowance = self.allowance();
-        // Behind an elastic wall is where the gap is, whatever its neighbours do.
+        let mut started = Trajectory::with_tangents(self.flow, self.law, y, tangents);
+        started.allowance = self.allowance();
+        // At an elastic wall the gap alone determines the mode.
         let is_elastic = |side: Side| self.flow.contacts[side.index()] == Contact::Elastic;
-        if let Mode::Sustained(side) = placed.mode
+        if let Mode::Sustained(side) = started.mode
             && is_elastic(side)
         {
-            return placed;
+            return started;
         }
         let mode = match mode {
             Mode::Sustained(side) if is_elastic(side) => Mode::Free,
             mode => mode,
         };
         if let Mode::Stuck(side) = mode {
-            placed.stand_on(side);
+            started.stand_on(side);
         } else {
-            (placed.mode, placed.from_wall, placed.pending) = (mode, None, None);
+            (started.mode, started.from_wall, started.pending) = (mode, None, None);
         }
-        placed.origin = origin;
-        placed
+        started.origin = origin;
+        started
     }
 
-    /// Whether it is in the same domain as another one, and comes from the same wall.
-    pub(crate) fn stands_as(&self, other: &Trajectory<'_, N>) -> bool {
+    /// Whether another trajectory has the same mode and comes from the same wall.
+    pub(crate) fn has_mode_and_origin_of(&self, other: &Trajectory<'_, N>) -> bool {
         (self.mode, self.origin, self.from_wall) == (other.mode, other.origin, other.from_wall)
     }
 
-    /// Whether it is in the same domain as another one, contact onset and sustained contact told apart where the gap does
-    /// not lie on the wall between them.
+    /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different,
+    /// unless the gap lies on the wall.
     pub(crate) fn is_in_domain_of(&self, other: &Trajectory<'_, N>) -> bool {
         let is_between = |side: Side| {
             let wall = self.flow.wall(side);
@@ -147,10 +145,9 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         self.mode == other.mode || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between)
     }
 
-    /// A trajectory from the mirror image of the present state at phase 0, in the mirrored domain:
-    /// half a period on, a motion goes on as this one does.
+    /// Starts a trajectory at phase 0 from the mirror image of the present state, in the mirrored domain.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Trajectory<'f, M> {
         let y = self.state().map(|value| -value);
-        self.placed(self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
+        self.start_in(self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
     }
 }

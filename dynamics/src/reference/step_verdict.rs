@@ -1,38 +1,42 @@
-//! What a step ahead holds: nothing, one crossing, or not decided at this length.
+//! The verdict on a step: clear, exactly one crossing, or undecided at this length.
 
 use super::{Mode, Trajectory};
 use crate::certificate::{Bernstein, Bracket, ROOMY, Verdict, judge};
 use crate::flow::{Gap, LinearFlow, Phasor, Step};
 use crate::model::Side;
 
-/// Distances from a wall that are rounding, relative to its position or the scale of length.
-const REST: f64 = 32.0 * f64::EPSILON;
+/// Distance from a wall that is rounding error, relative to the wall's position or the scale of length.
+const WALL_ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// What ends a flight, as seen by the certificate.
+/// The end of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Crossing {
     /// Free motion reaches a wall.
     Contact(Side),
-    /// The contact onset is over; no event.
+    /// The contact onset reaches its wall; this is not an event.
     OnsetEnds(Side),
-    /// Pressing ceases inside the contact onset.
+    /// The pressing acceleration vanishes in the contact onset, or at rest on a rigid wall.
     PressingEnds(Side),
-    /// The dip goes all the way to the opposite wall.
+    /// The contact onset reaches the opposite wall.
     Through(Side),
-    /// Meshing falls back through the wall.
+    /// Sustained contact ends at its wall.
     MeshEnds(Side),
 }
 
-/// What a step holds, over all that is watched.
+/// The verdict on a step.
 pub(super) enum StepVerdict {
+    /// No crossing; `roomy` if a step twice as long would probably be clear, too.
     Clear { roomy: bool },
-    Rests,
+    /// The gap stays within rounding of a wall.
+    OnWall,
+    /// Exactly one crossing.
     Crossing(Crossing, Bracket),
+    /// Undecided.
     Unclear,
 }
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Judges everything that could end the flight within one step.
+    /// Checks everything that could end the flight within one step.
     #[inline(always)]
     pub(super) fn step_verdict(&self, linear: &LinearFlow, step: &Step) -> StepVerdict {
         let gap = step.gap_polynomial.from(&self.q, &self.phasor);
@@ -51,8 +55,8 @@ impl<const N: usize> Trajectory<'_, N> {
             let roomy = gap.between(order, remainder, floor + room, ceiling - room) == [true; 2];
             return StepVerdict::Clear { roomy };
         }
-        if self.rests(&gap, order, remainder) {
-            return StepVerdict::Rests;
+        if self.stays_on_wall(&gap, order, remainder) {
+            return StepVerdict::OnWall;
         }
         match self.mode {
             Mode::Free if below => self.wall_ahead(&gap, Side::Left, remainder),
@@ -62,7 +66,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 self.wall_ahead(&gap, Side::Left, remainder),
             ),
             Mode::Sustained(side) => self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
-            // What presses tells, see `step_at_rest`.
+            // `step_at_rest` decides.
             Mode::Stuck(_) => StepVerdict::Unclear,
             Mode::Onset(side) => {
                 let ends = first_of(
@@ -71,7 +75,7 @@ impl<const N: usize> Trajectory<'_, N> {
                 );
                 let opposite = side.mirrored();
                 let room = (self.q[0] - self.flow.wall(opposite)).abs();
-                // Sustained, it only slows down on its way.
+                // Pressed in the other direction, the gap only slows down on its way to the opposite wall.
                 if self.q[1].abs() * step.h < room {
                     return ends;
                 }
@@ -80,11 +84,11 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Whether the gap stays within rounding of a wall: teeth that rest there neither part
-    /// nor press, and no step is short enough to tell which.
+    /// Whether the gap stays within rounding of a wall. Then no step is short enough to find out on which side of the
+    /// wall it is.
     #[inline(always)]
-    fn rests(&self, gap: &Bernstein, order: usize, remainder: f64) -> bool {
-        let rounding = |wall: f64| REST * wall.abs().max(self.flow.length);
+    fn stays_on_wall(&self, gap: &Bernstein, order: usize, remainder: f64) -> bool {
+        let rounding = |wall: f64| WALL_ROUNDING * wall.abs().max(self.flow.length);
         let ends_on = |wall: f64| (gap.end() - wall).abs() < rounding(wall);
         let within = |wall: f64| {
             let rounding = rounding(wall);
@@ -99,7 +103,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.judge(gap, side, -1.0, remainder, Crossing::Contact(side))
     }
 
-    /// Judges the distance of the gap from a wall; `inwards` is -1 on the free side of it.
+    /// Checks the distance of the gap from a wall; `inwards` is -1 on the free side of the wall and 1 behind it.
     #[inline(always)]
     fn judge(
         &self,
@@ -117,7 +121,7 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Judges whether pressing ceases inside the contact onset.
+    /// Checks whether the pressing acceleration vanishes.
     pub(super) fn pressing_ahead(&self, linear: &LinearFlow, step: &Step, side: Side) -> StepVerdict {
         let rates = |q: &Gap, p: &Phasor| linear.acceleration_rates(q, p);
         let (q, phasor) = step.end(&self.q, &self.phasor);
@@ -131,7 +135,7 @@ impl<const N: usize> Trajectory<'_, N> {
     }
 }
 
-/// The earlier of two things that may happen on a step.
+/// Returns the earlier of two crossings on a step, if that is certain.
 #[inline(always)]
 fn first_of(a: StepVerdict, b: StepVerdict) -> StepVerdict {
     match (a, b) {

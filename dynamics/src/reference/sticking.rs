@@ -1,26 +1,27 @@
 //! Rigid walls: a pressed contact that has come to rest sticks until the load pulls it off.
 //!
-//! While it lasts the gap is on the wall, `z = wall` and `w = 0` to the bit, and the other displacement moves
-//! by the constrained motion (`flow/constrained.rs`); the wall takes up the acceleration `p` of the gap. Where
-//! that ceases to point into the wall the gap leaves it, from rest and without acceleration: state and field
-//! are continuous there, and neighbours keep their tangents.
+//! While it sticks, `z = wall` and `w = 0` exactly, and the other displacement follows the constrained motion
+//! (`flow/constrained.rs`). The wall cancels the acceleration `p` of the gap. When `p` no longer points into the
+//! wall, the gap leaves it, from rest and with zero acceleration. State and vector field are continuous there, so
+//! tangents do not jump.
 
 use super::{EventKind, Mode, Observer, StepVerdict, Stop, Trajectory};
 use crate::flow::{DomainKind, Gap};
 use crate::model::Side;
 
-/// The order of the root of the distance for a gap that is let go: its acceleration is zero there, its rate is not.
-pub(super) const LET_GO: usize = 3;
+/// Order of the root of the distance when the gap leaves the wall: its acceleration is zero, the derivative of the
+/// acceleration is not.
+pub(super) const RELEASE_ORDER: usize = 3;
 
 impl<const N: usize> Trajectory<'_, N> {
-    /// Whether a contact with a rigid wall lasts: it leaves slowly enough, and at rest it is pressed.
+    /// Whether a contact with a rigid wall lasts: its leaving speed is low enough, and at rest it is pressed.
     pub(super) fn sticks(&self, side: Side) -> bool {
         let leaving = self.law.restitution[side.index()] * self.q[1].abs();
         leaving <= self.law.mesh_speed[side.index()]
             && self.presses(DomainKind::Meshing(side), side, &self.at_rest_on(side))
     }
 
-    /// The state after an impact that takes all of the gap's velocity.
+    /// Returns the state after an impact that stops the gap.
     fn at_rest_on(&self, side: Side) -> Gap {
         let [_, w, x, v] = self.q;
         [self.flow.wall(side), 0.0, x, v + self.flow.kick * w]
@@ -28,9 +29,9 @@ impl<const N: usize> Trajectory<'_, N> {
 
     /// Comes to rest on a rigid wall.
     ///
-    /// Neighbours meet it earlier or later and come to rest there, too. Of `S = R + (f+ - R f-) n^T / (n f-)`,
-    /// with `R` the impact that takes all velocity, the approach speed cancels: what is left is the way of the
-    /// other displacement, and the damping that its acceleration owes to the gap's velocity.
+    /// Neighbouring motions reach the wall earlier or later and come to rest, too. The approach speed cancels in
+    /// `S = R + (f+ - R f-) n^T / (n f-)`, where `R` is the impact that stops the gap. What remains is the
+    /// displacement of the other coordinate, and its damping by the gap's velocity.
     #[inline(never)]
     pub(super) fn stick(&mut self, side: Side, observer: &mut impl Observer) {
         self.q[0] = self.flow.wall(side);
@@ -47,7 +48,7 @@ impl<const N: usize> Trajectory<'_, N> {
         self.rest_on(side);
     }
 
-    /// Goes on at rest on a rigid wall.
+    /// Sets the mode of rest on a rigid wall.
     pub(super) fn rest_on(&mut self, side: Side) {
         self.mode = Mode::Stuck(side);
         self.from_wall = None;
@@ -55,7 +56,8 @@ impl<const N: usize> Trajectory<'_, N> {
         self.level[1] = self.flow.domain(DomainKind::Meshing(side)).taylor_level;
     }
 
-    /// One step at rest on a rigid wall, judged by what presses; its first trial is counted.
+    /// Takes one step at rest on a rigid wall, which ends if the pressing acceleration vanishes. The caller has
+    /// counted the first trial.
     #[cold]
     #[inline(never)]
     pub(super) fn step_at_rest(&mut self, until: f64, observer: &mut impl Observer) -> Result<(), Stop> {
@@ -63,12 +65,12 @@ impl<const N: usize> Trajectory<'_, N> {
         let linear = self.flow.domain(DomainKind::Meshing(side));
         let mut level = self.level[1];
         loop {
-            let made;
+            let computed;
             let step = match linear.step(level) {
                 Some(step) => step,
                 None => {
-                    made = linear.new_step(level);
-                    &made
+                    computed = linear.new_step(level);
+                    &computed
                 }
             };
             match self.pressing_ahead(linear, step, side) {
@@ -98,7 +100,7 @@ impl<const N: usize> Trajectory<'_, N> {
         }
     }
 
-    /// Stands on a rigid wall from the start.
+    /// Starts at rest on a rigid wall.
     pub(super) fn stand_on(&mut self, side: Side) {
         self.rest_on(side);
         self.origin = Some(side);
@@ -107,13 +109,13 @@ impl<const N: usize> Trajectory<'_, N> {
         self.tangents = self.tangents.map(|[_, _, x, v]| [0.0, 0.0, x, v]);
     }
 
-    /// The load lets go of a gap at rest on a rigid wall.
+    /// Processes the release: the load pulls the gap off a rigid wall.
     #[inline(never)]
-    pub(super) fn let_go(&mut self, side: Side, observer: &mut impl Observer) {
+    pub(super) fn release(&mut self, side: Side, observer: &mut impl Observer) {
         self.record(EventKind::MeshEnd, side, self.q, observer);
         self.mode = Mode::Free;
-        self.from_wall = Some((side, LET_GO));
-        // Short steps would not see it move.
+        self.from_wall = Some((side, RELEASE_ORDER));
+        // On a short step the gap would not move beyond rounding.
         self.level[0] = self.level[0].min(self.flow.domain(DomainKind::Free).taylor_level);
     }
 }

@@ -1,28 +1,28 @@
-//! The largest Lyapunov exponent as an average, with its standard error.
+//! The largest Lyapunov exponent as an average over time, with its standard error.
 
 use crate::model::State;
 use crate::reference::Trajectory;
 
-/// Blocks whose means give the standard error.
+/// Number of blocks whose means give the standard error.
 const BLOCKS: usize = 16;
 
-/// Periods below which an average has no standard error: it is infinite.
+/// Least number of periods for a finite standard error.
 pub const LEAST_FOR_ERROR: u32 = BLOCKS as u32;
 
-/// A fresh tangent vector: no direction that a gear pair keeps to itself. All entries alike would
-/// be a common translation, which without supports never meets a wall.
+/// The initial tangent vector. It lies in no invariant direction of a gear pair. Equal entries would be a common
+/// translation, which without supports never meets a wall.
 pub const FRESH_TANGENT: State = [0.64, -0.36, 0.28, 0.61];
 
-/// Collects the growth of one tangent vector, period by period.
+/// The growth of one tangent vector in every period.
 #[derive(Clone, Debug, Default)]
 pub struct Exponent {
     growth: Vec<f64>,
 }
 
 impl Exponent {
-    /// Takes the growth of a trajectory's first tangent vector since the last call and gives
-    /// it unit length again; a null vector, which a superstable orbit leaves, starts anew. A
-    /// trajectory without one is left alone.
+    /// Records the growth of the trajectory's first tangent vector since the last call and rescales it to unit
+    /// length. A zero vector, as after a superstable orbit, becomes [`FRESH_TANGENT`]. Without tangent vectors
+    /// nothing happens.
     pub fn renormalise<const N: usize>(&mut self, trajectory: &mut Trajectory<'_, N>) {
         let tangents = trajectory.tangents();
         let Some(u) = tangents.first() else { return };
@@ -32,24 +32,22 @@ impl Exponent {
             .set_tangents(tangents.map(|u| if length > 0.0 { u.map(|x| x / length) } else { FRESH_TANGENT }));
     }
 
-    /// Growth over the last `periods`, as a logarithm; none before there are as many.
-    pub(crate) fn lately(&self, periods: usize) -> Option<f64> {
+    /// Returns the logarithm of the growth over the last `periods`, or none if fewer were recorded.
+    pub(crate) fn recent_growth(&self, periods: usize) -> Option<f64> {
         let from = self.growth.len().checked_sub(periods)?;
         Some(self.growth[from..].iter().sum())
     }
 
-    /// Periods whose growth has been collected.
     pub(crate) fn periods(&self) -> usize {
         self.growth.len()
     }
 
-    /// Forgets what was collected: the vector needs a while to turn to its direction.
-    pub fn forget(&mut self) {
+    /// Discards the recorded growth, after the periods in which the vector turns to the most expanding direction.
+    pub fn reset(&mut self) {
         self.growth.clear();
     }
 
-    /// Mean growth rate per unit time and its standard error, from the means of
-    /// 16 blocks; the error is infinite for fewer than 16 periods.
+    /// Returns the mean growth rate per unit time and its [`standard_error`].
     pub fn estimate(&self, forcing_period: f64) -> (f64, f64) {
         let n = self.growth.len();
         if n == 0 {
@@ -60,8 +58,8 @@ impl Exponent {
     }
 }
 
-/// The standard error of the mean of consecutive values, from the means of 16 blocks, of the last ones if their number is
-/// no multiple of that; infinite for fewer than 16 values.
+/// Returns the standard error of the mean of consecutive values, from the means of 16 blocks of equal length. The
+/// first values are ignored if their number is not a multiple of 16. The error is infinite for fewer than 16 values.
 pub fn standard_error(values: &[f64]) -> f64 {
     let block = values.len() / BLOCKS;
     if block == 0 {

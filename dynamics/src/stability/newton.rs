@@ -1,62 +1,57 @@
-//! Newton's method on the strobe map, and the pitchfork where a symmetric orbit loses its
-//! stability.
+//! Newton's method on the strobe map.
 
 use nalgebra::{Matrix4, Vector4};
 
 use super::unit_circle::lies_within_unit_circle;
 use super::{Cycle, Image, StrobeMap, balanced, multipliers};
-use crate::flow::Flow;
-use crate::model::{Model, State};
+use crate::model::State;
 use crate::reference::{Trajectory, Work};
 
-/// How long Newton's method tries.
+/// Limits of one Newton search.
 #[derive(Clone, Copy, Debug)]
-struct Patience {
+struct SearchLimits {
     steps: u32,
-    /// Trials of a step that does not reduce the residual, each half as long as the last.
+    /// Trials of one step. Each trial halves the step, until the residual decreases.
     trials: u32,
-    /// Whether an unstable orbit is left where it is seen to.
-    leaves_unstable: bool,
+    /// Whether the search ends as soon as the orbit is clearly unstable.
+    stops_at_unstable: bool,
 }
 
-/// For an orbit that is wanted wherever it lies.
-const PATIENT: Patience = Patience { steps: 40, trials: 12, leaves_unstable: false };
+const FULL_SEARCH: SearchLimits = SearchLimits { steps: 40, trials: 12, stops_at_unstable: false };
 
-/// For one that the motion is about to reach: of 343 found in 400 cells along a map's borders, 4
-/// took more. Failed Newton searches, half of them without an end, were seven tenths of all periods.
-const HASTY: Patience = Patience { steps: 12, trials: 3, leaves_unstable: true };
+/// Limits of a quick search for a stable orbit near the motion, which can be repeated later. Of 343 orbits found in
+/// 400 cells along a map's borders, 4 needed more. Failed full searches took seven tenths of all periods.
+const QUICK_SEARCH: SearchLimits = SearchLimits { steps: 12, trials: 3, stops_at_unstable: true };
 
-/// Where the map expands by more than this, no orbit close by is stable.
+/// If the map expands by more than this factor, no stable orbit is nearby.
 pub(crate) const LARGEST_MULTIPLIER: f64 = 2.0;
 
-/// Singular values of `P' - I` below this, relative to the largest, are cut off: the
-/// direction along which a family of orbits runs near a saddle-node or pitchfork.
+/// Singular values of `P' - I` below this, relative to the largest, are treated as zero. Near a saddle-node or
+/// pitchfork, they belong to the direction along which the orbits form a family.
 const SINGULAR_CUTOFF: f64 = 1e-10;
 
-/// Pivots no smaller than this, relative to the largest, leave nothing to cut off.
+/// If no pivot of `P' - I` is smaller than this, relative to the largest, no singular value is treated as zero.
 const WELL_CONDITIONED: f64 = 1e-6;
 
-/// Sweeps of the singular value iteration allowed.
+/// Largest number of sweeps of the singular value iteration.
 const SVD_CAP: usize = 1000;
 
-/// Residuals below this, relative to the state, are rounding.
+/// Residuals below this, relative to the state, are rounding errors.
 const CONVERGED: f64 = 1e-13;
 
-/// Where a step has led below this, an orbit close by has the multipliers seen here, if they exceed 1 by ...
-const CLOSE: f64 = 1e-3;
+/// Residual, relative to the state, below which the multipliers differ from those of the orbit by at most a quarter.
+const MULTIPLIER_RESIDUAL: f64 = 1e-3;
 
-/// ... as much.
+/// Largest multiplier, at that residual, from which the orbit is certainly unstable.
 const UNSTABLE_EXPANSION: f64 = 1.25;
 
-/// Refines the state of `seed`, a trajectory at phase 0, to a fixed point of `map`; none if
-/// Newton does not converge.
-///
-/// Nothing is said about stability: plain Newton likes unstable orbits as much.
+/// Refines the state of `seed`, a trajectory at phase 0, to a fixed point of `map`. Returns none if Newton's method
+/// does not converge. The fixed point may be stable or unstable.
 pub fn refine(seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
     Newton::default().refine(seed, map)
 }
 
-/// Newton's method, and what it has taken so far.
+/// Newton's method, with counters of its work.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Newton {
     half_periods: u32,
@@ -64,25 +59,24 @@ pub(crate) struct Newton {
 }
 
 impl Newton {
-    /// Forcing periods integrated with four tangent vectors, rounded up.
+    /// Returns the number of forcing periods integrated with four tangent vectors, rounded up.
     pub(crate) fn periods(&self) -> u32 {
         self.half_periods.div_ceil(2)
     }
 
-    /// Work that they took.
     pub(crate) fn work(&self) -> Work {
         self.work
     }
 
-    /// [`refine`].
+    /// Searches for a fixed point of `map`, like [`refine`].
     pub(crate) fn refine(&mut self, seed: &Trajectory<'_>, map: StrobeMap) -> Option<Cycle> {
         let image = self.apply(map, seed, seed.state())?;
-        self.search(seed, map, image, PATIENT, |_| true)
+        self.search(seed, map, image, FULL_SEARCH, |_| true)
     }
 
-    /// The same for a motion that will be checked again: gives up where no stable orbit
-    /// seems to be near, since the motion will come nearer to one that is. The state of an unstable one
-    /// may be off by a thousandth squared.
+    /// Searches for a stable fixed point nearby with the limits of [`QUICK_SEARCH`]. It gives up early, because the
+    /// motion comes closer to a stable orbit and the search can be repeated. An unstable fixed point may be returned
+    /// with a relative error of `1e-6`.
     pub(crate) fn refine_nearby(
         &mut self,
         seed: &Trajectory<'_>,
@@ -90,10 +84,11 @@ impl Newton {
         is_near: impl Fn(&State) -> bool,
     ) -> Option<Cycle> {
         let image = self.apply(map, seed, seed.state())?;
-        if expands(&image)? { None } else { self.search(seed, map, image, HASTY, is_near) }
+        if expands(&image)? { None } else { self.search(seed, map, image, QUICK_SEARCH, is_near) }
     }
 
-    /// A map's image, if the trajectory can be continued, and within what all searches leave of its allowance.
+    /// Applies a map. Returns none if the trajectory cannot be continued, or if all searches together exceed the
+    /// seed's allowance.
     pub(crate) fn apply(&mut self, map: StrobeMap, seed: &Trajectory<'_>, y: State) -> Option<Image> {
         let allowance = seed.allowance();
         allowance.covers(self.work).ok()?;
@@ -101,37 +96,37 @@ impl Newton {
         map.apply_counting(&seed.clone().allowing(allowance.after(self.work)), y, &mut self.work).ok()
     }
 
-    /// Newton's method from the state of `seed` with its `image`, as long as its steps aim at states
-    /// that are near.
+    /// Runs Newton's method from the state of `seed`, whose image is `image`. Ends if a step leads to a state for
+    /// which `is_near` is false.
     fn search(
         &mut self,
         seed: &Trajectory<'_>,
         map: StrobeMap,
         mut image: Image,
-        patience: Patience,
+        limits: SearchLimits,
         is_near: impl Fn(&State) -> bool,
     ) -> Option<Cycle> {
         let mut y = Vector4::from(seed.state());
         let rate = seed.flow().rate;
         let mut residual = Vector4::from(image.state) - y;
-        for nth in 0..patience.steps {
+        for nth in 0..limits.steps {
             let now = size(&residual, rate) / size_of(seed, &y);
             if now <= CONVERGED {
                 break;
             }
             let step = newton_step(&image, &residual)?;
-            if patience.leaves_unstable && nth > 0 && now < CLOSE && is_unstable(&image) {
+            if limits.stops_at_unstable && nth > 0 && now < MULTIPLIER_RESIDUAL && is_unstable(&image) {
                 return cycle(seed, map, (y + step).into(), &image);
             }
             if !is_near(&(y + step).into()) {
                 return None;
             }
-            match self.damped(seed, map, &y, &residual, &step, patience.trials) {
+            match self.damped(seed, map, &y, &residual, &step, limits.trials) {
                 Some((next, next_image)) => {
                     residual = Vector4::from(next_image.state) - next;
                     (y, image) = (next, next_image);
                 }
-                // No step reduces the residual: rounding has been reached, or a dead end.
+                // No step reduces the residual: it is rounding error, or the search has failed.
                 None => break,
             }
         }
@@ -142,6 +137,7 @@ impl Newton {
         }
     }
 
+    /// Takes the longest of the step, its half, its quarter and so on that reduces the residual.
     fn damped(
         &mut self,
         seed: &Trajectory<'_>,
@@ -165,39 +161,39 @@ impl Newton {
     }
 }
 
-/// Whether an orbit that is close by is unstable.
+/// Whether the derivative has a multiplier above [`UNSTABLE_EXPANSION`].
 fn is_unstable(image: &Image) -> bool {
     lies_within_unit_circle(&(image.derivative() / UNSTABLE_EXPANSION)) == Some(false)
 }
 
-/// Whether the derivative has a multiplier above [`LARGEST_MULTIPLIER`]; none if that cannot be told.
+/// Whether the derivative has a multiplier above [`LARGEST_MULTIPLIER`]; none if it is not finite.
 fn expands(image: &Image) -> Option<bool> {
     lies_within_unit_circle(&(image.derivative() / LARGEST_MULTIPLIER)).map(|within| !within)
 }
 
-/// What residuals are measured by: the state, or the scale of length where it is small.
+/// Returns the size that residuals are relative to: that of the state, or the scale of length if that is larger.
 fn size_of(seed: &Trajectory<'_>, y: &Vector4<f64>) -> f64 {
     let flow = seed.flow();
     size(y, flow.rate).max(flow.length * flow.omega / flow.rate)
 }
 
-/// The largest of displacements and of velocities over `rate`.
+/// Returns the largest of displacements and of velocities divided by `rate`.
 fn size(y: &Vector4<f64>, rate: f64) -> f64 {
     in_displacements(y, rate).amax()
 }
 
-/// A state whose velocities are divided by `rate`.
+/// Divides the velocities of a state by `rate`.
 fn in_displacements(y: &Vector4<f64>, rate: f64) -> Vector4<f64> {
     Vector4::new(y[0], y[1] / rate, y[2], y[3] / rate)
 }
 
-/// Solves `(P' - I) step = -residual` in the sense of least squares.
+/// Solves `(P' - I) step = -residual` by least squares, with velocities divided by `rate`, so that the result does
+/// not depend on the unit of time.
 fn newton_step(image: &Image, residual: &Vector4<f64>) -> Option<Vector4<f64>> {
     let step = balanced_step(&image.balanced(), &in_displacements(residual, image.rate))?;
     Some(in_displacements(&step, image.rate.recip()))
 }
 
-/// The same with velocities in units of displacements: what is small must not depend on the unit of time.
 fn balanced_step(derivative: &Matrix4<f64>, residual: &Vector4<f64>) -> Option<Vector4<f64>> {
     let matrix = derivative - Matrix4::identity();
     if !matrix.iter().all(|x| x.is_finite()) {
@@ -230,52 +226,10 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
     })
 }
 
-/// The value of `parameter` in `[lo, hi]` at which the symmetric period-1 orbit of a model
-/// loses its symmetry: where a multiplier of the half-period map crosses -1, that is
-/// `det(Q' + I) = 0`. The orbit is followed from `guess`, its state at `lo`.
-///
-/// None if the orbit is lost on the way or the determinant does not change sign.
-pub fn pitchfork(model: &dyn Model, parameter: &str, lo: f64, hi: f64, guess: State) -> Option<f64> {
-    let mut state = guess;
-    let mut test = |value: f64| -> Option<f64> {
-        let mut model = model.boxed();
-        model.set(parameter, value).ok()?;
-        let flow = Flow::of(&*model).ok()?;
-        let map = StrobeMap::MirroredHalves(1);
-        let seed = Trajectory::new(&flow, model.law(), state);
-        let cycle = refine(&seed, map)?;
-        state = cycle.state;
-        let image = map.apply(&seed, state).ok()?;
-        Some((image.derivative() + Matrix4::identity()).determinant())
-    };
-    let (mut a, mut b) = (lo, hi);
-    let (mut at_a, mut at_b) = (test(a)?, test(b)?);
-    if at_a * at_b > 0.0 {
-        return None;
-    }
-    // Regula falsi with the Illinois rule: a bracket at every step, superlinear.
-    for _ in 0..100 {
-        if (b - a).abs() <= 1e-12 * b.abs().max(1e-12) {
-            break;
-        }
-        let c = (a * at_b - b * at_a) / (at_b - at_a);
-        let at_c = test(c)?;
-        if at_c == 0.0 || (c - b).abs() <= 1e-13 {
-            return Some(c);
-        }
-        if at_c * at_b < 0.0 {
-            (a, at_a) = (b, at_b);
-        } else {
-            at_a *= 0.5;
-        }
-        (b, at_b) = (c, at_c);
-    }
-    Some(b)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flow::Flow;
     use crate::model::GearPair;
 
     fn seed_of<'f>(flow: &'f Flow, pair: &GearPair, periods: u32) -> Trajectory<'f> {
@@ -284,18 +238,17 @@ mod tests {
         seed
     }
 
-    /// On its way to a cycle a motion is led there by either search.
     #[test]
-    fn hasty_searches_find_what_attracts_close_by() {
+    fn quick_and_full_searches_find_the_same_stable_cycle() {
         for e in [0.06, 0.3, 0.45, 0.58] {
             let pair = GearPair::paper(e);
             let flow = Flow::new(&pair.oscillator().unwrap());
             let seed = seed_of(&flow, &pair, 40);
-            let patient = refine(&seed, StrobeMap::Periods(1)).unwrap();
-            let hasty = Newton::default().refine_nearby(&seed, StrobeMap::Periods(1), |_| true).unwrap();
-            assert!(patient.spectral_radius() < 1.0, "e = {e}");
-            for (a, b) in patient.state.into_iter().zip(hasty.state) {
-                assert!((a - b).abs() < 1e-11, "e = {e}: {:?}, {:?}", patient.state, hasty.state);
+            let full = refine(&seed, StrobeMap::Periods(1)).unwrap();
+            let quick = Newton::default().refine_nearby(&seed, StrobeMap::Periods(1), |_| true).unwrap();
+            assert!(full.spectral_radius() < 1.0, "e = {e}");
+            for (a, b) in full.state.into_iter().zip(quick.state) {
+                assert!((a - b).abs() < 1e-11, "e = {e}: {:?}, {:?}", full.state, quick.state);
             }
             let mut newton = Newton::default();
             assert!(newton.refine_nearby(&seed, StrobeMap::Periods(1), |_| false).is_none(), "e = {e}");
@@ -303,9 +256,9 @@ mod tests {
         }
     }
 
-    /// As the multipliers have it, all along chaos.
+    /// Compares the test with the multipliers along a chaotic motion.
     #[test]
-    fn expansion_is_that_of_the_multipliers() {
+    fn expansion_agrees_with_the_multipliers() {
         let pair = GearPair { omega: 2.8172, ..GearPair::paper(0.7224) };
         let flow = Flow::new(&pair.oscillator().unwrap());
         let (mut expanding, mut others) = (0, 0);

@@ -1,24 +1,23 @@
-//! Do all eigenvalues lie within the unit circle?
+//! A test whether all eigenvalues lie within the unit circle, without computing them.
 //!
-//! Searches for cycles ask that of every derivative that they come by, and need no eigenvalue for
-//! it: the characteristic polynomial (Faddeev and LeVerrier) and the criterion of Schur and Cohn
-//! are a hundred multiplications.
+//! It uses the characteristic polynomial (Faddeev and LeVerrier) and the criterion of Schur and Cohn, about a hundred
+//! multiplications.
 
 use nalgebra::Matrix4;
 
-/// Whether every eigenvalue's modulus is below 1; none for what is not finite.
+/// Whether the modulus of every eigenvalue is below 1; none if the matrix is not finite.
 ///
-/// Within rounding of the circle the answer may be either.
+/// If an eigenvalue lies within rounding of the circle, either answer is possible.
 pub(super) fn lies_within_unit_circle(matrix: &Matrix4<f64>) -> Option<bool> {
     let mut polynomial = characteristic(matrix);
     if !polynomial.iter().all(|c| c.is_finite()) {
         return None;
     }
-    // A polynomial of degree n has all roots inside if its last coefficient is smaller than its
-    // first, and the one of degree n - 1 that elimination with its reverse leaves has as well.
+    // All roots of a polynomial of degree n lie inside if its last coefficient is smaller than its first, and if the
+    // same holds for the polynomial of degree n - 1 that remains after elimination with the reversed one.
     for degree in (1..=4).rev() {
         let (first, last) = (polynomial[0], polynomial[degree]);
-        // What has overflowed on the way is not inside.
+        // NaN is a sign of overflow.
         if last.abs() >= first.abs() || last.is_nan() || first.is_nan() {
             return Some(false);
         }
@@ -30,7 +29,7 @@ pub(super) fn lies_within_unit_circle(matrix: &Matrix4<f64>) -> Option<bool> {
     Some(true)
 }
 
-/// Coefficients of `det(z - A)`, of `z^4` first.
+/// Returns the coefficients of `det(z - A)`, that of `z^4` first.
 fn characteristic(a: &Matrix4<f64>) -> [f64; 5] {
     let mut coefficients = [1.0; 5];
     let mut product = *a;
@@ -50,14 +49,14 @@ mod tests {
     use crate::stability::multipliers;
 
     #[test]
-    fn a_polynomial_has_its_roots() {
+    fn the_characteristic_polynomial_has_the_eigenvalues_as_roots() {
         // (z - 1)(z - 2)(z + 3)(z - 4)
         let diagonal = Matrix4::from_diagonal(&Vector4::new(1.0, 2.0, -3.0, 4.0));
         assert_eq!(characteristic(&diagonal), [1.0, -4.0, -7.0, 34.0, -24.0]);
     }
 
     #[test]
-    fn what_is_not_finite_is_not_told() {
+    fn nan_zero_and_identity_matrices() {
         assert_eq!(lies_within_unit_circle(&Matrix4::from_element(f64::NAN)), None);
         assert_eq!(lies_within_unit_circle(&Matrix4::zeros()), Some(true));
         assert_eq!(lies_within_unit_circle(&Matrix4::identity()), Some(false));
@@ -65,7 +64,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_eigenvalues_agree(entries in prop::array::uniform16(-1.0..1.0f64), scale in 0.1..3.0f64) {
+        fn the_criterion_agrees_with_the_eigenvalues(entries in prop::array::uniform16(-1.0..1.0f64), scale in 0.1..3.0f64) {
             let matrix = Matrix4::from_column_slice(&entries) * scale;
             let [re, im] = multipliers(&matrix).unwrap()[0];
             let radius = re.hypot(im);

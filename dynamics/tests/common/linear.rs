@@ -1,4 +1,4 @@
-//! Oscillators of any kind for tests, and linear motion of one degree of freedom in closed form.
+//! Linear motion of one degree of freedom in closed form, and oscillators with walls.
 
 use rattlemap_dynamics::model::{Contact, Domain, Oscillator, Side};
 
@@ -13,20 +13,20 @@ pub(crate) struct Linear {
 }
 
 impl Linear {
-    /// Amplitude and lag of the steady response.
+    /// Returns amplitude and phase lag of the steady response.
     pub(crate) fn response(&self) -> [f64; 2] {
         let (real, imaginary) = (self.square - self.omega * self.omega, 2.0 * self.gamma * self.omega);
         [self.force / real.hypot(imaginary), imaginary.atan2(real)]
     }
 
-    /// Displacement and velocity of the steady response.
+    /// Returns displacement and velocity of the steady response.
     pub(crate) fn steady(&self, t: f64) -> [f64; 2] {
         let [amplitude, lag] = self.response();
         let (sin, cos) = (self.omega * t - lag).sin_cos();
         [self.load / self.square + amplitude * cos, -self.omega * amplitude * sin]
     }
 
-    /// What a departure from it becomes in a time: the rows of a matrix.
+    /// Returns the fundamental matrix of free motion over a time `tau`, by rows.
     pub(crate) fn fundamental(&self, tau: f64) -> [[f64; 2]; 2] {
         let own = (self.square - self.gamma * self.gamma).sqrt();
         let (sin, cos) = (own * tau).sin_cos();
@@ -34,7 +34,7 @@ impl Linear {
         [[decay * (cos + lean), decay * sin / own], [-decay * self.square / own * sin, decay * (cos - lean)]]
     }
 
-    /// From a state at a time, a time later.
+    /// Returns the state a time `tau` after the state at the time `t`.
     pub(crate) fn flow(&self, [x, v]: [f64; 2], t: f64, tau: f64) -> [f64; 2] {
         let ([p, q], [p_end, q_end]) = (self.steady(t), self.steady(t + tau));
         let [[a, b], [c, d]] = self.fundamental(tau);
@@ -42,12 +42,11 @@ impl Linear {
         [p_end + a * x + b * v, q_end + c * x + d * v]
     }
 
-    /// The acceleration.
     pub(crate) fn acceleration(&self, [x, v]: [f64; 2], t: f64) -> f64 {
         self.force * (self.omega * t).cos() + self.load - 2.0 * self.gamma * v - self.square * x
     }
 
-    /// The oscillator of one degree of freedom and unit mass that moves so, without a wall.
+    /// Returns the oscillator of one degree of freedom and unit mass, without walls.
     pub(crate) fn oscillator(&self) -> Oscillator {
         let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
         let free = Domain {
@@ -69,23 +68,23 @@ impl Linear {
     }
 }
 
-/// The product of two matrices given by their rows.
+/// Returns the product of two matrices.
 pub(crate) fn product(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
 }
 
-/// Trace and determinant.
+/// Returns trace and determinant of a matrix.
 pub(crate) fn invariants([[a, b], [c, d]]: [[f64; 2]; 2]) -> [f64; 2] {
     [a + d, a * d - b * c]
 }
 
-/// The same of a matrix with these eigenvalues.
+/// Returns trace and determinant of a matrix with these two eigenvalues.
 pub(crate) fn invariants_of(multipliers: &[[f64; 2]]) -> [f64; 2] {
-    let [[a, b], [c, d]] = multipliers else { panic!("one degree of freedom has two: {multipliers:?}") };
+    let [[a, b], [c, d]] = multipliers else { panic!("not two eigenvalues: {multipliers:?}") };
     [a + c, a * c - b * d]
 }
 
-/// The oscillator with a wall, and along the gap row a spring and a damper behind it.
+/// Adds a wall to an oscillator, with a spring and a damper along the gap row behind it.
 pub(crate) fn with_wall(
     oscillator: Oscillator,
     side: Side,

@@ -1,9 +1,10 @@
-//! Fixtures of one motion, for tests of the reference and of the lanes.
+//! Fixtures for tests of one motion, shared by the tests of the reference and of the lanes.
 #![allow(dead_code, reason = "every test binary compiles this module and uses a part of it")]
 
 use rattlemap_dynamics::flow::{DomainKind, Flow};
-use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Stop, Trajectory, Work};
+use rattlemap_dynamics::model::{GearPair, Law, Side, State};
+use rattlemap_dynamics::orbit::{Budget, Settings};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory, Work};
 
 pub(crate) mod linear;
 pub(crate) mod table;
@@ -11,17 +12,31 @@ pub(crate) mod table;
 /// At rest in the middle of the gap.
 pub(crate) const REST: State = [0.0; 4];
 
-/// Table 1 with a restitution and an excitation frequency.
+/// The default budget of a map, with early stops and exponents.
+pub(crate) const BUDGET: Budget = Budget {
+    settings: Settings { transient_periods: 400, observed_periods: 128, max_period: 64 },
+    early_stop: true,
+    undecided_periods: 1584,
+    exponent: true,
+    shows_exponent: true,
+};
+
+/// Whether two numbers differ by at most `within`.
+pub(crate) fn near(a: f64, b: f64, within: f64) -> bool {
+    (a - b).abs() <= within
+}
+
+/// Returns the gear pair of Table 1 with this restitution and excitation frequency.
 pub(crate) fn paper(e: f64, omega: f64) -> GearPair {
     GearPair { omega, ..GearPair::paper(e) }
 }
 
-/// The flow of a pair that is known to be valid.
+/// Returns the flow of a valid pair.
 pub(crate) fn flow_of(pair: &GearPair) -> Flow {
     Flow::new(&pair.oscillator().expect("valid parameters"))
 }
 
-/// Work done from one snapshot to the next.
+/// Returns the difference of two counters of work.
 pub(crate) fn work_since(now: Work, before: Work) -> Work {
     Work {
         steps: now.steps - before.steps,
@@ -32,7 +47,7 @@ pub(crate) fn work_since(now: Work, before: Work) -> Work {
     }
 }
 
-/// The strobe state after some periods.
+/// Returns the strobe state after `periods` periods.
 pub(crate) fn strobe(flow: &Flow, pair: &GearPair, from: State, periods: u64) -> Result<State, Stop> {
     let mut trajectory = Trajectory::new(flow, pair.law(), from);
     for _ in 0..periods {
@@ -41,15 +56,37 @@ pub(crate) fn strobe(flow: &Flow, pair: &GearPair, from: State, periods: u64) ->
     Ok(trajectory.state())
 }
 
-/// The domain of the flight that follows an event.
-pub(crate) fn domain_after(event: &Happening) -> DomainKind {
+/// Returns the events of `periods` periods. The trajectory must not stop.
+pub(crate) fn events(flow: &Flow, law: Law, from: State, periods: u64) -> Vec<GapEvent> {
+    let mut trajectory = Trajectory::new(flow, law, from);
+    let mut events = Vec::new();
+    (0..periods).for_each(|_| trajectory.advance_period(&mut events).expect("a trajectory without a stop"));
+    events
+}
+
+/// Returns the columns of the derivative of a map by central differences of fourth order with the steps `h` and
+/// `2 h`.
+pub(crate) fn differences(map: impl Fn(State) -> State, y: State, h: f64) -> [State; 4] {
+    std::array::from_fn(|j| {
+        let central = |h: f64| -> State {
+            let moved = |h: f64| map(std::array::from_fn(|i| y[i] + if i == j { h } else { 0.0 }));
+            let (right, left) = (moved(h), moved(-h));
+            std::array::from_fn(|i| (right[i] - left[i]) / (2.0 * h))
+        };
+        let (narrow, wide) = (central(h), central(2.0 * h));
+        std::array::from_fn(|i| (4.0 * narrow[i] - wide[i]) / 3.0)
+    })
+}
+
+/// Returns the domain of the flight that follows an event.
+pub(crate) fn domain_after(event: &GapEvent) -> DomainKind {
     match event.kind {
         EventKind::Impact | EventKind::MeshEnd => DomainKind::Free,
         EventKind::MeshStart => DomainKind::Meshing(event.side),
     }
 }
 
-/// Motion in one domain between two marks: events, or strobes inside a flight.
+/// Motion in one domain between two instants, each of which is an event or a strobe.
 #[derive(Clone, Debug)]
 pub(crate) struct Leg {
     pub(crate) domain: DomainKind,
@@ -58,13 +95,13 @@ pub(crate) struct Leg {
     pub(crate) duration: f64,
     pub(crate) start: State,
     pub(crate) end: State,
-    /// The event that begins it; none at a strobe.
-    pub(crate) begins: Option<Happening>,
-    /// The event that ends it; none at a strobe.
-    pub(crate) ends: Option<Happening>,
+    /// The event at the start; none at a strobe.
+    pub(crate) begins: Option<GapEvent>,
+    /// The event at the end; none at a strobe.
+    pub(crate) ends: Option<GapEvent>,
 }
 
-/// The legs of `periods` periods after `skip` periods.
+/// Returns the legs of `periods` periods after `skip` periods.
 pub(crate) fn legs(flow: &Flow, pair: &GearPair, from: State, skip: u64, periods: u64) -> Vec<Leg> {
     let mut trajectory = Trajectory::new(flow, pair.law(), from);
     for _ in 0..skip {
@@ -74,7 +111,7 @@ pub(crate) fn legs(flow: &Flow, pair: &GearPair, from: State, skip: u64, periods
     for _ in 0..periods {
         let domain = trajectory.meshing().map_or(DomainKind::Free, DomainKind::Meshing);
         let mut mark = (0.0, trajectory.state(), domain, None);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         trajectory.advance_period(&mut events).expect("an ordinary cell");
         for event in events {
             let (t, start, domain, begins) = mark;
@@ -89,20 +126,27 @@ pub(crate) fn legs(flow: &Flow, pair: &GearPair, from: State, skip: u64, periods
     legs
 }
 
-/// Largest difference of two states.
+/// Returns the larger of two numbers, or NaN if one is NaN; `f64::max` would ignore it.
+pub(crate) fn max_or_nan(m: f64, d: f64) -> f64 {
+    if d.is_nan() || d > m { d } else { m }
+}
+
+/// Returns the largest difference of two states.
 pub(crate) fn apart(a: State, b: State) -> f64 {
-    let differences = a.iter().zip(&b).map(|(x, y)| (x - y).abs());
-    // `f64::max` would swallow a NaN.
-    differences.fold(0.0, |m: f64, d| if d.is_nan() || d > m { d } else { m })
+    a.iter().zip(&b).map(|(x, y)| (x - y).abs()).fold(0.0, max_or_nan)
 }
 
-/// The same in units of the larger of 1 and their largest entry.
+/// Returns the largest entry of a state, or 1 if that is larger.
+pub(crate) fn size(y: State) -> f64 {
+    y.iter().fold(1.0, |m, x| m.max(x.abs()))
+}
+
+/// Returns the largest difference of two states, relative to their size.
 pub(crate) fn departure(a: State, b: State) -> f64 {
-    let scale = a.iter().chain(&b).fold(1.0f64, |m, x| m.max(x.abs()));
-    apart(a, b) / scale
+    apart(a, b) / size(a).max(size(b))
 }
 
-/// The other wall's name for a flight.
+/// Returns the symbol of the mirror image of a flight.
 pub(crate) fn mirrored_symbol(symbol: u8) -> u8 {
     match symbol {
         b'1' => b'4',
@@ -115,13 +159,12 @@ pub(crate) fn mirrored_symbol(symbol: u8) -> u8 {
     }
 }
 
-/// The opposite of a state.
+/// Returns a state with all signs reversed.
 pub(crate) fn negated(y: State) -> State {
     y.map(|x| -x)
 }
 
-/// `+1` for the right wall, `-1` for the left; spelled out here so that nothing is shared
-/// with what is being tested.
+/// Returns `+1` for the right wall and `-1` for the left, independently of the tested code.
 pub(crate) fn sign(side: Side) -> f64 {
     if side == Side::Right { 1.0 } else { -1.0 }
 }

@@ -1,16 +1,16 @@
-//! The independent program's table, `data/cells.csv`.
+//! Reference results of an independent program, `data/cells.csv`.
 
 use rattlemap_dynamics::model::{GearPair, State};
 use rattlemap_dynamics::orbit::Class;
 use rattlemap_dynamics::word::Word;
 use serde::Deserialize;
 
-/// Decimals that are printed of cycles.
+/// Decimals in the table of the values of cycles.
 pub(crate) const STROBE_DECIMALS: i32 = 8;
 pub(crate) const LYAPUNOV_DECIMALS: i32 = 5;
 pub(crate) const MESH_DECIMALS: i32 = 6;
 
-/// One row; fields that it leaves empty are absent.
+/// One row of the table; empty fields are none.
 #[derive(Deserialize)]
 pub(crate) struct Row {
     e: f64,
@@ -51,24 +51,23 @@ impl Row {
         }
     }
 
-    /// The state of a cycle at phase 0, or of its symmetry-conjugate orbit.
+    /// Returns a state of the cycle, or of its symmetry-conjugate orbit, at phase 0.
     pub(crate) fn strobe(&self) -> Option<State> {
         Some([self.x1?, self.v1?, self.x2?, self.v2?])
     }
 
-    /// The word of a cycle. An empty one is without events, unless they were too many to print.
+    /// Returns the word of the cycle; none if it was too long for the table.
     pub(crate) fn word(&self) -> Option<Word> {
         let printed = !self.word.is_empty() || self.impacts_per_period == 0.0;
         (self.class == Kind::Periodic && printed).then(|| Word::cyclic(self.word.as_bytes()))
     }
 
-    /// Which row it is.
     pub(crate) fn place(&self) -> String {
         format!("e = {}, omega = {}", self.e, self.omega)
     }
 }
 
-/// All 40 rows.
+/// Returns all 40 rows.
 pub(crate) fn rows() -> Vec<Row> {
     let mut reader = csv::Reader::from_reader(include_bytes!("../data/cells.csv").as_slice());
     let rows: Vec<Row> = reader.deserialize().map(Result::unwrap).collect();
@@ -76,7 +75,7 @@ pub(crate) fn rows() -> Vec<Row> {
     rows
 }
 
-/// Whether a number rounds to what the program printed with so many decimals.
+/// Whether a number agrees with a printed one to this many decimals.
 pub(crate) fn prints(value: f64, printed: f64, decimals: i32) -> bool {
     (value - printed).abs() <= 0.5 * 10f64.powi(-decimals)
 }

@@ -1,10 +1,14 @@
-//! What must hold for every oscillator: any masses, any gap row, any walls with any contacts and laws.
+//! Invariants of all oscillators: any masses, any gap row, any walls with any contacts and laws.
 
 use crate::common::linear::with_wall;
+use crate::common::{departure, size};
+use crate::one_wall::in_units;
+use crate::properties::{COMPARABLE_EVENTS, logarithmic, or_zero};
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, Side, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Stop, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
+use rattlemap_dynamics::stability::UNIT;
 
 type Matrix = [[f64; 2]; 2];
 
@@ -18,25 +22,14 @@ struct Case {
     behind: [[f64; 2]; 2],
 }
 
-/// Motions whose tangents grow by more are left out where two computations of one are compared.
+/// Largest growth of tangents for which two computations of one motion are compared.
 const GROWTH: f64 = 1e4;
 
-/// Above this many events in the time compared, rounding may have passed through an instability that was damped before.
-const COMPARED: usize = 12;
-
-const UNITS: [State; 4] =
-    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-
-/// Now and then nothing at all, which is a case of its own.
 fn or_none(values: impl Strategy<Value = f64> + 'static) -> impl Strategy<Value = f64> {
-    prop_oneof![3 => values.boxed(), 1 => Just(0.0).boxed()]
+    or_zero(3, values)
 }
 
-fn logarithmic(low: f64, high: f64) -> impl Strategy<Value = f64> {
-    (low.ln()..high.ln()).prop_map(f64::exp)
-}
-
-/// `a L L^T` of a lower triangle: semidefinite of any rank.
+/// Semidefinite matrices `a L L^T` of any rank.
 fn semidefinite(largest: f64) -> impl Strategy<Value = Matrix> {
     (or_none(0.0..1.0), or_none(-1.0..1.0), or_none(0.0..1.0)).prop_map(move |(a, b, c)| {
         let a = if a == 0.0 { b.abs() } else { a };
@@ -62,7 +55,7 @@ fn contacts() -> impl Strategy<Value = Contact> {
     prop_oneof![Just(Contact::Impact), Just(Contact::Rigid), Just(Contact::Elastic)]
 }
 
-/// Right, left or both, at least a tenth apart.
+/// A right wall, a left wall, or both at a distance of at least 0.1.
 fn walls() -> impl Strategy<Value = [f64; 2]> {
     (0..4u32, -0.5..1.5f64, 0.1..2.0f64).prop_map(|(which, right, apart)| match which {
         0 => [right, f64::NEG_INFINITY],
@@ -138,20 +131,10 @@ fn walled(plain: Oscillator, at: [f64; 2], contacts: [Contact; 2], behind: [[f64
     })
 }
 
-/// What the motion may differ by from another computation of it: rounding, times the growth of tangents.
+/// Returns the growth of tangents, by which the motion amplifies rounding errors.
 fn growth<const N: usize>(trajectory: &Trajectory<'_, N>) -> f64 {
     let largest = trajectory.tangents().iter().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
     (largest * trajectory.log_scale().exp()).max(1.0)
-}
-
-fn apart(a: State, b: State) -> f64 {
-    let size = a.iter().chain(&b).fold(1.0f64, |m, x| m.max(x.abs()));
-    a.iter().zip(&b).map(|(x, y)| (x - y).abs()).fold(0.0, |m, d| if d.is_nan() || d > m { d } else { m })
-        / size
-}
-
-fn size(y: State) -> f64 {
-    y.iter().fold(1.0, |m, x| m.max(x.abs()))
 }
 
 fn flow_of(case: &Case) -> Flow {
@@ -159,8 +142,8 @@ fn flow_of(case: &Case) -> Flow {
     Flow::new(&case.oscillator)
 }
 
-/// Whether some event decides by a threshold that it passes narrowly.
-fn is_narrow(case: &Case, events: &[Happening]) -> bool {
+/// Whether the leaving speed of some event is very close to the mesh speed.
+fn is_narrow(case: &Case, events: &[GapEvent]) -> bool {
     events.iter().any(|event| {
         let i = event.side.index();
         let leaving = case.law.restitution[i] * event.before[1].abs();
@@ -169,17 +152,17 @@ fn is_narrow(case: &Case, events: &[Happening]) -> bool {
     })
 }
 
-/// Which events there are, and at which walls.
-fn kinds(events: &[Happening]) -> Vec<(EventKind, Side)> {
+/// Returns kinds and walls of the events.
+fn kinds(events: &[GapEvent]) -> Vec<(EventKind, Side)> {
     events.iter().map(|event| (event.kind, event.side)).collect()
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, max_global_rejects: 40_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Free, the gap lies between the walls; stuck, on its wall to the bit; behind an elastic wall, behind it.
+    /// Free: between the walls. Stuck: on the rigid wall. In contact with an elastic wall: behind it.
     #[test]
-    fn the_gap_is_where_its_mode_says(case in cases()) {
+    fn the_gap_lies_in_its_domain(case in cases()) {
         let flow = flow_of(&case);
         let mut trajectory = Trajectory::new(&flow, case.law, case.start);
         for _ in 0..3 {
@@ -212,12 +195,12 @@ proptest! {
         }
     }
 
-    /// Contacts that last end before anything else; symbols name the flight between two walls; the law holds.
+    /// Checks the order of events, the symbols of flights, restitution, momentum and energy.
     #[test]
-    fn words_and_laws_are_those_of_the_events(case in cases()) {
+    fn events_obey_the_contact_law(case in cases()) {
         let flow = flow_of(&case);
         let mut trajectory = Trajectory::new(&flow, case.law, case.start);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         let mut meshing = trajectory.meshing();
         let mut origin = meshing;
         for _ in 0..4 {
@@ -234,13 +217,13 @@ proptest! {
                 (None, Some(Side::Left)) => Some(if right { b'6' } else { b'5' }),
                 (None, None) => None,
             };
-            // Where a start on a wall comes from is told by no event.
+            // If the motion started on a wall, the events do not tell where the first flight comes from.
             if meshing.is_some() || origin.is_some() {
                 prop_assert_eq!(event.symbol, expected, "{:?}", event);
             }
             prop_assert_eq!(event.kind == EventKind::MeshEnd, meshing.is_some(), "{:?}", event);
             let (w, contact) = (event.before[1], case.oscillator.contacts[i]);
-            let kept = match (event.kind, contact) {
+            let restitution = match (event.kind, contact) {
                 (EventKind::MeshEnd, _) => {
                     prop_assert_eq!(Some(side), meshing);
                     -1.0
@@ -253,40 +236,40 @@ proptest! {
                 (EventKind::MeshStart, Contact::Rigid) => 0.0,
                 (EventKind::MeshStart, Contact::Elastic) => -1.0,
             };
-            prop_assert!((event.after[1] + kept * w).abs() <= 1e-15 * w.abs(), "{event:?}");
+            prop_assert!((event.after[1] + restitution * w).abs() <= 1e-15 * w.abs(), "{event:?}");
             let (before, after) = (flow.to_state(event.before), flow.to_state(event.after));
-            let carried = 1e-13 * size(before).max(size(after)) * case.oscillator.mass.as_flattened().iter().fold(1.0, |m: f64, x| m.max(x.abs())) * 8.0;
-            prop_assert!((flow.momentum(after) - flow.momentum(before)).abs() <= carried, "{event:?}");
-            let lost = flow.kinetic_energy(before) - flow.kinetic_energy(after);
-            let exact = 0.5 * w * w * (1.0 - kept * kept) / inverse;
-            prop_assert!((lost - exact).abs() <= carried * size(before).max(size(after)), "lost {lost:e}, {exact:e}: {event:?}");
+            let rounding = 1e-13 * size(before).max(size(after)) * case.oscillator.mass.as_flattened().iter().fold(1.0, |m: f64, x| m.max(x.abs())) * 8.0;
+            prop_assert!((flow.momentum(after) - flow.momentum(before)).abs() <= rounding, "{event:?}");
+            let loss = flow.kinetic_energy(before) - flow.kinetic_energy(after);
+            let exact = 0.5 * w * w * (1.0 - restitution * restitution) / inverse;
+            prop_assert!((loss - exact).abs() <= rounding * size(before).max(size(after)), "loss {loss:e}, {exact:e}: {event:?}");
             meshing = (event.kind == EventKind::MeshStart).then_some(side);
             origin = Some(side);
         }
     }
 
-    /// Carried along, tangents are the derivative of the strobe map, by central differences of fourth order.
+    /// Compares tangents with central differences of fourth order.
     #[test]
     fn tangents_are_derivatives(case in cases()) {
         let flow = flow_of(&case);
-        // Off what a start may lie on, and into a domain.
+        // After a period the state lies well inside a domain.
         let mut settled = Trajectory::new(&flow, case.law, case.start);
         prop_assume!(settled.advance_period(&mut ()) != Err(Stop::CapEvents));
         let y = settled.state();
-        // A neighbour that begins behind a wall is put on it: so near to one there is a derivative on one side alone.
+        // Near a wall the differences would use starts behind it, which are moved onto the wall.
         let gap = flow.to_gap(y)[0];
-        let is_beside = |side: Side| (gap - flow.wall(side)).abs() < 1e-4 * size(y);
+        let is_near = |side: Side| (gap - flow.wall(side)).abs() < 1e-4 * size(y);
         let sticks = settled.meshing().is_some_and(|side| case.oscillator.contacts[side.index()] == Contact::Rigid);
-        prop_assume!(sticks || !Side::BOTH.into_iter().any(is_beside));
-        let mut carrier = settled.at(y, UNITS);
-        let mut events: Vec<Happening> = Vec::new();
+        prop_assume!(sticks || !Side::BOTH.into_iter().any(is_near));
+        let mut carrier = settled.at(y, UNIT);
+        let mut events: Vec<GapEvent> = Vec::new();
         prop_assume!(carrier.advance_period(&mut events) != Err(Stop::CapEvents));
-        prop_assume!(!carrier.near_grazing() && growth(&carrier) < GROWTH && events.len() <= 3 * COMPARED);
-        // Closed series of impacts are as good as the square of their length.
-        let is_closed = |event: &Happening| event.kind == EventKind::MeshStart && event.before[1] == 0.0;
-        prop_assume!(!events.iter().any(is_closed) && !is_narrow(&case, &events));
-        // Slow crossings bend the map within the width of the differences.
-        let is_slow = |event: &Happening| event.kind != EventKind::MeshEnd && event.before[1].abs() < 0.05;
+        prop_assume!(!carrier.near_grazing() && growth(&carrier) < GROWTH && events.len() <= 3 * COMPARABLE_EVENTS);
+        // Tangents through the jump over infinite chatter have an error of second order in its duration.
+        let is_jump = |event: &GapEvent| event.kind == EventKind::MeshStart && event.before[1] == 0.0;
+        prop_assume!(!events.iter().any(is_jump) && !is_narrow(&case, &events));
+        // Near slow crossings the map is too curved for the differences.
+        let is_slow = |event: &GapEvent| event.kind != EventKind::MeshEnd && event.before[1].abs() < 0.05;
         prop_assume!(!events.iter().any(is_slow));
         const H: f64 = 1e-6;
         let tangents = carrier.tangents().map(|u| u.map(|x| x * carrier.log_scale().exp()));
@@ -296,79 +279,62 @@ proptest! {
             for (end, h) in ends.iter_mut().zip([H, -H, 2.0 * H, -2.0 * H]) {
                 let moved = std::array::from_fn(|i| y[i] + if i == j { h } else { 0.0 });
                 let mut neighbour = settled.at::<0>(moved, []);
-                let mut met: Vec<Happening> = Vec::new();
-                prop_assume!(neighbour.advance_period(&mut met) != Err(Stop::CapEvents));
-                // Another branch of the map.
-                prop_assume!(kinds(&met) == kinds(&events));
+                let mut others: Vec<GapEvent> = Vec::new();
+                prop_assume!(neighbour.advance_period(&mut others) != Err(Stop::CapEvents));
+                // All differences must be on one branch of the map.
+                prop_assume!(kinds(&others) == kinds(&events));
                 *end = neighbour.state();
             }
             for i in 0..4 {
                 let central = |k: usize, h: f64| (ends[k][i] - ends[k + 1][i]) / (2.0 * h);
-                let (near, far) = (central(0, H), central(2, 2.0 * H));
-                let difference = (4.0 * near - far) / 3.0;
-                // Where the two disagree the map bends too much to tell.
-                prop_assume!((near - far).abs() < 1e-4 * growth(&carrier));
+                let (narrow, wide) = (central(0, H), central(2, 2.0 * H));
+                let difference = (4.0 * narrow - wide) / 3.0;
+                // If both differ, the map is too curved for the differences.
+                prop_assume!((narrow - wide).abs() < 1e-4 * growth(&carrier));
                 let off = (difference - tangent[i]).abs();
                 prop_assert!(off < 1e-6 * growth(&carrier) * size(y), "column {j}, {i}: {difference} for {}", tangent[i]);
             }
         }
     }
 
-    /// Begun anew at a phase 0, from state and contact, it goes on as it would.
     #[test]
-    fn a_restart_at_phase_0_goes_on(case in cases(), after in 1..4u32) {
+    fn a_restart_from_state_and_contact_agrees_with_the_trajectory(case in cases(), after in 1..4u32) {
         let flow = flow_of(&case);
         let mut whole = Trajectory::new(&flow, case.law, case.start);
         for _ in 0..after {
             prop_assume!(whole.advance_period(&mut ()) != Err(Stop::CapEvents));
         }
-        // A gap just behind its wall may be on its way there or back: state and contact do not tell.
-        let is_onset = whole.meshing().is_some_and(|side| {
-            let short = side.sign() * (flow.to_gap(whole.state())[0] - flow.wall(side));
-            case.oscillator.contacts[side.index()] == Contact::Impact && short < 1e-9
+        // Near the wall, state and contact do not determine whether the contact is an onset or sustained.
+        let is_ambiguous = whole.meshing().is_some_and(|side| {
+            let depth = side.sign() * (flow.to_gap(whole.state())[0] - flow.wall(side));
+            case.oscillator.contacts[side.index()] == Contact::Impact && depth < 1e-9
         });
-        prop_assume!(!is_onset);
-        let mut anew = Trajectory::meshing_from(&flow, case.law, whole.state(), whole.meshing());
-        let mut carrier = whole.carrying(UNITS);
+        prop_assume!(!is_ambiguous);
+        let mut restart = Trajectory::meshing_from(&flow, case.law, whole.state(), whole.meshing());
+        let mut carrier = whole.carrying(UNIT);
         carrier.clear_near_grazing();
-        let (mut first, mut second): (Vec<Happening>, Vec<Happening>) = (Vec::new(), Vec::new());
+        let (mut first, mut second): (Vec<GapEvent>, Vec<GapEvent>) = (Vec::new(), Vec::new());
         prop_assume!(carrier.advance_period(&mut first) != Err(Stop::CapEvents));
-        prop_assume!(anew.advance_period(&mut second) != Err(Stop::CapEvents));
+        prop_assume!(restart.advance_period(&mut second) != Err(Stop::CapEvents));
         prop_assume!(!carrier.near_grazing() && growth(&carrier) < GROWTH && !is_narrow(&case, &first));
-        prop_assume!(first.len() <= COMPARED);
+        prop_assume!(first.len() <= COMPARABLE_EVENTS);
         prop_assert_eq!(kinds(&first), kinds(&second));
-        prop_assert_eq!(carrier.meshing(), anew.meshing());
-        let off = apart(carrier.state(), anew.state());
+        prop_assert_eq!(carrier.meshing(), restart.meshing());
+        let off = departure(carrier.state(), restart.state());
         prop_assert!(off < 1e-11 * growth(&carrier) * size(carrier.state()), "off by {off:e}");
     }
 
-    /// Powers of two as units of length and time change no bit of any event.
     #[test]
-    fn units_change_no_bit(case in cases(), length in -20..=20i32, time in -8..=8i32) {
+    fn units_that_are_powers_of_two_change_no_bit(case in cases(), length in -20..=20i32, time in -8..=8i32) {
         let (length, rate) = (2f64.powi(length), 2f64.powi(time));
-        let force = length * rate * rate;
-        let domain = |d: &Domain| Domain {
-            damping: d.damping.map(|row| row.map(|c| rate * c)),
-            stiffness: d.stiffness.map(|row| row.map(|k| rate * rate * k)),
-            load: d.load.map(|f| force * f),
-        };
         let o = &case.oscillator;
-        let scaled = Oscillator {
-            walls: o.walls.map(|wall| length * wall),
-            omega: rate * o.omega,
-            force: o.force.map(|f| force * f),
-            free: domain(&o.free),
-            meshing: [domain(&o.meshing[0]), domain(&o.meshing[1])],
-            ..*o
-        };
-        prop_assert_eq!(scaled.length_scale(), length * o.length_scale());
+        let (scaled, law, start) = in_units(o, case.law, case.start, length, rate);
         let unit = [length, length * rate, length, length * rate];
         let times = |y: State, unit: State| std::array::from_fn::<f64, 4, _>(|i| y[i] * unit[i]);
-        let law = Law { mesh_speed: case.law.mesh_speed.map(|speed| length * rate * speed), ..case.law };
         let run = |oscillator: &Oscillator, law: Law, start: State| {
             let flow = Flow::new(oscillator);
             let mut trajectory = Trajectory::new(&flow, law, start);
-            let mut events: Vec<Happening> = Vec::new();
+            let mut events: Vec<GapEvent> = Vec::new();
             for _ in 0..3 {
                 let advanced = trajectory.advance_period(&mut events);
                 assert!(matches!(advanced, Ok(()) | Err(Stop::CapEvents)), "{advanced:?}");
@@ -376,7 +342,7 @@ proptest! {
             (trajectory.state(), events)
         };
         let (ours, events) = run(o, case.law, case.start);
-        let (theirs, images) = run(&scaled, law, times(case.start, unit));
+        let (theirs, images) = run(&scaled, law, start);
         prop_assert_eq!(theirs, times(ours, unit));
         prop_assert_eq!(kinds(&images), kinds(&events));
         for (image, event) in images.iter().zip(&events) {
@@ -385,17 +351,17 @@ proptest! {
         }
     }
 
-    /// In other coordinates, `x = A u`, it is the same motion: full mass matrices and any gap row.
+    /// Transforms the displacements, `x = A u`, which gives full mass matrices and any gap row.
     #[test]
-    fn coordinates_do_not_matter(case in cases(), a in prop::array::uniform4(-1.0..1.0f64)) {
+    fn the_motion_does_not_depend_on_the_coordinates(case in cases(), a in prop::array::uniform4(-1.0..1.0f64)) {
         prop_assume!(case.oscillator.degrees == 2);
-        // Where a start behind a rigid wall begins is a matter of coordinates.
-        let begins_on = |side: Side| {
+        // A start behind a rigid wall is moved onto the wall, which depends on the coordinates.
+        let starts_behind = |side: Side| {
             let [g0, g1] = case.oscillator.gap;
             let beyond = side.sign() * (g0 * case.start[0] + g1 * case.start[2] - case.oscillator.walls[side.index()]);
             case.oscillator.contacts[side.index()] == Contact::Rigid && beyond > 0.0
         };
-        prop_assume!(!Side::BOTH.into_iter().any(begins_on));
+        prop_assume!(!Side::BOTH.into_iter().any(starts_behind));
         let a: Matrix = [[1.5 + a[0], a[1]], [a[2], 1.5 + a[3]]];
         let determinant = a[0][0] * a[1][1] - a[0][1] * a[1][0];
         prop_assume!(determinant.abs() > 0.2);
@@ -403,7 +369,7 @@ proptest! {
         let congruent = |m: Matrix| -> Matrix {
             let half = m.map(row);
             let whole: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| a[0][i] * half[0][j] + a[1][i] * half[1][j]));
-            // Symmetric to the bit.
+            // Symmetric without rounding errors.
             [[whole[0][0], whole[0][1]], [whole[0][1], whole[1][1]]]
         };
         let o = &case.oscillator;
@@ -430,21 +396,21 @@ proptest! {
             [x[0], v[0], x[1], v[1]]
         };
         let (flow, other_flow) = (Flow::new(o), Flow::new(&other));
-        let mut ours = Trajectory::with_tangents(&flow, case.law, case.start, UNITS);
+        let mut ours = Trajectory::with_tangents(&flow, case.law, case.start, UNIT);
         let mut theirs = Trajectory::new(&other_flow, case.law, each(&back, case.start));
-        let (mut events, mut images): (Vec<Happening>, Vec<Happening>) = (Vec::new(), Vec::new());
+        let (mut events, mut images): (Vec<GapEvent>, Vec<GapEvent>) = (Vec::new(), Vec::new());
         prop_assume!(ours.advance_period(&mut events) != Err(Stop::CapEvents));
         prop_assume!(theirs.advance_period(&mut images) != Err(Stop::CapEvents));
         prop_assume!(!ours.near_grazing() && growth(&ours) < GROWTH && !is_narrow(&case, &events));
-        prop_assume!(events.len() <= COMPARED);
+        prop_assume!(events.len() <= COMPARABLE_EVENTS);
         prop_assert_eq!(kinds(&events), kinds(&images));
-        let off = apart(each(&forth, theirs.state()), ours.state());
+        let off = departure(each(&forth, theirs.state()), ours.state());
         prop_assert!(off < 1e-10 * growth(&ours) * size(ours.state()), "off by {off:e}");
     }
 
-    /// Nothing dissipates, nothing drives, and what the springs behind elastic walls take they give back.
+    /// There is no damping, no forcing and no loss in impacts; the springs behind walls store energy.
     #[test]
-    fn energy_is_kept_where_nothing_takes_it(case in cases()) {
+    fn conservative_motion_keeps_its_energy(case in cases()) {
         let o = &case.oscillator;
         let none = [[0.0; 2]; 2];
         let free = Domain { damping: none, ..o.free };
@@ -465,10 +431,9 @@ proptest! {
             };
             flow.kinetic_energy(y) + potential - load + spring(Side::Right) + spring(Side::Left)
         };
-        // A lasting contact is elastic, or compliant; both have springs, and none begins on an impact wall.
         let law = Law::both(1.0, 0.0);
         let mut trajectory = Trajectory::new(&flow, law, case.start);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         let before = energy(trajectory.state());
         for _ in 0..3 {
             prop_assume!(trajectory.advance_period(&mut events).is_ok());

@@ -1,20 +1,19 @@
-//! The gear pair's records to the bit, as they were before oscillators had full mass matrices, rigid and
-//! elastic walls.
+//! The results of gear pairs must not change by a bit.
 //!
-//! `data/gear_pair_bits.csv` was made on x86-64 Linux with `avx2` and `fma`, as `.cargo/config.toml` asks for:
-//! there every bit must agree. Elsewhere rounding differs, and only what a cell is must be the same.
+//! `data/gear_pair_bits.csv` was computed on x86-64 Linux with `avx2` and `fma`, the settings of
+//! `.cargo/config.toml`. There every bit must agree. On other targets rounding differs, and only period and word must
+//! agree.
 
-use crate::common::REST;
-use rattlemap_dynamics::flow::Flow;
+use crate::common::{BUDGET, REST, flow_of};
 use rattlemap_dynamics::model::GearPair;
-use rattlemap_dynamics::orbit::{Budget, Measured, Settings, measure};
+use rattlemap_dynamics::orbit::{Budget, Measurement, Settings, measure};
 use rayon::prelude::*;
 
-/// Whether this is a target that the table was made on.
+/// Whether this is the target on which the table was computed.
 const IS_SAME: bool =
     cfg!(all(target_arch = "x86_64", target_os = "linux", target_feature = "avx2", target_feature = "fma"));
 
-/// 64 cells over restitution and frequency, in every other column with infinite chatter.
+/// Returns 64 cells over restitution and frequency, half of them with infinite chatter.
 fn cells() -> Vec<GearPair> {
     let cell = |n: u32| {
         let (i, j) = (f64::from(n % 8), f64::from(n / 8));
@@ -24,19 +23,14 @@ fn cells() -> Vec<GearPair> {
     (0..64).map(cell).collect()
 }
 
-fn measured(pair: &GearPair) -> Measured {
-    let budget = Budget {
-        settings: Settings { transient_periods: 200, ..Settings::default() },
-        early_stop: true,
-        undecided_periods: 328,
-        exponent: true,
-        shows_exponent: true,
-    };
-    measure(&Flow::new(&pair.oscillator().expect("valid")), pair.law(), REST, &budget)
+fn measured(pair: &GearPair) -> Measurement {
+    let settings = Settings { transient_periods: 200, ..Settings::default() };
+    let budget = Budget { settings, undecided_periods: 328, ..BUDGET };
+    measure(&flow_of(pair), pair.law(), REST, &budget)
 }
 
-/// Period (0: none), word, then the bits of exponent and strobe state.
-fn row(measured: &Measured) -> String {
+/// Returns a line of the table: period (0 for none), word, and the bits of exponent and strobe state.
+fn row(measured: &Measurement) -> String {
     let [lyapunov, _] = measured.lyapunov.unwrap_or([f64::NAN; 2]);
     let bits = [lyapunov].into_iter().chain(measured.strobe).map(|x| format!("{:016x}", x.to_bits()));
     let word = measured.word.as_ref().map(ToString::to_string).unwrap_or_default();
@@ -45,7 +39,7 @@ fn row(measured: &Measured) -> String {
 }
 
 #[test]
-fn the_gear_pair_keeps_its_bits() {
+fn results_of_gear_pairs_agree_with_the_table_to_the_bit() {
     let table = include_str!("../data/gear_pair_bits.csv");
     let rows: Vec<String> = cells().par_iter().map(|pair| row(&measured(pair))).collect();
     assert_eq!(table.lines().count(), rows.len());
@@ -53,8 +47,8 @@ fn the_gear_pair_keeps_its_bits() {
         if IS_SAME {
             assert_eq!(now, then, "{pair:?}");
         } else {
-            let what = |row: &str| row.split(',').take(2).map(str::to_owned).collect::<Vec<_>>();
-            assert_eq!(what(now), what(then), "{pair:?}");
+            let period_and_word = |row: &str| row.split(',').take(2).map(str::to_owned).collect::<Vec<_>>();
+            assert_eq!(period_and_word(now), period_and_word(then), "{pair:?}");
         }
     }
 }

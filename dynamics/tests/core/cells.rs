@@ -1,4 +1,4 @@
-//! Every row of the independent program's table.
+//! The cells of the independent program's table.
 
 use crate::common::table::{LYAPUNOV_DECIMALS, MESH_DECIMALS, Row, STROBE_DECIMALS, prints, rows};
 use crate::common::{REST, apart, flow_of};
@@ -8,13 +8,13 @@ use rattlemap_dynamics::reference::Trajectory;
 use rattlemap_dynamics::stability::StrobeMap;
 use rayon::prelude::*;
 
-fn analysed(row: &Row) -> Orbit {
+fn orbit_of(row: &Row) -> Orbit {
     let observed_periods = if row.is_chaotic() { 20_000 } else { 128 };
     analyse(&row.pair(), REST, &Settings { transient_periods: 3000, observed_periods, max_period: 64 })
         .unwrap()
 }
 
-/// The strobe of the orbit or of its symmetry-conjugate orbit that is nearest to the table's.
+/// Returns the strobe state, of the orbit or its symmetry-conjugate orbit, that is nearest to the table's.
 fn nearest_strobe(orbit: &Orbit, row: &Row, strobe: State) -> State {
     let pair = row.pair();
     let flow = flow_of(&pair);
@@ -46,7 +46,6 @@ fn check_periodic(row: &Row, orbit: &Orbit) {
     for (value, printed) in nearest.into_iter().zip(strobe) {
         check("strobe", value, printed, STROBE_DECIMALS);
     }
-    // Of every cycle in the table they are whole.
     assert!((orbit.impacts_per_period - row.impacts_per_period).abs() < 1e-9, "{at}");
     if let Some(word) = row.word() {
         assert!(orbit.word == word || orbit.word.mirrored() == word, "{at}: {} {word}", orbit.word);
@@ -62,9 +61,9 @@ fn check_chaotic(row: &Row, orbit: &Orbit) {
 }
 
 #[test]
-fn every_row_agrees() {
+fn orbits_agree_with_the_independent_program() {
     rows().par_iter().for_each(|row| {
-        let orbit = analysed(row);
+        let orbit = orbit_of(row);
         assert_eq!(orbit.class, row.class(), "{}", row.place());
         let check = if row.is_chaotic() { check_chaotic } else { check_periodic };
         check(row, &orbit);

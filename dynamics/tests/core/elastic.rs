@@ -1,19 +1,19 @@
-//! Elastic walls: motion goes on behind them without a jump.
+//! Elastic walls: the motion continues behind them, and the state is continuous.
 
-use crate::common::REST;
 use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
+use crate::common::{REST, near};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, State};
 use rattlemap_dynamics::orbit::{Class, EventKind, Settings, Status, analyse_flow};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
-/// Neither is of meaning to an elastic wall.
+/// Any law: elastic walls ignore it.
 const LAW: Law = Law { restitution: [0.5; 2], mesh_speed: [0.01; 2] };
 
-/// Two unit tangents of one degree of freedom.
+/// The unit tangents of one degree of freedom.
 const UNITS: [State; 2] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
 
-/// Bilinear: free motion, and that behind an elastic wall on the right.
+/// A bilinear oscillator: free motion, and motion behind an elastic wall on the right.
 struct Bilinear {
     free: Linear,
     behind: Linear,
@@ -31,14 +31,10 @@ fn bilinear(free: Linear, at: f64, stiffness: f64, damping: f64) -> Bilinear {
     Bilinear { free, behind, oscillator }
 }
 
-fn near(a: f64, b: f64, within: f64) -> bool {
-    (a - b).abs() <= within
-}
-
-/// Between the two crossings of the wall each flight is linear: the closed forms lead from one to the other, and
-/// their product is the monodromy.
+/// Compares both flights between the two crossings of the wall with their closed forms. The monodromy matrix is the
+/// product of both fundamental matrices and of the dampers' saltation matrices.
 #[test]
-fn a_bilinear_oscillator_closes_over_two_linear_flights() {
+fn a_bilinear_oscillator_agrees_with_two_linear_flights() {
     let mut damped = 0;
     for (gamma, omega, load, at, stiffness, damping) in [
         (0.05, 0.8, 0.0, 0.0, 8.0, 0.0),
@@ -78,23 +74,23 @@ fn a_bilinear_oscillator_closes_over_two_linear_flights() {
     assert_eq!(damped, 3);
 }
 
-/// The tangents of a period, and where it ends.
-fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<Happening>) {
+/// Returns the tangents, the state and the events of one period.
+fn strobe(flow: &Flow, start: [f64; 2]) -> ([[f64; 2]; 2], [f64; 2], Vec<GapEvent>) {
     let mut trajectory = Trajectory::with_tangents(flow, LAW, [start[0], start[1], 0.0, 0.0], UNITS);
     let mut events = Vec::new();
     trajectory.advance_period(&mut events).expect("an ordinary cell");
-    assert!(!trajectory.near_grazing(), "no crossing of an elastic wall is near grazing: {start:?}");
+    assert!(!trajectory.near_grazing(), "a crossing of an elastic wall is near grazing: {start:?}");
     let [a, b] = trajectory.tangents();
     let [x, v, ..] = trajectory.state();
     ([[a[0], b[0]], [a[1], b[1]]], [x, v], events)
 }
 
-/// The largest entry of a difference.
+/// Returns the largest difference of two matrices.
 fn apart(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Central differences of the strobe map.
+/// Returns the derivative of the strobe map by central differences.
 fn differences(flow: &Flow, [x, v]: [f64; 2], h: f64) -> [[f64; 2]; 2] {
     let column = |along: [f64; 2]| {
         let at = |h: f64| strobe(flow, [x + h * along[0], v + h * along[1]]).1;
@@ -105,11 +101,10 @@ fn differences(flow: &Flow, [x, v]: [f64; 2], h: f64) -> [[f64; 2]; 2] {
     [[a[0], b[0]], [a[1], b[1]]]
 }
 
-/// A spring alone is continuous: where the motion just touches the wall the strobe map has one derivative from either
-/// side, that of free motion, and its second one grows like the root of the distance. Differences over `h` are as good
-/// as that root.
+/// Without a damper the strobe map is continuously differentiable where the motion grazes the wall. Its derivative
+/// there is that of free motion, and nearby it differs by the root of the distance.
 #[test]
-fn a_spring_leaves_the_strobe_map_smooth_at_grazing() {
+fn the_strobe_map_is_smooth_at_grazing_a_spring() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
     let [amplitude, _] = free.response();
     let Bilinear { oscillator, .. } = bilinear(free, amplitude, 20.0, 0.0);
@@ -118,7 +113,7 @@ fn a_spring_leaves_the_strobe_map_smooth_at_grazing() {
     let grazing = free.steady(0.0);
     let (at_grazing, ..) = strobe(&flow, grazing);
     assert!(apart(at_grazing, exact) < 1e-6, "{at_grazing:?}, {exact:?}");
-    let (mut through, mut past) = (0, 0);
+    let (mut contacts, mut misses) = (0, 0);
     for power in 2..=10 {
         let h = 10f64.powi(-power);
         let root = 60.0 * h.sqrt();
@@ -130,36 +125,22 @@ fn a_spring_leaves_the_strobe_map_smooth_at_grazing() {
             let (tangents, _, events) = strobe(&flow, [grazing[0] + sign * h, grazing[1]]);
             let off = apart(tangents, exact);
             assert!(off < root, "{h:e} to the side: {off:e}");
-            if events.is_empty() { past += 1 } else { through += 1 }
+            if events.is_empty() { misses += 1 } else { contacts += 1 }
         }
     }
-    assert!(through >= 8 && past >= 8, "{through} through, {past} past");
+    assert!(contacts >= 8 && misses >= 8, "{contacts} contacts, {misses} misses");
 }
 
-/// Across a crossing at speed they are the derivatives, dampers included.
+/// From rest on the wall, the gap follows the acceleration, or its first derivative that is not zero.
 #[test]
-fn tangents_are_derivatives_across_dampers() {
-    for damping in [0.0, 0.7, 5.0] {
-        let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
-        let Bilinear { oscillator, .. } = bilinear(free, 0.3, 20.0, damping);
-        let flow = Flow::new(&oscillator);
-        let (tangents, _, events) = strobe(&flow, [0.1, 0.9]);
-        assert!(events.len() >= 2, "{events:?}");
-        let off = apart(tangents, differences(&flow, [0.1, 0.9], 1e-5));
-        assert!(off < 1e-8, "damper {damping}: {off:e}");
-    }
-}
-
-/// From rest on the wall the load decides, and where it ceases the next rate does.
-#[test]
-fn a_start_on_the_wall_goes_where_the_load_leads() {
+fn a_start_at_rest_on_the_wall_follows_the_load() {
     for (load, force, behind) in [(0.5, 0.0, true), (-0.5, 0.0, false), (-1.0, 1.0, false), (1.0, -1.0, true)]
     {
         let free = Linear { gamma: 0.1, square: 1.0, force, load, omega: 1.0 };
         let Bilinear { oscillator, .. } = bilinear(free, 0.0, 50.0, 2.0);
         let flow = Flow::new(&oscillator);
         let mut trajectory = Trajectory::new(&flow, LAW, REST);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         trajectory.advance_to(0.1, &mut events).expect("an ordinary cell");
         assert_eq!(trajectory.meshing(), behind.then_some(Side::Right), "load {load}, force {force}");
         assert_eq!(trajectory.state()[0] > 0.0, behind);

@@ -1,15 +1,12 @@
-//! The exact flow against closed forms from the textbook, and against the matrix
-//! exponential of another library.
+//! The exact flow against closed forms and against the matrix exponential of nalgebra.
 
-use crate::common::{REST, departure, flow_of, paper};
+use crate::common::{REST, flow_of, max_or_nan};
 use nalgebra::{SMatrix, SVector};
 use rattlemap_dynamics::flow::DomainKind;
 use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::reference::Trajectory;
 
-/// Rounding of a matrix exponential per radian of the fastest rate: every doubling of the
-/// time doubles the error so far and adds the 7-term products' own. Where two exponentials
-/// are compared, both have it.
+/// Rounding error of a matrix exponential per radian of the fastest rate. Every doubling of the time doubles the
+/// error and adds that of a product.
 const PER_RADIAN: f64 = 32.0 * f64::EPSILON;
 
 const DOMAINS: [DomainKind; 3] =
@@ -27,7 +24,7 @@ struct Support {
 }
 
 impl Support {
-    /// `(x, v)` of a particular solution: steady state, or secular growth at resonance.
+    /// Returns `(x, v)` of a particular solution: the steady state, or linear growth at undamped resonance.
     fn particular(&self, t: f64) -> [f64; 2] {
         let Support { m, r, k, force, omega, phase } = *self;
         let (sin, cos) = (omega * t + phase).sin_cos();
@@ -41,7 +38,7 @@ impl Support {
         [in_phase * cos + behind * sin, omega * (behind * cos - in_phase * sin)]
     }
 
-    /// `(x, v)` of the free motion that starts at `(x, v)`.
+    /// Returns `(x, v)` of the free motion that starts at `(x, v)`.
     fn free(&self, [x, v]: [f64; 2], t: f64) -> [f64; 2] {
         let g = self.r / (2.0 * self.m);
         let square = self.k / self.m - g * g;
@@ -66,7 +63,7 @@ impl Support {
                 decay * (v * cosh - (g * v + self.k / self.m * x) * sinh / w),
             ];
         }
-        // Two real rates, the slow one by Vieta to keep its digits.
+        // Two real rates; the slow one by Vieta's formula, which loses no digits.
         let fast = -g - w;
         let slow = self.k / self.m / fast;
         let (b, a) = ((v - slow * x) / (fast - slow), (v - fast * x) / (slow - fast));
@@ -81,13 +78,10 @@ impl Support {
     }
 }
 
-fn first_support(pair: &GearPair) -> Support {
-    Support { m: pair.m1, r: pair.r1, k: pair.k1, force: pair.force, omega: pair.omega, phase: 0.0 }
-}
-
-/// Free motion: the forced first gear and the second, by the textbook.
-fn textbook(pair: &GearPair, [x1, v1, x2, v2]: State, phase: f64, t: f64) -> State {
-    let first = Support { phase, ..first_support(pair) };
+/// Returns the free motion of both gears in closed form.
+fn closed_form(pair: &GearPair, [x1, v1, x2, v2]: State, phase: f64, t: f64) -> State {
+    let GearPair { m1: m, r1: r, k1: k, force, omega, .. } = *pair;
+    let first = Support { m, r, k, force, omega, phase };
     let second = Support { m: pair.m2, r: pair.r2, k: pair.k2, force: 0.0, ..first };
     let ([x1, v1], [x2, v2]) = (first.solve([x1, v1], t), second.solve([x2, v2], t));
     [x1, v1, x2, v2]
@@ -97,14 +91,14 @@ fn table() -> GearPair {
     GearPair::paper(0.5)
 }
 
-/// Amplitudes of the particular solution that the textbook works with.
+/// Returns the amplitudes of the particular solution.
 fn response(pair: &GearPair) -> State {
     let (real, imaginary) = (pair.k1 - pair.m1 * pair.omega.powi(2), pair.r1 * pair.omega);
     let size = real.hypot(imaginary);
     if size == 0.0 { REST } else { [pair.force / size, pair.omega * pair.force / size, 0.0, 0.0] }
 }
 
-/// Pairs whose free motion covers every kind of support.
+/// Returns pairs with every kind of support.
 fn supports() -> Vec<(&'static str, GearPair)> {
     let p = table();
     vec![
@@ -134,8 +128,7 @@ fn supports() -> Vec<(&'static str, GearPair)> {
 const STARTS: [State; 3] = [REST, [0.3, -1.0, 0.2, 2.0], [-40.0, 3.0, 17.0, -250.0]];
 const TIMES: [f64; 9] = [0.0, 1e-12, 1e-6, 1e-3, 0.03, 0.3, 1.1, 7.0, 100.0];
 
-/// Rates of a pair in a domain, as a scale for rounding: squaring a propagator doubles its
-/// error, `log2(rate tau)` times.
+/// Returns a bound on the rates of a pair. Rounding errors of a propagator are proportional to it.
 fn rate(pair: &GearPair) -> f64 {
     let m = pair.m1.min(pair.m2);
     let (k, r) = (pair.k1.max(pair.k2) + 2.0 * pair.k, pair.r1.max(pair.r2) + 2.0 * pair.r);
@@ -146,20 +139,17 @@ fn free_rate(pair: &GearPair) -> f64 {
     rate(&GearPair { k: 0.0, r: 0.0, ..*pair })
 }
 
-/// Largest difference in units of what rounding acts on: displacements of the size of the
-/// largest displacement or `velocity / rate`, velocities of the size of that times `rate`.
-fn relative(got: State, want: State, met: &[State], rate: f64) -> f64 {
-    let largest = |i: usize| met.iter().fold(0.0f64, |m, y| m.max(y[i].abs()).max(y[i + 2].abs()));
+/// Returns the largest difference of two states, relative to the size of `states`. Displacements and velocities are
+/// made comparable by `rate`.
+fn relative(got: State, want: State, states: &[State], rate: f64) -> f64 {
+    let largest = |i: usize| states.iter().fold(0.0f64, |m, y| m.max(y[i].abs()).max(y[i + 2].abs()));
     let (x, v) = (largest(0).max(1.0), largest(1).max(1.0));
     let (x, v) = (x.max(v / rate), v.max(x * rate));
-    (0..4).map(|i| (got[i] - want[i]).abs() / if i % 2 == 0 { x } else { v }).fold(0.0, |m: f64, d| {
-        // `f64::max` would swallow a NaN.
-        if d.is_nan() || d > m { d } else { m }
-    })
+    (0..4).map(|i| (got[i] - want[i]).abs() / if i % 2 == 0 { x } else { v }).fold(0.0, max_or_nan)
 }
 
 #[test]
-fn free_flow_is_the_textbook_one() {
+fn free_flow_agrees_with_the_closed_form() {
     for (what, pair) in supports() {
         let flow = flow_of(&pair);
         let mut worst = (0.0f64, 0.0);
@@ -167,8 +157,8 @@ fn free_flow_is_the_textbook_one() {
             for phase in [0.0, 2.5] {
                 for t in TIMES {
                     let (got, want) =
-                        (flow.propagate(DomainKind::Free, y, phase, t), textbook(&pair, y, phase, t));
-                    // The textbook adds and subtracts a steady state, however large.
+                        (flow.propagate(DomainKind::Free, y, phase, t), closed_form(&pair, y, phase, t));
+                    // The closed form adds and subtracts the steady state, which may be large.
                     let steady = response(&pair);
                     let off = relative(got, want, &[y, want, steady], free_rate(&pair));
                     if off > worst.0 || off.is_nan() {
@@ -186,7 +176,7 @@ fn free_flow_is_the_textbook_one() {
     }
 }
 
-/// The generator of `(x1, v1, x2, v2, cos, sin, 1)`, written down from (11) to (13).
+/// Returns the generator of `(x1, v1, x2, v2, cos, sin, 1)` from (11) to (13).
 fn generator(pair: &GearPair, domain: DomainKind) -> SMatrix<f64, 7, 7> {
     let p = pair;
     let (r, k, s) = match domain {
@@ -206,13 +196,13 @@ fn generator(pair: &GearPair, domain: DomainKind) -> SMatrix<f64, 7, 7> {
     g
 }
 
-/// Pairs for the coupled domains.
+/// Returns pairs with every kind of support and mesh.
 fn pairs() -> Vec<(&'static str, GearPair)> {
     let p = table();
     let mut pairs = supports();
     pairs.extend([
         ("no meshing damping", GearPair { r: 0.0, ..p }),
-        ("nothing damped", GearPair { r: 0.0, r1: 0.0, r2: 0.0, ..p }),
+        ("undamped everywhere", GearPair { r: 0.0, r1: 0.0, r2: 0.0, ..p }),
         ("stiff mesh", GearPair { k: 1e6, ..p }),
         ("no mesh", GearPair { k: 0.0, r: 0.0, ..p }),
         ("overdamped mesh", GearPair { r: 1e3, ..p }),
@@ -229,7 +219,7 @@ fn every_domain_agrees_with_another_matrix_exponential() {
         let mut worst = 0.0f64;
         for domain in DOMAINS {
             for y in STARTS {
-                // The other exponential loses its digits once |G| t is large, so short times here.
+                // nalgebra's exponential loses digits for large |G| t, so the times are short.
                 for t in [0.0, 1e-9, 1e-4, 0.01, 0.2] {
                     let phase = 0.7f64;
                     let (sin, cos) = phase.sin_cos();
@@ -260,8 +250,7 @@ fn flows_compose() {
                     let end = flow.propagate(domain, middle, phase + omega * first, second);
                     let whole = flow.propagate(domain, y, phase, first + second);
                     let off = relative(end, whole, &[y, middle, end], rate(&pair));
-                    // In the energy norm nothing grows; to get there weighs one gear against the
-                    // other, and squaring feels that (1.7e-9 at a ratio of masses of 1e6).
+                    // The energy norm does not grow, but it weights the gears by their masses.
                     let weights = (pair.m1.max(pair.m2) / pair.m1.min(pair.m2)).sqrt();
                     let allowed = 32.0 * f64::EPSILON * (1.0 + weights * rate(&pair) * (first + second));
                     assert!(
@@ -274,9 +263,9 @@ fn flows_compose() {
     }
 }
 
-/// Liouville: the determinant of the fundamental matrix, `exp(trace tau)`.
+/// Liouville's formula: the determinant of the fundamental matrix is `exp(trace tau)`.
 #[test]
-fn phase_volume_shrinks_as_the_trace_says() {
+fn phase_volume_shrinks_at_the_rate_of_the_trace() {
     for (what, pair) in pairs() {
         let flow = flow_of(&pair);
         for domain in DOMAINS {
@@ -285,13 +274,13 @@ fn phase_volume_shrinks_as_the_trace_says() {
             let trace = -(pair.r1 + mesh) / pair.m1 - (pair.r2 + mesh) / pair.m2;
             assert!((linear.trace() - trace).abs() <= 1e-14 * trace.abs(), "{what}: trace");
             for t in [0.0, 1e-6, 0.01, 0.1, 1.0] {
-                // Determinants of matrices that are nearly singular are all rounding.
+                // The determinant of a nearly singular matrix is rounding error.
                 if trace * t < -10.0 {
                     continue;
                 }
                 let fundamental = linear.fundamental(t);
                 let (got, want) = (fundamental.determinant(), (trace * t).exp());
-                // Its error is that of the entries times the cofactors.
+                // The error of the determinant is that of the entries times the cofactors.
                 let size = fundamental.norm() * fundamental.map(f64::abs).max();
                 let allowed = 64.0 * f64::EPSILON * (1.0 + rate(&pair) * t) * size.max(1.0) * size.max(1.0);
                 assert!((got - want).abs() <= allowed, "{what}, {domain:?}: {got} is not {want} after {t}");
@@ -312,7 +301,7 @@ fn meshing_of_equal_gears_splits_into_two_modes() {
             let phase = 0.4;
             let sum = Support { m, r: 0.1, k: k1, force: pair.force, omega, phase };
             let difference = Support { r: 0.1 + 2.0 * r, k: k1 + 2.0 * k, ..sum };
-            // The wall pulls the difference towards where 2 k b balances the springs.
+            // In equilibrium the force 2 k b of the wall balances the springs.
             let rest = 2.0 * k * pair.b / (k1 + 2.0 * k);
             for t in [1e-3, 0.1, 1.0, 20.0] {
                 let [p, pv] = sum.solve([y[0] + y[2], y[1] + y[3]], t);
@@ -329,7 +318,7 @@ fn meshing_of_equal_gears_splits_into_two_modes() {
 }
 
 #[test]
-fn states_and_gaps_are_two_names_for_one_thing() {
+fn gap_coordinates_momentum_and_energy_of_a_state() {
     let flow = flow_of(&table());
     let y = [0.75, -2.0, 0.5, 3.0];
     assert_eq!(flow.to_gap(y), [0.25, -5.0, 0.5, 3.0]);
@@ -338,31 +327,4 @@ fn states_and_gaps_are_two_names_for_one_thing() {
     assert_eq!(flow.kinetic_energy(y), 8.5);
     assert_eq!([flow.wall(Side::Right), flow.wall(Side::Left)], [0.5, -0.5]);
     assert_eq!(flow.period, std::f64::consts::TAU / 5.6);
-}
-
-/// Contact-free, the exponent is the slower decay rate of the two supports, `r1 / (2 m1)`.
-#[test]
-fn contact_free_motion_contracts_at_the_rate_of_its_support() {
-    let pair = paper(0.5, 11.0);
-    let flow = flow_of(&pair);
-    let mut trajectory = Trajectory::with_tangents(&flow, pair.law(), REST, [[1.0, 0.0, 0.0, 0.0]]);
-    for _ in 0..500 {
-        trajectory.advance_period(&mut ()).expect("an ordinary cell");
-    }
-    trajectory.set_tangents([[0.6, -0.8, 0.5, 0.5]]);
-    let (g, square) = (pair.r1 / (2.0 * pair.m1), pair.k1 / pair.m1);
-    // The amplitude of the first support's free motion: no oscillation is left in it.
-    let amplitude = |[x, v, ..]: State| ((square - g * g) * x * x + (v + g * x).powi(2)).sqrt();
-    let before = amplitude(trajectory.tangents()[0]);
-    let impacts = trajectory.work().impacts;
-    let periods = 100;
-    for _ in 0..periods {
-        trajectory.advance_period(&mut ()).expect("an ordinary cell");
-    }
-    assert_eq!(trajectory.work().impacts, impacts, "not contact-free");
-    let exponent = (amplitude(trajectory.tangents()[0]) / before).ln() / (periods as f64 * flow.period);
-    assert!((exponent + 0.15).abs() < 1e-14, "exponent {exponent}, not -0.15");
-    let steady = first_support(&pair).particular(0.0);
-    let steady = [steady[0], steady[1], 0.0, 0.0];
-    assert!(departure(trajectory.state(), steady) < 1e-12);
 }

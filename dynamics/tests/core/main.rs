@@ -1,4 +1,4 @@
-//! One motion: against published facts, an independent program, and what must hold of every motion.
+//! Tests of single motions: against published results, closed forms, an independent program, and invariants.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,14 +1,16 @@
-//! Oscillators with one wall against closed form, and every oscillator in other units.
+//! Classification of oscillators with one wall, against closed forms, and the effect of units.
 
+use crate::common::linear::{Linear, with_wall};
+use crate::common::{BUDGET, near};
+use crate::single_stop::{Family, Impacting};
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Domain, GearPair, Law, Oscillator, REST, Side, State};
 use rattlemap_dynamics::orbit::{
-    Budget, Class, EventKind, Measured, Orbit, Settings, Status, analyse_flow, measure,
+    Class, EventKind, Measurement, Orbit, Settings, Status, analyse_flow, measure,
 };
-use rattlemap_dynamics::reference::{Happening, Trajectory};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
 
-/// `x'' + 2 gamma x' + x = cos(omega t)` below a wall at `sigma`, and a body that stands apart and
-/// is damped, so that no multiplier is its own 1.
+/// `x'' + 2 gamma x' + x = cos(omega t)` with a wall at `sigma`.
 #[derive(Clone, Copy, Debug)]
 struct ImpactOscillator {
     gamma: f64,
@@ -17,70 +19,25 @@ struct ImpactOscillator {
     e: f64,
 }
 
-/// Its steady motion with one impact in every period of the forcing.
-struct Steady {
-    /// When the impact happens, after phase 0, and how fast.
-    impact: f64,
-    approach: f64,
-    /// Displacement and velocity at phase 0.
-    strobe: [f64; 2],
-}
-
 impl ImpactOscillator {
+    fn family(&self) -> Family {
+        Family::new(self.gamma, self.omega, self.e, 1)
+    }
+
     fn oscillator(&self) -> Oscillator {
-        let (gamma, stop) = (self.gamma, 1000.0);
-        let domain = |damping: f64, stiffness: f64, load: f64| Domain {
-            damping: [[damping, 0.0], [0.0, 1.0]],
-            stiffness: [[stiffness, 0.0], [0.0, 4.0]],
-            load: [load, 0.0],
-        };
-        let free = domain(2.0 * gamma, 1.0, 0.0);
-        Oscillator {
-            degrees: 2,
-            mass: [[1.0, 0.0], [0.0, 1.0]],
-            gap: [1.0, 0.0],
-            walls: [self.sigma, f64::NEG_INFINITY],
-            contacts: [Contact::Impact; 2],
-            omega: self.omega,
-            force: [1.0, 0.0],
-            free,
-            meshing: [domain(2.0 * gamma + 1.0, 1.0 + stop, stop * self.sigma), free],
-        }
+        let free = self.family().linear.oscillator();
+        with_wall(free, Side::Right, self.sigma, Contact::Impact, [1000.0, 1.0])
     }
 
     fn law(&self) -> Law {
         Law::both(self.e, 0.01)
     }
 
-    /// Between impacts `x = P cos(omega t - psi) + exp(-gamma s) (a cos Omega s + b sin Omega s)`, `s` the
-    /// time since the last. That it closes after a period gives `b / a`; the impact law gives the
-    /// approach and `p'` at the impact in units of `a`; and `p^2 + (p' / omega)^2 = P^2`, with
-    /// `p = sigma - a` there, is a quadratic for `a`.
-    fn steady(&self) -> Steady {
-        let ImpactOscillator { gamma, omega, sigma, e } = *self;
-        let (own, period) = ((1.0 - gamma * gamma).sqrt(), std::f64::consts::TAU / omega);
-        let (real, imaginary) = (1.0 - omega * omega, 2.0 * gamma * omega);
-        let (amplitude, lag) = (real.hypot(imaginary).recip(), imaginary.atan2(real));
-        let decay = (-gamma * period).exp();
-        let (sin, cos) = (own * period).sin_cos();
-        let b = (1.0 - decay * cos) / (decay * sin);
-        // Rates of the transient just after an impact and just before the next.
-        let (first, last) = (own * b - gamma, own * decay * (b * cos - sin) - gamma);
-        let approach = (last - first) / (1.0 + e);
-        let forced = approach - last;
-        let (square, half, rest) =
-            (1.0 + (forced / omega).powi(2), -sigma, sigma * sigma - amplitude * amplitude);
-        let root = (half * half - square * rest).sqrt();
-        // The other root is unstable, or comes to the wall from behind.
-        let a = if approach > 0.0 { (root - half) / square } else { (-root - half) / square };
-        let turned = (-a * forced / omega).atan2(sigma - a) + lag;
-        let impact = (turned / omega).rem_euclid(period);
-        let s = period - impact;
-        let (sin, cos) = (own * s).sin_cos();
-        let (x, y) = (cos + b * sin, own * (b * cos - sin));
-        let transient = [x, y - gamma * x].map(|x| a * (-gamma * s).exp() * x);
-        let strobe = [amplitude * lag.cos() + transient[0], omega * amplitude * lag.sin() + transient[1]];
-        Steady { impact, approach: a * approach, strobe }
+    /// Returns the stable orbit with one impact per period, and its displacement and velocity at phase 0.
+    fn orbit(&self) -> (Impacting, [f64; 2]) {
+        let family = self.family();
+        let orbit = family.at_stop(self.sigma);
+        (orbit, family.strobe(&orbit))
     }
 }
 
@@ -97,47 +54,29 @@ fn cases() -> impl Iterator<Item = ImpactOscillator> {
     .map(|(gamma, omega, sigma)| ImpactOscillator { gamma, omega, sigma, e: 0.8 })
 }
 
-fn budget() -> Budget {
-    Budget {
-        settings: Settings::default(),
-        early_stop: true,
-        undecided_periods: 1024,
-        exponent: true,
-        shows_exponent: true,
-    }
-}
-
-fn near(a: f64, b: f64, within: f64) -> bool {
-    (a - b).abs() <= within
-}
-
 #[test]
-fn one_wall_has_the_closed_form_orbit() {
+fn an_orbit_at_one_wall_is_classified_and_agrees_with_the_closed_form() {
     for case in cases() {
-        let steady = case.steady();
-        assert!(steady.approach > 0.3, "{case:?}");
+        let (exact, [x, v]) = case.orbit();
+        assert!(exact.speed > 0.3, "{case:?}");
         let flow = Flow::new(&case.oscillator());
-        let [x, v] = steady.strobe;
-        let start = [x - 0.01, v + 0.02, 0.3, -0.2];
+        let start = [x - 0.01, v + 0.02, 0.0, 0.0];
 
         let orbit = analyse_flow(&flow, case.law(), start, &Settings::default(), 8);
         assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Ok), "{case:?}");
         assert_eq!((orbit.symmetric, orbit.impacts_per_period), (Some(false), 1.0), "{case:?}");
         for (ours, exact) in orbit.strobe.into_iter().zip([x, v, 0.0, 0.0]) {
-            assert!(near(ours, exact, 1e-11), "{case:?}: {:?}, not {:?}", orbit.strobe, steady.strobe);
+            assert!(near(ours, exact, 1e-11), "{case:?}: {:?}, not {:?}", orbit.strobe, [x, v]);
         }
         let [event] = &orbit.events[..] else { panic!("{case:?}: {:?}", orbit.events) };
         assert_eq!((event.kind, event.side), (EventKind::Impact, Side::Right));
-        assert!(
-            near(event.t, steady.impact, 1e-11) && near(event.before[1], steady.approach, 1e-11),
-            "{case:?}"
-        );
-        assert!(near(event.after[1], -case.e * steady.approach, 1e-11), "{case:?}");
-        // A complex pair of modulus `e exp(-gamma T)`: impacts take `e^2` of areas, damping the rest.
+        assert!(near(event.t, exact.at, 1e-11) && near(event.before[1], exact.speed, 1e-11), "{case:?}");
+        assert!(near(event.after[1], -case.e * exact.speed, 1e-11), "{case:?}");
+        // The multipliers are a complex pair of modulus `e exp(-gamma T)`.
         let exponent = case.e.ln() / flow.period - case.gamma;
         assert!(near(orbit.lyapunov, exponent, 1e-10), "{case:?}: {} not {exponent}", orbit.lyapunov);
 
-        let cell = measure(&flow, case.law(), start, &budget());
+        let cell = measure(&flow, case.law(), start, &BUDGET);
         assert_eq!(
             (cell.period, cell.status, cell.impacts_per_period),
             (Some(1), Status::Ok, 1.0),
@@ -148,9 +87,8 @@ fn one_wall_has_the_closed_form_orbit() {
     }
 }
 
-/// The mirror image of an oscillator has its wall on the left.
 #[test]
-fn a_left_wall_alone_mirrors_a_right_one() {
+fn an_oscillator_with_a_left_wall_is_the_mirror_image_of_one_with_a_right_wall() {
     for case in cases() {
         let right = case.oscillator();
         let mirrored = |d: &Domain| Domain { load: d.load.map(|x| -x), ..*d };
@@ -163,8 +101,8 @@ fn a_left_wall_alone_mirrors_a_right_one() {
             ..right
         };
         assert_eq!(left.length_scale(), right.length_scale());
-        let [x, v] = case.steady().strobe;
-        let start = [x - 0.01, v + 0.02, 0.3, -0.2];
+        let (_, [x, v]) = case.orbit();
+        let start = [x - 0.01, v + 0.02, 0.0, 0.0];
         let run = |oscillator: &Oscillator, start: State| {
             let flow = Flow::new(oscillator);
             analyse_flow(&flow, case.law(), start, &Settings::default(), 8)
@@ -176,9 +114,9 @@ fn a_left_wall_alone_mirrors_a_right_one() {
     }
 }
 
-/// Without any wall, and before one that it does not reach, motion is the steady response.
+/// Both without a wall and with one out of reach, the motion is the steady response.
 #[test]
-fn a_wall_out_of_reach_changes_nothing() {
+fn a_wall_out_of_reach_does_not_change_the_motion() {
     let case = ImpactOscillator { gamma: 0.05, omega: 1.5, sigma: 5.0, e: 0.8 };
     let near_wall = case.oscillator();
     let no_wall = Oscillator { walls: [f64::INFINITY, f64::NEG_INFINITY], ..near_wall };
@@ -187,7 +125,7 @@ fn a_wall_out_of_reach_changes_nothing() {
         .map(|oscillator| {
             let flow = Flow::new(oscillator);
             assert!(flow.non_impacting().is_some());
-            let cell = measure(&flow, case.law(), REST, &budget());
+            let cell = measure(&flow, case.law(), REST, &BUDGET);
             assert_eq!((cell.period, cell.status, cell.impacts_per_period), (Some(1), Status::Ok, 0.0));
             analyse_flow(&flow, case.law(), REST, &Settings::default(), 8)
         })
@@ -204,29 +142,13 @@ fn a_wall_out_of_reach_changes_nothing() {
     }
 }
 
-/// A ball that falls onto a floor, a shaken force on it: nothing but the floor and the load has a
-/// length. Where the floor lies makes no difference.
+/// Without a second wall and a force, only the load and the position of the floor give a scale of length.
 #[test]
-fn a_ball_comes_to_rest_on_a_floor_at_zero() {
+fn a_ball_comes_to_rest_on_a_floor_at_any_position() {
     let (g, v, e) = (2.0, 1.0, 0.5);
     let ball = |floor: f64| {
-        let domain = |damping: f64, stiffness: f64, load: f64| Domain {
-            damping: [[damping, 0.0], [0.0, 1.0]],
-            stiffness: [[stiffness, 0.0], [0.0, 1.0]],
-            load: [load, 0.0],
-        };
-        let free = domain(0.0, 0.0, g);
-        Oscillator {
-            degrees: 2,
-            mass: [[1.0, 0.0], [0.0, 1.0]],
-            gap: [1.0, 0.0],
-            walls: [floor, f64::NEG_INFINITY],
-            contacts: [Contact::Impact; 2],
-            omega: 1.0,
-            force: [0.0, 0.0],
-            free,
-            meshing: [domain(200.0, 1e4, g + 1e4 * floor), free],
-        }
+        let free = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: g, omega: 1.0 };
+        with_wall(free.oscillator(), Side::Right, floor, Contact::Impact, [1e4, 200.0])
     };
     for floor in [0.0, 0.75, -3.0] {
         let oscillator = ball(floor);
@@ -234,11 +156,10 @@ fn a_ball_comes_to_rest_on_a_floor_at_zero() {
         let flow = Flow::new(&oscillator);
         let law = Law::both(e, 0.0);
         let mut trajectory = Trajectory::new(&flow, law, [floor, -v, 0.0, 0.0]);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut events: Vec<GapEvent> = Vec::new();
         (0..3).for_each(|_| trajectory.advance_period(&mut events).unwrap());
         let end = events.pop().unwrap();
         assert_eq!(end.kind, EventKind::MeshStart, "floor {floor}");
-        // After `2 v / g` each time, `e` times as fast as before; in all `2 v / (g (1 - e))`.
         assert!(near(end.t, 2.0 * v / (g * (1.0 - e)), 1e-12), "floor {floor}: {end:?}");
         let (mut t, mut speed) = (0.0, v);
         for event in &events {
@@ -251,7 +172,7 @@ fn a_ball_comes_to_rest_on_a_floor_at_zero() {
             speed *= e;
         }
         assert!(events.len() > 8, "floor {floor}: {}", events.len());
-        // It sinks in by `g / k`, and stays.
+        // At rest the spring behind the floor is compressed by `g / k`.
         assert_eq!(trajectory.meshing(), Some(Side::Right));
         assert!(near(trajectory.state()[0] - floor, g / 1e4, 1e-12), "{:?}", trajectory.state());
 
@@ -261,8 +182,8 @@ fn a_ball_comes_to_rest_on_a_floor_at_zero() {
     }
 }
 
-/// An oscillator, its law and a start where lengths are `length` times and rates `rate` times as large.
-fn in_units(
+/// Transforms an oscillator, its law and a start so that lengths are multiplied by `length` and rates by `rate`.
+pub(crate) fn in_units(
     oscillator: &Oscillator,
     law: Law,
     start: State,
@@ -277,7 +198,6 @@ fn in_units(
     };
     let scaled = Oscillator {
         walls: oscillator.walls.map(|wall| length * wall),
-        contacts: [Contact::Impact; 2],
         omega: rate * oscillator.omega,
         force: oscillator.force.map(|f| force * f),
         free: domain(&oscillator.free),
@@ -290,8 +210,8 @@ fn in_units(
     (scaled, Law { mesh_speed: law.mesh_speed.map(|speed| length * rate * speed), ..law }, start)
 }
 
-/// Gear pairs over the paper's plane, and the impact oscillators from rest below their wall.
-fn all_kinds() -> Vec<(Oscillator, Law, State)> {
+/// Returns gear pairs over restitution and frequency, and impact oscillators that start from rest.
+fn gear_pairs_and_impact_oscillators() -> Vec<(Oscillator, Law, State)> {
     let mut list = Vec::new();
     for j in 0..9 {
         for i in 0..9 {
@@ -303,19 +223,19 @@ fn all_kinds() -> Vec<(Oscillator, Law, State)> {
     for i in 0..24 {
         let (gamma, sigma) = (if i % 2 == 0 { 0.0 } else { 0.05 }, 0.3 * f64::from(i % 3 - 1));
         let case = ImpactOscillator { gamma, omega: 1.3 + 0.07 * f64::from(i), sigma, e: 0.7 };
-        list.push((case.oscillator(), case.law(), [sigma - 0.5, 0.0, 0.1, 0.0]));
+        list.push((case.oscillator(), case.law(), [sigma - 0.5, 0.0, 0.0, 0.0]));
     }
     list
 }
 
-fn measured((oscillator, law, start): &(Oscillator, Law, State)) -> Measured {
-    measure(&Flow::new(oscillator), *law, *start, &budget())
+fn measured((oscillator, law, start): &(Oscillator, Law, State)) -> Measurement {
+    measure(&Flow::new(oscillator), *law, *start, &BUDGET)
 }
 
-/// Powers of two multiply every length without rounding: not a bit may differ.
+/// Multiplication by a power of two is exact.
 #[test]
-fn a_unit_of_length_changes_no_bit() {
-    for case in all_kinds() {
+fn a_unit_of_length_that_is_a_power_of_two_changes_no_bit() {
+    for case in gear_pairs_and_impact_oscillators() {
         let ours = measured(&case);
         for length in [2f64.powi(-20), 2f64.powi(20)] {
             let (oscillator, law, start) = case;
@@ -326,11 +246,11 @@ fn a_unit_of_length_changes_no_bit() {
     }
 }
 
-/// A power of two as the unit of time changes no bit of the motion, and none of what is read off it but by the
-/// rounding of tangent vectors, which mix displacements and velocities.
+/// The motion does not change by a bit, but tangent vectors have other rounding errors, because they mix
+/// displacements and velocities.
 #[test]
-fn a_unit_of_time_changes_no_class() {
-    for case in all_kinds() {
+fn a_unit_of_time_that_is_a_power_of_two_changes_no_class() {
+    for case in gear_pairs_and_impact_oscillators() {
         let ours = measured(&case);
         for rate in [2f64.powi(-20), 2f64.powi(20)] {
             let (oscillator, law, start) = case;
@@ -339,7 +259,6 @@ fn a_unit_of_time_changes_no_class() {
             assert_eq!((theirs.period, theirs.status), (ours.period, ours.status), "{}", say());
             assert_eq!(theirs.symmetric, ours.symmetric, "{}", say());
             for (i, unit) in [1.0, rate, 1.0, rate].into_iter().enumerate() {
-                // On a cycle that both reach; after as many periods, where it is not one.
                 let close = 1e-9 * (1.0 + ours.strobe[i].abs());
                 let same = ours.periods_run == theirs.periods_run;
                 assert!(!same || near(theirs.strobe[i] / unit, ours.strobe[i], close), "{}", say());

@@ -1,15 +1,15 @@
-//! Deciding what a motion is, where that is not straightforward.
+//! Classification of motions that are difficult to classify.
 
-use crate::common::{REST, flow_of, paper as cell};
+use crate::common::{BUDGET, REST, flow_of, paper as cell};
 use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::orbit::{Budget, Class, Orbit, Settings, Status, analyse, measure};
+use rattlemap_dynamics::orbit::{Class, Orbit, Settings, Status, analyse, measure};
 use rattlemap_dynamics::reference::Trajectory;
 
 fn orbit(pair: &GearPair) -> Orbit {
     analyse(pair, REST, &Settings::default()).unwrap()
 }
 
-/// State at half a period after the strobe, mirrored: a point of the symmetry-conjugate orbit at phase 0.
+/// Returns a state of the symmetry-conjugate orbit at phase 0: the mirror image of the state half a period later.
 fn conjugate(pair: &GearPair, strobe: State) -> State {
     let flow = flow_of(pair);
     let mut half = Trajectory::new(&flow, pair.law(), strobe);
@@ -18,27 +18,26 @@ fn conjugate(pair: &GearPair, strobe: State) -> State {
 }
 
 #[test]
-fn a_strobe_inside_the_dip_of_meshing_is_decided() {
-    // At phase 0 the teeth mesh although the gap is still short of the wall by 1e-6: the
-    // state alone would be taken for free motion.
+fn an_orbit_with_its_strobe_in_a_contact_onset_is_periodic() {
+    // At phase 0 the teeth mesh although the gap is still 1e-6 in front of the wall, as in free motion.
     for (e, omega) in [(0.44, 2.05875), (0.27, 3.14375), (0.02, 3.96625)] {
         let pair = cell(e, omega);
         let orbit = orbit(&pair);
         let gap = (orbit.strobe[0] - orbit.strobe[2]).abs();
-        assert!(gap < pair.b && pair.b - gap < 1e-5, "the strobe is not in a contact onset any more: {gap}");
+        assert!(gap < pair.b && pair.b - gap < 1e-5, "the strobe is not in a contact onset: {gap}");
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e} {omega}");
         assert_eq!(orbit.status, Status::Ok, "{e} {omega}");
     }
 }
 
 #[test]
-fn symmetry_conjugate_orbits_share_everything_but_the_side() {
+fn symmetry_conjugate_orbits_differ_only_in_the_side() {
     let pair = cell(0.56, 5.6);
     let one = orbit(&pair);
     let other = analyse(&pair, conjugate(&pair, one.strobe), &Settings::default()).unwrap();
     assert_eq!((one.class, other.class), (Class::Periodic { period: 1 }, Class::Periodic { period: 1 }));
     assert_eq!((one.symmetric, other.symmetric), (Some(false), Some(false)));
-    assert!((one.strobe[0] - other.strobe[0]).abs() > 1e-3, "the same orbit twice");
+    assert!((one.strobe[0] - other.strobe[0]).abs() > 1e-3, "both orbits are the same");
     assert!((one.lyapunov - other.lyapunov).abs() < 1e-9);
     assert_eq!(one.word.mirrored(), other.word);
     // A symmetric orbit is its own conjugate.
@@ -48,8 +47,8 @@ fn symmetry_conjugate_orbits_share_everything_but_the_side() {
 }
 
 #[test]
-fn banded_chaos_beyond_a_grazing_is_chaos() {
-    // Close to a period-10 cycle for ever, yet nearby motions separate.
+fn banded_chaos_after_a_grazing_bifurcation_is_chaotic() {
+    // The motion always stays near a period-10 cycle, but nearby motions separate.
     for e in [0.6054, 0.6058] {
         let orbit = orbit(&GearPair::paper(e));
         assert_eq!((orbit.class, orbit.status), (Class::Chaotic, Status::Ok), "{e}");
@@ -57,10 +56,10 @@ fn banded_chaos_beyond_a_grazing_is_chaos() {
     }
 }
 
-/// A band of chaos, 1 % of the motion wide, beside a stable cycle: by chance it comes nearer to the cycle from
-/// one check to the next.
+/// A chaotic band with a width of 1 % of the motion lies near a stable cycle. From one check to the next, the motion
+/// may come closer to the cycle by chance.
 #[test]
-fn a_band_of_chaos_beside_a_cycle_is_chaos() {
+fn a_chaotic_band_near_a_stable_cycle_is_chaotic() {
     let narrow = GearPair {
         m1: 1.5100944943278496,
         m2: 2.2228992243566275,
@@ -85,23 +84,14 @@ fn a_band_of_chaos_beside_a_cycle_is_chaos() {
             );
         }
     }
-    // Within the budget of a map, too.
-    let budget = Budget {
-        settings: Settings::default(),
-        early_stop: true,
-        undecided_periods: 1584,
-        exponent: true,
-        shows_exponent: true,
-    };
     for pair in [cell(0.6980392156862745, 5.96078431372549), narrow] {
-        let measured = measure(&flow_of(&pair), pair.law(), REST, &budget);
-        assert_eq!(measured.period, None);
+        assert_eq!(measure(&flow_of(&pair), pair.law(), REST, &BUDGET).period, None);
     }
 }
 
-/// A multiplier of 0.99995 shrinks little within any check; the motion about it is linear.
+/// With a multiplier of 0.99995 the distance hardly shrinks from one check to the next.
 #[test]
-fn a_slow_approach_is_seen_however_long_the_transient() {
+fn a_slow_approach_is_recognised_after_any_transient() {
     for transient_periods in [5000, 20_000] {
         let settings = Settings { transient_periods, ..Settings::default() };
         let orbit = analyse(&cell(0.7941176470588235, 3.3294117647058825), REST, &settings).unwrap();
@@ -111,8 +101,8 @@ fn a_slow_approach_is_seen_however_long_the_transient() {
 
 #[test]
 fn an_escape_from_an_unstable_cycle_is_not_chaos() {
-    // Start on the symmetric orbit, which is unstable here: nearby motions separate for
-    // hundreds of periods before the unsymmetric orbit is reached.
+    // The motion starts on the symmetric orbit, which is unstable here. Nearby motions separate for hundreds of
+    // periods until the unsymmetric orbit is reached.
     let below = orbit(&GearPair::paper(0.541));
     let pair = GearPair::paper(0.545);
     let symmetric = below.strobe;
@@ -122,14 +112,14 @@ fn an_escape_from_an_unstable_cycle_is_not_chaos() {
 }
 
 #[test]
-fn undamped_motion_is_undecided_and_says_so() {
+fn undamped_motion_is_undecided() {
     let pair = GearPair { r1: 0.0, r2: 0.0, force: 1e-3, ..cell(0.5, 11.0) };
     let orbit = analyse(&pair, REST, &Settings { transient_periods: 10, ..Settings::default() }).unwrap();
     assert_eq!((orbit.class, orbit.status), (Class::Undecided, Status::Slow));
 }
 
 #[test]
-fn what_cannot_be_finished_is_failed_by_name() {
+fn motion_with_too_many_events_has_failed() {
     let pair = GearPair { b: 1e-9, ..cell(1.0, 5.6) };
     let orbit = orbit(&pair);
     assert_eq!((orbit.class, orbit.status), (Class::Failed, Status::CapEvents));
@@ -137,7 +127,7 @@ fn what_cannot_be_finished_is_failed_by_name() {
 }
 
 #[test]
-fn no_force_means_no_motion() {
+fn without_force_the_motion_stays_at_rest() {
     let orbit = orbit(&GearPair { force: 0.0, ..cell(0.5, 5.6) });
     assert_eq!(orbit.class, Class::Periodic { period: 1 });
     assert_eq!(orbit.strobe, REST);
@@ -146,8 +136,8 @@ fn no_force_means_no_motion() {
 }
 
 #[test]
-fn a_strobe_at_the_turning_point_is_no_noise() {
-    // Quasi-static: at phase 0 the gears stand still, and their velocities are rounding.
+fn a_quasi_static_orbit_with_zero_velocity_at_the_strobe_is_periodic() {
+    // The velocities at phase 0 are rounding errors.
     let orbit = orbit(&cell(0.5, 0.001));
     assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 1 }, Some(true)));
     assert_eq!(orbit.word.time_order(), "121213454546");
@@ -155,16 +145,15 @@ fn a_strobe_at_the_turning_point_is_no_noise() {
 
 #[test]
 fn neutral_motion_is_not_chaos() {
-    // Unsupported and undamped gears that never meet: nearby motions separate in proportion to
-    // time.
+    // Gears without supports and damping that never meet: nearby motions separate in proportion to time.
     let pair = GearPair { k1: 0.0, k2: 0.0, r1: 0.0, r2: 0.0, b: 5.0, ..cell(0.605, 5.6) };
     assert_ne!(orbit(&pair).class, Class::Chaotic);
 }
 
-/// Without supports the pair's common translation keeps to itself: a tangent vector along it
-/// would never see that the teeth clatter chaotically.
+/// Without supports, the common translation of both gears is not coupled to their relative motion. A tangent vector
+/// along it would not show chaos.
 #[test]
-fn chaos_of_a_pair_without_supports_is_seen() {
+fn chaos_of_a_pair_without_supports_is_recognised() {
     let pair = GearPair {
         m1: 16.0,
         m2: 0.26,
@@ -182,10 +171,10 @@ fn chaos_of_a_pair_without_supports_is_seen() {
     for pair in [pair, clattering] {
         let orbit = analyse(&pair, REST, &settings).unwrap();
         assert_eq!(orbit.class, Class::Chaotic, "{pair:?}");
-        // Two motions themselves, a hair apart: their gaps part company.
+        // The gaps of two nearby motions separate.
         let flow = flow_of(&pair);
-        let gap = |hair: f64| {
-            let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, hair, 0.0, 0.0]);
+        let gap = |speed: f64| {
+            let mut trajectory = Trajectory::new(&flow, pair.law(), [0.0, speed, 0.0, 0.0]);
             (0..200).for_each(|_| trajectory.advance_period(&mut ()).unwrap());
             let [x1, _, x2, _] = trajectory.state();
             x1 - x2
@@ -195,8 +184,8 @@ fn chaos_of_a_pair_without_supports_is_seen() {
 }
 
 #[test]
-fn exponents_survive_periods_in_which_tangents_leave_the_range_of_f64() {
-    // Without contact the largest is that of the slower support, -0.15, however long the period.
+fn exponents_are_right_if_tangents_leave_the_range_of_f64_in_one_period() {
+    // Without contact the largest exponent is that of the slower support, -0.15, for every period.
     for omega in [1.0, 0.01, 0.001] {
         let orbit = orbit(&GearPair { b: 1e6, ..cell(0.5, omega) });
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{omega}");
@@ -204,10 +193,9 @@ fn exponents_survive_periods_in_which_tangents_leave_the_range_of_f64() {
     }
 }
 
-/// A symmetric cycle of period 5 that is met in meshing at some strobes and free at others: half a period
-/// on, the mirror image lies in another domain.
+/// A symmetric cycle of period 5 whose strobes lie partly in meshing and partly in free motion.
 #[test]
-fn a_symmetric_cycle_may_change_domains_between_its_half_periods() {
+fn a_symmetric_cycle_with_strobes_in_different_domains_is_found() {
     let pair = GearPair {
         m1: 0.19829369296457494,
         m2: 0.16481503350571672,

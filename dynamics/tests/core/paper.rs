@@ -1,30 +1,27 @@
-//! Every published fact of the paper, to its printed digits (omega = 5.6, Table 1, from rest).
+//! The published results of the paper, to their printed digits (omega = 5.6, Table 1, from rest).
 
-use crate::common::{REST, apart, flow_of, paper};
+use crate::common::{BUDGET, REST, apart, events, flow_of, paper};
 use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::orbit::{Budget, Class, EventKind, Orbit, Settings, Status, analyse, measure};
-use rattlemap_dynamics::reference::{Happening, Trajectory};
-use rattlemap_dynamics::stability::pitchfork;
+use rattlemap_dynamics::orbit::{Class, EventKind, Orbit, Settings, Status, analyse, measure};
+use rattlemap_dynamics::reference::{GapEvent, Trajectory};
+use rattlemap_dynamics::stability::{StrobeMap, refine};
 
 fn orbit(e: f64) -> Orbit {
     analyse(&GearPair::paper(e), REST, &Settings::default()).unwrap()
 }
 
-/// The event nearest to time `t` on the trajectory from rest: time, and states.
+/// Returns time, kind, wall and states of the event nearest to time `t` on the trajectory from rest.
 fn event_near(e: f64, t: f64) -> (f64, EventKind, Side, State, State) {
     let pair = GearPair::paper(e);
     let flow = flow_of(&pair);
-    let mut trajectory = Trajectory::new(&flow, pair.law(), REST);
-    let mut met: Vec<Happening> = Vec::new();
-    while (trajectory.period() as f64) * flow.period < t + 1.0 {
-        trajectory.advance_period(&mut met).unwrap();
-    }
-    let time = |h: &Happening| h.period as f64 * flow.period + h.t;
-    let h = met.iter().min_by(|a, b| (time(a) - t).abs().total_cmp(&(time(b) - t).abs())).unwrap();
-    (time(h), h.kind, h.side, flow.to_state(h.before), flow.to_state(h.after))
+    let events = events(&flow, pair.law(), REST, ((t + 1.0) / flow.period).ceil() as u64);
+    let time = |event: &GapEvent| event.period as f64 * flow.period + event.t;
+    let distance = |event: &GapEvent| (time(event) - t).abs();
+    let event = events.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+    (time(event), event.kind, event.side, flow.to_state(event.before), flow.to_state(event.after))
 }
 
-/// Asserts that numbers agree with printed ones to the last printed digit.
+/// Asserts that a number agrees with a printed one to the last printed digit.
 #[track_caller]
 fn assert_prints(value: f64, printed: &str) {
     let digits = printed.split('.').nth(1).map_or(0, str::len);
@@ -53,7 +50,7 @@ fn e_0605_is_period_1_with_word_36() {
 }
 
 #[test]
-fn e_0606_is_aperiodic_with_local_flights_between_3_and_6() {
+fn e_0606_is_chaotic_with_local_flights_between_3_and_6() {
     let orbit = orbit(0.606);
     assert_eq!(orbit.class, Class::Chaotic);
     let word = orbit.word.time_order();
@@ -69,10 +66,10 @@ fn e_006_meshes_on_both_sides() {
     assert_prints(t, "44.0097");
     assert_eq!((kind, side), (EventKind::MeshEnd, Side::Right));
     assert_state(after, ["0.1184", "6.3427", "-0.3816", "6.5333"]);
-    // The state is still 2e-4 away from its limit.
+    // At that time the distance from the cycle is still 2e-4.
     let end = orbit.events.iter().find(|e| e.kind == EventKind::MeshEnd && e.side == Side::Right).unwrap();
-    let left = apart(end.before, after);
-    assert!((1e-4..4e-4).contains(&left), "{left}");
+    let distance = apart(end.before, after);
+    assert!((1e-4..4e-4).contains(&distance), "{distance}");
 }
 
 #[test]
@@ -90,66 +87,61 @@ fn the_word_changes_between_e_00997_and_00998() {
 
 #[test]
 fn the_pitchfork_lies_at_05419() {
-    let guess = orbit(0.54).strobe;
-    let e = pitchfork(&GearPair::paper(0.54), "e", 0.54, 0.544, guess).unwrap();
-    assert_prints(e, "0.5419");
-    // To 1e-6, and independent of the bracket.
-    let other = pitchfork(&GearPair::paper(0.54), "e", 0.5405, 0.5432, guess).unwrap();
-    assert!((e - other).abs() < 1e-9, "{e} {other}");
-    // On either side, close by, the orbit is what the value says.
-    assert_eq!(orbit(e - 1e-5).symmetric, Some(true));
-    assert_eq!(orbit(e + 1e-5).symmetric, Some(false));
+    // A multiplier of the half-period map crosses -1 there: its derivative plus 1 is singular.
+    let determinant = |e: f64, guess: State| {
+        let pair = GearPair::paper(e);
+        let (flow, map) = (flow_of(&pair), StrobeMap::MirroredHalves(1));
+        let seed = Trajectory::new(&flow, pair.law(), guess);
+        let symmetric = refine(&seed, map).unwrap().state;
+        let derivative = map.apply(&seed, symmetric).unwrap().derivative();
+        ((derivative + nalgebra::Matrix4::identity()).determinant(), symmetric)
+    };
+    let (mut low, mut high) = (0.54, 0.544);
+    let (at_low, mut state) = determinant(low, orbit(low).strobe);
+    while high - low > 1e-9 {
+        let (middle, next) = determinant(0.5 * (low + high), state);
+        state = next;
+        if middle * at_low > 0.0 { low = 0.5 * (low + high) } else { high = 0.5 * (low + high) }
+    }
+    assert_prints(low, "0.5419");
+    assert!((low - 0.541_908).abs() < 1e-6, "{low}");
+    assert_eq!(orbit(low - 1e-5).symmetric, Some(true));
+    assert_eq!(orbit(low + 1e-5).symmetric, Some(false));
 }
 
 #[test]
 fn orbits_next_to_the_pitchfork_are_decided_early() {
-    // A map's budget.
-    let budget = Budget {
-        settings: Settings::default(),
-        early_stop: true,
-        undecided_periods: 1584,
-        exponent: true,
-        shows_exponent: true,
-    };
     for (e, symmetric) in [(0.541, true), (0.543, false)] {
         let pair = GearPair::paper(e);
-        let measured = measure(&flow_of(&pair), pair.law(), REST, &budget);
-        let periods = measured.periods_run + measured.periods_beside;
+        let measured = measure(&flow_of(&pair), pair.law(), REST, &BUDGET);
+        let periods = measured.periods_run + measured.search_periods;
         assert_eq!((measured.period, measured.symmetric), (Some(1), Some(symmetric)), "{e}");
-        // Measured 101 and 38, of 528 to wait for.
+        // The orbits are decided after 101 and 38 periods; the full budget is 528.
         assert!(periods < 200, "{e}: {periods}");
-    }
-    for (e, symmetric) in [(0.541, true), (0.543, false)] {
         let orbit = orbit(e);
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e}");
         assert_eq!(orbit.symmetric, Some(symmetric), "{e}");
         let [re, im] = orbit.floquet.unwrap()[0];
         assert!(re.hypot(im) < 1.0, "{e}: {re} {im}");
-        assert_eq!(orbit.status, Status::Slow, "decided by Newton, not by waiting");
+        assert_eq!(orbit.status, Status::Slow, "decided by Newton's method before the motion has converged");
     }
 }
 
 #[test]
-fn symmetry_up_to_the_pitchfork_and_period_1_up_to_0605() {
-    for i in 0..=54 {
-        let e = f64::from(i) * 0.01;
+fn orbits_have_period_1_up_to_0605_and_are_symmetric_up_to_the_pitchfork() {
+    for e in (0..=54).map(|i| f64::from(i) * 0.01).chain([0.545, 0.56, 0.58, 0.6, 0.605]) {
         let orbit = orbit(e);
         assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e}");
-        assert_eq!(orbit.symmetric, Some(true), "{e}");
-    }
-    for e in [0.545, 0.56, 0.58, 0.6, 0.605] {
-        let orbit = orbit(e);
-        assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e}");
-        assert_eq!(orbit.symmetric, Some(false), "{e}");
+        assert_eq!(orbit.symmetric, Some(e < 0.5419), "{e}");
     }
 }
 
 #[test]
-fn the_window_holds_period_4_and_above_it_period_2() {
+fn the_periodic_window_has_period_4_and_then_period_2() {
     for (e, expected) in [(0.855, 4), (0.86, 4), (0.87, 2), (0.88, 2), (0.9, 2), (0.92, 2)] {
         assert_eq!(orbit(e).class, Class::Periodic { period: expected }, "{e}");
     }
-    // Towards its end a period-3 orbit coexists; from rest at 0.93 the motion finds that one.
+    // Near the end of the window a period-3 orbit coexists, which the motion from rest at 0.93 reaches.
     assert_eq!(orbit(0.93).class, Class::Periodic { period: 3 });
     for e in [0.61, 0.65, 0.7, 0.8, 0.84, 0.94, 0.96] {
         assert_eq!(orbit(e).class, Class::Chaotic, "{e}");
@@ -157,7 +149,7 @@ fn the_window_holds_period_4_and_above_it_period_2() {
 }
 
 #[test]
-fn the_contact_free_response_ends_the_impacting_ones() {
+fn the_response_is_contact_free_above_a_frequency() {
     for (omega, impacts) in [(9.8, true), (10.1, false), (12.0, false)] {
         let orbit = analyse(&paper(0.5, omega), REST, &Settings::default()).unwrap();
         assert_eq!(orbit.impacts_per_period > 0.0, impacts, "{omega}");

@@ -1,34 +1,41 @@
-//! What must hold for every gear pair, whatever its parameters.
+//! Invariants of the motion of all gear pairs.
 
-use crate::common::{departure, domain_after, mirrored_symbol, negated, paper, sign};
+use crate::common::{departure, domain_after, mirrored_symbol, negated, paper, sign, size};
 use proptest::prelude::*;
 use rattlemap_dynamics::flow::{DomainKind, Flow};
 use rattlemap_dynamics::model::{GearPair, Side, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Stop, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Stop, Trajectory};
+use rattlemap_dynamics::stability::UNIT;
 use rayon::prelude::*;
 
-/// Events for which two computations of one motion are compared. Beyond, what differs by
-/// rounding may have passed through an instability that its tangents, damped before, do not
-/// show: inelastic contacts bring orbits back to symmetry just before it turns unstable.
-const COMPARED: usize = 12;
+/// Largest number of events for which two computations of one motion are compared. After more events, a difference by
+/// rounding may have grown in an instability that the tangents, damped before, do not show.
+pub(crate) const COMPARABLE_EVENTS: usize = 12;
 
-/// Events examined in one trajectory; fast clattering has millions in a period.
+/// Number of events examined in one trajectory. There may be millions in a period.
 const EVENTS: usize = 400;
 
-fn logarithmic(low: f64, high: f64) -> impl Strategy<Value = f64> {
+/// Numbers between `low` and `high`, uniform in their logarithm.
+pub(crate) fn logarithmic(low: f64, high: f64) -> impl Strategy<Value = f64> {
     (low.ln()..high.ln()).prop_map(f64::exp)
 }
 
-/// Now and then nothing at all, which is a case of its own.
+/// The given numbers, and zero in one case of `weight + 1`.
+pub(crate) fn or_zero(
+    weight: u32,
+    values: impl Strategy<Value = f64> + 'static,
+) -> impl Strategy<Value = f64> {
+    prop_oneof![weight => values.boxed(), 1 => Just(0.0).boxed()]
+}
+
 fn or_none(values: impl Strategy<Value = f64> + 'static) -> impl Strategy<Value = f64> {
-    prop_oneof![8 => values.boxed(), 1 => Just(0.0).boxed()]
+    or_zero(8, values)
 }
 
 fn pairs() -> impl Strategy<Value = GearPair> {
     let masses = (logarithmic(0.1, 10.0), logarithmic(0.1, 10.0));
     let supports = (or_none(0.0..5.0), or_none(0.0..5.0), or_none(0.0..2000.0), or_none(0.0..2000.0));
     let mesh = (or_none(0.0..5.0), logarithmic(10.0, 1e5));
-    // Unforced motion dies out on a wall, which is a test of its own among the extremes.
     let forcing = (0.01..200.0, 0.3..15.0);
     let contact =
         (logarithmic(0.01, 2.0), or_none(prop_oneof![4 => 0.0..1.0, 1 => Just(1.0)]), or_none(0.0..0.1));
@@ -59,8 +66,8 @@ fn flow_of(pair: &GearPair) -> Flow {
     Flow::new(&pair.oscillator().expect("the ranges are valid"))
 }
 
-/// Some periods of events, or those up to a stop; a stop must not be for want of finiteness.
-fn events_of(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> Result<Vec<Happening>, TestCaseError> {
+/// Returns the events of some periods, or those before the cap on events. No other stop may occur.
+fn events_of(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> Result<Vec<GapEvent>, TestCaseError> {
     let mut trajectory = Trajectory::new(flow, pair.law(), y);
     let mut events = Vec::new();
     for _ in 0..periods {
@@ -75,33 +82,29 @@ fn events_of(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> Result<Vec
     Ok(events)
 }
 
-/// Time from one event to the next.
-fn between(flow: &Flow, from: &Happening, to: &Happening) -> f64 {
+/// Returns the time from one event to the next.
+fn between(flow: &Flow, from: &GapEvent, to: &GapEvent) -> f64 {
     (to.period - from.period) as f64 * flow.period + (to.t - from.t)
 }
 
-fn scale(y: State) -> f64 {
-    y.iter().fold(1.0, |m, x| m.max(x.abs()))
-}
-
-/// See `free_flights_stay_between_the_walls`.
-fn free_flights_hold(pair: &GearPair, y: State) -> Result<(), TestCaseError> {
+/// Checks `free_flights_stay_between_the_walls` for one pair.
+fn check_free_flights(pair: &GearPair, y: State) -> Result<(), TestCaseError> {
     let flow = flow_of(pair);
     let events = events_of(&flow, pair, y, 3)?;
     for two in events.windows(2).filter(|two| domain_after(&two[0]) == DomainKind::Free) {
         let (from, to) = (&two[0], &two[1]);
-        // The end of an infinite series of impacts, closed in one jump, is no flight.
+        // The jump over an infinite series of impacts is no flight.
         if pair.mesh_speed == 0.0 && pair.e > 0.0 && to.kind == EventKind::MeshStart && to.before[1] == 0.0 {
             continue;
         }
         let free = flow.domain(DomainKind::Free);
         let (sin, cos) = (pair.omega * from.t).sin_cos();
         let duration = between(&flow, from, to);
-        // Rounding of the gap where displacements or travel are large, over the flight.
-        let size = scale(from.after).max(scale(to.before)) + pair.b;
+        // Rounding error of the gap for large displacements and long flights.
+        let size = size(from.after).max(size(to.before)) + pair.b;
         let rate = (pair.k1 / pair.m1 + pair.k2 / pair.m2).sqrt();
         let travel = 64.0 * f64::EPSILON * size * (1.0 + duration * (1.0 + rate));
-        // The forcing phase loses a rounding with every step since the strobe.
+        // The rounding error of the phase grows with the number of steps since the strobe.
         let steps = 1.0 + from.t * (rate + (pair.k / pair.m1 + pair.k / pair.m2).sqrt());
         let drive = f64::EPSILON * steps * 0.5 * pair.force / pair.m1 * duration * duration;
         let rounding = travel + drive;
@@ -120,16 +123,15 @@ fn free_flights_hold(pair: &GearPair, y: State) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, max_global_rejects: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Sampled between its events, a free flight stays between the walls, and it ends where
-    /// the event says.
+    /// A free flight between two events stays between the walls, and ends in the state of the second event.
     #[test]
     fn free_flights_stay_between_the_walls(pair in pairs(), y in starts()) {
-        free_flights_hold(&pair, y)?;
+        check_free_flights(&pair, y)?;
     }
 
-    /// Meshing ends where it says, and lies beyond its wall except for the contact onset that it starts with.
+    /// Meshing stays behind its wall after the contact onset, and ends in the state of its last event.
     #[test]
-    fn meshing_stays_beyond_its_wall(pair in pairs(), y in starts()) {
+    fn meshing_stays_behind_its_wall(pair in pairs(), y in starts()) {
         let flow = flow_of(&pair);
         let events = events_of(&flow, &pair, y, 3)?;
         for two in events.windows(2).filter(|two| two[0].kind == EventKind::MeshStart) {
@@ -140,13 +142,13 @@ proptest! {
             let meshing = flow.domain(DomainKind::Meshing(side));
             let (sin, cos) = (pair.omega * from.t).sin_cos();
             let duration = between(&flow, from, to);
-            let size = scale(from.after).max(scale(to.before)) + pair.b;
+            let size = size(from.after).max(size(to.before)) + pair.b;
             let mut onset_over = false;
             for i in 1..=24 {
                 let q = meshing.propagate(from.after, [cos, sin], duration * f64::from(i) / 24.0);
                 let depth = s * q[0] - pair.b;
                 onset_over |= depth > 1e-11 * size;
-                prop_assert!(!onset_over || depth > -1e-11 * size, "fell through at {i}/24 of {two:#?}");
+                prop_assert!(!onset_over || depth > -1e-11 * size, "in front of the wall at {i}/24 of {two:#?}");
                 if i == 24 {
                     let off = departure(q, to.before);
                     prop_assert!(off <= 1e-9, "ends {off:.1e} from {q:?}: {two:#?}");
@@ -155,9 +157,9 @@ proptest! {
         }
     }
 
-    /// Contacts keep the momentum and never make kinetic energy; their speeds obey `w+ = -e w-`.
+    /// Impacts conserve the momentum, lose the right energy, and obey `w+ = -e w-`.
     #[test]
-    fn contacts_conserve_momentum_and_never_make_energy(pair in pairs(), y in starts()) {
+    fn impacts_obey_momentum_energy_and_restitution(pair in pairs(), y in starts()) {
         let flow = flow_of(&pair);
         for event in events_of(&flow, &pair, y, 5)? {
             let (before, after) = (flow.to_state(event.before), flow.to_state(event.after));
@@ -169,43 +171,42 @@ proptest! {
             prop_assert_eq!(event.after[0], flow.wall(event.side));
             prop_assert_eq!(event.after[1], -pair.e * event.before[1]);
             prop_assert!(sign(event.side) * event.before[1] >= -1e-7, "not closing: {event:?}");
-            let carried = (pair.m1 + pair.m2) * scale(before).max(scale(after));
+            let scale = (pair.m1 + pair.m2) * size(before).max(size(after));
             let momentum = flow.momentum(after) - flow.momentum(before);
-            prop_assert!(momentum.abs() <= 8.0 * f64::EPSILON * carried, "momentum {momentum:e}: {event:?}");
+            prop_assert!(momentum.abs() <= 8.0 * f64::EPSILON * scale, "momentum {momentum:e}: {event:?}");
             let energy = flow.kinetic_energy(after) - flow.kinetic_energy(before);
             let lost = 0.5 / (1.0 / pair.m1 + 1.0 / pair.m2) * (1.0 - pair.e * pair.e) * event.before[1].powi(2);
-            let rounding = 16.0 * f64::EPSILON * carried * scale(before).max(scale(after));
+            let rounding = 16.0 * f64::EPSILON * scale * size(before).max(size(after));
             prop_assert!((energy + lost).abs() <= rounding, "energy {energy:e}, not {:e}: {event:?}", -lost);
         }
     }
 
-    /// `(y, t) -> (-y, t + T/2)` takes motions to motions.
+    /// The symmetry is `(y, t) -> (-y, t + T/2)`.
     #[test]
     fn the_mirror_image_of_a_motion_is_a_motion(pair in pairs(), y in starts()) {
         let flow = flow_of(&pair);
         let half = 0.5 * flow.period;
-        let mut original = Trajectory::with_tangents(&flow, pair.law(), y, UNITS);
+        let mut original = Trajectory::with_tangents(&flow, pair.law(), y, UNIT);
         prop_assume!(original.advance_to(half, &mut ()).is_ok());
         let state = original.state();
-        // A start inside the contact onset would be one in free motion.
+        // A start from the state alone would be free motion if the gap is in a contact onset.
         let gap = state[0] - state[2];
         prop_assume!(original.meshing().is_none_or(|side| sign(side) * gap > pair.b + 1e-9));
-        original.set_tangents(UNITS);
+        original.set_tangents(UNIT);
         original.clear_near_grazing();
         let mut events = Vec::new();
         let stopped = original.advance_to(flow.period, &mut events).is_err();
         prop_assume!(!stopped && !original.near_grazing());
-        // Half a period amplifies rounding by the tangents' growth on the way, and a
-        // threshold passed narrowly may decide otherwise: leave both kinds out.
+        // Exclude motions that amplify rounding errors strongly, or come very close to the threshold.
         let growth = original.tangents().iter().flatten().fold(1.0f64, |m, x| m.max(x.abs()));
         prop_assume!(growth < 1e4);
         prop_assume!(events.iter().all(|event| (pair.e * event.before[1].abs() - pair.mesh_speed).abs() > 1e-7));
 
         let mut mirror = Trajectory::new(&flow, pair.law(), negated(state));
-        let mut images: Vec<Happening> = Vec::new();
+        let mut images: Vec<GapEvent> = Vec::new();
         mirror.advance_to(half, &mut images).expect("the original did not stop");
-        prop_assert!(images.len() == events.len() || events.len() > COMPARED);
-        for (image, event) in images.iter().zip(&events).take(COMPARED) {
+        prop_assert!(images.len() == events.len() || events.len() > COMPARABLE_EVENTS);
+        for (image, event) in images.iter().zip(&events).take(COMPARABLE_EVENTS) {
             prop_assert_eq!(image.kind, event.kind);
             prop_assert_eq!(image.side, event.side.mirrored());
             if let (Some(a), Some(b)) = (image.symbol, event.symbol) {
@@ -215,18 +216,17 @@ proptest! {
             prop_assert!((image.t + half - event.t).abs() < tolerance, "{image:?} for {event:?}");
             prop_assert!(departure(negated(image.after), event.after) < tolerance, "{image:?} for {event:?}");
         }
-        if events.len() <= COMPARED {
+        if events.len() <= COMPARABLE_EVENTS {
             let off = departure(negated(mirror.state()), original.state());
-            prop_assert!(off < 1e-11 * growth * scale(state), "off by {off:.1e} at a growth of {growth:.1e}");
+            prop_assert!(off < 1e-11 * growth * size(state), "off by {off:.1e} at a growth of {growth:.1e}");
         }
     }
 
-    /// Cutting a period into pieces changes nothing but rounding.
     #[test]
-    fn a_period_may_be_cut_anywhere(pair in pairs(), y in starts(), cuts in prop::array::uniform3(0.0..1.0f64)) {
+    fn a_period_in_pieces_agrees_with_a_whole_period(pair in pairs(), y in starts(), cuts in prop::array::uniform3(0.0..1.0f64)) {
         let flow = flow_of(&pair);
-        let mut whole = Trajectory::with_tangents(&flow, pair.law(), y, UNITS);
-        let mut events: Vec<Happening> = Vec::new();
+        let mut whole = Trajectory::with_tangents(&flow, pair.law(), y, UNIT);
+        let mut events: Vec<GapEvent> = Vec::new();
         prop_assume!(whole.advance_period(&mut events).is_ok() && !whole.near_grazing());
         let growth = whole.tangents().iter().flatten().fold(1.0f64, |m, x| m.max(x.abs()));
         prop_assume!(growth < 1e4);
@@ -238,20 +238,17 @@ proptest! {
             prop_assert_eq!(pieces.time_in_period(), cut * flow.period);
         }
         pieces.advance_period(&mut ()).expect("the whole did not stop");
-        if events.len() <= COMPARED {
+        if events.len() <= COMPARABLE_EVENTS {
             prop_assert_eq!(pieces.work().events, whole.work().events);
             let off = departure(pieces.state(), whole.state());
-            prop_assert!(off < 1e-11 * growth * scale(y), "off by {off:.1e} at a growth of {growth:.1e}");
+            prop_assert!(off < 1e-11 * growth * size(y), "off by {off:.1e} at a growth of {growth:.1e}");
         }
     }
 }
 
-const UNITS: [State; 4] =
-    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-
-/// Stiff flights late in a long period: their speeds are as good as the times of their ends.
+/// Late in a long period, the time of an event has a larger rounding error, and so has the speed of a stiff flight.
 #[test]
-fn a_stiff_flight_late_in_a_period_ends_where_it_says() {
+fn a_stiff_flight_late_in_a_period_ends_in_the_state_of_its_event() {
     let pair = GearPair {
         m1: 0.657_851_055_472_107,
         m2: 0.580_344_156_213_021,
@@ -268,12 +265,12 @@ fn a_stiff_flight_late_in_a_period_ends_where_it_says() {
         mesh_speed: 0.0,
     };
     let start = -1.642_490_278_186_327;
-    free_flights_hold(&pair, [start, 0.0, start, 0.0]).expect("a flight that ends where it says");
+    check_free_flights(&pair, [start, 0.0, start, 0.0]).expect("an agreement");
 }
 
-/// Meshing starts with hardly any pressing left: where that ceases hangs on rounding, but it does.
+/// Meshing starts with almost no pressing acceleration, so its end depends on rounding.
 #[test]
-fn pressing_that_hardly_begins_ceases() {
+fn meshing_with_hardly_any_pressing_ends() {
     let pair = GearPair {
         m1: 0.360_926_782_500_657_3,
         m2: 1.279_671_013_419_157,
@@ -291,28 +288,27 @@ fn pressing_that_hardly_begins_ceases() {
     };
     let start =
         [0.385_414_006_558_098_93, 3.661_243_976_023_188_7, 0.328_508_820_108_546_65, 3.661_243_974_235_642];
-    let mut ceased = 0;
-    // Pressing from 1e-13 to 1e-3 of the acceleration; 0 is where it was found not to end.
+    let mut ends_in_onset = 0;
+    // The pressing acceleration is 0, or 1e-13 to 1e-3 of the total.
     for k in 0..=400 {
         let more = if k == 0 { 0.0 } else { 10f64.powf(-13.0 + f64::from(k) / 40.0) };
         let pair = GearPair { force: pair.force * (1.0 + more), ..pair };
         let flow = flow_of(&pair);
         let events = events_of(&flow, &pair, start, 1).expect("no stop");
         let meshing = flow.domain(DomainKind::Meshing(Side::Right));
-        let ends = |event: &&Happening| event.kind == EventKind::MeshEnd && event.side == Side::Right;
+        let ends = |event: &&GapEvent| event.kind == EventKind::MeshEnd && event.side == Side::Right;
         for end in events.iter().filter(ends).filter(|end| end.before[0] < pair.b) {
             let (sin, cos) = (pair.omega * end.t).sin_cos();
             let pressing = meshing.acceleration(&end.before, &[cos, sin]);
-            assert!(pressing.abs() < 1e-12 * pair.force / pair.m1, "{pressing:e} left: {end:?}");
-            ceased += 1;
+            assert!(pressing.abs() < 1e-12 * pair.force / pair.m1, "{pressing:e} at the end: {end:?}");
+            ends_in_onset += 1;
         }
     }
-    assert!(ceased > 100, "{ceased}");
+    assert!(ends_in_onset > 100, "{ends_in_onset}");
 }
 
-/// Cells are independent: the number of threads changes no bit of any result.
 #[test]
-fn threads_change_no_bit() {
+fn the_number_of_threads_changes_no_bit() {
     let cells: Vec<GearPair> =
         (0..64).map(|i| paper(f64::from(i % 8) / 7.0, 1.0 + 1.4 * f64::from(i / 8))).collect();
     let run = |threads: usize| -> Vec<(State, u64)> {
@@ -333,15 +329,5 @@ fn threads_change_no_bit() {
     assert!(one.iter().any(|(_, events)| *events > 0));
     for threads in [2, 4] {
         assert_eq!(run(threads), one, "{threads} threads");
-    }
-}
-
-/// Walls are where the parameters put them, for both sides.
-#[test]
-fn sides_are_mirror_images() {
-    for side in Side::BOTH {
-        assert_eq!(side.mirrored().mirrored(), side);
-        assert_eq!(side.sign(), sign(side));
-        assert_eq!(side.mirrored().sign(), -sign(side));
     }
 }

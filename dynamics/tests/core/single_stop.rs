@@ -1,30 +1,31 @@
-//! The oscillator below one rigid stop, `x'' + 2 gamma x' + x = cos(omega t)`, against its closed forms: orbits of
-//! one impact in `n` periods, their multipliers, folds and grazing.
+//! The oscillator `x'' + 2 gamma x' + x = cos(omega t)` with one rigid stop, against closed forms: orbits with one
+//! impact in `n` periods, their multipliers, folds and grazing.
 //!
-//! After an impact of approach speed `V` at the time `t_1` the departure from the steady response `p` is
-//! `(sigma - p_1, -e V - p_1')`, before the next one `(sigma - p_1, V - p_1')`, and the free motion over `n` periods
-//! leads from one to the other. These two equations give `sigma - p_1 = a V` and `p_1' = b V`; so with the amplitude
+//! Let `p` be the steady response. After an impact of approach speed `V` at the time `t_1` the deviation from `p` is
+//! `(sigma - p_1, -e V - p_1')`. Before the next impact it is `(sigma - p_1, V - p_1')`. Free motion over `n` periods
+//! maps the first to the second. These two equations give `sigma - p_1 = a V` and `p_1' = b V`. So with the amplitude
 //! `A` of the response
 //!
 //! ```text
 //! (sigma - a V)^2 + (b V / omega)^2 = A^2,
 //! ```
 //!
-//! an ellipse of stop position and impact velocity, at whose ends in `sigma` two orbits meet: C. J. Budd and F. J. Dux,
+//! an ellipse of stop position and impact velocity. At its ends in `sigma` two orbits meet: C. J. Budd and F. J. Dux,
 //! Chattering and related behaviour in impact oscillators, Phil. Trans. R. Soc. Lond. A 347 (1994) 365.
 
 use std::f64::consts::TAU;
 
 use crate::common::linear::{Linear, invariants, invariants_of, product, with_wall};
+use crate::common::near;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{Contact, Law, Side};
-use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
-/// Orbits of one impact in `n` periods of one oscillator, at any stop position.
+/// The orbits with one impact in `n` periods of one oscillator, at any stop position.
 #[derive(Clone, Copy, Debug)]
-struct Family {
-    linear: Linear,
+pub(crate) struct Family {
+    pub(crate) linear: Linear,
     e: f64,
     n: u32,
     /// The coefficients `a` and `b` of the module's text.
@@ -32,17 +33,17 @@ struct Family {
     b: f64,
 }
 
-/// One of them.
+/// An orbit with one impact in `n` periods.
 #[derive(Clone, Copy, Debug)]
-struct Impacting {
+pub(crate) struct Impacting {
     sigma: f64,
-    speed: f64,
+    pub(crate) speed: f64,
     /// Time of the impact, in `[0, T)`.
-    at: f64,
+    pub(crate) at: f64,
 }
 
 impl Family {
-    fn new(gamma: f64, omega: f64, e: f64, n: u32) -> Family {
+    pub(crate) fn new(gamma: f64, omega: f64, e: f64, n: u32) -> Family {
         let linear = Linear { gamma, square: 1.0, force: 1.0, load: 0.0, omega };
         let [[f11, f12], [f21, f22]] = linear.fundamental(f64::from(n) * TAU / omega);
         // (1 - f11) a + f12 b = -e f12,  -f21 a + (f22 - 1) b = -(1 + e f22)
@@ -57,7 +58,16 @@ impl Family {
         f64::from(self.n) * TAU / self.linear.omega
     }
 
-    /// The orbit whose impact lies at an angle of the steady response.
+    /// Returns the orbit with the largest approach speed at a stop position.
+    pub(crate) fn at_stop(&self, sigma: f64) -> Impacting {
+        let ([amplitude, _], c) = (self.linear.response(), self.b / self.linear.omega);
+        let (square, half) = (self.a * self.a + c * c, self.a * sigma);
+        let root = (half * half - square * (sigma * sigma - amplitude * amplitude)).sqrt();
+        let speed = (half + root) / square;
+        self.at_angle((-c * speed).atan2(sigma - self.a * speed))
+    }
+
+    /// Returns the orbit whose impact has the phase `angle` in the steady response.
     fn at_angle(&self, angle: f64) -> Impacting {
         let ([amplitude, lag], omega) = (self.linear.response(), self.linear.omega);
         let speed = -omega * amplitude * angle.sin() / self.b;
@@ -65,20 +75,19 @@ impl Family {
         Impacting { sigma: amplitude * angle.cos() + self.a * speed, speed, at }
     }
 
-    /// The angles at which the stop is as far as it can be.
+    /// Returns the angles of the ends of the ellipse.
     fn folds(&self) -> [f64; 2] {
         let first = (-self.a * self.linear.omega).atan2(self.b);
         [first, first + TAU / 2.0]
     }
 
-    /// How far from the stop the flight keeps between its ends, over all samples but those near the ends.
+    /// Returns the least distance of the flight from the stop, without the rise at its start and the fall at its end.
     fn room(&self, orbit: &Impacting) -> f64 {
         const SAMPLES: u32 = 4000;
         let height = |i: u32| {
             let tau = self.span() * f64::from(i) / f64::from(SAMPLES);
             orbit.sigma - self.linear.flow([orbit.sigma, -self.e * orbit.speed], orbit.at, tau)[0]
         };
-        // The first and the last stretch leave the stop and come to it.
         let rises = (1..SAMPLES).find(|&i| height(i + 1) < height(i)).unwrap_or(SAMPLES);
         let falls = (1..SAMPLES).rev().find(|&i| height(i - 1) < height(i)).unwrap_or(0);
         (rises..falls.max(rises)).map(height).fold(height(rises), f64::min)
@@ -88,13 +97,13 @@ impl Family {
         orbit.speed > 0.0 && self.room(orbit) > 0.0
     }
 
-    /// Displacement and velocity at the phase 0 that follows an impact.
-    fn strobe(&self, orbit: &Impacting) -> [f64; 2] {
+    /// Returns displacement and velocity at the phase 0 that follows an impact.
+    pub(crate) fn strobe(&self, orbit: &Impacting) -> [f64; 2] {
         let tau = TAU / self.linear.omega - orbit.at;
         self.linear.flow([orbit.sigma, -self.e * orbit.speed], orbit.at, tau)
     }
 
-    /// Trace and determinant of the monodromy: free motion, and the saltation matrix of the impact.
+    /// Returns trace and determinant of the monodromy matrix, the product of free motion and the saltation matrix.
     fn invariants(&self, orbit: &Impacting) -> [f64; 2] {
         let (e, v) = (self.e, orbit.speed);
         let [after, before] = [-e * v, v].map(|v| self.linear.acceleration([orbit.sigma, v], orbit.at));
@@ -112,8 +121,8 @@ impl Family {
         Law::both(self.e, 0.0)
     }
 
-    /// Events and end of `n` periods of the reference from the orbit's state at phase 0.
-    fn turn(&self, flow: &Flow, orbit: &Impacting) -> (Vec<Happening>, [f64; 2]) {
+    /// Returns events and end of `n` periods of the reference from the orbit's state at phase 0.
+    fn integrate(&self, flow: &Flow, orbit: &Impacting) -> (Vec<GapEvent>, [f64; 2]) {
         let [x, v] = self.strobe(orbit);
         let mut trajectory = Trajectory::new(flow, self.law(), [x, v, 0.0, 0.0]);
         let mut events = Vec::new();
@@ -123,11 +132,7 @@ impl Family {
     }
 }
 
-fn near(a: f64, b: f64, within: f64) -> bool {
-    (a - b).abs() <= within
-}
-
-/// Angles all around an ellipse.
+/// Returns angles all around the ellipse.
 fn angles() -> impl Iterator<Item = f64> {
     (0..48).map(|i| TAU * (f64::from(i) + 0.37) / 48.0)
 }
@@ -146,9 +151,9 @@ fn families() -> impl Iterator<Item = Family> {
     .map(|(gamma, omega, e, n)| Family::new(gamma, omega, e, n))
 }
 
-/// All along the ellipse, stable or not: state, impact and multipliers.
+/// Compares state, impact and multipliers of stable and unstable orbits.
 #[test]
-fn one_impact_in_n_periods_is_as_in_closed_form() {
+fn orbits_with_one_impact_in_n_periods_agree_with_the_closed_form() {
     for family in families() {
         let mut found = 0;
         for orbit in angles().map(|angle| family.at_angle(angle)) {
@@ -158,11 +163,11 @@ fn one_impact_in_n_periods_is_as_in_closed_form() {
             found += 1;
             let case = format!("{family:?} {orbit:?}");
             let flow = family.flow(orbit.sigma);
-            let (events, [x, v]) = family.turn(&flow, &orbit);
+            let (events, [x, v]) = family.integrate(&flow, &orbit);
             let [impact] = &events[..] else { panic!("{case}: {events:?}") };
             assert_eq!((impact.kind, impact.side), (EventKind::Impact, Side::Right), "{case}");
             let [trace, determinant] = family.invariants(&orbit);
-            // What rounding leaves at the start grows by the derivative.
+            // The derivative amplifies the rounding error of the start.
             let growth = 1.0 + trace.abs() + 1.0 / orbit.speed;
             let [x_start, v_start] = family.strobe(&orbit);
             assert!(near(impact.t, orbit.at, 1e-12), "{case}: {impact:?}");
@@ -184,7 +189,7 @@ fn one_impact_in_n_periods_is_as_in_closed_form() {
                 derivative.iter().enumerate().all(|(k, x)| k % 4 < 2 && k / 4 < 2 || *x == 0.0),
                 "{derivative}"
             );
-            // Away from its ends the family is isolated, and Newton's method stays where it is.
+            // Away from the ends of the ellipse the orbit is isolated, and Newton's method finds it.
             if (1.0 - trace + determinant).abs() > 1e-3 {
                 let cycle = refine(&seed, map).expect("a cycle");
                 let [ours, products] = invariants_of(&cycle.multipliers);
@@ -199,10 +204,10 @@ fn one_impact_in_n_periods_is_as_in_closed_form() {
     }
 }
 
-/// At the ends of the ellipse a multiplier is 1, and the reference's is, too.
+/// At the ends of the ellipse a multiplier is 1.
 #[test]
 fn the_ends_of_the_ellipse_are_folds() {
-    let mut met = 0;
+    let mut count = 0;
     for family in families() {
         for orbit in family.folds().map(|angle| family.at_angle(angle)) {
             let [trace, determinant] = family.invariants(&orbit);
@@ -212,7 +217,7 @@ fn the_ends_of_the_ellipse_are_folds() {
             if !family.is_physical(&orbit) || orbit.speed < 0.05 {
                 continue;
             }
-            met += 1;
+            count += 1;
             let flow = family.flow(orbit.sigma);
             let [x, v] = family.strobe(&orbit);
             let seed = Trajectory::new(&flow, family.law(), [x, v, 0.0, 0.0]);
@@ -224,7 +229,7 @@ fn the_ends_of_the_ellipse_are_folds() {
                 near(image.state[0], x, 1e-12) && near(image.state[1], v, 1e-12),
                 "{family:?}: {orbit:?}"
             );
-            // A little beyond it, no stop has such an orbit: the speed is complex there.
+            // A stop slightly beyond the end has no such orbit: the speed would be complex.
             let beyond = orbit.sigma + 1e-6 * orbit.sigma.signum() * orbit.sigma.abs().max(1.0);
             let ([amplitude, _], omega) = (family.linear.response(), family.linear.omega);
             let ratio = family.b / omega;
@@ -235,10 +240,9 @@ fn the_ends_of_the_ellipse_are_folds() {
             );
         }
     }
-    assert!(met >= 3, "{met}");
+    assert!(count >= 3, "{count}");
 }
 
-/// Motion without impacts reaches the stop where its amplitude does.
 #[test]
 fn contact_free_motion_grazes_at_its_amplitude() {
     for (gamma, omega) in [(0.0, 0.6), (0.0, 2.5), (0.05, 0.9), (0.1, 1.7), (0.02, 3.0)] {
@@ -249,7 +253,7 @@ fn contact_free_motion_grazes_at_its_amplitude() {
             for (share, hits) in [(1.0 + beyond, false), (1.0 - beyond, true)] {
                 let flow = family.flow(amplitude.abs() * share);
                 let mut trajectory = Trajectory::new(&flow, family.law(), [x, v, 0.0, 0.0]);
-                let mut events: Vec<Happening> = Vec::new();
+                let mut events: Vec<GapEvent> = Vec::new();
                 trajectory.advance_period(&mut events).expect("an ordinary cell");
                 assert_eq!(!events.is_empty(), hits, "gamma {gamma}, omega {omega}, {share}: {events:?}");
             }
@@ -257,11 +261,11 @@ fn contact_free_motion_grazes_at_its_amplitude() {
     }
 }
 
-/// A flight over two periods that touches the stop between: on one side of that there is one impact, on the other
-/// there are more.
+/// A flight over two or more periods may graze the stop between its ends. On one side of this orbit there is one
+/// impact, on the other side there are more.
 #[test]
 fn impacting_orbits_end_where_their_flight_grazes() {
-    let mut met = 0;
+    let mut count = 0;
     for family in families().filter(|family| family.n > 1) {
         let list: Vec<f64> = angles().collect();
         for two in list.windows(2) {
@@ -276,15 +280,15 @@ fn impacting_orbits_end_where_their_flight_grazes() {
                 let middle = 0.5 * (inside + outside);
                 if room(middle) > 0.0 { inside = middle } else { outside = middle }
             }
-            // Samples find the touch to the square of their distance.
+            // The error of the samples is the square of their distance.
             let away = 1e-4 * (inside - outside).signum();
             for (angle, is_alone) in [(inside + away, true), (outside - away, false)] {
                 let orbit = family.at_angle(angle);
-                let (events, _) = family.turn(&family.flow(orbit.sigma), &orbit);
+                let (events, _) = family.integrate(&family.flow(orbit.sigma), &orbit);
                 assert_eq!(events.len() == 1, is_alone, "{family:?}: {orbit:?}: {events:?}");
-                met += 1;
+                count += 1;
             }
         }
     }
-    assert!(met >= 4, "{met}");
+    assert!(count >= 4, "{count}");
 }

@@ -1,28 +1,22 @@
-//! Tangent vectors, saltation included, against central differences of the strobe map.
+//! Tangent vectors against central differences of the strobe map.
 //!
-//! The differences are what limits the agreement: with steps of `1e-6` their truncation is
-//! `1e-12` times the third derivative of the map, their rounding `1e-10` times the scale of
-//! the state over that of the derivative.
+//! The differences limit the agreement: with steps of `1e-6` their rounding error is `1e-10` times the scale of the
+//! state over that of the derivative.
 
 use crate::common::{REST, flow_of, paper, strobe};
 use nalgebra::Matrix4;
 use rattlemap_dynamics::flow::Flow;
 use rattlemap_dynamics::model::{GearPair, State};
-use rattlemap_dynamics::reference::{EventKind, Happening, Trajectory};
-
-/// Half the width of the central differences.
-const STEP: f64 = 1e-6;
-
-const UNITS: [State; 4] =
-    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+use rattlemap_dynamics::reference::{EventKind, GapEvent, Trajectory};
+use rattlemap_dynamics::stability::UNIT;
 
 fn matrix(columns: [State; 4]) -> Matrix4<f64> {
     Matrix4::from_columns(&columns.map(nalgebra::Vector4::from))
 }
 
-/// The derivative of the strobe map over some periods, carried along, with its events.
-fn carried(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> (Matrix4<f64>, Vec<Happening>) {
-    let mut trajectory = Trajectory::with_tangents(flow, pair.law(), y, UNITS);
+/// Returns the derivative of the strobe map over some periods by tangent vectors, and the events.
+fn derivative(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> (Matrix4<f64>, Vec<GapEvent>) {
+    let mut trajectory = Trajectory::with_tangents(flow, pair.law(), y, UNIT);
     let mut events = Vec::new();
     for _ in 0..periods {
         trajectory.advance_period(&mut events).expect("an ordinary cell");
@@ -30,25 +24,12 @@ fn carried(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> (Matrix4<f64
     (matrix(trajectory.tangents()), events)
 }
 
-/// The same by central differences of fourth order.
-fn differences(flow: &Flow, pair: &GearPair, y: State, periods: u64) -> Matrix4<f64> {
-    let at = |unit: State, step: f64| {
-        let from = std::array::from_fn(|i| y[i] + step * unit[i]);
-        nalgebra::Vector4::from(strobe(flow, pair, from, periods).expect("an ordinary cell"))
-    };
-    let column = |unit: State| {
-        let central = |h: f64| (at(unit, h) - at(unit, -h)) / (2.0 * h);
-        (central(STEP) * 4.0 - central(2.0 * STEP)) / 3.0
-    };
-    Matrix4::from_columns(&UNITS.map(column))
-}
-
 struct Cell {
     what: &'static str,
     pair: GearPair,
     periods: u64,
-    /// Agreement asked, relative to the norm of the matrix: four or five times what was measured, since the
-    /// differences' rounding, which limits it, is another on another processor. The worst came to 1.8e-8.
+    /// Largest difference, relative to the norm of the matrix: four or five times the measured one, because the
+    /// rounding of the differences depends on the processor. The worst measured one is 1.8e-8.
     agreement: f64,
 }
 
@@ -60,9 +41,10 @@ fn check(cell: &Cell) {
     let Cell { what, pair, periods, agreement } = cell;
     let flow = flow_of(pair);
     let y = strobe(&flow, pair, REST, 60).expect("an ordinary cell");
-    let (carried, events) = carried(&flow, pair, y, *periods);
-    let differences = differences(&flow, pair, y, *periods);
-    let off = (carried - differences).norm() / differences.norm();
+    let (ours, events) = derivative(&flow, pair, y, *periods);
+    let map = |y: State| strobe(&flow, pair, y, *periods).expect("an ordinary cell");
+    let differences = matrix(crate::common::differences(map, y, 1e-6));
+    let off = (ours - differences).norm() / differences.norm();
     let count = |kind: EventKind| events.iter().filter(|event| event.kind == kind).count();
     println!(
         "{what} (e = {}, omega = {}): {} impacts, {} starts of meshing, |M| = {:.1e}, off by {off:.1e}",
@@ -72,7 +54,7 @@ fn check(cell: &Cell) {
         count(EventKind::MeshStart),
         differences.norm()
     );
-    assert!(off < *agreement, "{what}: off by {off:.2e}:{carried}{differences}");
+    assert!(off < *agreement, "{what}: off by {off:.2e}:{ours}{differences}");
 }
 
 #[test]
@@ -98,48 +80,45 @@ fn tangents_are_derivatives_of_the_strobe_map() {
     }
 }
 
-/// An infinite series of impacts, closed in one jump that lasts up to `1e-4` in units of the fastest
-/// rate: tangents are right up to its square. (2e-7 at most, which is the differences' own; 1e-4 if they
-/// are right in the first order alone.)
+/// The jump over an infinite series of impacts lasts up to `1e-4` Taylor steps, and its tangents are of second order
+/// in that. The measured difference is at most 2e-7; tangents of first order would differ by 1e-4.
 #[test]
-fn tangents_survive_the_closing_of_a_chatter_series() {
+fn tangents_are_derivatives_through_infinite_chatter() {
     for (e, omega) in [(0.2, 1.5), (0.5, 1.5), (0.2, 2.5), (0.5, 1.0)] {
         let pair = GearPair { mesh_speed: 0.0, ..paper(e, omega) };
         check(&Cell { what: "infinite chatter", pair, periods: 1, agreement: 1e-6 });
     }
 }
 
-/// Period by period or all at once, the monodromy matrix is the same product.
 #[test]
-fn tangents_compose() {
-    // Measured 3.8e-16, 3.5e-16 and 2.4e-14.
+fn the_derivative_over_five_periods_is_the_product_of_five() {
+    // The measured differences are 3.8e-16, 3.5e-16 and 2.4e-14.
     for (e, omega, agreement) in [(0.56, 5.6, 2e-15), (0.0, 5.6, 2e-15), (0.2, 2.5, 1e-13)] {
         let pair = paper(e, omega);
         let flow = flow_of(&pair);
         let y = strobe(&flow, &pair, REST, 60).expect("an ordinary cell");
         let mut product = Matrix4::identity();
-        let mut trajectory = Trajectory::with_tangents(&flow, pair.law(), y, UNITS);
+        let mut trajectory = Trajectory::with_tangents(&flow, pair.law(), y, UNIT);
         for _ in 0..5 {
             trajectory.advance_period(&mut ()).expect("an ordinary cell");
             product = matrix(trajectory.tangents()) * product;
-            trajectory.set_tangents(UNITS);
+            trajectory.set_tangents(UNIT);
         }
-        let (whole, _) = carried(&flow, &pair, y, 5);
+        let (whole, _) = derivative(&flow, &pair, y, 5);
         let off = (product - whole).norm() / whole.norm();
         assert!(off < agreement, "e = {e}, omega = {omega}: off by {off:.1e}");
     }
 }
 
-/// Carrying tangent vectors along changes nothing in the motion.
 #[test]
-fn tangents_do_not_disturb_the_motion() {
+fn tangents_do_not_change_the_motion() {
     for (e, omega) in [(0.72, 5.6), (0.0, 4.2), (0.56, 1.5)] {
         let pair = paper(e, omega);
         let flow = flow_of(&pair);
-        let mut with = Trajectory::with_tangents(&flow, pair.law(), REST, UNITS);
+        let mut with = Trajectory::with_tangents(&flow, pair.law(), REST, UNIT);
         let mut without = Trajectory::new(&flow, pair.law(), REST);
         for _ in 0..100 {
-            with.set_tangents(UNITS);
+            with.set_tangents(UNIT);
             with.advance_period(&mut ()).expect("an ordinary cell");
             without.advance_period(&mut ()).expect("an ordinary cell");
         }

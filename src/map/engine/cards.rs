@@ -1,11 +1,12 @@
-//! Several equal cards as one engine: a thread for each, one queue for all.
+//! Several equal cards as one engine: one thread per card, one queue for all.
 //!
-//! A card takes up cells when it has room, as many as keeps it busy as long as the others: its part of all cells that
-//! are queued or under way goes by the rate at which it has computed so far. While there are more cells than it takes
-//! to fill the cards, a quarter waits for whoever is done first; the last cells are all under way at once. So a slow card
-//! has few of them, and none idles while another has a queue. A card that is lost leaves its cells to the others.
+//! A card takes cells when it has room. Its share of all cells that are queued or under way is proportional to the rate at
+//! which it has computed so far, so that all cards are busy for about the same time. While there are more cells than the
+//! cards need to be busy, a quarter of them stays in the queue for the card that ends first. The last cells are all under
+//! way at once. So a slow card gets few of them, and no card idles while another has a queue. The cells of a lost card go
+//! to the others.
 //!
-//! Which card computes a cell, nobody can see from its record.
+//! A record does not depend on which card computed it.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,38 +14,39 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::{CardReport, Engine, EngineError, Loss};
+use super::{CardReport, Device, Engine, EngineError, Loss};
 use crate::gpu::AdapterId;
 use crate::map::plan::Cell;
 use crate::record::Record;
 
-/// Records that have come wait no longer than this for others while there is a queue.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Longest time that records wait for further records while cells are queued.
+const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
-/// Without a queue cells may be wanted that wait for these records: then they wait for those of other cards as long as
-/// this, and this share of the time that the first of them took.
+/// Longest time that records wait for those of other cards without a queue. It is short, because the next cells may depend
+/// on these records. [`GRACE_SHARE`] of the time until the first record is added.
 const GRACE: Duration = Duration::from_millis(2);
+/// Part of the time until the first record that is added to [`GRACE`].
 const GRACE_SHARE: f64 = 0.25;
 
-/// How often flags are looked at that wake nobody.
+/// Interval at which threads poll flags that have no wake-up signal.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Cards that are told to stop are waited for no longer than this.
-const STOPPED_AFTER: Duration = Duration::from_secs(2);
+/// Longest time to wait for cards to stop.
+const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Share of its part that a card takes up at once, where that is more than enough to keep it busy.
+/// Part of its share that a card takes at once, if that is enough to keep it busy.
 const AT_ONCE: f64 = 0.75;
 
-/// How much an earlier rate counts beside the last one.
-const MEMORY: f64 = 0.5;
+/// Weight of earlier rates relative to the last one.
+const RATE_MEMORY: f64 = 0.5;
 
 /// Equal cards that compute one plan together.
 pub struct Cards {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
-    /// Raised by whoever wants no more cells.
+    /// Flag that stops the computation.
     halt: Arc<AtomicBool>,
-    /// Told of each card that is lost.
+    /// Called for each lost card.
     listener: Option<Listener>,
     name: &'static str,
     precision: &'static str,
@@ -53,20 +55,20 @@ pub struct Cards {
     steps_per_period: Option<[u32; 2]>,
 }
 
-/// Whoever is told of losses.
+/// Callback for losses of cards.
 type Listener = Box<dyn Fn(&Loss) + Send>;
 
 struct Shared {
-    state: Mutex<State>,
-    /// There are cells to take up, or no more will come.
+    state: Mutex<PoolState>,
+    /// Signals that there are cells to take, or that no more will come.
     work: Condvar,
-    /// There are records, or a card is gone.
+    /// Signals that there are records, or that a card is lost.
     news: Condvar,
-    /// What the cards' engines heed.
+    /// Flag that stops the cards' engines.
     stop: Arc<AtomicBool>,
 }
 
-struct State {
+struct PoolState {
     queue: VecDeque<Cell>,
     ended: Vec<(u32, Record)>,
     cards: Vec<Card>,
@@ -77,11 +79,11 @@ struct State {
 struct Card {
     adapter: AdapterId,
     under_way: HashMap<u32, Cell>,
-    /// Most cells under way that it has memory for.
+    /// Largest number of cells under way.
     most: usize,
-    /// Fewer do not keep it busy.
+    /// Smallest number of cells that keeps the card busy.
     least: usize,
-    /// Cells per second while it was busy; none if it was not yet.
+    /// Cells per second while the card was busy; none if unknown.
     rate: Option<f64>,
     cells: usize,
     steps: Option<u64>,
@@ -90,10 +92,10 @@ struct Card {
 }
 
 impl Cards {
-    /// Engines that compute the same records, each on a card of its own.
+    /// Combines engines of one plan, each on a card of its own.
     ///
     /// # Panics
-    /// If there is none.
+    /// Without engines.
     pub fn new(engines: Vec<(AdapterId, Engine<'static>)>) -> Cards {
         let (_, first) = engines.first().expect("one card at least");
         let cards = engines.iter().map(|(adapter, engine)| Card {
@@ -107,7 +109,7 @@ impl Cards {
             is_at_work: false,
             lost: None,
         });
-        let state = State {
+        let state = PoolState {
             queue: VecDeque::new(),
             ended: Vec::new(),
             cards: cards.collect(),
@@ -137,51 +139,11 @@ impl Cards {
         self.threads.len()
     }
 
-    pub(super) fn name(&self) -> &'static str {
-        self.name
-    }
-
-    pub(super) fn precision(&self) -> &'static str {
-        self.precision
-    }
-
-    pub(super) fn device(&self) -> String {
-        self.device.clone()
-    }
-
-    /// Of all cards.
-    pub(super) fn device_bytes(&self) -> Option<u64> {
-        self.device_bytes
-    }
-
-    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
-        self.steps_per_period
-    }
-
-    pub(super) fn least_batch(&self) -> usize {
-        let state = self.shared.lock();
-        state.at_hand().map(|card| card.least).fold(0, usize::saturating_add).max(1)
-    }
-
-    pub(super) fn lane_steps(&self) -> Option<u64> {
-        self.shared.lock().cards.iter().map(|card| card.steps).sum()
-    }
-
-    /// Cells that the cards have room for, those in the queue left out.
-    pub(super) fn room(&self) -> usize {
-        let state = self.shared.lock();
-        state.at_hand().map(|card| card.most).fold(0, usize::saturating_add).saturating_sub(state.left())
-    }
-
-    pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
-        self.halt = Arc::clone(halt);
-    }
-
     pub(super) fn listen(&mut self, listener: Listener) {
         self.listener = Some(listener);
     }
 
-    /// What each card has done so far.
+    /// Reports the work of each card so far.
     pub(super) fn reports(&self) -> Vec<CardReport> {
         let report = |card: &Card| CardReport {
             adapter: card.adapter.clone(),
@@ -202,7 +164,7 @@ impl Cards {
         Ok(())
     }
 
-    /// Waits until no more than `until` cells are left, or some have ended and waited long enough for others.
+    /// Waits until at most `until` cells are left, or until records have waited long enough. Returns the records.
     pub(super) fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         let clock = Instant::now();
         let (mut halted_at, mut first_at) = (None, None);
@@ -214,7 +176,7 @@ impl Cards {
             let is_over = if is_halted {
                 let halted_at = *halted_at.get_or_insert_with(Instant::now);
                 let is_idle = state.cards.iter().all(|card| !card.is_at_work);
-                is_idle || halted_at.elapsed() >= STOPPED_AFTER
+                is_idle || halted_at.elapsed() >= STOP_TIMEOUT
             } else {
                 let left = state.left();
                 if !state.ended.is_empty() {
@@ -222,7 +184,7 @@ impl Cards {
                 }
                 let is_patient = |first: Duration| match state.queue.is_empty() {
                     true => clock.elapsed() < first.mul_f64(1.0 + GRACE_SHARE) + GRACE,
-                    false => clock.elapsed() < PATIENCE,
+                    false => clock.elapsed() < LONGEST_WAIT,
                 };
                 left == 0
                     || state.last_loss().is_some()
@@ -235,7 +197,7 @@ impl Cards {
                     state.queue.clear();
                 }
                 drop(state);
-                self.tell(&losses);
+                self.report(&losses);
                 return gone.map_or(Ok(ended), Err);
             }
             if losses.is_empty() {
@@ -244,15 +206,55 @@ impl Cards {
                 drop(waited.unwrap_or_else(PoisonError::into_inner));
             } else {
                 drop(state);
-                self.tell(&losses);
+                self.report(&losses);
             }
         }
     }
 
-    fn tell(&self, losses: &[Loss]) {
+    fn report(&self, losses: &[Loss]) {
         if let Some(listener) = &self.listener {
             losses.iter().for_each(listener);
         }
+    }
+}
+
+impl Device for Cards {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn precision(&self) -> &'static str {
+        self.precision
+    }
+
+    fn device(&self) -> String {
+        self.device.clone()
+    }
+
+    fn device_bytes(&self) -> Option<u64> {
+        self.device_bytes
+    }
+
+    fn steps_per_period(&self) -> Option<[u32; 2]> {
+        self.steps_per_period
+    }
+
+    fn least_batch(&self) -> usize {
+        let state = self.shared.lock();
+        state.working().map(|card| card.least).fold(0, usize::saturating_add).max(1)
+    }
+
+    fn lane_steps(&self) -> Option<u64> {
+        self.shared.lock().cards.iter().map(|card| card.steps).sum()
+    }
+
+    fn room(&self) -> usize {
+        let state = self.shared.lock();
+        state.working().map(|card| card.most).fold(0, usize::saturating_add).saturating_sub(state.left())
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.halt = Arc::clone(halt);
     }
 }
 
@@ -262,20 +264,20 @@ impl Drop for Cards {
         self.shared.lock().is_closed = true;
         self.shared.work.notify_all();
         for thread in self.threads.drain(..) {
-            // One that has panicked has told so.
+            // A panic of the thread was reported as a loss.
             let _ = thread.join();
         }
     }
 }
 
 impl Shared {
-    /// What the lock guards is sound between any two of its changes.
-    fn lock(&self) -> MutexGuard<'_, State> {
+    /// Locks the state. A poisoned lock is usable, because every single change leaves the state consistent.
+    fn lock(&self) -> MutexGuard<'_, PoolState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next cells of a card, none to go on with those under way; waits while there are neither. False once no more
-    /// will come.
+    /// Puts the next cells of a card into `cells`; none if it continues with cells under way. Waits if there are neither.
+    /// Returns false if no more cells will come.
     fn next(&self, nth: usize, cells: &mut Vec<Cell>) -> bool {
         let mut state = self.lock();
         loop {
@@ -297,8 +299,8 @@ impl Shared {
         }
     }
 
-    /// Takes what a card has computed, in so many seconds.
-    fn take(&self, nth: usize, ended: Vec<(u32, Record)>, seconds: f64, steps: Option<u64>) {
+    /// Accepts the records that a card has computed within `seconds`.
+    fn accept(&self, nth: usize, ended: Vec<(u32, Record)>, seconds: f64, steps: Option<u64>) {
         let mut state = self.lock();
         let card = &mut state.cards[nth];
         let under_way = card.under_way.len();
@@ -308,18 +310,19 @@ impl Shared {
         card.cells += ended.len();
         card.steps = steps;
         card.is_at_work = false;
-        // Fewer cells take as long; the last few, which are waited for, say nothing.
+        // Small batches take as long as larger ones, and the last cells of a batch are few: neither measures the rate.
         if under_way >= card.least && 4 * ended.len() >= under_way {
             let now = ended.len() as f64 / seconds.max(1e-6);
-            card.rate = Some(card.rate.map_or(now, |before| MEMORY * before + (1.0 - MEMORY) * now));
+            card.rate =
+                Some(card.rate.map_or(now, |before| RATE_MEMORY * before + (1.0 - RATE_MEMORY) * now));
         }
         state.ended.extend(ended);
         drop(state);
         self.news.notify_all();
     }
 
-    /// Puts cells back for which a card has no memory. False if it has none for a single one.
-    fn take_back(&self, nth: usize, cells: &[Cell]) -> bool {
+    /// Puts back cells for which a card has no memory. Returns false if it has no memory for a single cell.
+    fn put_back(&self, nth: usize, cells: &[Cell]) -> bool {
         let mut state = self.lock();
         let card = &mut state.cards[nth];
         let tried = card.under_way.len();
@@ -334,7 +337,7 @@ impl Shared {
         goes_on
     }
 
-    /// Leaves a card's cells to the others.
+    /// Marks a card as lost and puts its cells back.
     fn lose(&self, nth: usize, error: EngineError) {
         let mut state = self.lock();
         let card = &mut state.cards[nth];
@@ -351,47 +354,47 @@ impl Shared {
     }
 }
 
-impl State {
-    /// Cards that are not lost.
-    fn at_hand(&self) -> impl Iterator<Item = &Card> {
+impl PoolState {
+    /// Returns the cards that are not lost.
+    fn working(&self) -> impl Iterator<Item = &Card> {
         self.cards.iter().filter(|card| card.lost.is_none())
     }
 
-    /// Cells that have not ended.
+    /// Returns the number of cells that have not ended.
     fn left(&self) -> usize {
         self.queue.len() + self.cards.iter().map(|card| card.under_way.len()).sum::<usize>()
     }
 
-    /// Why the last card was lost; none while one is left.
+    /// Returns the error of the last lost card if no card is left.
     fn last_loss(&self) -> Option<EngineError> {
-        if self.at_hand().next().is_some() {
+        if self.working().next().is_some() {
             return None;
         }
         self.cards.iter().rev().find_map(|card| card.lost.clone())
     }
 
-    /// Cells that a card takes up now.
+    /// Returns the number of cells that a card takes now.
     fn share(&self, nth: usize) -> usize {
         let card = &self.cards[nth];
-        let rates = || self.at_hand().filter_map(|card| card.rate);
-        // A card whose rate is not known yet is taken to be like the others.
+        let rates = || self.working().filter_map(|card| card.rate);
+        // A card without a rate is assumed to have the mean rate.
         let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
         let rate = |card: &Card| card.rate.unwrap_or(if mean > 0.0 { mean } else { 1.0 });
-        let weight = rate(card) / self.at_hand().map(rate).sum::<f64>();
+        let weight = rate(card) / self.working().map(rate).sum::<f64>();
         let part = (self.left() as f64 * weight).ceil() as usize;
         let at_once = ((part as f64 * AT_ONCE).ceil() as usize).max(card.least.min(part));
         at_once.min(card.most).saturating_sub(card.under_way.len()).min(self.queue.len())
     }
 }
 
-/// A card that leaves its thread by a panic is lost like any other.
-struct Leaving<'s> {
+/// Reports a card as lost if its thread panics.
+struct PanicGuard<'s> {
     nth: usize,
     shared: &'s Shared,
     device: String,
 }
 
-impl Drop for Leaving<'_> {
+impl Drop for PanicGuard<'_> {
     fn drop(&mut self) {
         if thread::panicking() {
             let (device, reason) = (self.device.clone(), "its thread panicked".to_owned());
@@ -400,16 +403,16 @@ impl Drop for Leaving<'_> {
     }
 }
 
-/// The thread of a card: takes up cells and hands over records until no more cells will come, or it is lost.
+/// Runs the thread of a card: computes cells until no more will come, or the card is lost.
 fn work(nth: usize, mut engine: Engine<'static>, shared: &Shared) {
-    let leaving = Leaving { nth, shared, device: engine.device() };
-    engine.heed(&shared.stop);
+    let guard = PanicGuard { nth, shared, device: engine.device() };
+    engine.stop_on(&shared.stop);
     let mut cells = Vec::new();
     while shared.next(nth, &mut cells) {
         let clock = Instant::now();
         match pollster::block_on(engine.begin(&cells)) {
             Ok(()) => {}
-            Err(EngineError::OutOfMemory { .. }) if shared.take_back(nth, &cells) => {
+            Err(EngineError::OutOfMemory { .. }) if shared.put_back(nth, &cells) => {
                 cells.clear();
                 continue;
             }
@@ -418,11 +421,11 @@ fn work(nth: usize, mut engine: Engine<'static>, shared: &Shared) {
         cells.clear();
         let half = shared.lock().cards[nth].under_way.len() / 2;
         match pollster::block_on(engine.advance(half)) {
-            Ok(ended) => shared.take(nth, ended, clock.elapsed().as_secs_f64(), engine.lane_steps()),
+            Ok(ended) => shared.accept(nth, ended, clock.elapsed().as_secs_f64(), engine.lane_steps()),
             Err(error) => return shared.lose(nth, error),
         }
     }
-    drop(leaving);
+    drop(guard);
 }
 
 #[cfg(test)]
@@ -445,7 +448,7 @@ mod tests {
         (0..count).map(|id| Cell { id, flow: 0, law: 0, start: [f64::from(id); 4] }).collect()
     }
 
-    /// By the start, which a cell that changes cards must keep.
+    /// Computes a record from the start, which a cell must keep when it changes cards.
     fn rule(cell: &Cell) -> Record {
         Record { period: cell.start[0] as u32 + 1, ..Record::default() }
     }
@@ -455,9 +458,9 @@ mod tests {
         rule(cell)
     }
 
-    /// Runs cells as a sweep does, some at a time; which cells came, and why it ended if not for want of cells.
+    /// Runs cells as a sweep does, at most `at_a_time` under way. Returns the cells that ended, and the error if there was one.
     fn run(cards: &mut Cards, cells: &[Cell], at_a_time: usize) -> (Vec<u32>, Option<EngineError>) {
-        let (mut left, mut under_way, mut seen) = (cells, 0, Vec::new());
+        let (mut left, mut under_way, mut ended_ids) = (cells, 0, Vec::new());
         while under_way > 0 || !left.is_empty() {
             let (next, later) = left.split_at(left.len().min(at_a_time - under_way).min(cards.room()));
             left = later;
@@ -467,26 +470,26 @@ mod tests {
                     under_way -= ended.len();
                     for (id, record) in ended {
                         assert_eq!(record, rule(&cells[id as usize]), "cell {id}");
-                        seen.push(id);
+                        ended_ids.push(id);
                     }
                 }
-                Err(error) => return (seen, Some(error)),
+                Err(error) => return (ended_ids, Some(error)),
             }
         }
-        (seen, None)
+        (ended_ids, None)
     }
 
-    fn all_of(mut seen: Vec<u32>, count: u32) {
-        seen.sort_unstable();
-        assert_eq!(seen, (0..count).collect::<Vec<_>>());
+    fn all_of(mut ended_ids: Vec<u32>, count: u32) {
+        ended_ids.sort_unstable();
+        assert_eq!(ended_ids, (0..count).collect::<Vec<_>>());
     }
 
     #[test]
     fn every_cell_comes_once_and_the_cards_share_them() {
         let mut cards = cards(vec![Fake::new(slow), Fake::new(slow), Fake::new(slow)]);
-        let (seen, error) = run(&mut cards, &cells(600), 200);
+        let (ended_ids, error) = run(&mut cards, &cells(600), 200);
         assert_eq!(error, None);
-        all_of(seen, 600);
+        all_of(ended_ids, 600);
         let counts: Vec<usize> = cards.reports().iter().map(|card| card.cells).collect();
         assert_eq!(counts.iter().sum::<usize>(), 600);
         assert!(counts.iter().all(|&count| count > 100), "{counts:?}");
@@ -504,18 +507,18 @@ mod tests {
         }
         let mut cards = cards(vec![Fake::new(slow), Fake::new(slower)]);
         let clock = Instant::now();
-        let (seen, _) = run(&mut cards, &cells(600), 120);
+        let (ended_ids, _) = run(&mut cards, &cells(600), 120);
         let took = clock.elapsed().as_secs_f64();
-        all_of(seen, 600);
+        all_of(ended_ids, 600);
         let counts: Vec<usize> = cards.reports().iter().map(|card| card.cells).collect();
         assert!(counts[1] < 200 && counts[1] > 30, "{counts:?}");
-        // Half of all cells would take the slow one three times as long as both need together.
+        // With half of all cells, the slow card would take three times as long as both together.
         let each = 1e-6 * MICROSECONDS.load(Ordering::Relaxed) as f64 / counts[1] as f64;
         assert!(took < 0.6 * 300.0 * each, "{took} s, {each} s per cell");
     }
 
     #[test]
-    fn nobody_waits_for_the_slowest_card() {
+    fn records_do_not_wait_for_the_slowest_card() {
         fn slow_for_one(cell: &Cell) -> Record {
             thread::sleep(Duration::from_millis(if cell.id == 1 { 1500 } else { 1 }));
             rule(cell)
@@ -530,62 +533,65 @@ mod tests {
 
     #[test]
     fn a_lost_card_leaves_its_cells_to_the_others() {
-        let told = Arc::new(Mutex::new(Vec::new()));
-        let heard = Arc::clone(&told);
+        let reported = Arc::new(Mutex::new(Vec::new()));
+        let sink = Arc::clone(&reported);
         let mut cards = cards(vec![Fake::new(slow), Fake::lost_after(2, slow)]);
-        cards.listen(Box::new(move |loss| heard.lock().unwrap().push(loss.clone())));
-        let (seen, error) = run(&mut cards, &cells(400), 100);
+        cards.listen(Box::new(move |loss| sink.lock().unwrap().push(loss.clone())));
+        let (ended_ids, error) = run(&mut cards, &cells(400), 100);
         assert_eq!(error, None);
-        all_of(seen, 400);
+        all_of(ended_ids, 400);
         let reports = cards.reports();
         assert_eq!(reports[0].cells + reports[1].cells, 400);
-        assert_eq!((&reports[0].lost, &reports[1].lost), (&None, &Some("as it was told".to_owned())));
-        let told = told.lock().unwrap();
-        assert!(told.len() == 1 && told[0].cells > 0 && told[0].adapter.number == 1, "{told:?}");
+        assert_eq!((&reports[0].lost, &reports[1].lost), (&None, &Some("by request of the test".to_owned())));
+        let reported = reported.lock().unwrap();
+        assert!(
+            reported.len() == 1 && reported[0].cells > 0 && reported[0].adapter.number == 1,
+            "{reported:?}"
+        );
     }
 
     #[test]
-    fn what_the_last_card_has_done_is_kept_when_it_is_lost() {
+    fn records_of_the_last_card_are_returned_when_it_is_lost() {
         let mut cards = cards(vec![Fake::lost_after(1, slow), Fake::lost_after(3, slow)]);
-        let (seen, error) = run(&mut cards, &cells(400), 100);
+        let (ended_ids, error) = run(&mut cards, &cells(400), 100);
         assert!(matches!(error, Some(EngineError::Lost { .. })), "{error:?}");
         let done: usize = cards.reports().iter().map(|card| card.cells).sum();
-        assert!(seen.len() == done && done > 0 && done < 400, "{done} {}", seen.len());
+        assert!(ended_ids.len() == done && done > 0 && done < 400, "{done} {}", ended_ids.len());
         assert!(cards.begin(&cells(1)).is_err());
     }
 
     #[test]
     fn a_card_without_memory_takes_fewer_cells() {
         let mut cards = cards(vec![Fake::new(slow), Fake::with_memory(5, slow)]);
-        let (seen, error) = run(&mut cards, &cells(200), 100);
+        let (ended_ids, error) = run(&mut cards, &cells(200), 100);
         assert_eq!(error, None);
-        all_of(seen, 200);
+        all_of(ended_ids, 200);
         let reports = cards.reports();
         assert!(reports[1].cells > 0 && reports[1].lost.is_none(), "{reports:?}");
-        // One that has none at all is none.
+        // A card without any memory is lost.
         let mut cards = self::cards(vec![Fake::new(slow), Fake::with_memory(0, slow)]);
-        let (seen, error) = run(&mut cards, &cells(50), 50);
+        let (ended_ids, error) = run(&mut cards, &cells(50), 50);
         assert_eq!(error, None);
-        all_of(seen, 50);
+        all_of(ended_ids, 50);
         assert!(cards.reports()[1].lost.is_some());
     }
 
     #[test]
-    fn a_raised_flag_stops_them_and_a_lowered_one_lets_them_go_on() {
+    fn cards_stop_and_continue_with_the_flag() {
         let mut cards = cards(vec![Fake::slow(|cell| cell.id, slow), Fake::slow(|cell| cell.id, slow)]);
         let halt = Arc::new(AtomicBool::new(false));
-        cards.heed(&halt);
+        cards.stop_on(&halt);
         let cells = cells(200);
         cards.begin(&cells).unwrap();
         halt.store(true, Ordering::Relaxed);
         let clock = Instant::now();
-        let mut seen = cards.advance(0).unwrap();
-        assert!(clock.elapsed() < Duration::from_secs(1) && seen.len() < 200);
+        let mut ended_ids = cards.advance(0).unwrap();
+        assert!(clock.elapsed() < Duration::from_secs(1) && ended_ids.len() < 200);
         halt.store(false, Ordering::Relaxed);
-        while seen.len() < 200 {
-            seen.extend(cards.advance(0).unwrap());
+        while ended_ids.len() < 200 {
+            ended_ids.extend(cards.advance(0).unwrap());
         }
-        all_of(seen.iter().map(|&(id, _)| id).collect(), 200);
+        all_of(ended_ids.iter().map(|&(id, _)| id).collect(), 200);
         assert_eq!(cards.advance(0), Ok(Vec::new()));
     }
 
@@ -602,7 +608,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_add_up_and_keep_some_for_the_first_to_be_done() {
+    fn shares_follow_rates_and_leave_a_quarter_in_the_queue() {
         let card = |least, rate| Card {
             adapter: adapter(0),
             under_way: HashMap::new(),
@@ -616,7 +622,7 @@ mod tests {
         };
         let shares = |cards: Vec<Card>, queued: u32| {
             let count = cards.len();
-            let state = State {
+            let state = PoolState {
                 queue: cells(queued).into(),
                 ended: Vec::new(),
                 cards,
@@ -625,9 +631,9 @@ mod tests {
             };
             (0..count).map(|nth| state.share(nth)).collect::<Vec<_>>()
         };
-        // More than enough: a quarter waits.
+        // More cells than needed: a quarter waits.
         assert_eq!(shares(vec![card(16, None), card(16, None)], 400), [150, 150]);
-        // Too few to keep them busy: all at once.
+        // Too few cells to keep the cards busy: all are taken at once.
         assert_eq!(shares(vec![card(256, None), card(256, None)], 400), [200, 200]);
         assert_eq!(shares(vec![card(256, Some(30.0)), card(256, Some(10.0))], 100), [75, 25]);
         assert_eq!(shares(vec![card(256, Some(30.0)), card(256, None)], 100), [50, 50]);

@@ -1,4 +1,4 @@
-//! The reference as an engine: one cell per task on all processor cores.
+//! The event-driven reference as an engine: one cell per task on all processor cores.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -7,32 +7,29 @@ use std::time::Duration;
 use rayon::prelude::*;
 use web_time::Instant;
 
+use super::Device;
 use super::flows::Flows;
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::flow::Flow;
-use rattlemap_dynamics::orbit::{Measured, measure_until};
+use rattlemap_dynamics::orbit::{Measurement, measure_until};
 
-/// Cells that have ended wait no longer than this for others to begin.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Time after which a batch begins no more cells and returns those that have ended.
+const BATCH_TIME: Duration = Duration::from_secs(2);
 
 /// The event-driven reference.
 pub struct Cpu<'p> {
     plan: &'p Plan,
     flows: Flows<'p>,
     under_way: Vec<Cell>,
-    /// Raised by whoever wants no more cells.
-    pub(super) halt: Arc<AtomicBool>,
+    /// Flag that stops the computation.
+    halt: Arc<AtomicBool>,
 }
 
 impl<'p> Cpu<'p> {
-    /// An engine for the cells of a plan.
+    /// Builds an engine for the cells of a plan.
     pub fn new(plan: &'p Plan) -> Cpu<'p> {
         Cpu { plan, flows: Flows::new(plan), under_way: Vec::new(), halt: Arc::default() }
-    }
-
-    pub(super) fn least_batch(&self) -> usize {
-        64 * rayon::current_num_threads()
     }
 
     pub(super) fn begin(&mut self, cells: &[Cell]) {
@@ -42,13 +39,13 @@ impl<'p> Cpu<'p> {
     pub(super) fn advance(&mut self) -> Vec<(u32, Record)> {
         let cells = std::mem::take(&mut self.under_way);
         let clock = Instant::now();
-        // Cells differ a thousandfold in cost: no task holds more than one, and where all are slow some are left.
+        // Costs of cells differ by a factor of 1000, so each task has one cell. If many are slow, some wait for the next call.
         let ended: Vec<Option<(u32, Record)>> = cells
             .par_iter()
             .with_max_len(1)
             .enumerate()
             .map(|(i, cell)| {
-                let record = (i == 0 || clock.elapsed() < PATIENCE).then(|| self.cell(cell))??;
+                let record = (i == 0 || clock.elapsed() < BATCH_TIME).then(|| self.cell(cell))??;
                 Some((cell.id, record))
             })
             .collect();
@@ -57,7 +54,7 @@ impl<'p> Cpu<'p> {
         ended.into_iter().flatten().collect()
     }
 
-    /// None if somebody wants no more cells.
+    /// Computes a cell; none if the flag is raised.
     fn cell(&self, cell: &Cell) -> Option<Record> {
         let (law, budget) = (self.plan.law(cell.law), self.plan.budget());
         let of = |flow: &Flow| measure_until(flow, law, cell.start, budget, &self.halt);
@@ -65,8 +62,26 @@ impl<'p> Cpu<'p> {
     }
 }
 
-/// What somebody asked for of what was measured.
-pub fn record(measured: &Measured, needs: &Needs) -> Record {
+impl Device for Cpu<'_> {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn device(&self) -> String {
+        "event-driven reference".to_owned()
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.halt = Arc::clone(halt);
+    }
+
+    fn least_batch(&self) -> usize {
+        64 * rayon::current_num_threads()
+    }
+}
+
+/// Converts a measurement to a record with the requested quantities.
+pub fn record(measured: &Measurement, needs: &Needs) -> Record {
     let mut record = Record {
         strobe: measured.strobe,
         periods_run: measured.periods_run,

@@ -1,41 +1,44 @@
-//! An engine without physics.
+//! An engine without physics, for tests.
 
-use super::EngineError;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::{Device, EngineError};
 use crate::map::plan::Cell;
 use crate::record::Record;
 
-/// Makes records by a rule, has as much memory as it is told, and is lost when it is told.
+/// Computes records by a rule, with a chosen amount of memory and a chosen failure.
 pub struct Fake {
-    /// The record of a cell.
+    /// Computes the record of a cell.
     pub rule: fn(&Cell) -> Record,
-    /// Advances that a cell is under way, at least one.
+    /// Number of calls of `advance` until a cell ends, at least one.
     pub advances: fn(&Cell) -> u32,
-    /// Advances that it makes before it is lost; none means that it never is.
+    /// Number of calls of `advance` before the engine is lost; none means never.
     pub advances_left: Option<usize>,
-    /// Most cells under way that it has memory for.
+    /// Largest number of cells under way.
     pub memory_cells: usize,
-    /// With the advances that each has still to wait for.
+    /// Cells under way, each with the number of calls of `advance` until it ends.
     under_way: Vec<(u32, Cell)>,
 }
 
 impl Fake {
-    /// An engine that never fails, and computes every cell at once.
+    /// Builds an engine that never fails and computes every cell in one call.
     pub fn new(rule: fn(&Cell) -> Record) -> Fake {
         let under_way = Vec::new();
         Fake { rule, advances: |_| 1, advances_left: None, memory_cells: usize::MAX, under_way }
     }
 
-    /// One that is lost after so many advances.
+    /// Builds an engine that is lost after `advances` calls of `advance`.
     pub fn lost_after(advances: usize, rule: fn(&Cell) -> Record) -> Fake {
         Fake { advances_left: Some(advances), ..Fake::new(rule) }
     }
 
-    /// One that has memory for so many cells.
+    /// Builds an engine with memory for `memory_cells` cells.
     pub fn with_memory(memory_cells: usize, rule: fn(&Cell) -> Record) -> Fake {
         Fake { memory_cells, ..Fake::new(rule) }
     }
 
-    /// One that takes as many advances for a cell as `advances` says.
+    /// Builds an engine that needs `advances(cell)` calls of `advance` for a cell.
     pub fn slow(advances: fn(&Cell) -> u32, rule: fn(&Cell) -> Record) -> Fake {
         Fake { advances, ..Fake::new(rule) }
     }
@@ -52,7 +55,7 @@ impl Fake {
     pub(super) fn advance(&mut self) -> Result<Vec<(u32, Record)>, EngineError> {
         match &mut self.advances_left {
             Some(0) => {
-                let (device, reason) = ("fake".to_owned(), "as it was told".to_owned());
+                let (device, reason) = ("fake".to_owned(), "by request of the test".to_owned());
                 return Err(EngineError::Lost { device, reason });
             }
             Some(left) => *left -= 1,
@@ -63,4 +66,20 @@ impl Fake {
         let ended: Vec<_> = self.under_way.extract_if(.., |&mut (left, _)| left == 0).collect();
         Ok(ended.iter().map(|(_, cell)| (cell.id, (self.rule)(cell))).collect())
     }
+}
+
+impl Device for Fake {
+    fn name(&self) -> &'static str {
+        "fake"
+    }
+
+    fn device(&self) -> String {
+        "fake".to_owned()
+    }
+
+    fn least_batch(&self) -> usize {
+        16
+    }
+
+    fn stop_on(&mut self, _: &Arc<AtomicBool>) {}
 }

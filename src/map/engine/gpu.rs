@@ -1,4 +1,4 @@
-//! Lanes on a graphics device as an engine.
+//! Lanes on a graphics device, as an engine.
 
 use std::collections::HashMap;
 use std::ops::Deref;
@@ -7,80 +7,93 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::EngineError;
-use crate::gpu::{self, AdapterId, Constants, Ended, GpuError, Lane, LaneSettings, Pool, Tables};
+use super::{Device, EngineError};
+use crate::gpu::{self, AdapterId, Constants, GpuError, Lane, LaneResult, LaneSettings, Pool, Tables};
 use crate::map::plan::{Cell, Needs, Plan};
 use crate::map::scene::Steps;
 use crate::record::{Record, valid};
-use rattlemap_dynamics::model::Contact;
+use rattlemap_dynamics::model::{Contact, Oscillator};
 
-/// First batches: enough to keep a hardware device busy, or a software one for a second.
+/// Smallest batch on a hardware device: enough to keep it busy.
 const LEAST_ON_HARDWARE: usize = 1 << 16;
+/// Smallest batch on a software device: about a second of work.
 const LEAST_IN_SOFTWARE: usize = 256;
 
-/// Cells with a flow of their own that a software device is given at a time: some seconds of work.
+/// Largest number of cells with distinct flows per batch on a software device: some seconds of work.
 const FLOWS_IN_SOFTWARE: usize = 8_192;
 
-/// Lanes on one device, in one precision.
+/// The engine of a plan's lanes on one device, in one precision.
 pub struct Gpu<'p> {
-    plan: Held<'p>,
+    plan: PlanRef<'p>,
     device: gpu::Gpu,
     settings: LaneSettings,
-    /// All flows and laws; none where there are too many of them to be kept.
+    /// All flows and laws; none if they are too many to be stored.
     tables: Option<Tables>,
-    /// Free steps taken so far.
+    /// Number of free steps so far.
     steps: u64,
-    /// Cells under way, where there are tables.
+    /// Least and most free steps per forcing period, over all flows that lanes can carry.
+    steps_per_period: Option<[u32; 2]>,
+    /// Cells under way, if all tables are stored.
     pool: Option<Pool>,
-    /// And where there are none; so many of them are run at a time.
+    /// Cells under way, if tables are loaded for each batch.
     waiting: Vec<Cell>,
+    /// Largest number of cells of such a batch.
     most_waiting: usize,
 }
 
-/// A plan, of somebody else's or one that several hold.
-enum Held<'p> {
+/// A borrowed or shared plan.
+enum PlanRef<'p> {
     Borrowed(&'p Plan),
     Shared(Arc<Plan>),
 }
 
-impl Deref for Held<'_> {
+impl Deref for PlanRef<'_> {
     type Target = Plan;
 
     fn deref(&self) -> &Plan {
         match self {
-            Held::Borrowed(plan) => plan,
-            Held::Shared(plan) => plan,
+            PlanRef::Borrowed(plan) => plan,
+            PlanRef::Shared(plan) => plan,
         }
     }
 }
 
 impl Gpu<'static> {
-    /// [`Gpu::new`] for a thread of its own.
+    /// Builds an engine that can move to another thread.
     ///
     /// # Errors
-    /// As [`Gpu::new`].
+    /// As for [`Gpu::new`].
     pub async fn shared(plan: Arc<Plan>, device: gpu::Gpu) -> Result<Gpu<'static>, EngineError> {
-        Gpu::open(Held::Shared(plan), device).await
+        Gpu::open(PlanRef::Shared(plan), device).await
     }
 }
 
 impl<'p> Gpu<'p> {
-    /// An engine for the cells of a plan on an open device.
+    /// Builds an engine for the cells of a plan on an open device.
     ///
     /// # Errors
-    /// [`EngineError`] if the device takes no constants.
+    /// [`EngineError`] if the device cannot store the constants.
     pub async fn new(plan: &'p Plan, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        Gpu::open(Held::Borrowed(plan), device).await
+        Gpu::open(PlanRef::Borrowed(plan), device).await
     }
 
-    async fn open(plan: Held<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
-        let settings = lane_settings(&plan);
+    async fn open(plan: PlanRef<'p>, device: gpu::Gpu) -> Result<Gpu<'p>, EngineError> {
+        // Each oscillator is derived once: if the flows are stored, together with its constants.
+        let (constants, survey) = if plan.stores_flows() {
+            let derived = survey_flows(&plan, |oscillator, steps| Constants::new(oscillator, steps));
+            let (constants, surveys): (Vec<_>, Vec<_>) = derived.unzip();
+            (Some(constants), surveys.into_iter().fold(Survey::default(), Survey::and))
+        } else {
+            (None, survey(&plan))
+        };
+        let settings = settings_after(&plan, &survey);
         let mut engine = Gpu {
             plan,
             device,
             settings,
             tables: None,
             steps: 0,
+            steps_per_period: survey.steps,
             pool: None,
             waiting: Vec::new(),
             most_waiting: gpu::MOST_FLOWS,
@@ -88,23 +101,21 @@ impl<'p> Gpu<'p> {
         if !engine.is_hardware() {
             engine.most_waiting = FLOWS_IN_SOFTWARE;
         }
-        let plan = &engine.plan;
-        if plan.keeps_flows() {
-            let flows: Vec<u32> = (0..plan.flow_count() as u32).collect();
-            let laws: Vec<u32> = (0..plan.law_count() as u32).collect();
-            engine.tables = match engine.load(&flows, &laws).await {
-                // Batches that need fewer of them may fit.
+        if let Some(constants) = constants {
+            let laws: Vec<u32> = (0..engine.plan.law_count() as u32).collect();
+            engine.tables = match engine.load(constants, &laws).await {
+                // The tables of single batches may fit.
                 Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) => None,
-                other => Some(other.map_err(|error| engine.error(error, plan.cell_count()))?),
+                other => Some(other.map_err(|error| engine.error(error, engine.plan.cell_count()))?),
             };
         }
-        // Compiled now, not while somebody waits for cells.
+        // The shader is compiled now, so that the first batch does not wait for it.
         let pool = engine.device.pool(&settings).await.map_err(|error| engine.error(error, 0))?;
-        engine.pool = engine.plan.keeps_flows().then_some(pool);
+        engine.pool = engine.plan.stores_flows().then_some(pool);
         Ok(engine)
     }
 
-    /// The device, for another plan.
+    /// Returns the device for another plan.
     pub fn into_device(self) -> gpu::Gpu {
         self.device
     }
@@ -113,48 +124,8 @@ impl<'p> Gpu<'p> {
         self.device.id()
     }
 
-    pub(super) fn heed(&mut self, halt: &Arc<AtomicBool>) {
-        self.device.heed(halt);
-    }
-
-    pub(super) fn precision(&self) -> &'static str {
-        self.device.precision().name()
-    }
-
-    pub(super) fn device(&self) -> String {
-        gpu::describe(self.device.adapter())
-    }
-
-    pub(super) fn least_batch(&self) -> usize {
-        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
-    }
-
-    /// Bytes of the device's memory that the plan takes at most, constants left out that are not kept.
-    pub(super) fn device_bytes(&self) -> u64 {
-        let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
-        self.device.bytes_of_lanes(self.plan.run_count()) + constants
-    }
-
     fn is_hardware(&self) -> bool {
         gpu::is_hardware(self.device.adapter())
-    }
-
-    /// Free steps of all lanes so far.
-    pub(super) fn steps(&self) -> u64 {
-        self.steps
-    }
-
-    /// The least and the most free steps per forcing period, over all flows that lanes can carry.
-    pub(super) fn steps_per_period(&self) -> Option<[u32; 2]> {
-        let (plan, asked) = (&*self.plan, self.settings.steps_per_period);
-        let steps = |flow| Constants::steps(&plan.oscillator(flow), asked);
-        let all = (0..plan.flow_count() as u32).into_par_iter().filter_map(steps).map(|steps| [steps; 2]);
-        all.reduce_with(|[least, most], [low, high]| [least.min(low), most.max(high)])
-    }
-
-    /// Cells that may be begun now.
-    pub(super) fn room(&self) -> usize {
-        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
     }
 
     pub(super) async fn begin(&mut self, cells: &[Cell]) -> Result<(), EngineError> {
@@ -164,18 +135,18 @@ impl<'p> Gpu<'p> {
         };
         let count = pool.under_way() + cells.len();
         let lanes: Vec<_> = cells.iter().map(|cell| (cell.id, lane(cell, cell.flow, cell.law))).collect();
-        self.device.begin(pool, tables, &lanes).await.map_err(|error| self.error(error, count))
+        pool.begin(&self.device, tables, &lanes).await.map_err(|error| self.error(error, count))
     }
 
     pub(super) async fn advance(&mut self, until: usize) -> Result<Vec<(u32, Record)>, EngineError> {
         let ended = match (&self.tables, &mut self.pool) {
-            (Some(tables), Some(pool)) => match self.device.advance(pool, tables, until).await {
+            (Some(tables), Some(pool)) => match pool.advance(&self.device, tables, until).await {
                 Ok(ended) => {
                     let constants = tables.constants();
-                    let told = |ended: &Ended| (ended.number(), ended.record(constants));
-                    let records: Vec<_> = ended.par_iter().map(told).collect();
-                    let steps = |id: u32| tables.steps_per_period(self.plan.cell(id).flow);
-                    self.steps += steps_of(records.iter().map(|(id, record)| (record, steps(*id))));
+                    let record = |ended: &LaneResult| (ended.number(), ended.record(constants));
+                    let records: Vec<_> = ended.par_iter().map(record).collect();
+                    let steps = ended.iter().map(|ended| tables.steps_per_period(ended.flow()));
+                    self.steps += steps_of(records.iter().map(|(_, record)| record).zip(steps));
                     Ok(records)
                 }
                 Err(error) => {
@@ -186,48 +157,55 @@ impl<'p> Gpu<'p> {
             _ => self.run_waiting().await,
         };
         let mut ended = ended.map_err(|error| self.error(error, self.waiting.len()))?;
-        ended.iter_mut().for_each(|(_, record)| keep(record, self.plan.needs()));
+        ended.iter_mut().for_each(|(_, record)| drop_unrequested(record, self.plan.needs()));
         Ok(ended)
     }
 
-    /// Some of the cells whose flows are too many to be kept all together, fewer where there is no memory for as
-    /// many.
+    /// Computes some of the waiting cells with tables of their own; fewer if they do not fit into the memory.
     async fn run_waiting(&mut self) -> Result<Vec<(u32, Record)>, GpuError> {
         while !self.waiting.is_empty() {
-            let bytes = |cell: &Cell| {
-                gpu::table_bytes(&self.plan.oscillator(cell.flow), self.settings.steps_per_period)
-            };
-            let left = self.waiting.len() - fitting(self.waiting.iter().rev().map(bytes), self.most_waiting);
-            let cells = self.waiting[left..].to_vec();
-            match self.run_cells(&cells).await {
-                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if cells.len() > 1 => {
-                    self.most_waiting = cells.len() / 2;
+            let steps = self.settings.steps_per_period;
+            let candidates = &self.waiting[self.waiting.len().saturating_sub(self.most_waiting)..];
+            let (flows, laws, lanes) = renumbered(candidates);
+            let plan: &Plan = &self.plan;
+            let oscillators: Vec<_> = flows.into_par_iter().map(|flow| plan.oscillator(flow)).collect();
+            let bytes = |lane: &Lane| gpu::table_bytes(&oscillators[lane.flow as usize], steps);
+            let count = fitting(lanes.iter().map(bytes), self.most_waiting);
+            match self.run_cells(&oscillators, &laws, &lanes[..count]).await {
+                Err(GpuError::TooManyFlows { .. } | GpuError::OutOfMemory { .. }) if count > 1 => {
+                    self.most_waiting = count / 2;
                 }
                 Err(GpuError::Halted) => return Ok(Vec::new()),
                 Err(error) => return Err(error),
                 Ok(records) => {
-                    self.waiting.truncate(left);
-                    return Ok(cells.iter().map(|cell| cell.id).zip(records).collect());
+                    let cells = self.waiting.split_off(self.waiting.len() - count);
+                    return Ok(cells.iter().map(|cell| cell.id).zip(records.into_iter().rev()).collect());
                 }
             }
         }
         Ok(Vec::new())
     }
 
-    async fn run_cells(&mut self, cells: &[Cell]) -> Result<Vec<Record>, GpuError> {
-        let (flows, laws, lanes) = renumbered(cells);
-        let tables = self.load(&flows, &laws).await?;
-        let records = self.device.run_on(&tables, &lanes, &self.settings).await?;
+    /// Runs lanes on the flows that they use: the first of `oscillators`.
+    async fn run_cells(
+        &mut self,
+        oscillators: &[Oscillator],
+        laws: &[u32],
+        lanes: &[Lane],
+    ) -> Result<Vec<Record>, GpuError> {
+        let steps = self.settings.steps_per_period;
+        let flows = lanes.iter().map(|lane| lane.flow as usize + 1).max().unwrap_or(0);
+        let constants = oscillators[..flows].par_iter().map(|flow| Constants::new(flow, steps)).collect();
+        let tables = self.load(constants, laws).await?;
+        let records = self.device.run_on(&tables, lanes, &self.settings).await?;
         let steps = lanes.iter().map(|lane| tables.steps_per_period(lane.flow));
         self.steps += steps_of(records.iter().zip(steps));
         Ok(records)
     }
 
-    async fn load(&self, flows: &[u32], laws: &[u32]) -> Result<Tables, GpuError> {
-        let (plan, steps): (&Plan, _) = (&self.plan, self.settings.steps_per_period);
-        let derive = |&flow: &u32| Constants::new(&plan.oscillator(flow), steps);
-        let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
-        self.device.load_derived(flows.par_iter().map(derive).collect(), &laws).await
+    async fn load(&self, constants: Vec<Option<Constants>>, laws: &[u32]) -> Result<Tables, GpuError> {
+        let laws: Vec<_> = laws.iter().map(|&law| self.plan.law(law)).collect();
+        self.device.load_constants(constants, &laws).await
     }
 
     fn error(&self, error: GpuError, cells: usize) -> EngineError {
@@ -242,13 +220,51 @@ impl<'p> Gpu<'p> {
     }
 }
 
-/// Free steps of lanes, by their records and by those of a period.
+impl Device for Gpu<'_> {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
+        self.device.stop_on(halt);
+    }
+
+    fn precision(&self) -> &'static str {
+        self.device.precision().name()
+    }
+
+    fn device(&self) -> String {
+        gpu::describe(self.device.adapter())
+    }
+
+    fn least_batch(&self) -> usize {
+        if self.is_hardware() { LEAST_ON_HARDWARE } else { LEAST_IN_SOFTWARE }
+    }
+
+    fn device_bytes(&self) -> Option<u64> {
+        let constants = self.tables.as_ref().map_or(gpu::MOST_BYTES, Tables::bytes);
+        Some(self.device.bytes_of_lanes(self.plan.run_count()) + constants)
+    }
+
+    fn lane_steps(&self) -> Option<u64> {
+        Some(self.steps)
+    }
+
+    fn steps_per_period(&self) -> Option<[u32; 2]> {
+        self.steps_per_period
+    }
+
+    fn room(&self) -> usize {
+        self.tables.as_ref().and(self.pool.as_ref()).map_or(usize::MAX, Pool::room)
+    }
+}
+
+/// Returns the number of free steps of lanes, given their records and steps per period.
 fn steps_of<'r>(lanes: impl Iterator<Item = (&'r Record, u32)>) -> u64 {
     lanes.map(|(record, steps)| u64::from(record.periods_run) * u64::from(steps)).sum()
 }
 
-/// How many things of these sizes are taken at a time: one at least, `most` at most, and between these as many as fit
-/// [`gpu::MOST_BYTES`].
+/// Returns how many tables of these sizes fit into [`gpu::MOST_BYTES`], between 1 and `most`.
 fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
     let total = bytes.take(most).scan(0, |total, bytes| {
         *total += bytes;
@@ -257,10 +273,11 @@ fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
     total.take_while(|&total| total <= gpu::MOST_BYTES).count().max(1)
 }
 
-/// The flows and laws of these cells alone, and their lanes with indices among them.
+/// Returns the flows and laws of some cells, and their lanes with indices into these lists.
 fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
     let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
-    let lanes = cells.iter().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
+    let lanes =
+        cells.iter().rev().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();
     (flows.list, laws.list, lanes)
 }
 
@@ -268,7 +285,7 @@ fn lane(cell: &Cell, flow: u32, law: u32) -> Lane {
     Lane { flow, law, start: cell.start }
 }
 
-/// Things in the order in which they were first met.
+/// Numbers things in the order of their first occurrence.
 #[derive(Default)]
 struct Numbering {
     list: Vec<u32>,
@@ -276,66 +293,107 @@ struct Numbering {
 }
 
 impl Numbering {
-    fn place(&mut self, thing: u32) -> u32 {
-        *self.places.entry(thing).or_insert_with(|| {
-            self.list.push(thing);
+    fn place(&mut self, number: u32) -> u32 {
+        *self.places.entry(number).or_insert_with(|| {
+            self.list.push(number);
             self.list.len() as u32 - 1
         })
     }
 }
 
-/// How lanes of a plan are run.
+/// Returns the settings of a plan's lanes.
 pub(crate) fn lane_settings(plan: &Plan) -> LaneSettings {
+    settings_after(plan, &survey(plan))
+}
+
+fn settings_after(plan: &Plan, survey: &Survey) -> LaneSettings {
     let budget = plan.budget();
     let default = LaneSettings::within(budget);
-    let [chatter, kinds] = branches(plan);
     LaneSettings {
         word: plan.needs().word,
         pattern: plan.needs().pattern,
         mesh: plan.needs().mesh,
         symmetry: plan.needs().symmetric,
-        chatter,
-        kinds,
+        chatter: survey.chatter,
+        kinds: survey.kinds,
         most_events: budget.allowance().events.min(u64::from(default.most_events)) as u32,
-        steps_per_period: match plan.steps_per_period() {
-            Steps::Auto => None,
-            Steps::PerPeriod(steps) => Some(steps),
-        },
+        steps_per_period: requested_steps(plan),
         ..default
     }
 }
 
-/// Whether any cell of the plan may follow chatter by short flights, and whether any has a wall that is elastic or rigid.
-fn branches(plan: &Plan) -> [bool; 2] {
+fn requested_steps(plan: &Plan) -> Option<u32> {
+    match plan.steps_per_period() {
+        Steps::Auto => None,
+        Steps::PerPeriod(steps) => Some(steps),
+    }
+}
+
+/// Properties of flows that decide which shaders a plan needs.
+#[derive(Clone, Copy, Default)]
+struct Survey {
+    /// Whether any cell may follow chatter by short flights.
+    chatter: bool,
+    /// Whether any wall is elastic or rigid.
+    kinds: bool,
+    /// Least and most free steps per forcing period, of flows that lanes can carry.
+    steps: Option<[u32; 2]>,
+}
+
+impl Survey {
+    /// Returns the properties of both.
+    fn and(self, other: Survey) -> Survey {
+        let steps = self.steps.into_iter().chain(other.steps);
+        Survey {
+            chatter: self.chatter || other.chatter,
+            kinds: self.kinds || other.kinds,
+            steps: steps.reduce(|[least, most], [low, high]| [least.min(low), most.max(high)]),
+        }
+    }
+}
+
+fn survey(plan: &Plan) -> Survey {
+    survey_flows(plan, |_, _| ()).map(|((), survey)| survey).reduce(Survey::default, Survey::and)
+}
+
+/// Derives each oscillator of a plan, and returns the result of `of` with its survey. `of` also gets the requested
+/// free steps per forcing period.
+fn survey_flows<T: Send>(
+    plan: &Plan,
+    of: impl Fn(&Oscillator, Option<u32>) -> T + Sync + Send,
+) -> impl IndexedParallelIterator<Item = (T, Survey)> {
     let laws = (0..plan.law_count() as u32).map(|law| plan.law(law).mesh_speed);
     let least =
         laws.fold([f64::INFINITY; 2], |least, speeds| [0, 1].map(|side| speeds[side].min(least[side])));
-    let of = |flow| {
+    let steps = requested_steps(plan);
+    (0..plan.flow_count() as u32).into_par_iter().map(move |flow| {
         let oscillator = plan.oscillator(flow);
-        let follows = (0..2).any(|side| {
+        let chatter = (0..2).any(|side| {
             let bounces = oscillator.walls[side].is_finite() && oscillator.contacts[side] != Contact::Elastic;
             bounces && gpu::follows_chatter(&oscillator, least[side])
         });
-        [follows, gpu::has_elastic_or_rigid_wall(&oscillator)]
-    };
-    let flows = (0..plan.flow_count() as u32).into_par_iter().map(of);
-    flows.reduce(|| [false; 2], |a, b| [a[0] || b[0], a[1] || b[1]])
+        let kinds = gpu::has_elastic_or_rigid_wall(&oscillator);
+        let survey = Survey { chatter, kinds, steps: Constants::steps(&oscillator, steps).map(|n| [n; 2]) };
+        (of(&oscillator, steps), survey)
+    })
 }
 
-/// Leaves what somebody asked for.
-pub(crate) fn keep(record: &mut Record, needs: &Needs) {
-    let mut drop = |asked: bool, bits: u32, clear: fn(&mut Record)| {
-        if !asked {
+/// Clears the fields of a record that the scene did not request.
+pub(crate) fn drop_unrequested(record: &mut Record, needs: &Needs) {
+    let mut clear_unless = |is_requested: bool, bits: u32, clear: fn(&mut Record)| {
+        if !is_requested {
             record.valid &= !bits;
             clear(record);
         }
     };
-    drop(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
-    drop(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
-    drop(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
-    drop(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
-    drop(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
-    drop(needs.pattern, valid::PATTERN, |r| (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0));
+    clear_unless(needs.exponent, valid::LYAPUNOV, |r| (r.lyapunov, r.lyapunov_error) = (0.0, 0.0));
+    clear_unless(needs.impacts, valid::IMPACTS, |r| r.impacts_per_period = 0.0);
+    clear_unless(needs.mesh, valid::MESH, |r| r.mesh_fraction = 0.0);
+    clear_unless(needs.symmetric, valid::SYMMETRIC, |r| r.symmetric = 0);
+    clear_unless(needs.word, valid::WORD, |r| (r.word, r.word_hash, r.word_length) = ([0; 4], 0, 0));
+    clear_unless(needs.pattern, valid::PATTERN, |r| {
+        (r.pattern, r.pattern_hash, r.pattern_length) = ([0; 4], 0, 0)
+    });
 }
 
 #[cfg(test)]
@@ -343,7 +401,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_taken_at_a_time_fits_the_memory() {
+    fn batches_fit_the_memory() {
         let third = gpu::MOST_BYTES / 3;
         assert_eq!(fitting([third; 10].into_iter(), 8), 3);
         assert_eq!(fitting([1; 10].into_iter(), 8), 8);
@@ -352,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_asked_for_is_not_in_the_record() {
+    fn quantities_that_are_not_requested_are_cleared() {
         let mut record = Record {
             lyapunov: 1.0,
             lyapunov_error: 1.0,
@@ -369,9 +427,9 @@ mod tests {
             ..Record::default()
         };
         let whole = record;
-        keep(&mut record, &Needs::EVERYTHING);
+        drop_unrequested(&mut record, &Needs::EVERYTHING);
         assert_eq!(record, whole);
-        keep(
+        drop_unrequested(
             &mut record,
             &Needs {
                 exponent: false,

@@ -1,17 +1,17 @@
-//! Morton order: a walk through a grid that stays among neighbours.
+//! Morton order: an order of the cells of a grid in which consecutive cells are close to each other.
 
-/// The place of a cell in Morton order: its indices with their bits interlaced.
+/// Returns the Morton key of a cell: its indices with their bits interleaved.
 pub(crate) fn key([i, j]: [usize; 2]) -> u64 {
     let spread = |n: usize| (0..32).fold(0, |bits, k| bits | (n as u64 >> k & 1) << (2 * k));
     spread(i) | spread(j) << 1
 }
 
-/// The indices of the cell that has this place, below the number of cells, in the Morton order of a grid. There is no table of
-/// it: one of 10^9 cells would take 4 GB of every process.
+/// Returns the indices of the cell at a place of the Morton order of a grid. `place` is below the number of cells. The order is
+/// computed, because a table of 10^9 cells would take 4 GB.
 pub(super) fn at(mut place: usize, counts: [usize; 2]) -> [usize; 2] {
     let mut corner = [0, 0];
     let mut side = counts[0].max(counts[1]).next_power_of_two();
-    // Squares that the grid's edge cuts have cells less; in a whole one the place is the key.
+    // Squares that cross the grid's edge contain fewer cells. Inside a complete square the place is the key.
     while !(0..2).all(|axis| corner[axis] + side <= counts[axis]) {
         side /= 2;
         let [i, j] = corner;
@@ -28,7 +28,7 @@ pub(super) fn at(mut place: usize, counts: [usize; 2]) -> [usize; 2] {
     [corner[0] + every_other_bit(place), corner[1] + every_other_bit(place >> 1)]
 }
 
-/// Bits 0, 2, 4 and so on, side by side.
+/// Returns bits 0, 2, 4, ... as consecutive bits.
 fn every_other_bit(n: usize) -> usize {
     let mut bits = n as u64 & 0x5555_5555_5555_5555;
     for (shift, mask) in [
@@ -55,7 +55,7 @@ mod tests {
         };
         assert_eq!(order([4, 4]), [0, 1, 4, 5, 2, 3, 6, 7, 8, 9, 12, 13, 10, 11, 14, 15]);
         assert_eq!(order([3, 2]), [0, 1, 3, 4, 2, 5]);
-        // Keys ascend, and every cell is there once.
+        // Keys increase strictly, so every cell occurs once.
         for counts in [[1000, 3], [1, 77], [64, 64], [65, 63], [37, 100]] {
             let keys = order(counts).into_iter().map(|id| key([id % counts[0], id / counts[0]]));
             assert!(keys.is_sorted_by(|a, b| a < b), "{counts:?}");

@@ -1,4 +1,4 @@
-//! Which cells share a flow, or a contact law. Pure.
+//! The distinct flows and contact laws of a plan, and the cells that share them. Pure.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -7,28 +7,28 @@ use std::sync::Arc;
 use crate::map::scene::{Points, Target};
 use rattlemap_dynamics::model::Parameter;
 
-/// The distinct flows of all cells, or the distinct laws, numbered from 0.
+/// The distinct flows, or the distinct laws, of all cells, numbered from 0.
 #[derive(Clone, Debug)]
 pub(crate) enum Parts {
-    /// One for each value of these axes.
+    /// One part for each value of the axes marked in `along`.
     Grid { counts: [usize; 2], along: [bool; 2] },
-    /// Of each cell of a list, and of each part the first cell that has it.
+    /// For each cell of a list its part, and for each part its first cell.
     List { of: Arc<[u32]>, first: Arc<[u32]> },
 }
 
 impl Parts {
-    /// The flows: cells share one if they agree in all that shapes the oscillator.
+    /// Finds the flows. Cells share one if all parameters of the oscillator are equal.
     pub(crate) fn flows(points: &Points) -> Parts {
         Parts::new(points, |parameter| parameter.shapes.oscillator())
     }
 
-    /// The contact laws, likewise.
+    /// Finds the contact laws. Cells share one if all parameters of the law are equal.
     pub(crate) fn laws(points: &Points) -> Parts {
         Parts::new(points, |parameter| parameter.shapes.law())
     }
 
     fn new(points: &Points, is_shaped: fn(&Parameter) -> bool) -> Parts {
-        // Cells that differ in their starts alone share everything.
+        // A component of the start affects neither flow nor law.
         let shapes = |target: Target| target.parameter().is_some_and(|index| points.shapes(index, is_shaped));
         let shapes: Vec<bool> = points.targets().map(shapes).collect();
         let Some(list) = points.list() else {
@@ -39,7 +39,7 @@ impl Parts {
         let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
         for cell in 0..list.len() {
             let values = list.row(cell).iter().zip(&shapes).filter(|(_, shapes)| **shapes);
-            // Numbers that are equal and differ in bits may be told apart: they cost a part more.
+            // Bits are compared: 0 and -0 give two parts, which is harmless.
             of.push(match known.entry(values.map(|(value, _)| value.to_bits()).collect()) {
                 Entry::Occupied(part) => *part.get(),
                 Entry::Vacant(part) => {
@@ -51,7 +51,7 @@ impl Parts {
         Parts::List { of: of.into(), first: first.into() }
     }
 
-    /// How many there are.
+    /// Returns the number of parts.
     pub(crate) fn count(&self) -> usize {
         match self {
             Parts::Grid { counts, along } => {
@@ -61,7 +61,7 @@ impl Parts {
         }
     }
 
-    /// The part of a cell.
+    /// Returns the part of a cell.
     pub(crate) fn of(&self, cell: usize) -> u32 {
         match self {
             Parts::Grid { counts: [columns, _], along } => match along {
@@ -74,7 +74,7 @@ impl Parts {
         }
     }
 
-    /// The first cell that has a part.
+    /// Returns the first cell with a part.
     pub(crate) fn cell(&self, part: u32) -> usize {
         let part = part as usize;
         match self {

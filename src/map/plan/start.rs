@@ -1,4 +1,4 @@
-//! Where runs begin. Pure.
+//! The starts of runs. Pure.
 
 use crate::map::random::Random;
 use crate::map::scene::{Draw, Start};
@@ -6,16 +6,15 @@ use crate::record::classify::status;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::{Oscillator, REST, State};
 
-/// Displacements are drawn within this many scales of length of the middle, velocities within as
-/// many times what that is as a velocity: the attractors of the paper's plane lie inside.
-const REACH: f64 = 4.0;
+/// Range of random starts: displacements are within this many scales of length of the middle, velocities within this many
+/// times the corresponding velocity. The attractors of the paper's plane are inside.
+const START_RANGE: f64 = 4.0;
 
-/// The starts of every cell, in units of the cell's own.
+/// The starts of every cell, in units that depend on the cell.
 #[derive(Clone, Debug)]
 pub(super) struct Starts {
     policy: Start,
-    /// Further starts; the same in every cell, so that what differs between neighbours is the
-    /// cell and not the draw.
+    /// Random starts after the first. All cells have the same ones, so that neighbouring cells differ only in their parameters.
     drawn: Vec<[f64; 4]>,
 }
 
@@ -35,7 +34,7 @@ impl Starts {
         self.policy
     }
 
-    /// The policy's own start.
+    /// Returns the start of the policy.
     pub(super) fn first(&self) -> State {
         match self.policy {
             Start::State(state) => state,
@@ -43,8 +42,8 @@ impl Starts {
         }
     }
 
-    /// The `nth` start, from 1 on, `l` the scale of length: the gap anywhere between the walls, or within
-    /// `2 l` of the only one, the second displacement within `4 l`, both velocities within `4 l omega`.
+    /// Returns the random start `nth`, from 1. With the scale of length `l`, the gap is uniform between the walls, or within `2 l`
+    /// of a single wall; the second displacement is within `4 l`, both velocities within `4 l omega`.
     pub(super) fn drawn(&self, nth: usize, oscillator: &Oscillator) -> State {
         let [gap, v1, x2, v2] = self.drawn[nth - 1];
         let length = oscillator.length_scale();
@@ -55,14 +54,14 @@ impl Starts {
             both => both,
         };
         let (middle, half) = (0.5 * (right + left), 0.5 * (right - left));
-        let (z, x2) = (middle + half * gap, REACH * length * x2);
-        let speed = REACH * length * oscillator.omega;
+        let (z, x2) = (middle + half * gap, START_RANGE * length * x2);
+        let speed = START_RANGE * length * oscillator.omega;
         let [g1, g2] = oscillator.gap;
         [(z - g2 * x2) / g1, speed * v1, x2, speed * v2]
     }
 }
 
-/// Where a run starts whose neighbour has this record.
+/// Returns the start of a run that follows the neighbour with this record.
 pub(crate) fn followed(record: Option<&Record>) -> State {
     let usable = |record: &&Record| {
         record.valid & valid::STROBE != 0
@@ -103,7 +102,7 @@ mod tests {
         let of = |pair: GearPair| pair.oscillator().unwrap();
         let small = of(GearPair::paper(0.5));
         let large = of(GearPair { b: 1.0, omega: 2.0 * small.omega, ..GearPair::paper(0.5) });
-        let mut seen = [[0.0f64; 2]; 2];
+        let mut ranges = [[0.0f64; 2]; 2];
         for nth in 1..200 {
             let (a, b) = (starts.drawn(nth, &small), starts.drawn(nth, &large));
             let gap = a[0] - a[2];
@@ -113,23 +112,23 @@ mod tests {
             {
                 assert!((b - scale * a).abs() < 1e-12 * (1.0 + b.abs()));
             }
-            for (range, x) in seen.iter_mut().zip([gap / 0.5, a[3] / (2.0 * small.omega)]) {
+            for (range, x) in ranges.iter_mut().zip([gap / 0.5, a[3] / (2.0 * small.omega)]) {
                 *range = [range[0].min(x), range[1].max(x)];
             }
         }
-        assert!(seen.iter().all(|[low, high]| *low < -0.95 && *high > 0.95), "{seen:?}");
+        assert!(ranges.iter().all(|[low, high]| *low < -0.95 && *high > 0.95), "{ranges:?}");
         let other = Starts::new(Start::Rest, Some(Draw { count: 200, seed: 8 }));
         assert_ne!(starts.drawn(1, &small), other.drawn(1, &small));
     }
 
     #[test]
-    fn a_neighbour_without_an_end_leaves_rest() {
+    fn runs_start_at_rest_if_the_neighbour_has_no_last_state() {
         let end = [1.0, 2.0, 3.0, 4.0];
         let record = Record { strobe: end, valid: valid::STROBE, ..Record::default() };
         assert_eq!(followed(Some(&record)), end);
         let failed = Record { status: Status::CapEvents.code(), ..record };
-        let wild = Record { strobe: [f64::NAN; 4], ..record };
-        for record in [None, Some(&failed), Some(&wild), Some(&Record::default())] {
+        let infinite = Record { strobe: [f64::NAN; 4], ..record };
+        for record in [None, Some(&failed), Some(&infinite), Some(&Record::default())] {
             assert_eq!(followed(record), REST, "{record:?}");
         }
     }

@@ -1,31 +1,29 @@
-//! Axes: which parameter is swept, or which component of the start, and its values.
+//! Axes: each sweeps a parameter or a component of the start over increasing values.
 
 use std::sync::Arc;
 
 use super::document::{Node, Value};
 use super::error::SceneError;
 use super::keys;
+use super::limits::MAX_COUNT;
 use super::section::{Field, Section};
 use rattlemap_dynamics::model::{Model, Parameter, Range, Shapes, State};
 
-/// The most values that one axis may have.
-pub const MAX_COUNT: u32 = 1_000_000;
-
 const EXAMPLE: &str = "write [[axis]] with parameter, min, max and count, or with parameter and values";
 
-const NEITHER: &str = "name one of the model's parameters, or with `start` a component of the start";
+const NEITHER: &str = "name one of the model's parameters, or a component of the start with `start`";
 
-/// What an axis, or a column of a list, sets.
+/// The quantity that an axis, or a column of a list, sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// The parameter with this index in the model's table.
     Parameter(usize),
-    /// The component of the start with this place among the model's [state names](Model::state_names).
+    /// The component of the start with this index among the model's [state names](Model::state_names).
     Start(usize),
 }
 
 impl Target {
-    /// The parameter's index, if it is one.
+    /// Returns the index of the parameter; none for a component of the start.
     pub(crate) fn parameter(self) -> Option<usize> {
         match self {
             Target::Parameter(index) => Some(index),
@@ -38,14 +36,14 @@ impl Target {
         matches!(self, Target::Start(_))
     }
 
-    /// Gives a model the value, if it has it.
+    /// Sets the parameter in `model`; does nothing for a component of the start.
     pub(super) fn set(self, model: &mut dyn Model, value: f64) {
         if let Target::Parameter(index) = self {
             model.assign(index, value);
         }
     }
 
-    /// Gives a start the value, if it has it.
+    /// Sets the component in `start`; does nothing for a parameter.
     pub(super) fn begin(self, start: &mut State, value: f64) {
         if let Target::Start(component) = self {
             start[component] = value;
@@ -53,19 +51,19 @@ impl Target {
     }
 }
 
-/// How the values of an axis follow each other.
+/// Spacing of the values of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// By equal differences.
+    /// Equal differences.
     Linear,
-    /// By equal ratios.
+    /// Equal ratios.
     Log,
-    /// As they were listed.
+    /// Listed one by one.
     Values,
 }
 
 impl Scale {
-    /// The name in scenes and manifests.
+    /// Returns the name in scenes and manifests.
     pub fn name(self) -> &'static str {
         match self {
             Scale::Linear => "linear",
@@ -84,66 +82,66 @@ pub struct Axis {
     max: f64,
     count: usize,
     scale: Scale,
-    /// All values, computed once for all engines; none on a linear axis, which has a formula.
+    /// All values, computed once for all engines. Empty for a linear axis, which has a formula.
     table: Arc<[f64]>,
 }
 
 impl Axis {
-    /// The swept parameter; of a component of the start its name, its meaning and its range.
+    /// Returns the swept parameter. A component of the start is described in the same form.
     pub fn parameter(&self) -> &Parameter {
         &self.parameter
     }
 
-    /// What the axis sets.
+    /// Returns the quantity that the axis sets.
     pub fn target(&self) -> Target {
         self.target
     }
 
-    /// Gives a model the axis' value `i`.
+    /// Sets the parameter in `model` to value `i` of the axis.
     pub(crate) fn set(&self, model: &mut dyn Model, i: usize) {
-        // Between two ends in the parameter's range, which is an interval.
+        // The value is in the parameter's range: both ends are, and the range is an interval.
         self.target.set(model, self.value(i));
     }
 
-    /// Gives a start the axis' value `i`.
+    /// Sets the component of `start` to value `i` of the axis.
     pub(crate) fn begin(&self, start: &mut State, i: usize) {
         self.target.begin(start, self.value(i));
     }
 
-    /// The first value.
+    /// Returns the first value.
     pub fn min(&self) -> f64 {
         self.min
     }
 
-    /// The last value, greater than the first.
+    /// Returns the last value, which is greater than the first.
     pub fn max(&self) -> f64 {
         self.max
     }
 
-    /// How many values, 2 to [`MAX_COUNT`].
+    /// Returns the number of values, 2 to [`MAX_COUNT`].
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// How the values follow each other.
+    /// Returns the spacing of the values.
     pub fn scale(&self) -> Scale {
         self.scale
     }
 
-    /// Value `i`, counted from 0. With `n = count - 1` it is on a linear axis
+    /// Returns value `i`, counted from 0. With `n = count - 1`, a value of a linear axis is
     ///
     /// ```text
     /// min + (max - min) * i / n
     /// ```
     ///
-    /// and on a logarithmic one, with the functions of the crate `libm`, which are the same on every machine,
+    /// A value of a logarithmic axis, computed by the crate `libm` so that it has the same bits on every machine, is
     ///
     /// ```text
     /// exp10((log10(min) * (n - i) + log10(max) * i) / n)
     /// ```
     ///
-    /// The first one is `min`, the last one `max` itself, and none lies outside, whatever the rounding, so that
-    /// no value leaves the parameter's range.
+    /// The first value is exactly `min` and the last exactly `max`. No value is outside, whatever the rounding, so each is in
+    /// the parameter's range.
     pub fn value(&self, i: usize) -> f64 {
         let last = self.count - 1;
         if i >= last {
@@ -155,13 +153,13 @@ impl Axis {
         }
     }
 
-    /// All values, ascending.
+    /// Returns all values in increasing order.
     pub fn values(&self) -> impl ExactSizeIterator<Item = f64> + '_ {
         (0..self.count).map(|i| self.value(i))
     }
 }
 
-/// The values of a logarithmic axis, as [`Axis::value`] says.
+/// Computes the values of a logarithmic axis by the formula in [`Axis::value`].
 fn geometric(min: f64, max: f64, count: usize) -> Arc<[f64]> {
     let last = count - 1;
     let [from, to] = [min, max].map(libm::log10);
@@ -173,7 +171,7 @@ fn geometric(min: f64, max: f64, count: usize) -> Arc<[f64]> {
     (0..count).map(value).collect()
 }
 
-/// Reads `[[axis]]`, of which there must be `wanted`; `command` is who wants them.
+/// Reads the `[[axis]]` tables. `command`, which messages name, needs `wanted` of them.
 pub(super) fn read(
     root: &Section<'_>,
     model: &dyn Model,
@@ -196,52 +194,53 @@ pub(super) fn read(
     Ok(axes)
 }
 
-/// Refuses axes of the start where `command` has no use for them.
+/// Refuses axes that sweep the start, which `command` cannot use.
 pub(super) fn refuse_starts(root: &Section<'_>, axes: &[Axis], command: &str) -> Result<(), SceneError> {
     match axes.iter().position(|axis| axis.target.is_start()) {
         Some(i) => Err(named(root, i)?.conflict(format!(
-            "`{command}` follows one motion along a parameter; starts are for `map`, which shows their basins"
+            "`{command}` follows one motion along a parameter; a map (`map`) can sweep the start"
         ))),
         None => Ok(()),
     }
 }
 
-/// The place of the axis too many, with the number of axes as the value shown.
+/// Builds the node that an error about the number of axes shows: the place of the first superfluous axis, and the number.
 fn count_node(at: &Node, count: usize) -> Node {
-    let shown = format!("{count} {}", if count == 1 { "table" } else { "tables" });
-    Node { place: at.name_place.clone(), shown, value: Value::Other, ..at.clone() }
+    let excerpt = format!("{count} {}", if count == 1 { "table" } else { "tables" });
+    Node { place: at.name_place.clone(), excerpt, value: Value::Other, ..at.clone() }
 }
 
 fn read_one(table: &Field<'_>, model: &dyn Model, before: &[Axis]) -> Result<Axis, SceneError> {
     let section = Section::open(table.node, &table.path, &keys::names("axis"))?;
-    let (field, is_start) = told_name(&section)?;
+    let (field, is_start) = swept_name(&section)?;
     let name = field.text()?;
     let (target, parameter) = if is_start {
         let names = model.state_names();
         let place = names.iter().position(|known| *known == name);
-        let place = place.ok_or_else(|| field.unknown_among(name, &names, &names.join(", ")))?;
+        let place = place.ok_or_else(|| field.unknown_name(name, &names, &names.join(", ")))?;
         (Target::Start(place), component(model, place))
     } else {
         let index =
-            model.index(name).map_err(|_| field.unknown_among(name, &names(model), &meanings(model)))?;
+            model.index(name).map_err(|_| field.unknown_name(name, &names(model), &meanings(model)))?;
         (Target::Parameter(index), model.parameters()[index].clone())
     };
     if let Some(i) = before.iter().position(|axis| axis.target == target) {
         let what = if is_start { "component of the start" } else { "parameter" };
         return Err(field.conflict(format!("axis {i} sweeps it already; name another {what}")));
     }
-    match told_values(&section)? {
+    match listed_values(&section)? {
         Some(values) => read_values(&values, parameter, target),
         None => read_range(&section, parameter, target),
     }
 }
 
-/// The name of what an axis sweeps, and whether that is a component of the start: an argument wins over the text.
-fn told_name<'a>(section: &Section<'a>) -> Result<(Field<'a>, bool), SceneError> {
+/// Returns the field that names the swept quantity, and whether it is a component of the start. An argument overrides the
+/// text.
+fn swept_name<'a>(section: &Section<'a>) -> Result<(Field<'a>, bool), SceneError> {
     match (section.get("parameter"), section.get("start")) {
         (Some(parameter), Some(start)) if parameter.is_argument() == start.is_argument() => Err(start
             .conflict(format!(
-                "`{}` is given, too, and an axis sweeps one thing; drop either",
+                "`{}` is given, too, but an axis sweeps one quantity; remove one of the two",
                 parameter.path
             ))),
         (Some(parameter), Some(_)) if parameter.is_argument() => Ok((parameter, false)),
@@ -251,7 +250,7 @@ fn told_name<'a>(section: &Section<'a>) -> Result<(Field<'a>, bool), SceneError>
     }
 }
 
-/// A component of the start, as it is told where parameters are.
+/// Describes a component of the start in the form of a parameter.
 pub(super) fn component(model: &dyn Model, place: usize) -> Parameter {
     let name = model.state_names()[place].to_owned();
     let meaning = if place.is_multiple_of(2) { "displacement at the start" } else { "velocity at the start" };
@@ -260,20 +259,21 @@ pub(super) fn component(model: &dyn Model, place: usize) -> Parameter {
         meaning: meaning.into(),
         default: None,
         range: Range::Finite,
-        // Neither: nothing asks.
+        // Never read for a component of the start.
         shapes: Shapes::Both,
     }
 }
 
-/// `values`, if they are what tells the axis: an argument wins over the text, for them or for what they replace.
-fn told_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneError> {
+/// Returns the field `values` if it defines the axis. Both `values` and a range may be given if one of them is an argument,
+/// which overrides the text.
+fn listed_values<'a>(section: &Section<'a>) -> Result<Option<Field<'a>>, SceneError> {
     let Some(values) = section.get("values") else { return Ok(None) };
     let others = ["min", "max", "count", "scale"].map(|name| section.get(name));
     let mut others = others.iter().flatten();
     let is_argument = values.is_argument();
     if let Some(other) = others.clone().find(|other| other.is_argument() == is_argument) {
         return Err(values.conflict(format!(
-            "values stand in the place of min, max, count and scale, and `{}` is given, too; drop either",
+            "values replace min, max, count and scale, but `{}` is given, too; remove one of the two",
             other.path
         )));
     }
@@ -311,7 +311,7 @@ fn read_range(section: &Section<'_>, parameter: Parameter, target: Target) -> Re
     let (min, min_field) = end("min")?;
     if scale == Scale::Log && min <= 0.0 {
         return Err(
-            min_field.out_of_range("greater than 0 where `scale = \"log\"`; raise it, or drop the scale")
+            min_field.out_of_range("greater than 0 for `scale = \"log\"`; raise it, or remove the scale")
         );
     }
     let (max, max_field) = end("max")?;
@@ -321,7 +321,7 @@ fn read_range(section: &Section<'_>, parameter: Parameter, target: Target) -> Re
     let count_field = section.require("count", "say how many values, 2 or more")?;
     let count = count_field.whole(2..=MAX_COUNT)? as usize;
     if scale == Scale::Linear && !((max - min) * count as f64).is_finite() {
-        return Err(max_field.out_of_range("near enough to `min` for the difference to be a finite number"));
+        return Err(max_field.out_of_range("so close to `min` that their difference is a finite number"));
     }
     let table = match scale {
         Scale::Log => geometric(min, max, count),
@@ -329,12 +329,12 @@ fn read_range(section: &Section<'_>, parameter: Parameter, target: Target) -> Re
     };
     let axis = Axis { parameter, target, min, max, count, scale, table };
     if axis.values().zip(axis.values().skip(1)).any(|(value, next)| value >= next) {
-        return Err(count_field.out_of_range("so small that no two values are the same number"));
+        return Err(count_field.out_of_range("so small that neighbouring values differ after rounding"));
     }
     Ok(axis)
 }
 
-/// A number that the parameter may take.
+/// Reads a number within the parameter's range.
 fn in_range(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError> {
     let value = field.number()?;
     match parameter.range.contains(value) {
@@ -346,18 +346,19 @@ fn in_range(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError>
     }
 }
 
-/// The name of what axis `i` sweeps.
+/// Returns the field that names the quantity swept by axis `i`.
 pub(super) fn named<'a>(root: &Section<'a>, i: usize) -> Result<Field<'a>, SceneError> {
     let tables = root.require("axis", EXAMPLE)?.list("a list of tables, [[axis]]")?;
     let section = Section::open(tables[i].node, &tables[i].path, &keys::names("axis"))?;
-    told_name(&section).map(|(field, _)| field)
+    swept_name(&section).map(|(field, _)| field)
 }
 
+/// Returns the names of the model's parameters.
 pub(super) fn names(model: &dyn Model) -> Vec<&str> {
     model.parameters().iter().map(|parameter| &*parameter.name).collect()
 }
 
-/// The parameters with what they mean, as a list within a sentence.
+/// Lists the model's parameters with their meanings, for messages.
 pub(super) fn meanings(model: &dyn Model) -> String {
     let of = |parameter: &Parameter| format!("{} ({})", parameter.name, parameter.meaning);
     model.parameters().iter().map(of).collect::<Vec<_>>().join(", ")

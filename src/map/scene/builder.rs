@@ -1,6 +1,6 @@
-//! A scene built in Rust. It is written down as TOML and read like any other: one set of rules,
-//! one set of errors, and a text for manifests.
+//! A scene built in Rust. It is written as TOML and then read like a file, so the same checks, errors and manifests apply.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::RangeInclusive;
 
@@ -11,163 +11,157 @@ use super::settings::{Continuous, Format, Integration, Quantity, Refine, Steps};
 use super::{Draw, Purpose, Scene, SceneError, Start};
 use rattlemap_dynamics::model::Model;
 
-/// What is asked, step by step; [`SceneBuilder::build`] looks at all of it. What is not said is as
-/// in a scene file that does not say it.
-///
-/// ```
-/// use rattlemap::map::scene::Scene;
-/// use rattlemap::model::GearPair;
-///
-/// let pair = GearPair { k: 800.0, ..GearPair::paper(0.5) };
-/// let scene = Scene::builder(pair).axis("e", 0.0..=1.0, 64).axis("omega", 1.0..=12.0, 64);
-/// assert_eq!(scene.build()?.cell_count(), 4096);
-/// let wrong = Scene::builder(pair).axis("e", 0.0..=1.5, 64).axis("omega", 1.0..=12.0, 64);
-/// let error = wrong.build().unwrap_err().to_string();
-/// assert_eq!(error, "scene: `axis.0.max = 1.5` is out of range: it must be between 0 and 1, as `e` is");
-/// # Ok::<(), rattlemap::map::scene::SceneError>(())
-/// ```
+/// Builds a scene step by step; [`SceneBuilder::build`] checks it. Anything that is not set has the default of scene files.
 #[derive(Clone, Debug)]
 #[must_use]
 pub struct SceneBuilder {
     model: Box<dyn Model>,
-    title: Option<String>,
-    parameters: Vec<(String, f64)>,
-    derived: Vec<(String, String)>,
-    /// What each sweeps, its name, and the other lines of its table.
-    axes: Vec<(&'static str, String, String)>,
-    /// A table.
+    /// Values as TOML, by table and key. A later value replaces an earlier one.
+    fields: BTreeMap<(&'static str, String), String>,
+    /// Fields of each axis, as TOML.
+    axes: Vec<String>,
+    /// Names of swept parameters.
+    swept: Vec<String>,
+    /// A list of cells as CSV.
     cells: Option<String>,
-    integration: Option<Integration>,
-    start: Start,
-    draw: Option<Draw>,
-    refine: Option<Refine>,
-    quantities: Option<Vec<Quantity>>,
-    files: Option<Vec<Format>>,
 }
 
 impl SceneBuilder {
-    /// Cells have the model's values, but for those of the axes.
+    /// Begins a scene whose cells have the model's values, except for swept parameters.
     pub(super) fn new(model: Box<dyn Model>) -> SceneBuilder {
-        SceneBuilder {
-            model,
-            title: None,
-            parameters: Vec::new(),
-            derived: Vec::new(),
-            axes: Vec::new(),
-            cells: None,
-            integration: None,
-            start: Start::Rest,
-            draw: None,
-            refine: None,
-            quantities: None,
-            files: None,
-        }
+        SceneBuilder { model, fields: BTreeMap::new(), axes: Vec::new(), swept: Vec::new(), cells: None }
     }
 
-    /// The heading of figures and reports.
-    pub fn title(mut self, title: &str) -> SceneBuilder {
-        self.title = Some(title.to_owned());
+    fn set(&mut self, table: &'static str, key: &str, value: impl ToString) {
+        self.fields.insert((table, key.to_owned()), value.to_string());
+    }
+
+    fn with(mut self, table: &'static str, key: &str, value: impl ToString) -> SceneBuilder {
+        self.set(table, key, value);
         self
+    }
+
+    /// Sets the heading of figures and reports.
+    pub fn title(self, title: &str) -> SceneBuilder {
+        self.with("", "title", quoted(title))
     }
 
     /// Sets a parameter that no axis sweeps.
-    pub fn parameter(mut self, name: &str, value: f64) -> SceneBuilder {
-        self.parameters.push((name.to_owned(), value));
-        self
+    pub fn parameter(self, name: &str, value: f64) -> SceneBuilder {
+        self.with("parameters", name, number(value))
     }
 
-    /// Has a parameter follow others: `derived("k2", "0.5*k1")`.
-    pub fn derived(mut self, name: &str, expression: &str) -> SceneBuilder {
-        // A later expression wins over an earlier one.
-        self.derived.retain(|(derived, _)| derived != name);
-        self.derived.push((name.to_owned(), expression.to_owned()));
-        self
+    /// Derives a parameter from others: `derived("k2", "0.5*k1")`.
+    pub fn derived(self, name: &str, expression: &str) -> SceneBuilder {
+        self.with("derived", name, quoted(expression))
     }
 
-    /// Sweeps a parameter over `count` values, both ends included. The first axis is along columns.
+    /// Sweeps a parameter over `count` values with equal differences, both ends included. The first axis runs along columns.
     pub fn axis(self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
-        self.swept(parameter, range_lines(&range, count))
+        self.sweep(parameter, range_lines(&range, count))
     }
 
-    /// The same by equal ratios.
+    /// Sweeps a parameter over `count` values with equal ratios, both ends included.
     pub fn log_axis(self, parameter: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
-        self.swept(parameter, range_lines(&range, count) + "\nscale = \"log\"")
+        self.sweep(parameter, range_lines(&range, count) + "\nscale = \"log\"")
     }
 
-    /// Sweeps a parameter over these values, which increase.
+    /// Sweeps a parameter over increasing values.
     pub fn values_axis(self, parameter: &str, values: &[f64]) -> SceneBuilder {
-        let values: Vec<String> = values.iter().map(|&value| number(value)).collect();
-        self.swept(parameter, format!("values = [{}]", values.join(", ")))
+        self.sweep(parameter, format!("values = {}", list(values.iter().map(|&value| number(value)))))
     }
 
-    fn swept(mut self, parameter: &str, lines: String) -> SceneBuilder {
-        self.axes.push(("parameter", parameter.to_owned(), lines));
+    fn sweep(mut self, parameter: &str, lines: String) -> SceneBuilder {
+        self.swept.push(parameter.to_owned());
+        self.axes.push(format!("parameter = {}\n{lines}", quoted(parameter)));
         self
     }
 
-    /// Sweeps a component of the start, by its name among the model's state names: the map then shows basins.
+    /// Sweeps a component of the start, given by one of the model's state names. The map then shows basins.
     pub fn start_axis(mut self, component: &str, range: RangeInclusive<f64>, count: u32) -> SceneBuilder {
-        self.axes.push(("start", component.to_owned(), range_lines(&range, count)));
+        self.axes.push(format!("start = {}\n{}", quoted(component), range_lines(&range, count)));
         self
     }
 
-    /// Lists cells in the place of axes: values of these parameters or components of the start, row by row.
+    /// Lists the cells instead of axes. Each row has the values of these parameters or components of the start.
     pub fn cells<const N: usize>(mut self, parameters: [&str; N], rows: &[[f64; N]]) -> SceneBuilder {
-        let row = |row: &[f64; N]| row.map(number).join(",");
-        let rows = rows.iter().map(row);
+        self.swept.extend(parameters.map(str::to_owned));
+        let rows = rows.iter().map(|row| row.map(number).join(","));
         let lines: Vec<String> = std::iter::once(parameters.join(",")).chain(rows).collect();
         self.cells = Some(lines.join("\n"));
-        self
+        self.with("cells", "file", quoted("cells.csv"))
     }
 
-    /// How long each cell is integrated, and what for.
+    /// Sets how long each cell is integrated.
     pub fn integration(mut self, integration: Integration) -> SceneBuilder {
-        self.integration = Some(integration);
-        self
+        match integration.steps_per_period {
+            Steps::Auto => self.set("integration", "steps_per_period", quoted("auto")),
+            Steps::PerPeriod(steps) => self.set("integration", "steps_per_period", steps),
+        }
+        self.set("integration", "transient_periods", integration.transient_periods);
+        self.set("integration", "observed_periods", integration.observed_periods);
+        self.set("integration", "early_stop", integration.early_stop);
+        self.set("integration", "undecided_periods", integration.undecided_periods);
+        self.with("integration", "max_period", integration.max_period)
     }
 
-    /// Where cells start: at rest unless told.
+    /// Sets the states in which cells start; at rest by default.
     pub fn start(mut self, start: Start) -> SceneBuilder {
-        self.start = start;
-        self
+        self.fields.remove(&("start", "state".to_owned()));
+        if let Start::State(state) = start {
+            // A nonzero component beyond those of the model is written, so that reading the scene refuses it.
+            let count = self.model.state_names().len();
+            let has_more = state[count..].iter().any(|&x| x != 0.0);
+            let written = if has_more { &state[..] } else { &state[..count] };
+            self.set("start", "state", list(written.iter().map(|&x| number(x))));
+        }
+        self.with("start", "policy", quoted(start.policy()))
     }
 
-    /// Several starts per cell, which are drawn beside the first.
-    pub fn draw(mut self, draw: Draw) -> SceneBuilder {
-        self.draw = Some(draw);
-        self
+    /// Adds random starts to each cell.
+    pub fn draw(self, draw: Draw) -> SceneBuilder {
+        self.with("start", "count", draw.count).with("start", "seed", draw.seed)
     }
 
     /// Makes the map adaptive.
     pub fn refine(mut self, refine: Refine) -> SceneBuilder {
-        self.refine = Some(refine);
+        let continuous = match refine.continuous {
+            Continuous::Interpolated => "interpolated",
+            Continuous::Empty => "empty",
+        };
+        self.set("refine", "minimum_grid", refine.minimum_grid);
+        self.set("refine", "max_error", number(refine.max_error));
+        self.set("refine", "word", refine.word);
+        self.set("refine", "continuous", quoted(continuous));
+        for (key, value) in [("rounds", refine.rounds), ("audit", refine.audit)] {
+            self.fields.remove(&("refine", key.to_owned()));
+            value.iter().for_each(|value| self.set("refine", key, value));
+        }
         self
     }
 
-    /// What is computed: class and Lyapunov exponent unless told.
-    pub fn quantities(mut self, quantities: &[Quantity]) -> SceneBuilder {
-        self.quantities = Some(quantities.to_vec());
-        self
+    /// Sets the quantities that are computed; class and Lyapunov exponent by default.
+    pub fn quantities(self, quantities: &[Quantity]) -> SceneBuilder {
+        self.with("outputs", "quantities", list(quantities.iter().map(|quantity| quoted(quantity.name()))))
     }
 
-    /// What is written, if anything is: all kinds of file unless told.
-    pub fn files(mut self, files: &[Format]) -> SceneBuilder {
-        self.files = Some(files.to_vec());
-        self
+    /// Sets the kinds of files that are written.
+    pub fn files(self, files: &[Format]) -> SceneBuilder {
+        self.with("outputs", "files", list(files.iter().map(|format| quoted(format.name()))))
     }
 
-    /// The scene of a map over two axes.
+    /// Builds the scene of a map.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong.
+    /// [`SceneError`] for the first error.
     pub fn build(self) -> Result<Scene, SceneError> {
         self.build_for(Purpose::Map)
     }
 
-    /// A scene for this purpose.
+    /// Builds a scene for this purpose.
     ///
     /// # Errors
-    /// [`SceneError`] for the first thing that is wrong.
+    /// [`SceneError`] for the first error.
     pub fn build_for(self, purpose: Purpose) -> Result<Scene, SceneError> {
         let text = self.text();
         let document = document::read(&text, "scene")?.placed(Place::Builder);
@@ -176,79 +170,30 @@ impl SceneBuilder {
         Scene::read(text, &document, &*self.model, purpose, &find)
     }
 
-    /// The scene in TOML.
+    /// Writes the scene as TOML. The model's values are added to the parameters that were set.
     fn text(&self) -> String {
-        let mut text = String::new();
-        let mut line = |line: String| {
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "{line}");
-        };
-        self.title.iter().for_each(|title| line(format!("title = {}", quoted(title))));
-        line(format!("model = {}", quoted(&super::models::named(&*self.model))));
-        line("\n[parameters]".to_owned());
-        let mut parameters = self.parameters.clone();
+        let mut all = self.clone();
+        all.set("", "model", quoted(&super::models::named(&*self.model)));
         for (index, parameter) in self.model.parameters().iter().enumerate() {
             let (name, value) = (&*parameter.name, self.model.value(index));
-            let is_told = parameters.iter().any(|(told, _)| told == name)
-                || self.axes.iter().any(|(what, set, _)| *what == "parameter" && set == name)
-                || self.derived.iter().any(|(set, _)| set == name)
-                || self.cells.as_ref().is_some_and(|table| {
-                    table.lines().next().is_some_and(|names| names.split(',').any(|column| column == name))
-                });
-            if !is_told && parameter.default != Some(value) {
-                parameters.push((name.to_owned(), value));
+            let has = |table| self.fields.contains_key(&(table, name.to_owned()));
+            let is_set = has("parameters") || has("derived") || self.swept.iter().any(|swept| swept == name);
+            if !is_set && parameter.default != Some(value) {
+                all.set("parameters", name, number(value));
             }
         }
-        // A later value wins over an earlier one.
-        for (i, (name, value)) in parameters.iter().enumerate() {
-            if !parameters[i + 1..].iter().any(|(later, _)| later == name) {
-                line(format!("{} = {}", quoted(name), number(*value)));
+        let mut text = String::new();
+        let mut table = "";
+        for ((next, key), value) in &all.fields {
+            if *next != table {
+                text += &format!("\n[{next}]\n");
+                table = next;
             }
+            let is_bare = key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+            text += &format!("{} = {value}\n", if is_bare { key.clone() } else { quoted(key) });
         }
-        if !self.derived.is_empty() {
-            line("\n[derived]".to_owned());
-        }
-        for (name, expression) in &self.derived {
-            line(format!("{} = {}", quoted(name), quoted(expression)));
-        }
-        for (what, name, lines) in &self.axes {
-            line(format!("\n[[axis]]\n{what} = {}\n{lines}", quoted(name)));
-        }
-        if self.cells.is_some() {
-            line("\n[cells]\nfile = \"cells.csv\"".to_owned());
-        }
-        self.integration.iter().for_each(|integration| line(integration_table(integration)));
-        line(self.start_table());
-        self.refine.iter().for_each(|refine| line(refine_table(refine)));
-        line("\n[outputs]".to_owned());
-        let names = |names: Vec<&str>| names.into_iter().map(quoted).collect::<Vec<_>>().join(", ");
-        if let Some(quantities) = &self.quantities {
-            let list = names(quantities.iter().map(|quantity| quantity.name()).collect());
-            line(format!("quantities = [{list}]"));
-        }
-        if let Some(files) = &self.files {
-            line(format!("files = [{}]", names(files.iter().map(|format| format.name()).collect())));
-        }
+        all.axes.iter().for_each(|axis| text += &format!("\n[[axis]]\n{axis}\n"));
         text
-    }
-
-    fn start_table(&self) -> String {
-        let policy = match self.start {
-            Start::Rest => "\"rest\"".to_owned(),
-            Start::Up => "\"up\"".to_owned(),
-            Start::Down => "\"down\"".to_owned(),
-            Start::Both => "\"both\"".to_owned(),
-            Start::State(state) => {
-                // Components that the model has not are written only where somebody gave them, and then refused.
-                let count = self.model.state_names().len();
-                let is_its_own = state[count..].iter().all(|&x| x == 0.0);
-                let told = if is_its_own { &state[..count] } else { &state[..] };
-                let numbers: Vec<String> = told.iter().map(|&x| number(x)).collect();
-                format!("\"state\"\nstate = [{}]", numbers.join(", "))
-            }
-        };
-        let draw = self.draw.map(|Draw { count, seed }| format!("\ncount = {count}\nseed = {seed}"));
-        format!("\n[start]\npolicy = {policy}{}", draw.unwrap_or_default())
     }
 }
 
@@ -256,43 +201,12 @@ fn range_lines(range: &RangeInclusive<f64>, count: u32) -> String {
     format!("min = {}\nmax = {}\ncount = {count}", number(*range.start()), number(*range.end()))
 }
 
-fn integration_table(integration: &Integration) -> String {
-    let Integration {
-        steps_per_period,
-        transient_periods,
-        observed_periods,
-        early_stop,
-        undecided_periods,
-        max_period,
-    } = integration;
-    let steps = match steps_per_period {
-        Steps::Auto => "\"auto\"".to_owned(),
-        Steps::PerPeriod(steps) => steps.to_string(),
-    };
-    format!(
-        "\n[integration]\nsteps_per_period = {steps}\ntransient_periods = {transient_periods}\n\
-         observed_periods = {observed_periods}\nearly_stop = {early_stop}\n\
-         undecided_periods = {undecided_periods}\nmax_period = {max_period}"
-    )
+/// Writes a TOML list.
+fn list(items: impl Iterator<Item = String>) -> String {
+    format!("[{}]", items.collect::<Vec<_>>().join(", "))
 }
 
-fn refine_table(refine: &Refine) -> String {
-    let Refine { minimum_grid, rounds, max_error, audit, word, continuous } = *refine;
-    let continuous = match continuous {
-        Continuous::Interpolated => "interpolated",
-        Continuous::Empty => "empty",
-    };
-    let max_error = number(max_error);
-    let optional = |name, value: Option<u32>| value.map_or(String::new(), |n| format!("\n{name} = {n}"));
-    format!(
-        "\n[refine]\nminimum_grid = {minimum_grid}\nmax_error = {max_error}\nword = {word}\n\
-         continuous = \"{continuous}\"{}{}",
-        optional("rounds", rounds),
-        optional("audit", audit)
-    )
-}
-
-/// A TOML string, or a key that any name fits.
+/// Quotes a TOML string or key.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from('"');
     for c in text.chars() {
@@ -309,7 +223,7 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-/// The shortest decimal that reads back as the same number, as TOML writes it.
+/// Writes a number in TOML as the shortest decimal that reads back as the same number.
 fn number(x: f64) -> String {
     if x.is_nan() { "nan".to_owned() } else { format!("{x:?}") }
 }

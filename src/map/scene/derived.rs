@@ -1,4 +1,4 @@
-//! `[derived]`: parameters that follow others.
+//! `[derived]`: parameters that are computed from others.
 
 use super::axis::{meanings, names};
 use super::error::SceneError;
@@ -6,55 +6,55 @@ use super::section::{Field, Section};
 use crate::map::expression::Expression;
 use rattlemap_dynamics::model::{Model, Parameter};
 
-/// Parameters that follow others, in an order in which each comes after those that it follows.
+/// Derived parameters, ordered so that each needs only earlier ones.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Derived(Vec<Rule>);
 
-/// One parameter and its expression.
+/// A derived parameter and its expression.
 #[derive(Clone, Debug)]
 pub(crate) struct Rule {
     parameter: Parameter,
-    /// Of the parameter in the model's table.
+    /// Index of the parameter in the model's table.
     index: usize,
     expression: Expression,
-    /// Parameters that are not derived, by index, on which it depends, through others or not.
+    /// Indices of the parameters that are not derived and on which this one depends, directly or through other rules.
     roots: Vec<usize>,
 }
 
 impl Rule {
-    /// The parameter.
+    /// Returns the parameter.
     pub(crate) fn parameter(&self) -> &Parameter {
         &self.parameter
     }
 
-    /// Its place in the model's table.
+    /// Returns the parameter's index in the model's table.
     pub(crate) fn index(&self) -> usize {
         self.index
     }
 
-    /// The expression as it was written.
+    /// Returns the expression as written.
     pub(crate) fn text(&self) -> &str {
         self.expression.text()
     }
 
-    /// Whether it depends on a parameter, through others or not.
+    /// Whether the derived parameter depends on the parameter `index`, directly or through other rules.
     pub(crate) fn follows(&self, index: usize) -> bool {
         self.roots.contains(&index)
     }
 }
 
 impl Derived {
-    /// The rules, each after those that it follows.
+    /// Returns the rules, ordered so that each needs only earlier ones.
     pub(crate) fn rules(&self) -> &[Rule] {
         &self.0
     }
 
-    /// Whether the parameter of this index is derived.
+    /// Whether the parameter `index` is derived.
     pub(crate) fn has(&self, index: usize) -> bool {
         self.0.iter().any(|rule| rule.index == index)
     }
 
-    /// Computes the derived parameters of a model from its others. They may leave their ranges.
+    /// Computes the derived parameters of `model`. Their values may be outside their ranges.
     pub(crate) fn apply(&self, model: &mut dyn Model) {
         for rule in &self.0 {
             let value = rule.expression.evaluate(&|index| model.value(index));
@@ -63,7 +63,7 @@ impl Derived {
     }
 }
 
-/// Reads `[derived]`. `is_swept` says whether an axis or a column sets a parameter, by index.
+/// Reads `[derived]`. `is_swept(index)` says whether an axis or a column sets a parameter.
 pub(super) fn read(
     root: &Section<'_>,
     model: &dyn Model,
@@ -76,13 +76,14 @@ pub(super) fn read(
     for (name, field) in section.fields() {
         let Some(index) = names.iter().position(|known| *known == name) else { continue };
         if is_swept(index) {
-            return Err(field.conflict("it is swept, too; drop it here, or sweep another parameter".into()));
+            return Err(field.conflict("it is also swept; remove it here, or sweep another parameter"));
         }
-        // An argument wins over the text, but for a value that the text derives: it would be lost unseen.
+        // An expression in an argument overrides a value in the text. A value in an argument does not override an
+        // expression in the text, which would be lost silently.
         if let Some(value) = parameters.get(name)
             && (value.is_argument() || !field.is_argument())
         {
-            return Err(value.conflict(format!("`{}` derives it; drop either", field.path)));
+            return Err(value.conflict(format!("`{}` derives it; remove one of the two", field.path)));
         }
         let expression = field.expression(&names, &meanings(model), "\"0.5*k1\"")?;
         let parameter = model.parameters()[index].clone();
@@ -91,7 +92,7 @@ pub(super) fn read(
     in_order(left)
 }
 
-/// Puts rules in an order in which they can be computed, and finds what each depends on.
+/// Orders rules so that each needs only earlier ones, and finds their roots.
 fn in_order(mut left: Vec<(Field<'_>, Rule)>) -> Result<Derived, SceneError> {
     let mut ordered: Vec<Rule> = Vec::new();
     while !left.is_empty() {
@@ -111,9 +112,9 @@ fn in_order(mut left: Vec<(Field<'_>, Rule)>) -> Result<Derived, SceneError> {
     Ok(Derived(ordered))
 }
 
-/// The error for rules of which none can be computed first.
+/// Builds the error for rules that depend on each other in a circle.
 fn circle(left: &[(Field<'_>, Rule)]) -> SceneError {
-    // Each follows another of them, so that going on leads round.
+    // Each rule depends on another of them, so following the dependencies leads into the circle.
     let next = |at: usize| {
         let uses = left[at].1.expression.uses();
         left.iter().position(|(_, rule)| uses.contains(&rule.index)).unwrap_or(at)
@@ -128,7 +129,8 @@ fn circle(left: &[(Field<'_>, Rule)]) -> SceneError {
     };
     let round = path[begin..].iter().chain([&path[begin]]);
     let named: Vec<&str> = round.map(|&at| &*left[at].1.parameter.name).collect();
-    left[path[begin]]
-        .0
-        .conflict(format!("it follows itself: {}; derive one of them from others", named.join(" <- ")))
+    left[path[begin]].0.conflict(format!(
+        "it depends on itself: {}; derive one of them from other parameters",
+        named.join(" <- ")
+    ))
 }

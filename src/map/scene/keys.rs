@@ -1,54 +1,52 @@
-//! Every key of a scene, once: the parser knows these names, and `docs/scenes.md` is made from them.
+//! Table of every key of a scene. The parser takes its names from here, and `docs/scenes.md` lists it.
 
-use super::axis::MAX_COUNT;
-use super::settings::{LONGEST_TITLE, MAX_PERIODS};
-use super::start::MAX_STARTS;
+use super::limits::{LONGEST_TITLE, MAX_COUNT, MAX_PERIODS, MAX_STARTS};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 
-/// One key.
+/// A key of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
-    /// The table that it stands in; empty for those before any table.
+    /// TOML table that contains the key; empty for keys before any table.
     pub table: &'static str,
-    /// Its name.
+    /// Name of the key.
     pub name: &'static str,
-    /// What holds where it is not written, as TOML.
+    /// Value when the scene does not set the key.
     pub default: KeyDefault,
-    /// What it takes.
+    /// Values that the key accepts.
     pub takes: Takes,
-    /// One phrase.
+    /// Meaning of the key in one phrase.
     pub meaning: &'static str,
 }
 
-/// What holds where a key is not written.
+/// Default of a key.
 #[derive(Clone, Copy, Debug)]
 pub enum KeyDefault {
-    /// This value.
+    /// A value, as TOML.
     Value(&'static str),
-    /// What the words say.
+    /// A default that depends on the scene, in words.
     Words(&'static str),
-    /// Nothing: it must be written where it applies.
+    /// No default.
     None,
 }
 
-/// The values that a key takes.
+/// Values that a key accepts.
 #[derive(Clone, Copy, Debug)]
 pub enum Takes {
-    /// A whole number between these, ends included.
+    /// A whole number in this range, both ends included.
     Whole(u32, u32),
-    /// The same, or "auto".
+    /// A whole number in this range, both ends included, or "auto".
     WholeOrAuto(u32, u32),
-    /// A number between 0 and 1, ends excluded.
+    /// A number between 0 and 1, both ends excluded.
     Fraction,
     /// true or false.
     Flag,
-    /// One of these names.
+    /// One of these texts.
     OneOf(&'static [&'static str]),
-    /// A list of some of these names.
+    /// A list of some of these texts.
     List(&'static [&'static str]),
-    /// Text of at most so many characters.
+    /// Text with at most this number of characters.
     Text(usize),
-    /// What the words say; it depends on the model.
+    /// Values that depend on the model, in words.
     Words(&'static str),
 }
 
@@ -64,53 +62,53 @@ const fn key(
     Key { table, name, default, takes, meaning }
 }
 
-const END: Takes = Takes::Words("the parameter's range; of a start any finite number");
+const END: Takes = Takes::Words("the range of the parameter; any finite number for a start");
 
-/// Every key, in the order in which messages list them; `[parameters]` has those of the model.
+/// All keys, in the order in which messages list them. The keys of `[parameters]` are the parameters of the model.
 #[rustfmt::skip]
 pub const KEYS: &[Key] = &[
-    key("", "title", Words("from the axes"), Takes::Text(LONGEST_TITLE), "heading of figures and of the report"),
-    key("", "model", Value("\"gear-pair\""), Takes::Words("a name that `rattlemap models` lists, or the path of a model's file (`.toml`), from the scene's folder"), "what moves"),
-    key("axis", "parameter", KeyDefault::None, Takes::Words("a parameter of the model"), "what the axis sweeps; the first axis runs along columns"),
-    key("axis", "start", KeyDefault::None, Takes::Words("a component of the start, such as v1"), "what the axis sweeps instead: cells then belong to basins"),
+    key("", "title", Words("made from the axes"), Takes::Text(LONGEST_TITLE), "heading of figures and of the report"),
+    key("", "model", Value("\"gear-pair\""), Takes::Words("a name that `rattlemap models` lists, or the path of a model file (`.toml`), relative to the scene"), "the oscillator"),
+    key("axis", "parameter", KeyDefault::None, Takes::Words("a parameter of the model"), "parameter that varies along the axis; the first axis is horizontal"),
+    key("axis", "start", KeyDefault::None, Takes::Words("a component of the start, such as v1"), "instead of `parameter`: start component that varies along the axis (basins of attraction)"),
     key("axis", "min", KeyDefault::None, END, "first value"),
     key("axis", "max", KeyDefault::None, END, "last value, greater than min"),
-    key("axis", "count", KeyDefault::None, Takes::Whole(2, MAX_COUNT), "how many values, both ends included"),
-    key("axis", "scale", Value("\"linear\""), Takes::OneOf(&["linear", "log"]), "values by equal differences, or by equal ratios (min above 0)"),
-    key("axis", "values", KeyDefault::None, Takes::Words("2 to 1000000 numbers in the parameter's range, each greater than the one before"), "the values themselves, in the place of min, max, count and scale"),
-    key("cells", "file", KeyDefault::None, Takes::Words("path of a CSV table, from the scene's folder"), "cells in the place of axes: a column per parameter or component of the start, a row per cell"),
-    key("integration", "steps_per_period", Value("\"auto\""), Takes::WholeOrAuto(1, MOST_STEPS), "grid of the lanes; the reference has none"),
-    key("integration", "transient_periods", Value("400"), Takes::Whole(1, MAX_PERIODS), "forcing periods before anything is read; an upper bound where cells may stop early"),
-    key("integration", "observed_periods", Value("128"), Takes::Whole(2, MAX_PERIODS), "forcing periods after that, likewise"),
-    key("integration", "early_stop", Value("true"), Takes::Flag, "cells stop once they are decided"),
-    key("integration", "undecided_periods", Value("0"), Takes::Whole(0, MAX_PERIODS), "periods that undecided cells get beyond these, with early stops alone"),
-    key("integration", "max_period", Value("64"), Takes::Whole(1, LONGEST_CYCLE), "longest cycle that is searched for; at most, and by default no more than, half of observed_periods"),
-    key("start", "policy", Value("\"rest\""), Takes::OneOf(&["rest", "state", "up", "down", "both"]), "where cells start; up and down: where the neighbour along the last axis ended; both: up and down in one `bifurcation`"),
-    key("start", "state", KeyDefault::None, Takes::Words("[x1, v1, x2, v2], finite"), "state at phase 0, with policy = \"state\" alone"),
-    key("start", "count", Value("1"), Takes::Whole(1, MAX_STARTS), "starts per cell of a map, all but the first drawn at random"),
-    key("start", "seed", Value("1"), Takes::Whole(0, u32::MAX), "decides the draw, with a count above 1 alone"),
-    key("refine", "minimum_grid", Value("8"), Takes::Whole(1, 1024), "every so many cells along an axis one is integrated in any case"),
-    key("refine", "rounds", Words("down to single cells"), Takes::Whole(0, 32), "how often a block is halved at most"),
-    key("refine", "max_error", Value("0.003"), Takes::Fraction, "share of filled cells that may be wrong; above it the map is refined further"),
-    key("refine", "audit", Words("2000, or a quarter of what is filled"), Takes::Whole(1, 10_000_000), "filled cells that an audit integrates at first"),
-    key("refine", "word", Value("false"), Takes::Flag, "a change of the word alone is a border; of the pattern alone, where patterns are asked for"),
+    key("axis", "count", KeyDefault::None, Takes::Whole(2, MAX_COUNT), "number of values, both ends included"),
+    key("axis", "scale", Value("\"linear\""), Takes::OneOf(&["linear", "log"]), "linear: equal differences; log: equal ratios (min above 0)"),
+    key("axis", "values", KeyDefault::None, Takes::Words("2 to 1000000 increasing numbers in the range of the parameter"), "instead of min, max, count and scale: list of the values"),
+    key("cells", "file", KeyDefault::None, Takes::Words("path of a CSV table, relative to the scene"), "instead of axes: a table with one row per cell and one column per parameter or start component"),
+    key("integration", "steps_per_period", Value("\"auto\""), Takes::WholeOrAuto(1, MOST_STEPS), "steps per forcing period on the GPU engine; the CPU engine has no fixed step"),
+    key("integration", "transient_periods", Value("400"), Takes::Whole(1, MAX_PERIODS), "forcing periods before the motion is analysed; with early stops, the maximum"),
+    key("integration", "observed_periods", Value("128"), Takes::Whole(2, MAX_PERIODS), "forcing periods in which the motion is analysed; with early stops, the maximum"),
+    key("integration", "early_stop", Value("true"), Takes::Flag, "stop a cell as soon as its class is decided"),
+    key("integration", "undecided_periods", Value("0"), Takes::Whole(0, MAX_PERIODS), "additional periods for undecided cells; needs early_stop"),
+    key("integration", "max_period", Value("64"), Takes::Whole(1, LONGEST_CYCLE), "longest period that is searched for, at most half of observed_periods; the default is lowered to that half"),
+    key("start", "policy", Value("\"rest\""), Takes::OneOf(&["rest", "state", "up", "down", "both"]), "rest or state: every cell starts there; up or down: a cell starts from the final state of its neighbour along the last axis; both: up and down in one `bifurcation`"),
+    key("start", "state", KeyDefault::None, Takes::Words("[x1, v1, x2, v2], finite"), "state at phase 0, for policy = \"state\""),
+    key("start", "count", Value("1"), Takes::Whole(1, MAX_STARTS), "starts per cell of a map; all except the first are random"),
+    key("start", "seed", Value("1"), Takes::Whole(0, u32::MAX), "seed of the random starts, for count above 1"),
+    key("refine", "minimum_grid", Value("8"), Takes::Whole(1, 1024), "along each axis, at least every n-th cell is integrated"),
+    key("refine", "rounds", Words("until blocks are single cells"), Takes::Whole(0, 32), "maximum number of times that a block is halved"),
+    key("refine", "max_error", Value("0.003"), Takes::Fraction, "accepted share of wrong filled cells; if the audit finds more, the map is refined further"),
+    key("refine", "audit", Words("2000, or a quarter of the filled cells"), Takes::Whole(1, 10_000_000), "number of filled cells that the first audit integrates"),
+    key("refine", "word", Value("false"), Takes::Flag, "also refine where only the word changes (only the pattern, if the scene requests patterns)"),
     key("refine", "continuous", Value("\"interpolated\""), Takes::OneOf(&["interpolated", "empty"]), "exponent, impacts and mesh fraction of filled cells"),
-    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]), "what is not asked for is not computed"),
-    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "what is written; png, svg and pdf are figures; `bifurcation` knows them and csv, a list of cells csv and npy"),
+    key("outputs", "quantities", Value("[\"class\", \"lyapunov\"]"), Takes::List(&["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]), "quantities to compute"),
+    key("outputs", "files", Value("[\"csv\", \"npy\", \"png\", \"html\"]"), Takes::List(&["csv", "npy", "png", "svg", "pdf", "html"]), "files to write; png, svg and pdf are figures. `bifurcation` accepts figures and csv; a list of cells accepts csv and npy"),
 ];
 
-/// The names in one table.
+/// Returns the names of the keys in one table.
 pub(super) fn names(table: &str) -> Vec<&'static str> {
     KEYS.iter().filter(|key| key.table == table).map(|key| key.name).collect()
 }
 
 impl Takes {
-    /// In words.
+    /// Describes the accepted values in words.
     pub fn in_words(self) -> String {
         match self {
             Takes::Whole(least, most) => format!("{least} to {most}"),
             Takes::WholeOrAuto(least, most) => format!("\"auto\" or {least} to {most}"),
-            Takes::Fraction => "between 0 and 1, ends excluded".to_owned(),
+            Takes::Fraction => "between 0 and 1, both ends excluded".to_owned(),
             Takes::Flag => "true or false".to_owned(),
             Takes::OneOf(names) => names.join(", "),
             Takes::List(names) => format!("a list of {}", names.join(", ")),
@@ -121,7 +119,7 @@ impl Takes {
 }
 
 impl KeyDefault {
-    /// In words; a dash where there is none.
+    /// Describes the default in words; a dash if there is none.
     pub fn in_words(self) -> &'static str {
         match self {
             Value(words) | Words(words) => words,

@@ -1,4 +1,4 @@
-//! `[cells]`: a table of cells in the place of axes.
+//! `[cells]`: a table of cells instead of axes.
 
 use std::fmt::Write;
 
@@ -7,71 +7,71 @@ use sha2::{Digest, Sha256};
 use super::Purpose;
 use super::axis::{Target, component, meanings, names};
 use super::document::shorten;
-use super::error::{Place, Problem, SceneError, suggest};
+use super::error::{Fault, Place, Problem, SceneError, suggest};
 use super::keys;
-use super::section::{Field, Section};
+use super::section::Section;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 
-/// A file beside a scene, as whoever reads the scene has found it.
+/// A file that a scene names, as the caller has read it.
 #[derive(Clone, Debug)]
 pub struct FileText {
-    /// What messages call it.
+    /// Name of the file in messages.
     pub name: String,
-    /// What it holds.
+    /// Contents of the file.
     pub text: String,
 }
 
-/// What a scene names a file for.
+/// Purposes for which a scene names a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Beside {
+pub enum CompanionFile {
     /// A table of cells.
     Cells,
     /// A model.
     Model,
 }
 
-/// Finds a file beside a scene, by its name in the scene; the error says why it cannot be read.
-pub type FindFile<'f> = &'f dyn Fn(Beside, &str) -> Result<FileText, String>;
+/// Reads a file that a scene names. The error says why it cannot be read.
+pub type FindFile<'f> = &'f dyn Fn(CompanionFile, &str) -> Result<FileText, String>;
 
-/// A list of cells: parameters or components of the start, and a value of each per cell.
+/// A list of cells: columns set parameters or components of the start, rows are cells.
 #[derive(Clone, Debug)]
 pub struct List {
     file: String,
-    columns: Vec<Column>,
-    /// Row by row.
+    columns: Vec<ListColumn>,
+    /// All rows, one after the other.
     values: Vec<f64>,
     hash: String,
 }
 
-/// What one column of a list sets.
+/// The quantity that one column sets.
 #[derive(Clone, Debug)]
-struct Column {
+struct ListColumn {
     parameter: Parameter,
     target: Target,
 }
 
 impl List {
-    /// The file's name in the scene.
+    /// Returns the file's name in the scene.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// The parameters, or components of the start, of its columns, in their order.
+    /// Returns the parameters or components of the start that the columns set.
     pub fn parameters(&self) -> impl ExactSizeIterator<Item = &Parameter> {
         self.columns.iter().map(|column| &column.parameter)
     }
 
-    /// How many cells there are, at least one.
+    /// Returns the number of cells, at least 1.
     pub fn len(&self) -> usize {
         self.values.len() / self.columns.len()
     }
 
-    /// No list is.
+    /// Whether the list has no cells; always false.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// The values of a cell, in the order of the columns.
+    /// Returns the values of a cell, one per column.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -80,12 +80,12 @@ impl List {
         &self.values[cell * columns..(cell + 1) * columns]
     }
 
-    /// A hash of names and values, SHA-256: lists of the same hash are the same cells.
+    /// Returns the SHA-256 hash of the columns' names and the values.
     pub fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// The list as a table that reads back as the same: names, then numbers as shortest decimals.
+    /// Writes the list as CSV that reads back as an equal list: names, then numbers as shortest decimals.
     pub fn to_csv(&self) -> String {
         let names: Vec<&str> = self.parameters().map(|parameter| &*parameter.name).collect();
         let mut text = names.join(",") + "\n";
@@ -99,23 +99,23 @@ impl List {
         text
     }
 
-    /// What the columns set.
+    /// Returns the quantities that the columns set.
     pub(crate) fn targets(&self) -> impl ExactSizeIterator<Item = Target> {
         self.columns.iter().map(|column| column.target)
     }
 
-    /// Gives a model the values of a cell.
+    /// Sets the parameters of a cell in `model`.
     pub(crate) fn set(&self, model: &mut dyn Model, cell: usize) {
         self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.set(model, value));
     }
 
-    /// Gives a start the values of a cell.
+    /// Sets the components of a cell in `start`.
     pub(crate) fn begin(&self, start: &mut State, cell: usize) {
         self.targets().zip(self.row(cell)).for_each(|(target, &value)| target.begin(start, value));
     }
 }
 
-/// Reads `[cells]` and the file that it names; none where the scene has no such table.
+/// Reads `[cells]` and the file that it names; returns none if the scene has no such table.
 pub(super) fn read(
     root: &Section<'_>,
     model: &dyn Model,
@@ -125,21 +125,21 @@ pub(super) fn read(
     let section = root.section("cells", &keys::names("cells"))?;
     let Some(cells) = root.get("cells") else { return Ok(None) };
     if purpose == Purpose::Bifurcation {
-        return Err(cells.conflict("`bifurcation` takes an axis; a list of cells is for `map`".into()));
+        return Err(cells.conflict("`bifurcation` needs an axis; a list of cells is for `map`"));
     }
     if let Some(axis) = root.get("axis") {
-        return Err(axis.conflict("[cells] says which cells there are; drop [[axis]] or [cells]".into()));
+        return Err(axis.conflict("[cells] lists the cells instead of axes; remove [[axis]] or [cells]"));
     }
     let field = section.require("file", "name a table, such as file = \"points.csv\"")?;
     let file = field.text()?.to_owned();
-    let found = find(Beside::Cells, &file).map_err(|reason| field.unreadable(&reason))?;
+    let found = find(CompanionFile::Cells, &file).map_err(|reason| field.unreadable(&reason))?;
     let (columns, values) = table(&found, model)?;
     let names: Vec<&str> = columns.iter().map(|column| &*column.parameter.name).collect();
     let hash = hash(&names, values.iter().copied());
     Ok(Some(List { file, columns, values, hash }))
 }
 
-/// SHA-256 of names and of the bits of numbers.
+/// Computes the SHA-256 hash of names and of the bits of numbers.
 pub(super) fn hash(names: &[&str], values: impl Iterator<Item = f64>) -> String {
     let mut hasher = Sha256::new();
     for name in names {
@@ -150,9 +150,9 @@ pub(super) fn hash(names: &[&str], values: impl Iterator<Item = f64>) -> String 
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Columns and values of a table.
-fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<Column>, Vec<f64>), SceneError> {
-    // Spreadsheets begin a file with a mark of its byte order.
+/// Reads the columns and values of a table.
+fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<ListColumn>, Vec<f64>), SceneError> {
+    // Spreadsheets write a byte-order mark at the beginning.
     let text = file.text.strip_prefix('\u{feff}').unwrap_or(&file.text);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let damaged = |error: csv::Error| {
@@ -174,22 +174,17 @@ fn table(file: &FileText, model: &dyn Model) -> Result<(Vec<Column>, Vec<f64>), 
         for (i, (column, text)) in columns.iter().zip(&record).enumerate() {
             let (field, value) = (column.parameter.name.to_string(), shorten(text));
             let at = |problem| wrong(file, line, i + 1, problem);
-            let number: f64 = text.parse().map_err(|_| {
-                at(Problem::WrongType {
-                    field: field.clone(),
-                    value: value.clone(),
-                    expected: "a number".into(),
-                })
-            })?;
+            let number: f64 =
+                text.parse().map_err(|_| at(Problem::value(Fault::WrongType, &field, &value, "a number")))?;
             if !column.parameter.range.contains(number) {
-                let requirement = column.parameter.range.requirement().into_owned();
-                return Err(at(Problem::OutOfRange { field, value, requirement }));
+                let requirement = column.parameter.range.requirement();
+                return Err(at(Problem::value(Fault::OutOfRange, field, value, requirement)));
             }
             values.push(number);
         }
     }
     if values.is_empty() {
-        let message = "it lists no cells; write a line of numbers for each".to_owned();
+        let message = "it has no cells; write a line of numbers for each cell".to_owned();
         return Err(wrong(file, 1, 1, Problem::Table { message }));
     }
     Ok((columns, values))
@@ -199,8 +194,8 @@ fn columns(
     file: &FileText,
     header: &csv::StringRecord,
     model: &dyn Model,
-) -> Result<Vec<Column>, SceneError> {
-    let mut columns: Vec<Column> = Vec::new();
+) -> Result<Vec<ListColumn>, SceneError> {
+    let mut columns: Vec<ListColumn> = Vec::new();
     for (i, name) in header.iter().enumerate() {
         let (field, value) = (format!("column {}", i + 1), shorten(name));
         let at = |problem| wrong(file, 1, i + 1, problem);
@@ -210,22 +205,23 @@ fn columns(
                 (Ok(index), _) => (Target::Parameter(index), model.parameters()[index].clone()),
                 (Err(_), Some(place)) => (Target::Start(place), component(model, place)),
                 (Err(_), None) => {
-                    let all = format!("{}; or of the start {}", meanings(model), components.join(", "));
+                    let all =
+                        format!("{}; components of the start: {}", meanings(model), components.join(", "));
                     let remedy = suggest(name, &[names(model), components].concat(), &all);
-                    return Err(at(Problem::UnknownName { field, value, remedy }));
+                    return Err(at(Problem::value(Fault::UnknownName, field, value, remedy)));
                 }
             };
         if columns.iter().any(|before| before.target == target) {
-            let remedy = "another column sets it already; drop either".to_owned();
-            return Err(at(Problem::Conflict { field, value, remedy }));
+            let remedy = "another column sets it; remove one of the two";
+            return Err(at(Problem::value(Fault::Conflict, field, value, remedy)));
         }
-        columns.push(Column { parameter, target });
+        columns.push(ListColumn { parameter, target });
     }
     match columns.is_empty() {
         false => Ok(columns),
         true => {
             let message =
-                "it is empty; write a line with names of parameters, and a line of numbers for each cell";
+                "it is empty; write a line with parameter names, then a line of numbers for each cell";
             Err(wrong(file, 1, 1, Problem::Table { message: message.to_owned() }))
         }
     }
@@ -235,23 +231,19 @@ fn fields(count: u64) -> String {
     if count == 1 { "1 field".to_owned() } else { format!("{count} fields") }
 }
 
-/// An error in a table: its columns count fields, not characters.
+/// Builds an error at a place in a table. `column` counts fields, not characters.
 fn wrong(file: &FileText, line: u64, column: usize, problem: Problem) -> SceneError {
     let place = Place::Text { file: file.name.as_str().into(), line: line as usize, column };
     SceneError { place, problem }
 }
 
-/// Refuses what does not go with a list.
+/// Refuses settings that need neighbouring cells.
 pub(super) fn check(root: &Section<'_>, follows: bool) -> Result<(), SceneError> {
-    let conflict = |field: Field<'_>, remedy: &str| Err(field.conflict(remedy.to_owned()));
     if let Some(refine) = root.get("refine") {
-        return conflict(refine, "cells of a list have no neighbours to be filled from; drop [refine]");
+        return Err(refine.conflict("cells of a list have no neighbours to be filled from; remove [refine]"));
     }
     let policy = root.section("start", &keys::names("start"))?.get("policy");
-    match policy.filter(|_| follows) {
-        Some(policy) => {
-            conflict(policy, "cells of a list have no neighbours to start from; use \"rest\" or \"state\"")
-        }
-        None => Ok(()),
-    }
+    policy.filter(|_| follows).map_or(Ok(()), |policy| {
+        Err(policy.conflict("cells of a list have no neighbours to start from; use \"rest\" or \"state\""))
+    })
 }

@@ -1,18 +1,18 @@
-//! `--set NAME=VALUE`: values that win over the scene's own.
+//! `--set NAME=VALUE`: arguments that override the scene's text.
 
 use std::sync::Arc;
 
 use super::TOP_LEVEL;
 use super::document::{Node, Table, Value, read_argument, shorten};
-use super::error::{Place, Problem, SceneError};
+use super::error::{Fault, Place, Problem, SceneError};
 
-/// Names in a path: more than any setting has, and few enough to go down by recursion.
+/// Largest number of names in a path: more than any setting has, and few enough for recursion.
 const DEEPEST: usize = 8;
 
 /// Writes the value of one `NAME=VALUE` argument into the tree.
 ///
-/// `e=0.6` means `parameters.e`; other settings go by full path, axes by number from 0.
-/// Names are not checked here: whoever reads the tree does that for every origin alike.
+/// `e=0.6` means `parameters.e`. Other settings need their full path; axes are numbered from 0. Names are checked later,
+/// when the tree is read.
 pub(super) fn apply(document: &mut Node, argument: &str) -> Result<(), SceneError> {
     let argument: Arc<str> = argument.into();
     let fail = |problem| SceneError { place: Place::Set { argument: argument.clone() }, problem };
@@ -29,20 +29,22 @@ pub(super) fn apply(document: &mut Node, argument: &str) -> Result<(), SceneErro
     }
     let node = read_argument(value, &argument);
     let unknown = |remedy| {
-        let (field, value) = (shorten(&path.join(".")), node.shown.clone());
-        fail(Problem::UnknownField { field, value, remedy })
+        let (field, value) = (shorten(&path.join(".")), node.excerpt.clone());
+        fail(Problem::value(Fault::UnknownField, field, value, remedy))
     };
     if path.len() > DEEPEST {
-        return Err(unknown("no setting lies as deep; the deepest are such as axis.0.count".to_owned()));
+        return Err(unknown(
+            "no setting has so many names; the longest paths are such as axis.0.count".to_owned(),
+        ));
     }
     insert(document, &path, &node).map_err(unknown)
 }
 
-/// Puts `leaf` at `path` below `parent`, making tables on the way; the error is the remedy.
+/// Puts `leaf` at `path` below `parent` and creates missing tables. The error is the remedy for the message.
 fn insert(parent: &mut Node, path: &[&str], leaf: &Node) -> Result<(), String> {
     let (name, rest) = match path {
         [] => {
-            // Keep the place of the argument, not of the value that it replaces.
+            // The node gets the place of the argument, not of the value that it replaces.
             *parent = leaf.clone();
             return Ok(());
         }
@@ -51,7 +53,7 @@ fn insert(parent: &mut Node, path: &[&str], leaf: &Node) -> Result<(), String> {
     match &mut parent.value {
         Value::Table(table) => {
             let empty =
-                || Node { value: Value::Table(Table::new()), shown: "{ ... }".into(), ..leaf.clone() };
+                || Node { value: Value::Table(Table::new()), excerpt: "{ ... }".into(), ..leaf.clone() };
             insert(table.entry(name.to_owned()).or_insert_with(empty), rest, leaf)
         }
         Value::List(items) => {
@@ -64,6 +66,6 @@ fn insert(parent: &mut Node, path: &[&str], leaf: &Node) -> Result<(), String> {
                 )),
             }
         }
-        _ => Err(format!("`{}` has no fields; drop `.{}`", parent.shown, shorten(name))),
+        _ => Err(format!("`{}` has no fields; remove `.{}`", parent.excerpt, shorten(name))),
     }
 }

@@ -1,4 +1,4 @@
-//! `[parameters]`: the base from which every cell is made.
+//! `[parameters]`: values of the parameters that are neither swept nor derived.
 
 use super::axis::{self, Axis, Target, meanings, names};
 use super::derived::Derived;
@@ -7,15 +7,15 @@ use super::list::List;
 use super::section::{Field, Section};
 use rattlemap_dynamics::model::{Model, Parameter};
 
-/// What sets a cell's parameters beside `[parameters]`.
+/// The parts of a scene, other than `[parameters]`, that set parameters.
 #[derive(Clone, Copy)]
-pub(super) struct Beside<'a> {
+pub(super) struct ParameterSources<'a> {
     pub(super) axes: &'a [Axis],
     pub(super) list: Option<&'a List>,
     pub(super) derived: &'a Derived,
 }
 
-impl Beside<'_> {
+impl ParameterSources<'_> {
     fn axis(&self, index: usize) -> Option<usize> {
         self.axes.iter().position(|axis| axis.target() == Target::Parameter(index))
     }
@@ -25,35 +25,35 @@ impl Beside<'_> {
     }
 }
 
-/// Reads `[parameters]`; what is set beside it comes later.
+/// Reads `[parameters]`. Swept parameters get their first value; derived ones are computed later.
 ///
-/// A parameter that is an axis or a column must not be set as well, except that an axis named by a `--set`
-/// argument replaces the value in the scene's text: arguments win over the text.
+/// A parameter must not be both set here and swept by an axis or a column. One exception: if a `--set` argument names
+/// the axis' parameter, it overrides the value in the text.
 pub(super) fn read(
     root: &Section<'_>,
     model: &dyn Model,
-    beside: Beside<'_>,
+    sources: ParameterSources<'_>,
 ) -> Result<Box<dyn Model>, SceneError> {
     let section = root.section_among("parameters", &names(model), &meanings(model))?;
-    let mut base = model.boxed();
+    let mut base = model.clone_model();
     for (index, parameter) in model.parameters().iter().enumerate() {
         let name = &*parameter.name;
         let field = section.get(name);
-        if let (Some(field), Some(list)) = (&field, beside.column(index)) {
+        if let (Some(field), Some(list)) = (&field, sources.column(index)) {
             let file = list.file();
-            return Err(field.conflict(format!("a column of `{file}` sets it; drop either")));
+            return Err(field.conflict(format!("a column of `{file}` sets it; remove one of the two")));
         }
-        if beside.column(index).is_some() || beside.derived.has(index) {
+        if sources.column(index).is_some() || sources.derived.has(index) {
             continue;
         }
-        let value = match (field, beside.axis(index)) {
+        let value = match (field, sources.axis(index)) {
             (Some(field), Some(i)) if field.is_argument() || !axis::named(root, i)?.is_argument() => {
                 return Err(field.conflict(format!(
-                    "axis {i} sweeps `{name}`; set `axis.{i}.min` and `axis.{i}.max`, or drop one of the two"
+                    "axis {i} sweeps `{name}`; set `axis.{i}.min` and `axis.{i}.max`, or remove one of the two"
                 )));
             }
-            (Some(field), None) => given(&field, parameter)?,
-            (_, Some(i)) => beside.axes[i].min(),
+            (Some(field), None) => read_value(&field, parameter)?,
+            (_, Some(i)) => sources.axes[i].min(),
             (None, None) => parameter.default.ok_or_else(|| {
                 let remedy = format!(
                     "{} has no default: set it under [parameters] or make it an axis",
@@ -62,13 +62,13 @@ pub(super) fn read(
                 section.missing(name, &remedy)
             })?,
         };
-        // In range: checked above, or the table's own default.
+        // The value is in range: it was checked above, or it is the model's default.
         base.assign(index, value);
     }
     Ok(base)
 }
 
-fn given(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError> {
+fn read_value(field: &Field<'_>, parameter: &Parameter) -> Result<f64, SceneError> {
     let value = field.number()?;
     match parameter.range.contains(value) {
         true => Ok(value),

@@ -1,4 +1,4 @@
-//! The points of a sweep: which parameters and components of the start the cells differ in, and what each has.
+//! The points of a sweep: the values of the swept quantities in each cell.
 
 use std::sync::Arc;
 
@@ -7,19 +7,19 @@ use super::derived::Derived;
 use super::list::List;
 use rattlemap_dynamics::model::{Model, Parameter, State};
 
-/// All cells of a scene, numbered from 0: along the first axis, then along the second; or in the order of a list.
+/// All cells of a scene, numbered from 0: along the first axis, then along the second; or in the order of the list.
 #[derive(Clone, Debug)]
 pub(crate) struct Points {
     /// The model in the first cell.
     base: Box<dyn Model>,
-    /// One or two; none where there is a list.
+    /// One or two axes; empty for a list.
     axes: Vec<Axis>,
     list: Option<Arc<List>>,
     derived: Derived,
 }
 
 impl Points {
-    /// From a model whose fixed parameters are set.
+    /// Builds the points from a model whose fixed parameters are set.
     pub(super) fn new(base: Box<dyn Model>, axes: Vec<Axis>, list: Option<List>, derived: Derived) -> Points {
         let mut points = Points { base, axes, list: list.map(Arc::new), derived };
         points.base = points.model(0);
@@ -42,7 +42,7 @@ impl Points {
         &self.derived
     }
 
-    /// Cells along the first axis and the second; a list is one row.
+    /// Returns the numbers of cells along the first and the second axis. A list is one row.
     pub(crate) fn counts(&self) -> [usize; 2] {
         match &self.list {
             Some(list) => [list.len(), 1],
@@ -50,13 +50,13 @@ impl Points {
         }
     }
 
-    /// Places of a cell on the two axes.
+    /// Returns the indices of a cell on the two axes.
     pub(crate) fn indices(&self, cell: usize) -> [usize; 2] {
         let [columns, _] = self.counts();
         [cell % columns, cell / columns]
     }
 
-    /// The model of a cell.
+    /// Returns the model of a cell.
     pub(crate) fn model(&self, cell: usize) -> Box<dyn Model> {
         let mut model = self.base.clone();
         match &self.list {
@@ -67,7 +67,7 @@ impl Points {
         model
     }
 
-    /// The start of a cell: components that cells differ in from there, the others from `start`.
+    /// Returns the start of a cell: `start` with the swept components replaced.
     pub(crate) fn start(&self, cell: usize, mut start: State) -> State {
         match &self.list {
             Some(list) => list.begin(&mut start, cell),
@@ -81,18 +81,18 @@ impl Points {
         self.targets().any(Target::is_start)
     }
 
-    /// What cells differ in: the axes' parameters or components of the start, or the list's.
+    /// Returns the swept parameters or components of the start.
     pub(crate) fn swept(&self) -> impl Iterator<Item = &Parameter> {
         let listed = self.list.iter().flat_map(|list| list.parameters());
         self.axes.iter().map(Axis::parameter).chain(listed)
     }
 
-    /// The same by what they set.
+    /// Returns the targets of the axes or columns.
     pub(crate) fn targets(&self) -> impl Iterator<Item = Target> {
         self.axes.iter().map(Axis::target).chain(self.list.iter().flat_map(|list| list.targets()))
     }
 
-    /// Values of what is swept in a cell.
+    /// Returns the values of the swept quantities in a cell.
     pub(crate) fn values(&self, cell: usize) -> Vec<f64> {
         match &self.list {
             Some(list) => list.row(cell).to_vec(),
@@ -100,13 +100,13 @@ impl Points {
         }
     }
 
-    /// The same in words.
+    /// Describes a cell by the values of the swept quantities, such as `e = 0.5, omega = 5.6`.
     pub(crate) fn named(&self, cell: usize) -> String {
         let named = self.swept().zip(self.values(cell)).map(|(p, value)| format!("{} = {value:?}", p.name));
         named.collect::<Vec<_>>().join(", ")
     }
 
-    /// Whether what `is_shaped` names depends on a swept parameter: directly, or by one that is derived from it.
+    /// Whether `is_shaped` holds for the parameter `index` or for a parameter that is derived from it.
     pub(crate) fn shapes(&self, index: usize, is_shaped: impl Fn(&Parameter) -> bool) -> bool {
         let rules = self.derived.rules().iter();
         is_shaped(&self.base.parameters()[index])

@@ -4,39 +4,34 @@ use super::Purpose;
 use super::document::Value;
 use super::error::SceneError;
 use super::keys;
+use super::limits::{LONGEST_TITLE, MAX_PERIODS};
 use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
 use rattlemap_dynamics::orbit;
 
-/// The most forcing periods that one field may ask for.
-pub(super) const MAX_PERIODS: u32 = 1_000_000_000;
-
-/// Characters of a title: figures have one line for it.
-pub(super) const LONGEST_TITLE: usize = 200;
-
-/// How fine the lanes' time grid is.
+/// Resolution of the lanes' time grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Steps {
-    /// Chosen per cell from its fastest motion.
+    /// Chosen for each cell from its fastest motion.
     Auto,
-    /// The same number of steps per forcing period everywhere.
+    /// This number of steps per forcing period in every cell.
     PerPeriod(u32),
 }
 
-/// How long each cell is integrated, and what for.
+/// How long each cell is integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integration {
-    /// Grid of the lane engines; the event-driven reference has none.
+    /// Time grid of the lanes. The event-driven reference has none.
     pub steps_per_period: Steps,
-    /// Forcing periods before anything is observed.
+    /// Number of forcing periods before the observation.
     pub transient_periods: u32,
-    /// Forcing periods to observe.
+    /// Number of observed forcing periods.
     pub observed_periods: u32,
-    /// Whether a lane may stop as soon as its class is certain.
+    /// Whether a cell may stop as soon as its class is certain.
     pub early_stop: bool,
-    /// Periods that undecided cells get beyond these; with early stops alone.
+    /// Number of further periods for undecided cells. It needs `early_stop`.
     pub undecided_periods: u32,
-    /// Longest cycle that is searched for, at most half the observed periods.
+    /// Longest cycle that is searched for; at most half of the observed periods.
     pub max_period: u32,
 }
 
@@ -64,29 +59,28 @@ impl From<&Integration> for orbit::Settings {
     }
 }
 
-/// Bounds of an adaptive map.
+/// Settings of an adaptive map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refine {
-    /// Every this many cells along an axis one is integrated in any case.
+    /// Distance of the lines of the coarse grid, in cells. Cells where lines cross are always integrated.
     pub minimum_grid: u32,
-    /// Times that blocks are halved at most; none for as many as it takes to come down to single cells.
-    /// Where the audit finds a wrong cell its block is cut down all the same.
+    /// Largest number of times that a block is halved; none means down to single cells. A block in which the audit finds a
+    /// wrong cell is halved further in any case.
     pub rounds: Option<u32>,
-    /// Fraction of the filled cells that may be wrong, as the audit measures it.
+    /// Allowed fraction of wrong filled cells, as measured by the audit.
     pub max_error: f64,
-    /// Filled cells that one audit integrates at first, up to sixteen times as many where the result may be
-    /// chance; none for [`AUDIT`], or a quarter of the filled ones if that is less.
+    /// Number of filled cells that an audit integrates at first; none means [`DEFAULT_AUDIT`], or a quarter of the filled
+    /// cells if that is less. If the result may be due to chance, the audit integrates up to sixteen times as many.
     pub audit: Option<u32>,
-    /// Whether a change of the word alone is a border, where the scene asks for words; of the pattern alone, where it
-    /// asks for patterns. At low frequencies words change from one cell to the next but few, while class, period and
-    /// symmetry stay.
+    /// Whether a change of the word alone is a border, if the scene computes words; of the pattern alone, if it computes
+    /// patterns. At low frequencies words change between most neighbouring cells, while class, period and symmetry do not.
     pub word: bool,
-    /// What filled cells show of quantities that vary continuously.
+    /// Treatment of the continuous quantities in filled cells.
     pub continuous: Continuous,
 }
 
-/// Filled cells that one audit integrates unless told otherwise: enough to see an error of 0.3 %.
-pub const AUDIT: u32 = 2000;
+/// Number of filled cells that an audit integrates by default: enough to detect an error of 0.3 %.
+pub const DEFAULT_AUDIT: u32 = 2000;
 
 impl Default for Refine {
     fn default() -> Self {
@@ -102,26 +96,26 @@ impl Default for Refine {
 }
 
 impl Refine {
-    /// How many of `filled` cells an audit integrates. Unless told it leaves three quarters of a
-    /// small map alone: to integrate all of it would be no refinement.
+    /// Returns how many of `filled` cells an audit integrates. By default it is at most a quarter, because an audit of all
+    /// filled cells of a small map would cancel the saving.
     pub fn audited(&self, filled: usize) -> usize {
         match self.audit {
             Some(cells) => filled.min(cells as usize),
-            None => filled.div_ceil(4).min(AUDIT as usize),
+            None => filled.div_ceil(4).min(DEFAULT_AUDIT as usize),
         }
     }
 }
 
-/// What filled cells show of exponent, impacts and mesh fraction.
+/// Values of exponent, impacts and mesh fraction in filled cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuous {
-    /// The bilinear average of the corners around them.
+    /// The bilinear average of the corners of the block.
     Interpolated,
-    /// Nothing.
+    /// None.
     Empty,
 }
 
-/// What can be asked of a cell.
+/// Quantities of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
     /// Periodic, chaotic, undecided or failed, and the period.
@@ -140,24 +134,24 @@ pub enum Quantity {
     Pattern,
 }
 
-/// What can be written.
+/// Kinds of output files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Text table.
     Csv,
     /// Structured array.
     Npy,
-    /// Figures as pixels.
+    /// Figures as bitmaps.
     Png,
-    /// Figures as lines and text; maps in them as pixels.
+    /// Figures as vector graphics; maps in them are bitmaps.
     Svg,
-    /// The same.
+    /// Figures as vector graphics; maps in them are bitmaps.
     Pdf,
     /// Interactive report.
     Html,
 }
 
-/// What is computed and written.
+/// Quantities that are computed and files that are written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outputs {
     /// Quantities of a map's cells; a bifurcation diagram always has its section points.
@@ -192,10 +186,10 @@ impl Quantity {
 }
 
 impl Format {
-    /// Those of figures.
+    /// The kinds of files that contain figures.
     pub const FIGURES: [Format; 3] = [Format::Png, Format::Svg, Format::Pdf];
 
-    /// The name in scenes; of figures also what their files' names end with.
+    /// Returns the name in scenes, which is also the extension of figures.
     pub fn name(self) -> &'static str {
         name(&FORMATS, self)
     }
@@ -205,7 +199,7 @@ fn name<T: PartialEq>(names: &[(&'static str, T)], thing: T) -> &'static str {
     names.iter().find(|(_, named)| *named == thing).map_or("", |&(name, _)| name)
 }
 
-/// The heading of figures and reports.
+/// Reads the heading of figures and reports.
 pub(super) fn read_title(field: &Field<'_>) -> Result<String, SceneError> {
     let title = field.text()?;
     match title.chars().count() {
@@ -224,7 +218,7 @@ pub(super) fn read_integration(root: &Section<'_>) -> Result<Integration, SceneE
     let default = Integration::default();
     let transient_periods = periods("transient_periods", default.transient_periods)?;
     let observed_periods = match section.get("observed_periods") {
-        // A cycle counts only once it has come round twice.
+        // A cycle is recognized only after it has repeated once.
         Some(field) => field.whole(2..=MAX_PERIODS)?,
         None => default.observed_periods,
     };
@@ -256,7 +250,7 @@ fn read_max_period(section: &Section<'_>, observed_periods: u32) -> Result<u32, 
     let max_period = field.whole(1..=LONGEST_CYCLE)?;
     if max_period > observed_periods / 2 {
         return Err(field.conflict(format!(
-            "a cycle has to come round twice, so `integration.observed_periods = {observed_periods}` must be at least {}",
+            "a cycle must be observed twice, so `integration.observed_periods = {observed_periods}` must be at least {}",
             2 * max_period
         )));
     }
@@ -269,7 +263,7 @@ pub(super) fn read_refine(root: &Section<'_>, purpose: Purpose) -> Result<Option
         return Ok(None);
     }
     if let (Purpose::Bifurcation, Some(field)) = (purpose, root.get("refine")) {
-        return Err(field.conflict("`bifurcation` integrates every column; drop [refine]".into()));
+        return Err(field.conflict("`bifurcation` integrates every column; remove [refine]"));
     }
     let default = Refine::default();
     let max_error = match section.get("max_error") {
@@ -306,12 +300,12 @@ pub(super) fn read_outputs(
         Some(field) => field.choices(&QUANTITIES)?,
         None => vec![Quantity::Class, Quantity::Lyapunov],
     };
-    // A diagram's points have no fixed number per column, so there is no array of it; a list of cells has no picture.
+    // The columns of a diagram have different numbers of points, so it has no array. A list of cells has no figure.
     let (usual, figures, remedy): (_, &[Format], _) = match (purpose, is_list) {
         (Purpose::Map, true) => (
             vec![Format::Csv, Format::Npy],
             &[],
-            "a list of cells has no picture, it is written as csv and npy",
+            "a list of cells has no figures; it is written as csv and npy",
         ),
         (Purpose::Map, false) => {
             (vec![Format::Csv, Format::Npy, Format::Png, Format::Html], &Format::FIGURES, "")
@@ -324,7 +318,7 @@ pub(super) fn read_outputs(
     let files = field.choices(&FORMATS)?;
     if let Some(i) = files.iter().position(|format| !figures.contains(format) && !usual.contains(format)) {
         let name = files[i].name();
-        return Err(field.conflict(format!("{remedy}; drop \"{name}\"")));
+        return Err(field.conflict(format!("{remedy}; remove \"{name}\"")));
     }
     Ok(Outputs { quantities, files })
 }

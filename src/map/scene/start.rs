@@ -2,32 +2,48 @@
 
 use super::error::SceneError;
 use super::keys;
+use super::limits::MAX_STARTS;
 use super::section::{Field, Section};
 use super::{Purpose, Scene};
 use rattlemap_dynamics::model::{Model, REST, State};
-
-/// The most states that one cell may start from: attractors are counted in a byte.
-pub(super) const MAX_STARTS: u32 = 255;
 
 /// The state in which cells start at phase 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
     /// At rest.
     Rest,
-    /// The same given state in every cell.
+    /// In one state, which is equal for all cells.
     State(State),
-    /// The last state of the cell before, along the last axis from `min` to `max`; the first
-    /// one starts at rest.
+    /// In the last state of the preceding cell along the last axis, from `min` to `max`. The first cell starts at rest.
     Up,
-    /// The last state of the cell after, along the last axis from `max` to `min`; the last one
-    /// starts at rest.
+    /// In the last state of the following cell along the last axis, from `max` to `min`. The last cell starts at rest.
     Down,
-    /// Both of these, one beside the other; for a bifurcation diagram alone.
+    /// [`Start::Up`] and [`Start::Down`] in one bifurcation diagram.
     Both,
 }
 
+/// Names of the policies in scenes. The state of `"state"` is read from a field of its own.
+const POLICIES: [(&str, Start); 5] = [
+    ("rest", Start::Rest),
+    ("state", Start::State(REST)),
+    ("up", Start::Up),
+    ("down", Start::Down),
+    ("both", Start::Both),
+];
+
 impl Start {
-    /// How cells start, to end a title with: which attractor is shown depends on it.
+    /// Returns the name of the policy in scenes.
+    pub(super) fn policy(&self) -> &'static str {
+        match self {
+            Start::Rest => "rest",
+            Start::State(_) => "state",
+            Start::Up => "up",
+            Start::Down => "down",
+            Start::Both => "both",
+        }
+    }
+
+    /// Describes the start for the end of a title: it decides which attractor is shown.
     pub fn in_words(&self) -> &'static str {
         match self {
             Start::Rest => "from rest",
@@ -38,62 +54,41 @@ impl Start {
         }
     }
 
-    /// Whether cells start from their neighbours.
+    /// Whether cells start from the last states of their neighbours.
     pub fn follows(&self) -> bool {
         matches!(self, Start::Up | Start::Down | Start::Both)
     }
 }
 
-/// Several starts per cell: the policy's own, then states drawn at random.
+/// Several starts per cell: the start of the policy, then random states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Draw {
-    /// Starts per cell, the policy's own included; at least 2.
+    /// Number of starts per cell, including the one of the policy; at least 2.
     pub count: u32,
-    /// What decides the draw.
+    /// Seed of the random states.
     pub seed: u32,
 }
 
-/// `start.policy` as written, before its state is known.
-#[derive(Clone, Copy, PartialEq)]
-enum Policy {
-    Rest,
-    State,
-    Up,
-    Down,
-    Both,
-}
-
-const POLICIES: [(&str, Policy); 5] = [
-    ("rest", Policy::Rest),
-    ("state", Policy::State),
-    ("up", Policy::Up),
-    ("down", Policy::Down),
-    ("both", Policy::Both),
-];
-
 pub(super) fn read(root: &Section<'_>, model: &dyn Model, purpose: Purpose) -> Result<Start, SceneError> {
     let section = root.section("start", &keys::names("start"))?;
-    let policy = section.get("policy").map_or(Ok(Policy::Rest), |field| field.choice(&POLICIES))?;
-    if let (Policy::Both, Purpose::Map, Some(field)) = (policy, purpose, section.get("policy")) {
+    let field = section.get("policy");
+    let policy = field.as_ref().map_or(Ok(Start::Rest), |field| field.choice(&POLICIES))?;
+    if let (Start::Both, Purpose::Map, Some(field)) = (policy, purpose, field) {
         return Err(field.conflict(
             "a map shows one attractor per cell; make two maps, with \"up\" and with \"down\", and let \
-             `rattlemap compare` show where they differ"
-                .to_owned(),
+             `rattlemap compare` show where they differ",
         ));
     }
     match (policy, section.get("state")) {
-        (Policy::State, Some(field)) => read_state(&field, model).map(Start::State),
-        (Policy::State, None) => {
+        (Start::State(_), Some(field)) => read_state(&field, model).map(Start::State),
+        (Start::State(_), None) => {
             let names = model.state_names().join(", ");
             Err(section.missing("state", &format!("policy = \"state\" needs state = [{names}]")))
         }
-        (_, Some(field)) => Err(field.conflict(
-            "it is read with start.policy = \"state\" alone; set that or drop the state".to_owned(),
-        )),
-        (Policy::Rest, None) => Ok(Start::Rest),
-        (Policy::Up, None) => Ok(Start::Up),
-        (Policy::Down, None) => Ok(Start::Down),
-        (Policy::Both, None) => Ok(Start::Both),
+        (_, Some(field)) => {
+            Err(field.conflict("it needs start.policy = \"state\"; set that policy or remove the state"))
+        }
+        (policy, None) => Ok(policy),
     }
 }
 
@@ -117,55 +112,52 @@ fn read_state(field: &Field<'_>, model: &dyn Model) -> Result<State, SceneError>
     Ok(state)
 }
 
-/// `count` and `seed`; none for one start per cell.
+/// Reads `count` and `seed`; returns none where each cell has one start.
 pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<Draw>, SceneError> {
     let section = root.section("start", &keys::names("start"))?;
     let seed = section.get("seed").map(|field| field.whole(0..=u32::MAX)).transpose()?;
-    let count = match section.get("count") {
-        Some(field) => field.whole(1..=MAX_STARTS)?,
-        None => 1,
-    };
+    let count = section.get("count").map_or(Ok(1), |field| field.whole(1..=MAX_STARTS))?;
     match (section.get("count").filter(|_| count > 1), section.get("seed")) {
         (Some(field), _) if purpose == Purpose::Bifurcation => {
-            Err(field
-                .conflict("`bifurcation` follows one motion per column; drop it, or draw a `map`".into()))
+            Err(field.conflict("`bifurcation` follows one motion per column; remove it, or compute a `map`"))
         }
-        (None, Some(field)) => Err(field.conflict("it draws nothing without start.count above 1".into())),
+        (None, Some(field)) => Err(field.conflict("a seed needs start.count above 1; remove the seed")),
         (None, None) => Ok(None),
         (Some(_), _) => Ok(Some(Draw { count, seed: seed.unwrap_or(1) })),
     }
 }
 
-/// Refuses starts that do not fit each other, the axes, or a map that is refined.
+/// Refuses starts that contradict each other, the axes, or `[refine]`.
 pub(super) fn check(root: &Section<'_>, scene: &Scene) -> Result<(), SceneError> {
-    let (start, draw) = (scene.start, scene.draw);
+    let (follows, is_drawn) = (scene.start.follows(), scene.draw.is_some());
     let section = root.section("start", &keys::names("start"))?;
     let is_refined = root.get("refine").is_some();
     let sweeps_start = scene.sweeps_start();
-    let is_one_of_two = scene.is_basin() && !scene.axes().iter().all(|axis| axis.target().is_start());
-    if let Some(refine) = root.get("refine").filter(|_| is_one_of_two) {
+    let sweeps_both = scene.is_basin() && !scene.axes().iter().all(|axis| axis.target().is_start());
+    if let Some(refine) = root.get("refine").filter(|_| sweeps_both) {
         return Err(refine.conflict(
-            "attractors at different parameters are told the same only once all are known; sweep two components of \
-             the start, or drop [refine]"
-                .into(),
+            "attractors at different parameters can be matched only after all cells are known; sweep two components \
+             of the start, or remove [refine]",
         ));
     }
-    match (section.get("policy"), section.get("count")) {
-        (Some(policy), _) if sweeps_start && start.follows() => Err(policy.conflict(
-            "cells have starts of their own here and follow none; use \"rest\" or \"state\"".into(),
-        )),
-        (_, Some(count)) if sweeps_start && draw.is_some() => {
-            Err(count.conflict("cells have starts of their own here; drop the count".into()))
+    let conflict = match (section.get("policy"), section.get("count")) {
+        (Some(policy), _) if sweeps_start && follows => {
+            (policy, "the axes or columns give each cell its start; use \"rest\" or \"state\"")
         }
-        (_, Some(count)) if draw.is_some() && start.follows() => Err(count.conflict(
-            "cells that follow their neighbours have one start each; use policy \"rest\" or \"state\"".into(),
-        )),
-        (Some(policy), _) if is_refined && start.follows() => Err(policy.conflict(
-            "filled cells have no motion for their neighbours to start from; drop [refine]".into(),
-        )),
-        (_, Some(count)) if is_refined && draw.is_some() => Err(count.conflict(
-            "where the map is filled, attractors are not counted; drop [refine] or the count".into(),
-        )),
-        _ => Ok(()),
-    }
+        (_, Some(count)) if sweeps_start && is_drawn => {
+            (count, "the axes or columns give each cell its start; remove the count")
+        }
+        (_, Some(count)) if is_drawn && follows => (
+            count,
+            "cells that follow their neighbours have one start each; use policy \"rest\" or \"state\"",
+        ),
+        (Some(policy), _) if is_refined && follows => {
+            (policy, "filled cells have no last state for their neighbours to start from; remove [refine]")
+        }
+        (_, Some(count)) if is_refined && is_drawn => {
+            (count, "attractors are not counted in filled cells; remove [refine] or the count")
+        }
+        _ => return Ok(()),
+    };
+    Err(conflict.0.conflict(conflict.1))
 }

@@ -1,4 +1,4 @@
-//! Every kind of refusal, and what a good scene says.
+//! Reading of scenes: the values of a valid scene, and every kind of error.
 
 mod along;
 mod axes;
@@ -12,6 +12,7 @@ mod starts;
 mod texts;
 
 use super::*;
+use crate::text::test_cases;
 use rattlemap_dynamics::model::GearPair;
 
 const GOOD: &str = r#"title = "A scene"
@@ -48,13 +49,21 @@ fn parse(text: &str, sets: &[&str]) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml", &sets, Purpose::Bifurcation)
 }
 
-/// The message for GOOD with `old` replaced by `new`.
+/// Returns the message for GOOD with `old` replaced by `new`.
 fn refusal(old: &str, new: &str) -> String {
     assert!(GOOD.contains(old), "{old:?} is not in the scene");
     parse(&GOOD.replacen(old, new, 1), &[]).expect_err(new).to_string()
 }
 
-/// The gear pair that a model's values make.
+/// Checks the messages for changes of GOOD, from lines of the form `old | new | part of the message`.
+#[track_caller]
+fn check_refusals(cases: &str) {
+    for [old, new, expected] in test_cases(cases) {
+        assert_says(&refusal(&old, &new), &[&expected, "s.toml:"]);
+    }
+}
+
+/// Returns the gear pair with the values of a model.
 fn pair(model: &dyn Model) -> GearPair {
     let mut pair = GearPair::paper(0.0);
     model.parameters().iter().for_each(|p| pair.set(&p.name, model.get(&p.name).unwrap()).unwrap());
@@ -69,7 +78,7 @@ fn assert_says(message: &str, parts: &[&str]) {
 }
 
 #[test]
-fn a_good_scene_is_read_whole() {
+fn all_fields_of_a_scene_are_read() {
     let scene = parse(GOOD, &[]).unwrap();
     assert_eq!(scene.title(), "A scene");
     assert_eq!(scene.text(), GOOD);
@@ -118,21 +127,28 @@ fn a_map_takes_two_axes_in_their_order() {
 }
 
 #[test]
-fn a_map_refuses_what_it_would_ignore() {
+fn a_map_refuses_settings_that_contradict_following() {
     let text = format!("{GOOD}{SECOND_AXIS}");
     let refused = |text: &str| Scene::parse(text, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
     for policy in ["up", "down"] {
         let text = text.replace("\"rest\"", &format!("\"{policy}\""));
         assert!(Scene::parse(&text, "s.toml", &[], Purpose::Map).is_ok());
         let message = refused(&format!("{text}\n[refine]\n"));
-        assert_says(&message, &["s.toml:21:10", &format!("`start.policy = \"{policy}\"`"), "drop [refine]"]);
+        assert_says(
+            &message,
+            &["s.toml:21:10", &format!("`start.policy = \"{policy}\"`"), "remove [refine]"],
+        );
         let message = refused(&text.replace("[start]", "[start]\ncount = 3"));
         assert_says(&message, &["s.toml:21:9", "`start.count = 3`", "have one start each"]);
     }
+    let message = refused(&text.replace("[start]", "[refine]\n[start]\ncount = 3"));
+    assert_says(&message, &["`start.count = 3`", "attractors are not counted in filled cells"]);
+    let message = refused(&text.replace("[start]", "[start]\nseed = 3"));
+    assert_says(&message, &["`start.seed = 3`", "a seed needs start.count above 1"]);
 }
 
 #[test]
-fn the_identity_tells_scenes_apart_that_compute_otherwise() {
+fn the_identity_differs_for_scenes_with_other_records() {
     let scene = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         Scene::parse(&format!("{GOOD}{SECOND_AXIS}"), "s", &sets, Purpose::Map).unwrap().identity()
@@ -149,7 +165,7 @@ fn the_identity_tells_scenes_apart_that_compute_otherwise() {
 }
 
 #[test]
-fn text_that_is_not_toml() {
+fn syntax_errors_show_the_line() {
     assert_says(&refusal("min = 0.1", "min = = 0.1"), &["s.toml:9:7: not valid TOML", "min = = 0.1"]);
     assert_says(&refusal("F = 50.0", "F = 1.0\nF = 2.0"), &["s.toml:6:1", "duplicate key"]);
     assert_says(&refusal("F = 50.0", "F = fifty"), &["s.toml:5:5", "F = fifty"]);
@@ -158,62 +174,32 @@ fn text_that_is_not_toml() {
 
 #[test]
 fn unknown_fields_get_a_suggestion() {
-    let cases = [
-        ("title =", "titel =", "s.toml:1:1: unknown field `titel = \"A scene\"`; did you mean `title`?"),
-        ("[integration]", "[integraton]", "s.toml:13:2: unknown field `integraton = { ... }`; did you mean"),
-        ("F = ", "omgea = ", "s.toml:5:1: unknown field `parameters.omgea = 50.0`; did you mean `omega`?"),
-        ("F = ", "f = ", "did you mean `F`? valid names: m1 (equivalent mass of gear 1), m2 ("),
-        ("count =", "cuont =", "s.toml:11:1: unknown field `axis.0.cuont = 4`; did you mean `count`?"),
-        ("max_period", "max_periods", "s.toml:18:1: unknown field `integration.max_periods = 4`"),
-        (
-            "policy",
-            "begin",
-            "unknown field `start.begin = \"rest\"`; valid names: policy, state, count, seed",
-        ),
-        ("files", "file", "s.toml:25:1: unknown field `outputs.file = [\"csv\"]`; did you mean `files`?"),
-    ];
-    for (old, new, expected) in cases {
-        assert_says(&refusal(old, new), &[expected]);
-    }
+    check_refusals(
+        r#"
+title = | titel = | s.toml:1:1: unknown field `titel = "A scene"`; did you mean `title`?
+[integration] | [integraton] | s.toml:13:2: unknown field `integraton = { ... }`; did you mean
+F =  | omgea =  | s.toml:5:1: unknown field `parameters.omgea = 50.0`; did you mean `omega`?
+F =  | f =  | did you mean `F`? valid names: m1 (equivalent mass of gear 1), m2 (
+count = | cuont = | s.toml:11:1: unknown field `axis.0.cuont = 4`; did you mean `count`?
+max_period | max_periods | s.toml:18:1: unknown field `integration.max_periods = 4`
+policy | begin | unknown field `start.begin = "rest"`; valid names: policy, state, count, seed
+files | file | s.toml:25:1: unknown field `outputs.file = ["csv"]`; did you mean `files`?
+"#,
+    );
 }
 
 #[test]
 fn unknown_names_get_a_suggestion() {
-    let cases = [
-        (
-            "\"gear-pair\"",
-            "\"gearpair\"",
-            "s.toml:2:9: `model = \"gearpair\"` is not known; did you mean `gear-pair`?",
-        ),
-        (
-            "\"e\"",
-            "\"omgea\"",
-            "s.toml:8:13: `axis.0.parameter = \"omgea\"` is not known; did you mean `omega`?",
-        ),
-        (
-            "\"rest\"",
-            "\"rset\"",
-            "s.toml:21:10: `start.policy = \"rset\"` is not known; did you mean `rest`?",
-        ),
-        (
-            "\"word\"",
-            "\"wrod\"",
-            "s.toml:24:24: `outputs.quantities.1 = \"wrod\"` is not known; did you mean `word`?",
-        ),
-        (
-            "[\"csv\"]",
-            "[\"cvs\"]",
-            "s.toml:25:10: `outputs.files.0 = \"cvs\"` is not known; did you mean `csv`?",
-        ),
-        (
-            "\"auto\"",
-            "\"atuo\"",
-            "s.toml:14:20: `integration.steps_per_period = \"atuo\"` has the wrong type",
-        ),
-    ];
-    for (old, new, expected) in cases {
-        assert_says(&refusal(old, new), &[expected, "s.toml:"]);
-    }
+    check_refusals(
+        r#"
+"gear-pair" | "gearpair" | s.toml:2:9: `model = "gearpair"` is not known; did you mean `gear-pair`?
+"e" | "omgea" | s.toml:8:13: `axis.0.parameter = "omgea"` is not known; did you mean `omega`?
+"rest" | "rset" | s.toml:21:10: `start.policy = "rset"` is not known; did you mean `rest`?
+"word" | "wrod" | s.toml:24:24: `outputs.quantities.1 = "wrod"` is not known; did you mean `word`?
+["csv"] | ["cvs"] | s.toml:25:10: `outputs.files.0 = "cvs"` is not known; did you mean `csv`?
+"auto" | "atuo" | s.toml:14:20: `integration.steps_per_period = "atuo"` has the wrong type
+"#,
+    );
 }
 
 #[test]
@@ -245,7 +231,7 @@ fn missing_fields() {
 }
 
 #[test]
-fn values_that_contradict_each_other() {
+fn contradicting_values_are_refused() {
     let two = format!(
         "{GOOD}{}",
         SECOND_AXIS.replacen("omega", "e", 1).replacen("12.0", "1.0", 1).replacen("1.0", "0.0", 1)
@@ -259,32 +245,15 @@ fn values_that_contradict_each_other() {
         &parse(&two, &[]).unwrap_err().to_string(),
         &["s.toml:27:", "`axis = 2 tables` does not fit: `bifurcation` needs 1 axis"],
     );
-    let cases = [
-        (
-            "F = 50.0",
-            "e = 0.5",
-            "s.toml:5:5: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`; set `axis.0.min`",
-        ),
-        (
-            "d = 4",
-            "d = 11",
-            "s.toml:18:14: `integration.max_period = 11` does not fit: a cycle has to come round twice, so `integration.observed_periods = 20` must be at least 22",
-        ),
-        (
-            "\"rest\"",
-            "\"rest\"\nstate = [0, 0, 0, 0]",
-            "s.toml:22:9: `start.state = [0, 0, 0, 0]` does not fit: it is read with start.policy = \"state\" alone",
-        ),
-        ("[start]", "[refine]\n[start]", "s.toml:20:"),
-        (
-            "[\"csv\"]",
-            "[\"csv\", \"html\"]",
-            "s.toml:25:9: `outputs.files = [\"csv\", \"html\"]` does not fit: `bifurcation` writes csv, png, svg and pdf; drop \"html\"",
-        ),
-    ];
-    for (old, new, expected) in cases {
-        assert_says(&refusal(old, new), &[expected, "does not fit"]);
-    }
+    check_refusals(
+        r#"
+F = 50.0 | e = 0.5 | s.toml:5:5: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`; set `axis.0.min`
+d = 4 | d = 11 | s.toml:18:14: `integration.max_period = 11` does not fit: a cycle must be observed twice, so `integration.observed_periods = 20` must be at least 22
+"rest" | "rest"\nstate = [0, 0, 0, 0] | s.toml:22:9: `start.state = [0, 0, 0, 0]` does not fit: it needs start.policy = "state"
+[start] | [refine]\n[start] | s.toml:20:
+["csv"] | ["csv", "html"] | s.toml:25:9: `outputs.files = ["csv", "html"]` does not fit: `bifurcation` writes csv, png, svg and pdf; remove "html"
+"#,
+    );
 }
 
 #[test]

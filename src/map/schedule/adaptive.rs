@@ -1,13 +1,13 @@
-//! Refinement: coarse blocks first, then only those that a border crosses, down to single cells;
-//! then an audit of what was not integrated ([`auditing`]).
+//! Refinement: coarse blocks, then blocks that a border crosses, down to single cells; then an audit of the filled cells
+//! ([`auditing`]).
 //!
-//! Which cells are integrated does not depend on the order in which records come: a block is halved for what is
-//! known to differ, and that stays so, whatever else will be known. So no block waits for the others.
+//! The integrated cells do not depend on the order of the records. A block is halved because cells are known to differ, and
+//! further records cannot change that. So no block waits for others.
 
 mod auditing;
 
 use super::audit::Audit;
-use super::basins::Basins;
+use super::basins::BasinLabels;
 use super::fill::Filling;
 use super::label::Label;
 use super::tiling::{Tile, Tiling};
@@ -16,82 +16,84 @@ use crate::map::random::Random;
 use crate::map::scene::Refine;
 use crate::record::Record;
 
-/// Blocks narrower than this are not halved for touching one that a border crosses: the cells on
-/// their common edge show whether it goes on here. On the main plane 0.24 % of what is filled is wrong then, with
-/// classes alone. Symmetries add 0.1 %, thin bands that none of these rules finds, and leave no room for that.
+/// Smallest width of a block that is halved because it touches a block with a border. In narrower blocks, the cells on the
+/// common edge show whether the border continues. With classes alone, 0.24 % of the filled cells of the main map are then
+/// wrong.
 const NARROW: usize = 8;
 
-/// The same with symmetries, and where an audit has shown too many wrong cells.
+/// Smallest width of such a block if symmetries are borders, which adds 0.1 % of wrong cells in thin bands, or after an
+/// audit has found too many wrong cells.
 const NARROWEST: usize = 4;
 
-/// Levels that are told apart where blocks touch.
+/// Number of levels of halving that are distinguished where blocks touch.
 const LEVELS: u32 = u16::BITS;
 
 /// The state of an adaptive map.
 pub(super) struct Adaptive {
     counts: [usize; 2],
     refine: Refine,
-    /// What makes borders: what the scene asks for, words only where they are to.
+    /// Quantities whose changes are borders.
     needs: Needs,
-    /// What makes borders in a map of basins.
-    basins: Option<Basins>,
-    /// By cell id; unknown where nothing was integrated.
+    /// Labels of a map of basins, whose borders are changes of the attractor.
+    basins: Option<BasinLabels>,
+    /// Labels by cell id; unknown if the cell was not integrated.
     labels: Vec<Label>,
-    /// By cell id.
-    is_asked: Vec<bool>,
-    /// Cells that were not asked for.
-    unasked: usize,
+    /// Whether each cell was requested.
+    is_requested: Vec<bool>,
+    /// Number of cells that were not requested.
+    unrequested: usize,
     tiling: Tiling,
-    /// What is known of each block.
-    sights: Vec<Sight>,
-    /// Levels of blocks with differing corners that a cell belongs to, a bit for each.
+    /// State of each block.
+    blocks: Vec<BlockState>,
+    /// Levels of the blocks with different corners that contain a cell, one bit for each level.
     touched: Vec<u16>,
-    /// Blocks that are to be halved.
+    /// Blocks to be halved.
     pending: Vec<Tile>,
-    /// The most that a coarse block has been halved.
+    /// Largest number of halvings of a coarse block.
     deepest: u32,
-    /// Blocks narrower than this are not halved for touching others.
+    /// Smallest width of blocks that are halved because they touch others.
     narrow: usize,
-    /// Cells of the audit under way.
+    /// Cells of the current audit.
     audited: Vec<u32>,
-    /// Where samples are drawn from, and how many have been.
+    /// Random numbers of the samples, and the number of samples so far.
     random: Random,
     samples: usize,
     audits: Vec<Audit>,
     stage: Stage,
 }
 
-/// What is known of a block.
+/// Knowledge about a block.
 #[derive(Clone, Copy, Default)]
-struct Sight {
-    /// Of the first cell that was known.
+struct BlockState {
+    /// Label of the first known cell.
     label: Label,
-    /// Of the first corner that was known.
+    /// Kind of the first known corner.
     kind: u32,
-    /// Whether corners are known to differ in more than the word.
+    /// Whether corners differ in more than the word.
     has_border: bool,
-    /// Whether it is halved however often its coarse block has been.
+    /// Whether the block may be halved more often than `refine.rounds` allows.
     is_free: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Stage {
-    /// The coarse grid, then halving blocks.
+    /// Integrates the coarse grid, then halves blocks.
     Halving,
-    /// The sample is being integrated.
+    /// Integrates the sample.
     Auditing,
-    /// The audit is passed; blocks around wrong cells are halved.
+    /// Halves the blocks around wrong cells after a passed audit.
     Mending,
     Done,
 }
 
 impl Adaptive {
-    /// Nothing is known; `asks` gets the cells of the coarse grid, neighbours one after the other.
-    pub(super) fn new(plan: &Plan, refine: Refine, asks: &mut Vec<u32>) -> Adaptive {
+    /// Begins an adaptive map. Adds the cells of the coarse grid to `requests`, in Morton order.
+    pub(super) fn new(plan: &Plan, refine: Refine, requests: &mut Vec<u32>) -> Adaptive {
         let counts = plan.counts();
         let tiling = Tiling::new(counts, refine.minimum_grid as usize);
         let cells = plan.cell_count();
-        // Borders of words and none of patterns would be those of bounces before meshing.
+        // If patterns are computed, words make no borders: they would mark every change in the number of bounces before
+        // meshing.
         let (word, pattern) = (plan.needs().word, plan.needs().pattern);
         let needs =
             Needs { word: refine.word && word && !pattern, pattern: refine.word && pattern, ..*plan.needs() };
@@ -100,11 +102,11 @@ impl Adaptive {
             refine,
             narrow: if needs.symmetric { NARROWEST } else { NARROW },
             needs,
-            basins: Basins::of(plan),
+            basins: BasinLabels::of(plan),
             labels: vec![Label::default(); cells],
-            is_asked: vec![false; cells],
-            unasked: cells,
-            sights: vec![Sight::default(); tiling.tiles().len()],
+            is_requested: vec![false; cells],
+            unrequested: cells,
+            blocks: vec![BlockState::default(); tiling.tiles().len()],
             tiling,
             touched: vec![0; cells],
             pending: Vec::new(),
@@ -116,9 +118,9 @@ impl Adaptive {
             stage: Stage::Halving,
         };
         for tile in adaptive.tiling.tiles() {
-            adaptive.ask_corners(tile, asks);
+            adaptive.request_corners(tile, requests);
         }
-        asks.sort_by_cached_key(|&id| crate::map::plan::morton_key(adaptive.at(id)));
+        requests.sort_by_cached_key(|&id| crate::map::plan::morton_key(adaptive.at(id)));
         adaptive
     }
 
@@ -130,75 +132,75 @@ impl Adaptive {
         self.refine.max_error
     }
 
-    /// Steps that had to follow each other: the coarse grid, halvings, samples.
+    /// Returns the number of consecutive steps: the coarse grid, halvings, samples.
     pub(super) fn rounds(&self) -> usize {
         1 + self.deepest as usize + self.samples
     }
 
-    /// Looks at records that are taken up next.
-    pub(super) fn foresee(&mut self, records: &[(u32, Record)]) {
+    /// Prepares for records that are accepted next.
+    pub(super) fn prepare(&mut self, records: &[(u32, Record)]) {
         if let Some(basins) = &mut self.basins {
-            basins.foresee(records);
+            basins.prepare(records);
         }
     }
 
-    /// Takes up the record of a cell that was asked for; `asks` gets the cells that are needed for that.
-    pub(super) fn take(&mut self, id: u32, record: &Record, asks: &mut Vec<u32>) {
+    /// Accepts the record of a requested cell and adds the cells that it makes necessary to `requests`.
+    pub(super) fn take(&mut self, id: u32, record: &Record, requests: &mut Vec<u32>) {
         let label = match &mut self.basins {
             Some(basins) => basins.label(id, record),
             None => Label::of(record, &self.needs),
         };
         self.labels[id as usize] = label;
         if self.stage != Stage::Auditing {
-            self.show(self.at(id), label);
-            self.halve(asks);
+            self.update(self.at(id), label);
+            self.halve(requests);
         }
     }
 
-    /// Goes on once every cell that was asked for has been taken up: audits once, and again after every audit
-    /// that is failed. `asks` gets the next cells, none if the map is finished.
-    pub(super) fn settle(&mut self, records: &[Record], asks: &mut Vec<u32>) {
-        let before = asks.len();
-        while asks.len() == before && self.stage != Stage::Done {
+    /// Continues after all requested cells have their records: begins an audit, or evaluates it. Adds the next cells to
+    /// `requests`; none if the map is finished.
+    pub(super) fn settle(&mut self, records: &[Record], requests: &mut Vec<u32>) {
+        let before = requests.len();
+        while requests.len() == before && self.stage != Stage::Done {
             match self.stage {
-                Stage::Halving => self.begin_audit(asks),
-                Stage::Auditing => self.judge_audit(records, asks),
+                Stage::Halving => self.begin_audit(requests),
+                Stage::Auditing => self.judge_audit(records, requests),
                 Stage::Mending | Stage::Done => self.stage = Stage::Done,
             }
         }
     }
 
-    /// Tells all blocks that a cell belongs to what it is.
-    fn show(&mut self, at: [usize; 2], label: Label) {
+    /// Passes the label of a cell to all blocks that contain it.
+    fn update(&mut self, at: [usize; 2], label: Label) {
         for tile in self.tiling.covering(at) {
-            self.show_to(tile, label);
-            // A block may have been halved before all of its corners were known.
+            self.update_block(tile, label);
+            // A block may have been halved before all its corners were known.
             let with_corner = |&tile: &Tile| self.tiling.block(tile).has_corner(at);
             let corner_of: Vec<Tile> = self.tiling.lineage(tile).take_while(with_corner).collect();
-            corner_of.into_iter().for_each(|tile| self.show_corner(tile, label));
+            corner_of.into_iter().for_each(|tile| self.update_corner(tile, label));
         }
     }
 
-    fn show_to(&mut self, tile: Tile, label: Label) {
-        let sight = &mut self.sights[tile];
-        if !sight.label.is_known() {
-            sight.label = label;
-        } else if sight.label != label {
+    fn update_block(&mut self, tile: Tile, label: Label) {
+        let block = &mut self.blocks[tile];
+        if !block.label.is_known() {
+            block.label = label;
+        } else if block.label != label {
             self.pending.push(tile);
         }
     }
 
-    fn show_corner(&mut self, tile: Tile, label: Label) {
-        let sight = &mut self.sights[tile];
-        if sight.kind == 0 {
-            sight.kind = label.kind;
-        } else if sight.kind != label.kind && !sight.has_border {
-            sight.has_border = true;
+    fn update_corner(&mut self, tile: Tile, label: Label) {
+        let block = &mut self.blocks[tile];
+        if block.kind == 0 {
+            block.kind = label.kind;
+        } else if block.kind != label.kind && !block.has_border {
+            block.has_border = true;
             self.touch(tile);
         }
     }
 
-    /// Blocks of the same level that touch one with differing corners are halved with it.
+    /// Marks blocks of the same level that touch a block with different corners: they are halved, too.
     fn touch(&mut self, tile: Tile) {
         let (level, block) = (self.tiling.level(tile), self.tiling.block(tile));
         for at in block.cells() {
@@ -207,40 +209,40 @@ impl Adaptive {
         }
         let on_edge = |[i, j]: &[usize; 2]| block.i.contains(i) || block.j.contains(j);
         for at in block.cells().filter(on_edge) {
-            for beside in self.tiling.covering(at) {
-                if self.tiling.level(beside) == level && self.is_touched(beside) {
-                    self.pending.push(beside);
+            for neighbour in self.tiling.covering(at) {
+                if self.tiling.level(neighbour) == level && self.is_touched(neighbour) {
+                    self.pending.push(neighbour);
                 }
             }
         }
     }
 
-    /// Whether a corner belongs to a block of the same level with differing corners.
+    /// Whether a corner belongs to a block of the same level with different corners.
     fn is_touched(&self, tile: Tile) -> bool {
         let (level, block) = (self.tiling.level(tile), self.tiling.block(tile));
         let is_touched = |&at: &[usize; 2]| self.touched[self.id(at)] & bit(level) != 0;
         block.width() >= self.narrow && block.corners().iter().any(is_touched)
     }
 
-    /// Halves what is to be halved, and what that shows.
-    fn halve(&mut self, asks: &mut Vec<u32>) {
+    /// Halves the pending blocks, and further blocks that become pending by that.
+    fn halve(&mut self, requests: &mut Vec<u32>) {
         while let Some(tile) = self.pending.pop() {
             if !self.may_halve(tile) {
                 continue;
             }
-            let is_free = self.sights[tile].is_free;
+            let is_free = self.blocks[tile].is_free;
             let parts = self.tiling.halve(tile);
             self.deepest = self.deepest.max(self.tiling.level(parts.start));
             for part in parts {
-                self.sights.push(Sight { is_free, ..Sight::default() });
-                self.ask_corners(part, asks);
+                self.blocks.push(BlockState { is_free, ..BlockState::default() });
+                self.request_corners(part, requests);
                 let block = self.tiling.block(part);
                 for at in block.cells() {
                     let label = self.label(at);
                     if label.is_known() {
-                        self.show_to(part, label);
+                        self.update_block(part, label);
                         if block.has_corner(at) {
-                            self.show_corner(part, label);
+                            self.update_corner(part, label);
                         }
                     }
                 }
@@ -254,29 +256,29 @@ impl Adaptive {
     fn may_halve(&self, tile: Tile) -> bool {
         let is_allowed = || {
             let level = self.tiling.level(tile);
-            self.sights[tile].is_free || self.refine.rounds.is_none_or(|most| level < most)
+            self.blocks[tile].is_free || self.refine.rounds.is_none_or(|most| level < most)
         };
         self.tiling.is_leaf(tile) && self.tiling.block(tile).has_inside() && is_allowed()
     }
 
-    fn ask_corners(&mut self, tile: Tile, asks: &mut Vec<u32>) {
+    fn request_corners(&mut self, tile: Tile, requests: &mut Vec<u32>) {
         for at in self.tiling.block(tile).corners() {
             let id = self.id(at);
-            self.ask(id, asks);
+            self.request(id, requests);
         }
     }
 
-    /// Asks for a cell, once; whether it was the first time.
-    fn ask(&mut self, id: usize, asks: &mut Vec<u32>) -> bool {
-        let is_new = !std::mem::replace(&mut self.is_asked[id], true);
+    /// Requests a cell unless it was requested before. Returns whether it is new.
+    fn request(&mut self, id: usize, requests: &mut Vec<u32>) -> bool {
+        let is_new = !std::mem::replace(&mut self.is_requested[id], true);
         if is_new {
-            self.unasked -= 1;
-            asks.push(id as u32);
+            self.unrequested -= 1;
+            requests.push(id as u32);
         }
         is_new
     }
 
-    /// From now on narrower blocks are halved, too, for touching one that a border crosses: those that there are.
+    /// Lowers the width of blocks that are halved because they touch a border. Returns such blocks.
     fn follow_closely(&mut self) -> Vec<Tile> {
         if self.narrow <= NARROWEST {
             return Vec::new();
@@ -285,9 +287,9 @@ impl Adaptive {
         self.tiles_to_halve(|tile| self.is_touched(tile)).collect()
     }
 
-    /// Blocks that may be halved, and are `wanted`.
-    fn tiles_to_halve(&self, wanted: impl Fn(Tile) -> bool) -> impl Iterator<Item = Tile> {
-        self.tiling.tiles().filter(move |&tile| self.may_halve(tile) && wanted(tile))
+    /// Returns the blocks that may be halved and for which `is_selected` holds.
+    fn tiles_to_halve(&self, is_selected: impl Fn(Tile) -> bool) -> impl Iterator<Item = Tile> {
+        self.tiling.tiles().filter(move |&tile| self.may_halve(tile) && is_selected(tile))
     }
 
     fn id(&self, [i, j]: [usize; 2]) -> usize {
@@ -302,7 +304,8 @@ impl Adaptive {
         self.labels[self.id(at)]
     }
 
-    /// Fills every cell that was not integrated; returns how many, and in a map of basins from which cell each was.
+    /// Fills all cells that were not integrated. Returns their number and, for a map of basins, the cell from which each cell
+    /// was filled.
     pub(super) fn fill(&self, records: &mut [Record]) -> (usize, Vec<u32>) {
         let mut count = 0;
         let cells = if self.basins.is_some() { records.len() } else { 0 };
@@ -313,7 +316,7 @@ impl Adaptive {
             let filling = Filling::new(&block, corners.each_ref());
             for at in block.cells().filter(|&at| self.tiling.owner(at) == tile) {
                 let id = self.id(at);
-                if !self.is_asked[id] {
+                if !self.is_requested[id] {
                     records[id] = filling.record(at);
                     if let Some(from) = from.get_mut(id) {
                         *from = self.id(block.corners()[block.nearest(at)]) as u32;

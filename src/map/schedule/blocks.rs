@@ -1,7 +1,6 @@
-//! Blocks of cells between lattice lines, and how they are halved.
+//! Rectangular blocks of cells and their halving.
 
-/// A rectangle of cells, borders included, by its first and last indices on the two axes.
-/// Neighbours share their borders.
+/// A rectangle of cells, given by the first and last index on each axis. Neighbouring blocks share their borders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
     pub(super) i: [usize; 2],
@@ -9,29 +8,29 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// Its corners, in the order (low, low), (high, low), (low, high), (high, high).
+    /// Returns the corners in the order (low, low), (high, low), (low, high), (high, high).
     pub(super) fn corners(&self) -> [[usize; 2]; 4] {
         let ([i0, i1], [j0, j1]) = (self.i, self.j);
         [[i0, j0], [i1, j0], [i0, j1], [i1, j1]]
     }
 
-    /// Whether it has cells beside its corners.
+    /// Whether the block has cells other than its corners.
     pub(super) fn has_inside(&self) -> bool {
         self.width() > 1
     }
 
-    /// Cells along its longer side, less one.
+    /// Returns the length of the longer side: its number of cells minus one.
     pub(super) fn width(&self) -> usize {
         (self.i[1] - self.i[0]).max(self.j[1] - self.j[0])
     }
 
-    /// Its cells, corners included.
+    /// Returns all cells, including corners.
     pub(super) fn cells(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         let ([i0, i1], [j0, j1]) = (self.i, self.j);
         (j0..=j1).flat_map(move |j| (i0..=i1).map(move |i| [i, j]))
     }
 
-    /// How far along its sides a cell lies.
+    /// Returns the relative position of a cell along the two sides, from 0 to 1.
     pub(super) fn shares(&self, [i, j]: [usize; 2]) -> [f64; 2] {
         let share = |at: usize, [from, to]: [usize; 2]| {
             if to > from { (at - from) as f64 / (to - from) as f64 } else { 0.0 }
@@ -39,18 +38,18 @@ impl Block {
         [share(i, self.i), share(j, self.j)]
     }
 
-    /// The corner, by its place among them, that is nearest to a cell.
+    /// Returns the index of the corner nearest to a cell.
     pub(super) fn nearest(&self, at: [usize; 2]) -> usize {
         let [u, v] = self.shares(at);
         usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5)
     }
 
-    /// The blocks that the lines through its middle leave.
+    /// Returns the parts into which the lines through the middle divide the block.
     pub(super) fn halves(&self) -> Vec<Block> {
         self.cut([(self.i[0] + self.i[1]) / 2, (self.j[0] + self.j[1]) / 2])
     }
 
-    /// Whether a cell is one of its corners.
+    /// Whether a cell is a corner.
     pub(super) fn has_corner(&self, [i, j]: [usize; 2]) -> bool {
         self.i.contains(&i) && self.j.contains(&j)
     }
@@ -64,7 +63,7 @@ impl Block {
     }
 }
 
-/// Every `step`-th index of an axis, and the last one.
+/// Returns every `step`-th index of an axis, and the last index.
 fn lattice(count: usize, step: usize) -> Vec<usize> {
     let mut lines: Vec<usize> = (0..count).step_by(step).collect();
     if lines.last() != Some(&(count - 1)) {
@@ -73,7 +72,7 @@ fn lattice(count: usize, step: usize) -> Vec<usize> {
     lines
 }
 
-/// The blocks of a grid between every `step`-th line.
+/// Returns the blocks of a grid between every `step`-th line.
 pub(super) fn coarse([columns, rows]: [usize; 2], step: usize) -> Vec<Block> {
     let (i, j) = (lattice(columns, step), lattice(rows, step));
     j.windows(2).flat_map(|j| i.windows(2).map(move |i| Block { i: [i[0], i[1]], j: [j[0], j[1]] })).collect()
@@ -85,17 +84,17 @@ mod tests {
 
     #[test]
     fn coarse_blocks_cover_the_grid_and_share_borders() {
-        let mut seen = vec![0; 11 * 6];
+        let mut counts = vec![0; 11 * 6];
         for block in coarse([11, 6], 4) {
-            block.cells().for_each(|[i, j]| seen[j * 11 + i] += 1);
+            block.cells().for_each(|[i, j]| counts[j * 11 + i] += 1);
         }
-        assert!(seen.iter().all(|&times| times > 0));
-        assert_eq!(seen[0], 1);
-        assert_eq!(seen[4 * 11 + 4], 4, "four blocks meet in a lattice point");
+        assert!(counts.iter().all(|&times| times > 0));
+        assert_eq!(counts[0], 1);
+        assert_eq!(counts[4 * 11 + 4], 4, "four blocks meet in a lattice point");
     }
 
     #[test]
-    fn cutting_goes_on_down_to_single_cells() {
+    fn blocks_are_halved_down_to_single_cells() {
         let mut blocks = vec![Block { i: [0, 5], j: [2, 3] }];
         let mut corners = std::collections::BTreeSet::new();
         while let Some(block) = blocks.pop() {

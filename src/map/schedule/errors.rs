@@ -1,50 +1,51 @@
-//! How far what is filled is from what integration shows.
+//! Differences between filled and integrated values.
 
 use crate::map::plan::Needs;
+use crate::map::statistics::{TWO_SIDED_95, score_interval};
 use crate::record::distance::apart;
 use crate::record::{Record, valid};
 
-/// Impacts are counted: what is off by less than this has the same count.
+/// Two counts of impacts per cycle that differ by less than this are equal.
 const HALF_AN_IMPACT: f64 = 0.5;
 
-/// Counts per period that differ by one are a rounding away from it.
-const ROUNDING: f64 = 1e-9;
+/// Tolerance for the rounding of counts per period whose difference is exactly 1.
+const COUNT_ROUNDING: f64 = 1e-9;
 
-/// Errors of the continuous quantities of audited cells; none where the scene does not ask for a quantity, or
-/// leaves it empty in filled cells.
+/// Errors of the continuous quantities of audited cells; none if the scene does not request a quantity, or leaves it empty in
+/// filled cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// Of the largest Lyapunov exponent.
+    /// Errors of the largest Lyapunov exponent.
     pub lyapunov: Option<Deviation>,
-    /// Of the impacts per forcing period.
+    /// Errors of the impacts per forcing period.
     pub impacts: Option<Deviation>,
-    /// Of the fraction of time spent meshing.
+    /// Errors of the fraction of time spent meshing.
     pub mesh: Option<Deviation>,
 }
 
 /// Absolute differences between filled and integrated values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
-    /// Cells that have both values.
+    /// Number of cells with both values.
     pub compared: usize,
-    /// Cells that have a value of their own and were filled with none.
+    /// Number of cells with an integrated value but without a filled one.
     pub empty: usize,
-    /// The median difference: half of those compared have no larger one.
+    /// Median difference.
     pub median: f64,
-    /// 95 % of those compared have no larger one.
+    /// 95 % quantile of the differences.
     pub p95: f64,
-    /// The largest.
+    /// Largest difference.
     pub worst: f64,
-    /// Cells whose values differ by 1 or more.
+    /// Number of cells whose values differ by 1 or more.
     pub off_by_one: usize,
 }
 
 impl Errors {
-    /// Of pairs of records: as filled, as integrated.
+    /// Compares pairs of filled and integrated records.
     pub(super) fn new(pairs: &[(Record, &Record)], needs: &Needs) -> Errors {
         let deviation = |bit, field: fn(&Record) -> f64| {
             let value = |record: &Record| {
-                // The exponent of a superstable cycle is no quantity that others are near to.
+                // The exponent of a superstable cycle is minus infinity, which cannot be compared.
                 Some(field(record)).filter(|&value| record.valid & bit != 0 && value != f64::NEG_INFINITY)
             };
             let values = pairs.iter().map(|(filled, own)| (value(filled), value(own)));
@@ -59,7 +60,7 @@ impl Errors {
 }
 
 impl Deviation {
-    /// Of pairs of values: as filled, as integrated.
+    /// Compares pairs of filled and integrated values.
     fn new(pairs: impl Iterator<Item = (Option<f64>, Option<f64>)>) -> Deviation {
         let (mut differences, mut empty) = (Vec::new(), 0);
         for pair in pairs {
@@ -80,22 +81,22 @@ impl Deviation {
             median: rank(0.5),
             p95: rank(0.95),
             worst: rank(1.0),
-            off_by_one: differences.iter().filter(|&&difference| difference >= 1.0 - ROUNDING).count(),
+            off_by_one: differences.iter().filter(|&&difference| difference >= 1.0 - COUNT_ROUNDING).count(),
         }
     }
 
-    /// The fraction of the compared cells that is off by 1 or more.
+    /// Returns the fraction of the compared cells whose values differ by 1 or more.
     pub fn off_by_one_rate(&self) -> f64 {
         self.off_by_one as f64 / self.compared.max(1) as f64
     }
 
-    /// Its 95 % interval, as [`Audit::interval`](super::Audit::interval).
+    /// Returns the 95 % interval of [`Deviation::off_by_one_rate`].
     pub fn off_by_one_interval(&self) -> [f64; 2] {
-        super::audit::score_interval(self.off_by_one, self.compared, super::audit::TWO_SIDED_95)
+        score_interval(self.off_by_one, self.compared, TWO_SIDED_95)
     }
 }
 
-/// Whether cycles of one period make the same number of impacts.
+/// Whether two cycles of one period have the same number of impacts.
 pub(super) fn same_count(cycle: &Record, other: &Record) -> bool {
     let difference = (cycle.impacts_per_period - other.impacts_per_period).abs();
     difference * f64::from(cycle.period) < HALF_AN_IMPACT
@@ -106,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn differences_are_ranked_and_absent_values_counted_apart() {
+    fn differences_are_ranked_and_missing_values_counted_separately() {
         let pairs = (1..=100).map(|k| (Some(f64::from(k) * 0.125), Some(0.0)));
         let absent = [(None, Some(1.0)), (Some(1.0), None), (None, None)];
         let deviation = Deviation::new(pairs.chain(absent));
@@ -114,8 +115,8 @@ mod tests {
             Deviation { compared: 100, empty: 1, median: 6.25, p95: 11.875, worst: 12.5, off_by_one: 93 };
         assert_eq!(deviation, expected);
         assert_eq!(Deviation::new(std::iter::empty()), Deviation::default());
-        let lost = Deviation::new([(Some(1.0), Some(1.0)), (Some(f64::NAN), Some(1.0))].into_iter());
-        assert_eq!((lost.compared, lost.worst, lost.off_by_one), (2, f64::INFINITY, 1));
+        let not_finite = Deviation::new([(Some(1.0), Some(1.0)), (Some(f64::NAN), Some(1.0))].into_iter());
+        assert_eq!((not_finite.compared, not_finite.worst, not_finite.off_by_one), (2, f64::INFINITY, 1));
         let [low, high] = deviation.off_by_one_interval();
         assert!(low < deviation.off_by_one_rate() && deviation.off_by_one_rate() < high);
     }

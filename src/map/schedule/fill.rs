@@ -1,4 +1,4 @@
-//! Filling a block whose corners agree.
+//! Filling of blocks from the records of their corners.
 
 use super::blocks::Block;
 use super::errors::same_count;
@@ -7,18 +7,18 @@ use crate::record::classify::classify;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
-/// What fills one block: what does not depend on the cell is found once.
+/// Computes the filled records of one block. Values that do not depend on the cell are computed once.
 pub(super) struct Filling<'r> {
     block: Block,
     corners: [&'r Record; 4],
-    /// What all corners know, by the bits of [`valid`].
+    /// Quantities that all corners have, as bits of [`valid`].
     valid: u32,
-    /// Whether the cells next to each corner get averages.
+    /// For each corner, whether the cells nearest to it get averages.
     averages: [bool; 4],
 }
 
 impl<'r> Filling<'r> {
-    /// From the records of a block's corners, in the order of [`Block::corners`].
+    /// Prepares the filling of a block from the records of its corners, in the order of [`Block::corners`].
     pub(super) fn new(block: &Block, corners: [&'r Record; 4]) -> Filling<'r> {
         let common = corners.iter().fold(u32::MAX, |bits, corner| bits & corner.valid);
         let mut valid = common & !valid::STROBE | valid::FILLED;
@@ -31,24 +31,24 @@ impl<'r> Filling<'r> {
         }
         let averages = corners.map(|nearest| {
             let class = classify(&Record { valid, ..*nearest });
-            // Of undecided cells an average might be a decision.
+            // An average exponent could turn undecided cells into decided ones.
             let decided = matches!(class, Class::Periodic { .. } | Class::Chaotic);
             decided && corners.iter().all(|corner| classify(corner) == class)
         });
         Filling { block: *block, corners, valid, averages }
     }
 
-    /// The record of a cell of the block: the nearest corner's, with bilinear averages of what
-    /// varies continuously inside a region. A word or a pattern is filled where all corners have the same, and so are the
-    /// impacts of cycles: whole numbers over the period, which no average of others is.
+    /// Returns the filled record of a cell: that of the nearest corner, with bilinear averages of continuous quantities. A word
+    /// or pattern is filled only if all corners agree. So are the impacts of cycles, which are whole numbers over the period,
+    /// and an average of different counts need not be.
     pub(super) fn record(&self, at: [usize; 2]) -> Record {
         let [u, v] = self.block.shares(at);
         let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
         let nearest = self.block.nearest(at);
         let average = |field: fn(&Record) -> f64| {
-            // What counts for nothing may be infinite: the exponent of a superstable cycle.
-            let beside = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
-            beside.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
+            // Corners without weight are skipped: the exponent of a superstable cycle is infinite.
+            let weighted = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
+            weighted.map(|(corner, weight)| weight * field(corner)).sum::<f64>()
         };
         let filled = Record { periods_run: 0, strobe: [0.0; 4], valid: self.valid, ..*self.corners[nearest] };
         if !self.averages[nearest] {
@@ -64,9 +64,9 @@ impl<'r> Filling<'r> {
         if !matches!(classify(&filled), Class::Periodic { .. }) {
             return averaged;
         }
-        // A corner beyond the edge on which a cell lies has no part in it.
-        let mut beside = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
-        if beside.all(|(corner, _)| same_count(&filled, corner)) {
+        // A cell on an edge depends only on the corners of that edge.
+        let mut weighted = self.corners.iter().zip(weights).filter(|&(_, weight)| weight > 0.0);
+        if weighted.all(|(corner, _)| same_count(&filled, corner)) {
             Record { impacts_per_period: filled.impacts_per_period, ..averaged }
         } else {
             Record { impacts_per_period: 0.0, valid: averaged.valid & !valid::IMPACTS, ..averaged }
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_superstable_corner_counts_where_it_has_weight() {
+    fn a_superstable_corner_contributes_only_with_weight() {
         let block = Block { i: [0, 2], j: [0, 2] };
         let corners = [-1.0, f64::NEG_INFINITY, -3.0, -4.0].map(corner);
         let exponent = |at| Filling::new(&block, corners.each_ref()).record(at).lyapunov;
@@ -106,16 +106,16 @@ mod tests {
     }
 
     #[test]
-    fn what_one_corner_does_not_know_is_not_filled() {
+    fn quantities_that_one_corner_lacks_are_not_filled() {
         let block = Block { i: [0, 2], j: [0, 2] };
         let mut corners = [0.0; 4].map(corner);
         corners[3].valid &= !valid::LYAPUNOV;
         assert_eq!(Filling::new(&block, corners.each_ref()).record([0, 0]).valid & valid::LYAPUNOV, 0);
     }
 
-    /// On an edge only its own corners count.
+    /// On an edge only the corners of that edge count.
     #[test]
-    fn impacts_of_cycles_are_filled_where_the_corners_beside_a_cell_agree() {
+    fn impacts_of_cycles_are_filled_if_the_corners_agree() {
         let block = Block { i: [0, 2], j: [0, 2] };
         let impacting = |count: f64, valid: u32| Record {
             impacts_per_period: count / 3.0,
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(impacts(&corners, [1, 0]), Some(7.0 / 3.0));
         let record = Filling::new(&block, corners.each_ref()).record([1, 1]);
         assert_eq!((record.mesh_fraction, record.impacts_per_period), (29.0 / 64.0, 0.0));
-        // The mean of chaos is no count.
+        // Impacts of chaos are means, not counts, and are averaged.
         let chaos = |count| Record { period: 0, lyapunov: 1.0, ..impacting(count, valid::LYAPUNOV) };
         let corners = [7.5, 7.5, 7.5, 9.0].map(chaos);
         let mean = impacts(&corners, [1, 1]).unwrap();

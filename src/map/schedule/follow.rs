@@ -1,4 +1,4 @@
-//! Rows that follow the attractor: each cell starts where its neighbour in the row before ended.
+//! Rows that follow the attractor: each cell starts in the last state of its neighbour in the preceding row.
 
 use crate::map::plan::{Plan, followed};
 use crate::map::scene::Start;
@@ -6,16 +6,16 @@ use crate::map::shard::Shard;
 use crate::record::Record;
 use rattlemap_dynamics::model::{REST, State};
 
-/// Where a map that follows its neighbours stands.
+/// State of a map whose cells follow their neighbours.
 pub(super) struct Follow {
-    /// Cells of a row of the map, and those of them that are followed.
+    /// Number of cells in a row of the map, and the columns that are computed.
     width: usize,
     columns: Vec<u32>,
     rows: usize,
     is_down: bool,
-    /// Rows before the one under way.
+    /// Number of finished rows.
     done: usize,
-    /// Starts of the row under way, by place.
+    /// Starts of the current row.
     starts: Vec<State>,
 }
 
@@ -31,18 +31,18 @@ impl Follow {
         self.columns.len() * self.rows
     }
 
-    /// The cells of the row under way, by column.
+    /// Returns the cells of the current row, by column.
     pub(super) fn row(&self) -> Vec<u32> {
         let j = if self.is_down { self.rows - 1 - self.done } else { self.done };
         self.columns.iter().map(|column| (j * self.width) as u32 + column).collect()
     }
 
-    /// Where a cell of the row under way starts, by its place there.
+    /// Returns the start of a cell of the current row, by its place there.
     pub(super) fn start(&self, place: usize) -> State {
         self.starts[place]
     }
 
-    /// The next row, now that this one has its records; none after the last.
+    /// Returns the next row after the current one has its records; empty after the last row.
     pub(super) fn next(&mut self, records: &[Record]) -> Vec<u32> {
         if self.done + 1 == self.rows {
             return Vec::new();

@@ -1,17 +1,17 @@
-//! What makes two cells the same to an adaptive map.
+//! Labels of cells: an adaptive map treats cells with equal labels as equal.
 
 use crate::map::plan::Needs;
 use crate::record::classify::classify;
 use crate::record::{Record, Spelling, valid, word_hash};
 use rattlemap_dynamics::orbit::Class;
 
-/// Class, period and whether there is contact; symmetry and word or pattern where they are asked for. In a map of basins
-/// the attractor instead.
+/// Class, period and whether there is contact; symmetry and word or pattern if their changes are borders. In a map of
+/// basins the attractor instead.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Label {
-    /// See [`word_of`] and [`pattern_of`].
+    /// Hash of the word or pattern, from [`word_of`] or [`pattern_of`].
     word: u64,
-    /// What makes a border; 0 for a cell that nothing is known of.
+    /// Number of the kind of motion; 0 for an unknown cell.
     pub(super) kind: u32,
 }
 
@@ -34,7 +34,7 @@ impl Label {
         Label { word, kind: 8 * class + 4 * free + symmetry }
     }
 
-    /// Of a kind, and nothing else.
+    /// Builds a label from a kind alone.
     pub(super) fn of_kind(kind: u32) -> Label {
         Label { word: 0, kind }
     }
@@ -44,13 +44,13 @@ impl Label {
     }
 }
 
-/// Hash of the word or of that of the symmetry-conjugate orbit, whichever is smaller: the two coexist, and
-/// which one a cell shows says nothing. 0 where there is no word.
+/// Returns the smaller of the hashes of the word and of the word of the symmetry-conjugate orbit. The two orbits coexist, so
+/// both must have one label. Returns 0 without a word.
 pub(super) fn word_of(record: &Record) -> u64 {
     lesser(record.word_hash, record.spelling())
 }
 
-/// The same of the pattern.
+/// Returns the smaller of the hashes of the pattern and of its mirror image; 0 without a pattern.
 pub(super) fn pattern_of(record: &Record) -> u64 {
     lesser(record.pattern_hash, record.pattern())
 }

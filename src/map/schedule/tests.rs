@@ -1,17 +1,18 @@
-//! Test pictures are refined, and the cost is counted.
+//! Adaptive maps of test pictures, with the number of integrated cells.
 
 use super::*;
-use crate::map::scene::{Purpose, Scene};
+use crate::map::plan::test_plan;
 use crate::record::classify::classify;
 use crate::record::valid;
 use rattlemap_dynamics::orbit::Class;
 use rattlemap_dynamics::word::Word;
 
-/// In a picture's number beside the period: cycles that are their own mirror image, and another word.
+/// Added to the period in a picture's number: a symmetric cycle.
 const SYMMETRIC: u32 = 1000;
-const WORD: u32 = 2000;
+/// Added to the period in a picture's number: another word.
+const OTHER_WORD: u32 = 2000;
 
-/// The record of a cell that a picture shows.
+/// Converts a number of a picture to a record.
 fn shown(number: u32) -> Record {
     let mut record = Record {
         period: number % SYMMETRIC,
@@ -20,42 +21,39 @@ fn shown(number: u32) -> Record {
         periods_run: 7,
         ..Record::default()
     };
-    record.set_word(&Word::cyclic(&[b'1' + (number / WORD) as u8]));
+    record.set_word(&Word::cyclic(&[b'1' + (number / OTHER_WORD) as u8]));
     record
 }
 
-fn plan(counts: [usize; 2], refine: &str) -> Plan {
-    let axis =
-        |name, count| format!("[[axis]]\nparameter = '{name}'\nmin = 0.5\nmax = 1.0\ncount = {count}\n");
-    let text = format!("{}{}[refine]\n{refine}", axis("e", counts[0]), axis("omega", counts[1]));
-    Plan::new(&Scene::parse(&text, "s", &[], Purpose::Map).unwrap())
+fn plan([columns, rows]: [usize; 2], refine: &str) -> Plan {
+    test_plan([("e", columns), ("omega", rows)], &format!("[refine]\n{refine}"))
 }
 
-/// Runs a schedule on a picture: a number for every cell.
+/// Runs a schedule on a picture, a function that gives every cell a number.
 fn run(plan: &Plan, picture: impl Fn(usize, usize) -> u32) -> (Vec<Record>, Refined) {
-    run_in(plan, std::mem::take, picture)
+    run_in(plan, std::mem::take, |i, j| shown(picture(i, j)))
 }
 
-/// The same where `come` says which of the cells under way come next.
+/// Runs a schedule. `record` computes a record; `arrive` removes the cells whose records arrive next from those under way.
 fn run_in(
     plan: &Plan,
-    mut come: impl FnMut(&mut Vec<u32>) -> Vec<u32>,
-    picture: impl Fn(usize, usize) -> u32,
+    mut arrive: impl FnMut(&mut Vec<u32>) -> Vec<u32>,
+    record: impl Fn(usize, usize) -> Record,
 ) -> (Vec<Record>, Refined) {
     let mut schedule = Schedule::new(plan);
     let mut records = vec![Record::default(); plan.cell_count()];
     let mut waiting = Vec::new();
     while !schedule.is_finished() {
         waiting.extend(schedule.next(plan, usize::MAX).iter().map(|cell| cell.id));
-        for id in come(&mut waiting) {
+        for id in arrive(&mut waiting) {
             let [i, j] = plan.indices(id);
             assert_eq!(records[id as usize].periods_run, 0, "cell {id} was asked for twice");
-            records[id as usize] = shown(picture(i, j));
-            assert!(schedule.waits_for(id));
+            records[id as usize] = record(i, j);
+            assert!(schedule.is_waiting_for(id));
             schedule.take(id, &records);
         }
     }
-    assert!(waiting.is_empty() && schedule.next(plan, 1).is_empty(), "cells were begun that nobody asks for");
+    assert!(waiting.is_empty() && schedule.next(plan, 1).is_empty(), "cells were begun without a request");
     let refined = schedule.finish(&mut records).unwrap();
     assert_eq!(refined.integrated + refined.filled, plan.cell_count());
     assert!(records.iter().all(|r| (r.periods_run == 0) == (r.valid & valid::FILLED != 0)));
@@ -80,7 +78,7 @@ fn a_smooth_border_is_found_cell_by_cell() {
     assert_eq!(refined.audits[0].wrong, 0);
 }
 
-/// A winding band narrower than the blocks: where a corner meets it, it is followed to its ends.
+/// A winding band narrower than the blocks is followed to its ends from a corner that meets it.
 #[test]
 fn a_narrow_band_is_followed() {
     let band = |i: usize, j: usize| {
@@ -102,7 +100,7 @@ fn a_uniform_map_costs_the_coarse_grid_and_the_audit() {
     assert_eq!(wrong(&records, 101, |_, _| 4), 0);
 }
 
-/// To integrate what was to be filled would be no refinement.
+/// An audit of all filled cells would cancel the saving.
 #[test]
 fn the_audit_of_a_small_map_leaves_most_of_it_filled() {
     let small = plan([40, 40], "minimum_grid = 8");
@@ -110,15 +108,15 @@ fn the_audit_of_a_small_map_leaves_most_of_it_filled() {
     let [audit] = refined.audits[..] else { panic!("{refined:?}") };
     assert_eq!((audit.filled, audit.sampled), (1600 - 36, 391), "{refined:?}");
     assert_eq!(refined.filled, 1600 - 36 - 391);
-    // Who asks for so many cells gets them.
+    // The scene can request a larger audit.
     let (_, refined) = run(&plan([40, 40], "minimum_grid = 8\naudit = 2000"), |_, _| 4);
     assert_eq!((refined.audits[0].sampled, refined.filled), (1564, 0), "{refined:?}");
-    // On a large map the cells that it takes to see 0.3 %.
+    // A large map has the default sample.
     let (_, refined) = run(&plan([200, 200], "minimum_grid = 8"), |_, _| 4);
-    assert_eq!(refined.audits[0].sampled, crate::map::scene::AUDIT as usize);
+    assert_eq!(refined.audits[0].sampled, crate::map::scene::DEFAULT_AUDIT as usize);
 }
 
-/// Islands smaller than a block that the coarse grid misses altogether.
+/// Islands smaller than a block, which the coarse grid misses.
 #[test]
 fn the_audit_finds_planted_islands_and_mends_the_map() {
     let islands =
@@ -130,7 +128,7 @@ fn the_audit_finds_planted_islands_and_mends_the_map() {
     let last = refined.audits[refined.audits.len() - 1];
     assert!(last.rate() <= 0.01);
     assert!(wrong(&records, 241, islands) <= refined.filled / 100, "{refined:?}");
-    // One island too small to matter: what the audit finds of it is cut out.
+    // One island below the allowed error: its cells in the audit are mended.
     let one = |i: usize, j: usize| if (40..48).contains(&i) && (40..48).contains(&j) { 5 } else { 1 };
     let plan = self::plan([241, 241], "minimum_grid = 48\naudit = 4000");
     let (records, refined) = run(&plan, one);
@@ -138,10 +136,10 @@ fn the_audit_finds_planted_islands_and_mends_the_map() {
     assert_eq!(wrong(&records, 241, one), 0, "{refined:?}");
 }
 
-/// Where classes alone make borders, only coarse blocks are halved for touching one, until an audit finds too many
-/// wrong cells: islands beside a border that no corner of the blocks there meets.
+/// If only classes are borders, narrow blocks are not halved for touching one until an audit fails. Here islands near a border
+/// meet no corner of the blocks.
 #[test]
-fn a_failed_audit_has_borders_followed_more_closely_first() {
+fn after_a_failed_audit_borders_are_first_followed_in_narrower_blocks() {
     let beaded = |i: usize, j: usize| {
         let is_bead = (1..4).contains(&(i % 8)) && (97..103).contains(&j);
         if j < 96 || is_bead { 1 } else { 2 }
@@ -155,20 +153,19 @@ fn a_failed_audit_has_borders_followed_more_closely_first() {
     assert!(first.rate() > 0.002 && second.rate() <= 0.002, "{refined:?}");
     assert_eq!(
         first.sampled,
-        crate::map::scene::AUDIT as usize,
+        crate::map::scene::DEFAULT_AUDIT as usize,
         "mended before more is audited: {refined:?}"
     );
-    // As with symmetries from the beginning, but for what the audits integrate.
+    // The result is that of a scene with symmetries, except for cells of audits.
     let (closely, by_symmetry) = run_with("'class', 'symmetric'");
     assert_eq!(by_symmetry.audits.len(), 1, "{by_symmetry:?}");
     assert!(refined.integrated < by_symmetry.integrated + 2100, "{refined:?}, {by_symmetry:?}");
     assert!(wrong(&records, 241, beaded) <= wrong(&closely, 241, beaded));
 }
 
-/// Single cells strewn over the map, fewer than it allows: where the first sample happens to hold
-/// too many of them, a larger one tells.
+/// Scattered wrong cells, fewer than allowed: if the first sample contains too many by chance, a larger one decides.
 #[test]
-fn an_audit_that_may_be_chance_goes_on() {
+fn an_audit_goes_on_if_its_result_may_be_due_to_chance() {
     let plan = plan([301, 301], "minimum_grid = 8\n[outputs]\nquantities = ['class', 'symmetric']");
     let (mut prolonged, mut passed) = (0, 0);
     for salt in 0..40u64 {
@@ -179,20 +176,23 @@ fn an_audit_that_may_be_chance_goes_on() {
         };
         let (_, refined) = run(&plan, strewn);
         let first = refined.audits[0];
-        let is_prolonged = first.sampled > crate::map::scene::AUDIT as usize;
+        let is_prolonged = first.sampled > crate::map::scene::DEFAULT_AUDIT as usize;
         prolonged += u32::from(is_prolonged);
         passed += u32::from(is_prolonged && refined.audits.len() == 1);
-        assert!(first.sampled <= 16 * crate::map::scene::AUDIT as usize && first.rate() > 0.0, "{refined:?}");
+        assert!(
+            first.sampled <= 16 * crate::map::scene::DEFAULT_AUDIT as usize && first.rate() > 0.0,
+            "{refined:?}"
+        );
     }
     assert!((2..20).contains(&prolonged) && 2 * passed >= prolonged, "{passed} of {prolonged}");
-    // What is no chance is mended at once.
+    // A significant result is mended at once.
     let (_, refined) = run(&plan, |i, j| if (2..7).contains(&(i % 16)) && j % 16 > 8 { 5 } else { 1 });
-    assert_eq!(refined.audits[0].sampled, crate::map::scene::AUDIT as usize, "{refined:?}");
+    assert_eq!(refined.audits[0].sampled, crate::map::scene::DEFAULT_AUDIT as usize, "{refined:?}");
 }
 
-/// A plain region does not pay for what is wrong elsewhere.
+/// A uniform region is not refined for wrong cells elsewhere.
 #[test]
-fn only_what_is_wrong_too_often_is_refined_further() {
+fn only_kinds_with_too_many_wrong_cells_are_refined() {
     let islands = |i: usize, j: usize| match (i < 121, i % 16, j % 16) {
         (true, ..) => 1,
         (false, 2..7, 3..9) => 5,
@@ -202,7 +202,7 @@ fn only_what_is_wrong_too_often_is_refined_further() {
     let (records, refined) = run(&plan, islands);
     assert!(refined.audits.len() > 1 && refined.audits[0].rate() > 0.02);
     assert!(wrong(&records, 241, islands) <= refined.filled / 100, "{refined:?}");
-    // Centres of the plain region's blocks: a few are audited, none is asked for by a halving.
+    // Centres of the uniform region's blocks: a few are audited, none is requested by a halving.
     let centres = (8..241).step_by(16).flat_map(|j| (8..96).step_by(16).map(move |i| 241 * j + i));
     let (all, integrated) =
         (centres.clone().count(), centres.filter(|&id| records[id].periods_run > 0).count());
@@ -216,25 +216,25 @@ fn rounds_bound_the_refinement() {
     let (records, refined) = run(&plan, half);
     assert!(wrong(&records, 129, half) > 0);
     assert!(refined.rounds <= 4, "{refined:?}");
-    // Also where that leaves more wrong than the map allows.
+    // The bound also holds if more cells are wrong than allowed.
     let plan = self::plan([129, 129], "minimum_grid = 16\nrounds = 2\nmax_error = 1e-3\naudit = 500");
     let (_, refined) = run(&plan, half);
     assert!(refined.audits.len() == 1 && refined.audits[0].rate() > 1e-3, "{refined:?}");
-    // A block down to which a wrong cell was cut is no reason not to halve others.
+    // The block of a wrong cell is halved further; other blocks are still halved.
     let islands = |i: usize, j: usize| {
         if (2..7).contains(&(i % 16)) && (3..9).contains(&(j % 16)) { 5 } else { half(i, j) }
     };
     let plan = self::plan([129, 129], "minimum_grid = 16\nrounds = 3\nmax_error = 1e-3\naudit = 500");
     let (_, islanded) = run(&plan, islands);
     assert!(islanded.audits.len() > 1 && islanded.audits[0].rate() > 1e-3, "{islanded:?}");
-    // What is wrong in the audit is mended, and nothing else.
+    // Only the wrong cells of the audit are mended.
     assert!(refined.integrated < 1000, "{refined:?}");
 }
 
-/// Discs, bands and strewn cells, audits that fail and that go on: in whatever order records come, the same
-/// cells are integrated, and the audits find the same.
+/// The order of the records changes neither the integrated cells nor the audits, for discs, bands and scattered cells, and with
+/// failed and prolonged audits.
 #[test]
-fn what_is_integrated_does_not_depend_on_the_order_in_which_records_come() {
+fn integrated_cells_do_not_depend_on_the_order_of_records() {
     let picture = |i: usize, j: usize| {
         let strewn = crate::map::random::Random::new((j * 203 + i) as u64).unit() < 0.01;
         let band = (j as f64 - 60.0 - 20.0 * (i as f64 / 17.0).sin()).abs() < 1.5;
@@ -242,7 +242,7 @@ fn what_is_integrated_does_not_depend_on_the_order_in_which_records_come() {
         let slope = (j as f64 - 0.3 * i as f64 - 80.0).abs() < 2.5;
         let corner = i + 2 * j > 420;
         let period = 1 + u32::from(strewn && disc) + 2 * u32::from(band) + 4 * u32::from(disc);
-        period + SYMMETRIC * u32::from(slope) + WORD * u32::from(corner)
+        period + SYMMETRIC * u32::from(slope) + OTHER_WORD * u32::from(corner)
     };
     let everything = "[outputs]\nquantities = ['class', 'symmetric', 'word']";
     for (refine, outputs) in [
@@ -256,50 +256,41 @@ fn what_is_integrated_does_not_depend_on_the_order_in_which_records_come() {
         assert!(refined.audits.iter().any(|audit| audit.wrong > 0), "{refined:?}");
         for seed in 0..20 {
             let mut random = crate::map::random::Random::new(seed);
-            // Any one of those that wait, the last ones, or all but the first.
-            let come = |waiting: &mut Vec<u32>| match seed % 3 {
+            // A random one of the waiting cells, the last ones, or all but the first.
+            let arrive = |waiting: &mut Vec<u32>| match seed % 3 {
                 0 => vec![waiting.swap_remove(random.below(waiting.len()))],
                 1 => waiting.split_off(waiting.len() - (waiting.len() / 3).max(1)),
                 _ => waiting.split_off(usize::from(waiting.len() > 1)),
             };
-            let (others, other) = run_in(&plan, come, picture);
+            let (others, other) = run_in(&plan, arrive, |i, j| shown(picture(i, j)));
             assert_eq!(refined, other, "{seed}");
             assert!(records == others, "{seed}");
         }
     }
 }
 
-/// Exponents that vary linearly but for a step that no corner sees, and impacts that change along a band.
+/// Exponents are constant except in bands that no corner meets; impacts change at a border.
 #[test]
-fn the_audit_says_by_how_much_filled_values_are_off() {
+fn the_audit_reports_errors_of_filled_values() {
     let outputs = |refine: &str| {
         let quantities = "[outputs]\nquantities = ['class', 'lyapunov', 'impacts']";
         plan([129, 129], &format!("minimum_grid = 16\naudit = 4000\n{refine}\n{quantities}"))
     };
     let stepped = |i: usize| (5..10).contains(&(i % 16));
-    let number = |i: usize, _| 1 + u32::from(stepped(i)) * SYMMETRIC + u32::from(i > 64) * WORD;
-    // What the picture calls symmetry is a step of the exponent here, and what it calls a word the count.
+    let number = |i: usize, _| 1 + u32::from(stepped(i)) * SYMMETRIC + u32::from(i > 64) * OTHER_WORD;
+    // The symmetry of the picture becomes a step of the exponent, its word a number of impacts.
     let record = |number: u32| {
         let counted = shown(number);
         Record {
             lyapunov: -1.0 - 0.25 * f64::from(counted.symmetric),
-            impacts_per_period: f64::from(2 + 3 * (number / WORD)),
+            impacts_per_period: f64::from(2 + 3 * (number / OTHER_WORD)),
             valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS,
             symmetric: 0,
             ..counted
         }
     };
     let audit_of = |plan: &Plan| {
-        let mut schedule = Schedule::new(plan);
-        let mut records = vec![Record::default(); plan.cell_count()];
-        while !schedule.is_finished() {
-            for cell in schedule.next(plan, usize::MAX) {
-                let [i, j] = plan.indices(cell.id);
-                records[cell.id as usize] = record(number(i, j));
-                schedule.take(cell.id, &records);
-            }
-        }
-        let refined = schedule.finish(&mut records).unwrap();
+        let (_, refined) = run_in(plan, std::mem::take, |i, j| record(number(i, j)));
         let [audit] = refined.audits[..] else { panic!("{refined:?}") };
         audit
     };
@@ -309,12 +300,12 @@ fn the_audit_says_by_how_much_filled_values_are_off() {
     let exponents = errors.lyapunov.unwrap();
     assert_eq!((exponents.compared, exponents.empty), (4000, 0));
     assert_eq!((exponents.median, exponents.p95, exponents.worst), (0.0, 0.25, 0.25));
-    // The blocks beside column 64 have corners with either count: what lies inside is left empty.
+    // The corners of blocks at column 64 have different counts, so the impacts inside are empty.
     let impacts = errors.impacts.unwrap();
     assert_eq!((impacts.compared + impacts.empty, impacts.worst, impacts.off_by_one), (4000, 0.0, 0));
     assert!((300..650).contains(&impacts.empty), "{impacts:?}");
     assert_eq!(errors.mesh, None, "not asked for");
-    // What no table shows is not judged.
+    // Empty quantities have no errors.
     assert_eq!(audit_of(&outputs("continuous = 'empty'")).errors, Errors::default());
 }
 

@@ -1,17 +1,17 @@
-//! The map as a tiling by blocks: which block covers a cell, and which blocks it was halved from.
+//! The tiling of a map by blocks: which block covers a cell, and from which block it was halved.
 
 use std::ops::Range;
 
 use super::blocks::{Block, coarse};
 
-/// Number of a block of the tiling.
+/// Index of a block in the tiling.
 pub(super) type Tile = usize;
 
-/// Blocks that cover a map without gaps, and all that they were made from by halving.
+/// Blocks that cover a map without gaps, and the larger blocks from which they were halved.
 pub(super) struct Tiling {
     counts: [usize; 2],
     tiles: Vec<Entry>,
-    /// The leaf that covers each square between four neighbouring cells, row by row.
+    /// Leaf that covers each square between four neighbouring cells, row by row.
     owners: Vec<u32>,
 }
 
@@ -23,7 +23,7 @@ struct Entry {
 }
 
 impl Tiling {
-    /// Blocks between every `step`-th line, none of them halved.
+    /// Builds the tiling by blocks between every `step`-th line.
     pub(super) fn new(counts: [usize; 2], step: usize) -> Tiling {
         let owners = vec![0; (counts[0] - 1) * (counts[1] - 1)];
         let mut tiling = Tiling { counts, tiles: Vec::new(), owners };
@@ -42,7 +42,7 @@ impl Tiling {
         self.tiles.push(Entry { block, parent, level, is_leaf: true });
     }
 
-    /// All blocks, halved ones included.
+    /// Returns all blocks, including halved ones.
     pub(super) fn tiles(&self) -> Range<Tile> {
         0..self.tiles.len()
     }
@@ -51,22 +51,22 @@ impl Tiling {
         self.tiles[tile].block
     }
 
-    /// How often a coarse block was halved on the way to this one.
+    /// Returns the number of halvings that led to a block.
     pub(super) fn level(&self, tile: Tile) -> u32 {
         self.tiles[tile].level
     }
 
-    /// Whether it has not been halved.
+    /// Whether the block has not been halved.
     pub(super) fn is_leaf(&self, tile: Tile) -> bool {
         self.tiles[tile].is_leaf
     }
 
-    /// The block and all that it was made from, the smallest first.
+    /// Returns the block and the blocks from which it was halved, the smallest first.
     pub(super) fn lineage(&self, tile: Tile) -> impl Iterator<Item = Tile> + '_ {
         std::iter::successors(Some(tile), |&tile| self.tiles[tile].parent.map(|parent| parent as Tile))
     }
 
-    /// Halves a leaf; returns what it is made of.
+    /// Halves a leaf and returns its parts.
     pub(super) fn halve(&mut self, tile: Tile) -> Range<Tile> {
         let Entry { block, level, ref mut is_leaf, .. } = self.tiles[tile];
         *is_leaf = false;
@@ -77,7 +77,7 @@ impl Tiling {
         from..self.tiles.len()
     }
 
-    /// Leaves that a cell belongs to: up to four, where they meet.
+    /// Returns the leaves that contain a cell, up to four.
     pub(super) fn covering(&self, [i, j]: [usize; 2]) -> impl Iterator<Item = Tile> + use<> {
         let [columns, rows] = self.counts.map(|count| count - 1);
         let mut found = [usize::MAX; 4];
@@ -94,7 +94,7 @@ impl Tiling {
         found.into_iter().take(count)
     }
 
-    /// The one of them that fills the cell: up and to the right of it, if there is one there.
+    /// Returns the leaf that fills a cell: the one above and to the right of it, if there is one.
     pub(super) fn owner(&self, [i, j]: [usize; 2]) -> Tile {
         let [columns, rows] = self.counts.map(|count| count - 1);
         self.owners[j.min(rows - 1) * columns + i.min(columns - 1)] as Tile

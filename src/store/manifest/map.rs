@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::findings::attractors::Attractor;
 use crate::gpu::AdapterId;
@@ -11,13 +12,14 @@ use crate::map::engine::{CardReport, Engine};
 use crate::map::plan::count_classes;
 use crate::map::scene::{List, Scene, Steps};
 use crate::map::schedule::{Audit, Deviation, Refined};
+use crate::map::shard::Shard;
 use crate::show::cells::{Cells, SOURCES};
 use crate::show::names;
 use crate::show::parameters::Parameters;
 use crate::show::table::cell_columns::ABSENT;
 use crate::store::file_names::LIST;
 use crate::store::inventory::FileEntry;
-use crate::store::manifest::{AxisObject, DerivedObject, Head, ModelObject, StartObject, derived, start};
+use crate::store::manifest::{self, Head, joined, without_nulls};
 use crate::store::record_file::Identity;
 use rattlemap_dynamics::orbit::Status;
 
@@ -99,204 +101,165 @@ pub struct ShardOrigin<'a> {
     pub target: &'a str,
 }
 
-/// The manifest of a map. It contains neither paths nor user names.
-#[derive(Serialize)]
-pub(crate) struct MapManifest<'a> {
-    #[serde(flatten)]
-    head: Head,
-    #[serde(flatten)]
-    made: MadeObject<'a>,
-    /// The host's processor.
-    processor: &'a str,
-    /// Hash of the sources that decide the contents of records, and target of their compilation.
-    sources: &'a str,
-    target: &'a str,
-    /// Number of shards of a merged map.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shards: Option<u32>,
-    title: &'a str,
-    scene: &'a str,
-    set: &'a [String],
-    model: ModelObject,
-    axes: Vec<AxisObject>,
-    /// The list of cells of a map without axes.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    list: Option<ListObject>,
-    parameters: Parameters,
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    derived: BTreeMap<String, DerivedObject>,
-    start: StartObject,
-    integration: IntegrationObject,
-    quantities: Vec<String>,
-    cells: usize,
-    classes: BTreeMap<&'static str, usize>,
-    statuses: BTreeMap<&'static str, usize>,
-    /// Number of cells by the number of attractors that their starts reach.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    attractors: Option<BTreeMap<u8, usize>>,
-    /// Attractors of a map of basins, by label.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    basins: Option<Vec<BasinObject>>,
-    periods: u64,
-    /// Swept parameters without effect on any measured quantity.
-    without_effect: &'a [String],
-    codes: Codes,
-    /// Sum over all runs that were resumed.
-    elapsed_seconds: f64,
-    resumed_cells: usize,
-    refinement: Option<RefinementObject>,
-    timings: MapTimings,
-    files: &'a [FileEntry],
+/// Returns the manifest of a map. It contains neither paths nor user names.
+pub(crate) fn map(cells: &Cells<'_>, run: &Run<'_>, writing: Duration, files: &[FileEntry]) -> Value {
+    let scene = cells.scene();
+    let quantities: Vec<String> =
+        scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect();
+    joined([
+        run_and_scene("map", None, run, scene),
+        json!({ "parameters": Parameters::of_scene(scene) }),
+        without_nulls(json!({ "derived": manifest::derived(scene) })),
+        json!({
+            "start": manifest::start(scene),
+            "integration": integration(scene, run.lane_grid),
+            "quantities": quantities,
+            "cells": cells.counts().iter().product::<usize>(),
+        }),
+        counts(cells),
+        json!({
+            "periods": cells.periods(),
+            "without_effect": run.without_effect,
+            "codes": codes(),
+            "elapsed_seconds": (run.elapsed_before + run.elapsed).as_secs_f64(),
+            "resumed_cells": run.resumed_cells,
+            "refinement": cells.refinement().map(RefinementObject::from),
+            "timings": timings(run, writing),
+            "files": files,
+        }),
+    ])
 }
 
-/// The engine that computed a map, and its graphics adapters.
-#[derive(Serialize)]
-pub(crate) struct MadeObject<'a> {
-    engine: &'a str,
-    precision: &'a str,
-    device: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    adapter: Option<AdapterObject<'a>>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    cards: Vec<CardObject<'a>>,
+/// Returns the first fields of the manifest of a map or of a shard: program, engine and scene.
+pub(crate) fn run_and_scene(
+    command: &'static str,
+    shard: Option<Shard>,
+    run: &Run<'_>,
+    scene: &Scene,
+) -> Value {
+    joined([
+        json!(Head::of(command)),
+        without_nulls(json!({ "shard": shard })),
+        made(run),
+        json!({
+            "processor": run.processor,
+            "sources": run.shards.map_or(Identity::own_sources(), |shards| shards.sources),
+            "target": run.shards.map_or(Identity::own_target(), |shards| shards.target),
+        }),
+        without_nulls(json!({ "shards": run.shards.map(|shards| shards.count) })),
+        json!({
+            "title": scene.title(),
+            "scene": scene.text(),
+            "set": run.sets,
+            "model": manifest::model(scene.base()),
+            "axes": scene.axes().iter().map(manifest::axis).collect::<Vec<_>>(),
+        }),
+        without_nulls(json!({ "list": scene.list().map(list) })),
+    ])
 }
 
-impl<'a> MadeObject<'a> {
-    pub(crate) fn of(run: &'a Run<'_>) -> MadeObject<'a> {
-        let Made { engine, precision, device } = run.made;
-        MadeObject {
-            engine,
-            precision,
-            device,
-            adapter: run.adapter.as_ref().map(AdapterObject::from),
-            cards: run.cards.iter().map(CardObject::from).collect(),
-        }
+/// Describes the engine and its graphics adapters.
+pub(crate) fn made(run: &Run<'_>) -> Value {
+    let Made { engine, precision, device } = run.made;
+    let adapter = run.adapter.as_ref();
+    let cards: Vec<Value> = run.cards.iter().map(card).collect();
+    joined([
+        json!({ "engine": engine, "precision": precision, "device": device }),
+        without_nulls(json!({
+            "adapter": adapter.map(|AdapterId { number, pci, .. }| json!({ "number": number, "pci": pci })),
+            "cards": (!cards.is_empty()).then_some(cards),
+        })),
+    ])
+}
+
+/// Describes one of several cards: its number in `rattlemap devices`, the cells that it computed in this run, and why it
+/// was lost.
+fn card(CardReport { adapter: AdapterId { number, name, pci }, cells, lost }: &CardReport) -> Value {
+    json!({ "number": number, "name": name, "pci": pci, "cells": cells, "lost": lost })
+}
+
+/// Describes the list of cells of a map without axes; `hash` is the SHA-256 of names and values.
+fn list(list: &List) -> Value {
+    json!({
+        "file": LIST,
+        "columns": list.parameters().map(|parameter| parameter.name.to_string()).collect::<Vec<_>>(),
+        "cells": list.len(),
+        "hash": list.hash(),
+    })
+}
+
+/// Describes the settings of the integration. The numbers of steps are null on the CPU.
+pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> Value {
+    let settings = scene.integration();
+    json!({
+        "steps_per_period": match settings.steps_per_period {
+            Steps::Auto => None,
+            Steps::PerPeriod(steps) => Some(steps),
+        },
+        "least_steps_used": lane_grid.map(|[least, _]| least),
+        "most_steps_used": lane_grid.map(|[_, most]| most),
+        "transient_periods": settings.transient_periods,
+        "observed_periods": settings.observed_periods,
+        "early_stop": settings.early_stop,
+        "undecided_periods": settings.undecided_periods,
+        "max_period": settings.max_period,
+    })
+}
+
+/// Seconds that each phase took. `integrate` is the sum over all resumed runs; the others are those of the last run.
+pub(crate) fn timings(run: &Run<'_>, writing: Duration) -> Value {
+    json!({
+        "open": run.opening.as_secs_f64(),
+        "integrate": (run.elapsed_before + run.elapsed).as_secs_f64(),
+        "write": writing.as_secs_f64(),
+    })
+}
+
+/// Counts the cells by class, status and number of attractors, and describes the basins.
+pub(crate) fn counts(cells: &Cells<'_>) -> Value {
+    let classes = names::CLASSES.into_iter().zip(count_classes(cells.classes()));
+    let mut statuses: BTreeMap<_, usize> = Status::ALL.iter().map(|&s| (names::status(s), 0)).collect();
+    for status in cells.statuses() {
+        *statuses.entry(names::status(status)).or_default() += 1;
     }
+    let attractors = cells.attractors().map(|list| {
+        let mut counts = BTreeMap::<u8, usize>::new();
+        list.iter().for_each(|&count| *counts.entry(count).or_default() += 1);
+        counts
+    });
+    joined([
+        json!({ "classes": classes.collect::<BTreeMap<_, _>>(), "statuses": statuses }),
+        without_nulls(json!({ "attractors": attractors, "basins": basins(cells) })),
+    ])
 }
 
-/// A graphics adapter: its number in `rattlemap devices` and its address on the PCI bus.
-#[derive(Serialize)]
-struct AdapterObject<'a> {
-    number: usize,
-    pci: Option<&'a str>,
-}
-
-impl<'a> From<&'a AdapterId> for AdapterObject<'a> {
-    fn from(adapter: &'a AdapterId) -> AdapterObject<'a> {
-        AdapterObject { number: adapter.number, pci: adapter.pci.as_deref() }
-    }
-}
-
-/// One of several cards: the number of cells that it computed in this run, and why it was lost.
-#[derive(Serialize)]
-struct CardObject<'a> {
-    number: usize,
-    name: &'a str,
-    pci: Option<&'a str>,
-    cells: usize,
-    lost: Option<&'a str>,
-}
-
-impl<'a> From<&'a CardReport> for CardObject<'a> {
-    fn from(card: &'a CardReport) -> CardObject<'a> {
-        let CardReport { adapter, cells, lost } = card;
-        let AdapterId { number, name, pci } = adapter;
-        let (pci, lost) = (pci.as_deref(), lost.as_deref());
-        CardObject { number: *number, name, pci, cells: *cells, lost }
-    }
-}
-
-/// Records and time of earlier runs, in objects that commands print; zero without such runs.
-#[derive(Serialize)]
-pub(crate) struct ResumedObject {
-    runs: usize,
-    seconds: f64,
-}
-
-impl ResumedObject {
-    pub(crate) fn of(run: &Run<'_>) -> ResumedObject {
-        ResumedObject { runs: run.resumed_cells, seconds: run.elapsed_before.as_secs_f64() }
-    }
-}
-
-/// An attractor and the size of its basin.
-#[derive(Serialize)]
-pub(crate) struct BasinObject {
-    class: &'static str,
-    period: Option<u32>,
-    cells: usize,
-    share: f64,
-}
-
-/// Returns the attractors of a map of basins, in the order of their labels.
-pub(crate) fn basins(cells: &Cells<'_>) -> Option<Vec<BasinObject>> {
+/// Describes the attractors of a map of basins, in the order of their labels.
+fn basins(cells: &Cells<'_>) -> Option<Vec<Value>> {
     let basins = cells.basins()?;
     let total = basins.labels().len() as f64;
-    let object = |attractor: &Attractor| BasinObject {
-        class: names::class(attractor.class),
-        period: names::period(attractor.class),
-        cells: attractor.cells,
-        share: attractor.cells as f64 / total,
+    let describe = |attractor: &Attractor| {
+        json!({
+            "class": names::class(attractor.class),
+            "period": names::period(attractor.class),
+            "cells": attractor.cells,
+            "share": attractor.cells as f64 / total,
+        })
     };
-    Some(basins.attractors().iter().map(object).collect())
+    Some(basins.attractors().iter().map(describe).collect())
 }
 
-/// The list of cells of a map without axes.
-#[derive(Serialize)]
-pub(crate) struct ListObject {
-    /// Name of the copy in the folder.
-    file: &'static str,
-    columns: Vec<String>,
-    cells: usize,
-    /// SHA-256 over names and values.
-    hash: String,
+/// Meaning of the small integers in `cells.npy`.
+fn codes() -> Value {
+    let numbered = |names: Vec<&'static str>| names.into_iter().zip(0..).collect::<BTreeMap<_, i8>>();
+    let mut class = numbered(names::CLASSES.to_vec());
+    class.insert("absent", ABSENT);
+    json!({
+        "class": class,
+        "status": numbered(Status::ALL.iter().map(|&status| names::status(status)).collect()),
+        "source": numbered(SOURCES.iter().map(|&source| names::source(source)).collect()),
+        "symmetric": BTreeMap::from([("false", 0), ("true", 1), ("absent", ABSENT)]),
+    })
 }
-
-impl From<&List> for ListObject {
-    fn from(list: &List) -> ListObject {
-        ListObject {
-            file: LIST,
-            columns: list.parameters().map(|parameter| parameter.name.to_string()).collect(),
-            cells: list.len(),
-            hash: list.hash().to_owned(),
-        }
-    }
-}
-
-/// Seconds that each phase took. `integrate` is the sum over all resumed runs; `open` and `write` are those of the last run.
-/// Validation and repair add their own.
-#[derive(Serialize)]
-pub(crate) struct MapTimings {
-    open: f64,
-    integrate: f64,
-    write: f64,
-}
-
-impl MapTimings {
-    pub(crate) fn of(run: &Run<'_>, writing: Duration) -> MapTimings {
-        MapTimings {
-            open: run.opening.as_secs_f64(),
-            integrate: (run.elapsed_before + run.elapsed).as_secs_f64(),
-            write: writing.as_secs_f64(),
-        }
-    }
-}
-
-/// Settings of the integration.
-#[derive(Serialize)]
-pub(crate) struct IntegrationObject {
-    /// Number that the scene asks for; null for `auto`.
-    steps_per_period: Option<u32>,
-    /// Numbers that lanes took, over all flows; null on the CPU.
-    least_steps_used: Option<u32>,
-    most_steps_used: Option<u32>,
-    transient_periods: u32,
-    observed_periods: u32,
-    early_stop: bool,
-    undecided_periods: u32,
-    max_period: u32,
-}
-
 /// An adaptive map: how much was integrated, and how good the rest is.
 #[derive(Serialize)]
 pub(crate) struct RefinementObject {
@@ -388,102 +351,5 @@ impl From<&Refined> for RefinementObject {
         };
         let Refined { integrated, filled, rounds, ref audits, .. } = *refined;
         RefinementObject { integrated, filled, rounds, audits: audits.iter().map(audit).collect() }
-    }
-}
-
-/// Meaning of the small integers in `cells.npy`.
-#[derive(Serialize)]
-struct Codes {
-    class: BTreeMap<&'static str, i8>,
-    status: BTreeMap<&'static str, i8>,
-    source: BTreeMap<&'static str, i8>,
-    symmetric: BTreeMap<&'static str, i8>,
-}
-
-/// Returns the manifest of a map.
-pub(crate) fn map<'a>(
-    cells: &Cells<'a>,
-    run: &'a Run<'a>,
-    writing: Duration,
-    files: &'a [FileEntry],
-) -> MapManifest<'a> {
-    let scene = cells.scene();
-    MapManifest {
-        head: Head::of("map"),
-        made: MadeObject::of(run),
-        processor: run.processor,
-        sources: run.shards.map_or(Identity::own_sources(), |shards| shards.sources),
-        target: run.shards.map_or(Identity::own_target(), |shards| shards.target),
-        shards: run.shards.map(|shards| shards.count),
-        title: scene.title(),
-        scene: scene.text(),
-        set: run.sets,
-        model: ModelObject::of(scene.base()),
-        axes: scene.axes().iter().map(AxisObject::from).collect(),
-        list: scene.list().map(ListObject::from),
-        parameters: Parameters::of_scene(scene),
-        derived: derived(scene),
-        start: start(scene),
-        integration: integration(scene, run.lane_grid),
-        quantities: scene.outputs().quantities.iter().map(|q| format!("{q:?}").to_lowercase()).collect(),
-        cells: cells.counts().iter().product(),
-        classes: names::CLASSES.into_iter().zip(count_classes(cells.classes())).collect(),
-        statuses: statuses(cells),
-        attractors: cells.attractors().map(attractor_counts),
-        basins: basins(cells),
-        periods: cells.periods(),
-        without_effect: &run.without_effect,
-        codes: codes(),
-        elapsed_seconds: (run.elapsed_before + run.elapsed).as_secs_f64(),
-        resumed_cells: run.resumed_cells,
-        refinement: cells.refinement().map(RefinementObject::from),
-        timings: MapTimings::of(run, writing),
-        files,
-    }
-}
-
-/// Returns the settings of the integration of a scene.
-pub(crate) fn integration(scene: &Scene, lane_grid: Option<[u32; 2]>) -> IntegrationObject {
-    let settings = scene.integration();
-    IntegrationObject {
-        steps_per_period: match settings.steps_per_period {
-            Steps::Auto => None,
-            Steps::PerPeriod(steps) => Some(steps),
-        },
-        least_steps_used: lane_grid.map(|[least, _]| least),
-        most_steps_used: lane_grid.map(|[_, most]| most),
-        transient_periods: settings.transient_periods,
-        observed_periods: settings.observed_periods,
-        early_stop: settings.early_stop,
-        undecided_periods: settings.undecided_periods,
-        max_period: settings.max_period,
-    }
-}
-
-/// Counts the cells by status.
-pub(crate) fn statuses(cells: &Cells<'_>) -> BTreeMap<&'static str, usize> {
-    let mut counts: BTreeMap<_, _> = Status::ALL.iter().map(|&s| (names::status(s), 0)).collect();
-    for status in cells.statuses() {
-        *counts.entry(names::status(status)).or_default() += 1;
-    }
-    counts
-}
-
-/// Counts the cells by their number of attractors.
-pub(crate) fn attractor_counts(list: &[u8]) -> BTreeMap<u8, usize> {
-    let mut counts = BTreeMap::new();
-    list.iter().for_each(|&count| *counts.entry(count).or_default() += 1);
-    counts
-}
-
-fn codes() -> Codes {
-    let numbered = |names: Vec<&'static str>| names.into_iter().zip(0..).collect::<BTreeMap<_, _>>();
-    let mut class = numbered(names::CLASSES.to_vec());
-    class.insert("absent", ABSENT);
-    Codes {
-        class,
-        status: numbered(Status::ALL.iter().map(|&status| names::status(status)).collect()),
-        source: numbered(SOURCES.iter().map(|&source| names::source(source)).collect()),
-        symmetric: [("false", 0), ("true", 1), ("absent", ABSENT)].into_iter().collect(),
     }
 }

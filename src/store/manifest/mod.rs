@@ -1,4 +1,4 @@
-//! `manifest.json`: the parts that the manifests of all commands share.
+//! `manifest.json`: the fields that the manifests of several commands share.
 
 pub mod bifurcation;
 pub mod map;
@@ -6,6 +6,7 @@ pub mod map;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::map::scene::{Axis, Scale, Scene, Start};
 use crate::model_file::FileModel;
@@ -22,7 +23,8 @@ pub struct Head {
     format: u32,
     command: &'static str,
     crate_version: &'static str,
-    /// Commit of the program; `unknown` if it was built outside of its repository or without release settings.
+    /// Commit that the program was built from, with `-modified` added if its sources had changed; `unknown` in
+    /// development builds.
     commit: &'static str,
 }
 
@@ -38,104 +40,67 @@ impl Head {
     }
 }
 
-/// The model. Its text makes the folder independent of the model's file.
-#[derive(Serialize)]
-pub(crate) struct ModelObject {
-    name: String,
-    title: String,
-    source: Option<String>,
-    /// Text of the model's file; null for a model in code.
-    text: Option<String>,
+/// Joins the fields of several objects into one.
+pub(crate) fn joined<const N: usize>(objects: [Value; N]) -> Value {
+    let fields = |object| if let Value::Object(fields) = object { fields } else { Default::default() };
+    Value::Object(objects.into_iter().flat_map(fields).collect())
 }
 
-impl ModelObject {
-    pub(crate) fn of(model: &dyn Model) -> ModelObject {
-        ModelObject {
-            name: model.name().to_owned(),
-            title: model.title().to_owned(),
-            source: model.source().map(str::to_owned),
-            text: model.downcast_ref().map(|file: &FileModel| file.definition().text.clone()),
-        }
+/// Removes the fields of an object that are null.
+pub(crate) fn without_nulls(mut object: Value) -> Value {
+    if let Value::Object(fields) = &mut object {
+        fields.retain(|_, value| !value.is_null());
     }
+    object
 }
 
-/// An axis.
-#[derive(Serialize)]
-pub(crate) struct AxisObject {
-    /// Name of the swept parameter, and of its column in tables.
-    parameter: String,
-    /// Whether the axis sweeps a component of the initial state.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    is_start: bool,
-    min: f64,
-    max: f64,
-    count: usize,
-    /// `linear`, `log` or `values`.
-    scale: &'static str,
-    /// The values, if the scene lists them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    values: Option<Vec<f64>>,
+/// Describes a model. `text` is the text of its file, which makes the folder independent of that file; it is null for a
+/// model in code.
+pub(crate) fn model(model: &dyn Model) -> Value {
+    let text = model.downcast_ref().map(|file: &FileModel| &file.definition().text);
+    json!({ "name": model.name(), "title": model.title(), "source": model.source(), "text": text })
 }
 
-impl From<&Axis> for AxisObject {
-    fn from(axis: &Axis) -> Self {
-        AxisObject {
-            parameter: axis.parameter().name.to_string(),
-            is_start: axis.target().is_start(),
-            min: axis.min(),
-            max: axis.max(),
-            count: axis.count(),
-            scale: axis.scale().name(),
-            values: (axis.scale() == Scale::Values).then(|| axis.values().collect()),
-        }
-    }
+/// Describes an axis. `is_start` marks the axis of a component of the initial state, `scale` is `linear`, `log` or
+/// `values`, and `values` are those that the scene lists.
+pub(crate) fn axis(axis: &Axis) -> Value {
+    without_nulls(json!({
+        "parameter": axis.parameter().name,
+        "is_start": axis.target().is_start().then_some(true),
+        "min": axis.min(),
+        "max": axis.max(),
+        "count": axis.count(),
+        "scale": axis.scale().name(),
+        "values": (axis.scale() == Scale::Values).then(|| axis.values().collect::<Vec<_>>()),
+    }))
 }
 
-/// A parameter that is computed from others.
-#[derive(Serialize)]
-pub(crate) struct DerivedObject {
-    expression: String,
-    /// Smallest and largest value over all cells.
-    min: f64,
-    max: f64,
-}
-
-/// Returns the derived parameters of a scene, by name.
-pub(crate) fn derived(scene: &Scene) -> BTreeMap<String, DerivedObject> {
+/// Describes the derived parameters of a scene, each with its smallest and largest value over all cells; none if there
+/// are no such parameters.
+pub(crate) fn derived(scene: &Scene) -> Option<BTreeMap<String, Value>> {
     let points = scene.points();
     let rules = points.derived().rules();
-    let mut objects: Vec<DerivedObject> = rules
-        .iter()
-        .map(|rule| {
-            let expression = rule.text().to_owned();
-            DerivedObject { expression, min: f64::INFINITY, max: f64::NEG_INFINITY }
-        })
-        .collect();
+    if rules.is_empty() {
+        return None;
+    }
+    let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; rules.len()];
     let [columns, rows] = points.counts();
-    // Without derived parameters no cell needs a look.
-    for cell in (0..columns * rows).take(if rules.is_empty() { 0 } else { usize::MAX }) {
+    for cell in 0..columns * rows {
         let model = points.model(cell);
-        for (rule, object) in rules.iter().zip(&mut objects) {
+        for (rule, [min, max]) in rules.iter().zip(&mut ranges) {
             let value = model.value(rule.index());
-            (object.min, object.max) = (object.min.min(value), object.max.max(value));
+            (*min, *max) = (min.min(value), max.max(value));
         }
     }
-    rules.iter().map(|rule| rule.parameter().name.to_string()).zip(objects).collect()
+    let described = rules.iter().zip(ranges).map(|(rule, [min, max])| {
+        let name = rule.parameter().name.to_string();
+        (name, json!({ "expression": rule.text(), "min": min, "max": max }))
+    });
+    Some(described.collect())
 }
 
-/// The initial states.
-#[derive(Serialize)]
-pub(crate) struct StartObject {
-    policy: &'static str,
-    state: Option<Vec<f64>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    count: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    seed: Option<u32>,
-}
-
-/// Returns the initial states of a scene.
-pub(crate) fn start(scene: &Scene) -> StartObject {
+/// Describes the initial states of a scene; `count` and `seed` belong to random ones.
+pub(crate) fn start(scene: &Scene) -> Value {
     let (policy, state) = match scene.start() {
         Start::Rest => ("rest", None),
         Start::State(state) => ("state", Some(state[..scene.base().state_names().len()].to_vec())),
@@ -143,13 +108,6 @@ pub(crate) fn start(scene: &Scene) -> StartObject {
         Start::Down => ("down", None),
         Start::Both => ("both", None),
     };
-    let (count, seed) = scene.draw().map(|draw| (draw.count, draw.seed)).unzip();
-    StartObject { policy, state, count, seed }
-}
-
-/// Seconds that each phase took.
-#[derive(Serialize)]
-pub(crate) struct TimingsObject {
-    pub(crate) integrate: f64,
-    pub(crate) write: f64,
+    let drawn = scene.draw().map(|draw| json!({ "count": draw.count, "seed": draw.seed }));
+    joined([json!({ "policy": policy, "state": state }), drawn.unwrap_or_default()])
 }

@@ -1,6 +1,5 @@
 //! Why shards cannot be merged.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -38,8 +37,8 @@ pub enum MergeError {
     #[error("{} and {} are both shard {shard}; name one of them", .first.display(), .part.display())]
     Twice { shard: Shard, first: PathBuf, part: PathBuf },
     /// Shards are missing or unfinished.
-    #[error("{}", incomplete(.missing, .unfinished))]
-    Incomplete { missing: Vec<MissingShard>, unfinished: Vec<UnfinishedShard> },
+    #[error("{0}")]
+    Incomplete(String),
     /// The map would be written into the folder of one of its shards.
     #[error("{}: this is the folder of a shard; name another one for the map", .part.display())]
     IsPart { part: PathBuf },
@@ -72,55 +71,4 @@ impl MergeError {
             _ => true,
         }
     }
-}
-
-/// A shard that no part contains.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MissingShard {
-    /// The shard.
-    pub shard: Shard,
-    /// Command that computes it.
-    pub command: String,
-}
-
-/// A part that has not all of its records.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnfinishedShard {
-    /// The folder.
-    pub part: PathBuf,
-    /// The shard; none if nothing was written yet.
-    pub shard: Option<Shard>,
-    /// Number of runs with a record.
-    pub count: usize,
-    /// Number of all runs; none if no finished part has the scene.
-    pub of: Option<usize>,
-    /// Command that computes the others.
-    pub command: String,
-}
-
-impl fmt::Display for UnfinishedShard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let UnfinishedShard { part, shard, count, of, command } = self;
-        let part = part.display();
-        match shard {
-            Some(shard) => write!(f, "shard {shard} in {part} is unfinished: {count} ")?,
-            None => write!(f, "{part} is an unfinished run: {count} ")?,
-        }
-        match of {
-            Some(of) => write!(f, "of {of} runs are there (`{command}`)"),
-            None => write!(f, "runs are there (`{command}`)"),
-        }
-    }
-}
-
-/// Lists missing and unfinished shards with the commands that compute them.
-fn incomplete(missing: &[MissingShard], unfinished: &[UnfinishedShard]) -> String {
-    let count = missing.first().map_or(0, |first| first.shard.count());
-    let each: Vec<String> =
-        missing.iter().map(|MissingShard { shard, command }| format!("{shard} (`{command}`)")).collect();
-    let are = if missing.len() == 1 { "is" } else { "are" };
-    let missing = (!each.is_empty())
-        .then(|| format!("{} of {count} shards {are} missing: {}", each.len(), each.join(", ")));
-    let unfinished = unfinished.iter().map(ToString::to_string);
-    missing.into_iter().chain(unfinished).collect::<Vec<_>>().join("; ")
 }

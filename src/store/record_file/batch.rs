@@ -10,9 +10,9 @@ pub(crate) const HEAD: usize = 32;
 /// Largest number of cells in a batch. It bounds the loss by one damaged byte and the memory of a reader.
 pub(crate) const MOST_CELLS: usize = 1 << 16;
 
-/// Head of a batch.
+/// BatchHead of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Head {
+pub(crate) struct BatchHead {
     /// Number of the batch; it increases along the file.
     pub(crate) number: u32,
     cells: u32,
@@ -28,11 +28,11 @@ pub(crate) struct Head {
 pub(crate) fn encode(number: u32, batch: &[(u32, Record)]) -> std::io::Result<Vec<u8>> {
     let (columns, body) = columns::encode(batch)?;
     let (cells, bytes) = (batch.len() as u32, body.len() as u32);
-    let head = Head { number, cells, columns, bytes, sum: crc32fast::hash(&body) };
+    let head = BatchHead { number, cells, columns, bytes, sum: crc32fast::hash(&body) };
     Ok([&head.bytes()[..], &body].concat())
 }
 
-impl Head {
+impl BatchHead {
     fn bytes(&self) -> [u8; HEAD] {
         let mut bytes = [0; HEAD];
         bytes[..8].copy_from_slice(&MARK);
@@ -46,10 +46,10 @@ impl Head {
     }
 
     /// Returns the head that these bytes encode, or none if they are damaged.
-    pub(crate) fn read(bytes: &[u8; HEAD]) -> Option<Head> {
+    pub(crate) fn read(bytes: &[u8; HEAD]) -> Option<BatchHead> {
         let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
         let head =
-            Head { number: word(8), cells: word(12), columns: word(16), bytes: word(20), sum: word(24) };
+            BatchHead { number: word(8), cells: word(12), columns: word(16), bytes: word(20), sum: word(24) };
         (head.bytes() == *bytes && head.cells as usize <= MOST_CELLS).then_some(head)
     }
 

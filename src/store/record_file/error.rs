@@ -17,7 +17,7 @@ pub enum RecordFileError {
         folder: PathBuf,
     },
     /// The records belong to another run.
-    #[error("--resume: {} holds another run: {differences}; ask for the same again, or start anew with --force", .path.display())]
+    #[error("{} holds another run: {differences}; give the settings of that run, or start anew with --force", .path.display())]
     OtherRun {
         /// The file.
         path: PathBuf,
@@ -25,7 +25,7 @@ pub enum RecordFileError {
         differences: String,
     },
     /// The header is unreadable, or a batch contains records that no run of this version writes.
-    #[error("--resume: {} is damaged at byte {at}: {what}; start anew with --force", .path.display())]
+    #[error("{} is damaged at byte {at}: {what}; start anew with --force", .path.display())]
     Damaged {
         /// The file.
         path: PathBuf,

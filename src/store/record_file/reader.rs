@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::record::{Record, valid};
-use crate::store::record_file::batch::{self, HEAD, Head};
+use crate::store::record_file::batch::{self, BatchHead, HEAD};
 use crate::store::record_file::error::RecordFileError;
 use crate::store::record_file::header::{self, Found};
 use crate::store::record_file::identity::Identity;
@@ -176,7 +176,11 @@ impl<'a> Reader<'a> {
 
     /// Reads the batch at an offset; the error says what is wrong with it. Its number must be at least `least`.
     #[expect(clippy::type_complexity, reason = "used once")]
-    fn batch_at(&self, at: u64, least: u32) -> io::Result<Result<(Head, Vec<(u32, Record)>), &'static str>> {
+    fn batch_at(
+        &self,
+        at: u64,
+        least: u32,
+    ) -> io::Result<Result<(BatchHead, Vec<(u32, Record)>), &'static str>> {
         const CUT: &str = "a batch is cut short";
         let mut head = [0; HEAD];
         let left = self.length - at;
@@ -185,7 +189,7 @@ impl<'a> Reader<'a> {
         }
         let mut input = read_at(self.file, at)?;
         input.read_exact(&mut head)?;
-        let Some(head) = Head::read(&head) else { return Ok(Err("the head of a batch is damaged")) };
+        let Some(head) = BatchHead::read(&head) else { return Ok(Err("the head of a batch is damaged")) };
         if left - (HEAD as u64) < u64::from(head.bytes) {
             return Ok(Err(CUT));
         }
@@ -208,7 +212,7 @@ impl<'a> Reader<'a> {
             while let Some(place) = batch::find(&window[searched..here]) {
                 searched += place;
                 let head = window[searched..here].first_chunk::<HEAD>();
-                if head.is_some_and(|head| Head::read(head).is_some()) {
+                if head.is_some_and(|head| BatchHead::read(head).is_some()) {
                     return Ok(from + searched as u64);
                 }
                 searched += 1;

@@ -1,12 +1,12 @@
-//! Oscillators of every kind, drawn by a seed.
+//! Random oscillators of every kind, by seed.
 
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State};
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
-struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    fn next(&mut self) -> u64 {
+    pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -21,7 +21,7 @@ impl Numbers {
         all[self.next() as usize % all.len()]
     }
 
-    /// A symmetric positive definite matrix about the size of `scale`.
+    /// Returns a symmetric positive definite matrix of about the size `scale`.
     fn definite(&mut self, scale: f64) -> [[f64; 2]; 2] {
         let [a, b] = [self.between(0.3, 1.5), self.between(0.3, 1.5)];
         let c = self.one_of(&[0.0, 0.6]) * self.between(-1.0, 1.0) * (a * b).sqrt();
@@ -29,9 +29,9 @@ impl Numbers {
     }
 }
 
-/// An oscillator with its law and a start. All that a seed may draw: one or two displacements, one wall or two, each of
-/// any kind with a law of its own, loads, full masses, gap rows of which either entry is the larger.
-pub(super) fn drawn(seed: u64) -> (Oscillator, Law, State) {
+/// Returns an oscillator with its law and a start. It has one or two displacements; one wall or two, each of any kind
+/// with a law of its own; loads; full mass matrices; gap rows of which either entry may be the larger.
+pub(super) fn random_cell(seed: u64) -> (Oscillator, Law, State) {
     let mut draw = Numbers(seed);
     let degrees = draw.one_of(&[1, 2, 2]);
     let first = |m: [[f64; 2]; 2]| if degrees == 1 { [[m[0][0], 0.0], [0.0, 0.0]] } else { m };
@@ -55,7 +55,7 @@ pub(super) fn drawn(seed: u64) -> (Oscillator, Law, State) {
     let contacts = [0; 2].map(|_| draw.one_of(&[Contact::Impact, Contact::Rigid, Contact::Elastic]));
     let meshing = [0, 1].map(|side: usize| {
         let (k, c) = (draw.between(10.0, 400.0), draw.one_of(&[0.0, 1.0]) * draw.between(0.0, 4.0));
-        // A rigid wall asks for none.
+        // Rigid walls have no meshing domain.
         if contacts[side] == Contact::Rigid || walls[side].is_infinite() {
             return free;
         }
@@ -77,7 +77,7 @@ pub(super) fn drawn(seed: u64) -> (Oscillator, Law, State) {
     };
     let omega = draw.between(0.6, 4.0);
     let oscillator = Oscillator { degrees, mass, gap, walls, contacts, omega, force, free, meshing };
-    oscillator.validate().expect("what is drawn is an oscillator");
+    oscillator.validate().expect("a valid oscillator");
     let mut start = [0; 4].map(|_| draw.between(-0.4, 0.4));
     if degrees == 1 {
         start[2..].fill(0.0);

@@ -1,12 +1,13 @@
-//! A motion by short steps of matrix exponentials, each event by bisection: plain, slow, and nobody's lane.
+//! Integrates a motion by short steps of matrix exponentials and finds events by bisection: slow, simple, and
+//! independent of lanes.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rattlemap_dynamics::model::{Contact, Domain, Law, Oscillator, State};
 
-/// Steps per period: what crosses a wall and comes back within one is missed.
+/// Steps per period. A crossing of a wall and back within one step is missed.
 const STEPS: u32 = 1000;
 
-/// What leaves a wall may seem to lie beyond it by so much.
+/// Distance beyond a wall that counts as rounding.
 const ROUNDING: f64 = 1e-14;
 
 /// Displacements, velocities, cos, sin and 1.
@@ -16,7 +17,7 @@ type Matrix = SMatrix<f64, 7, 7>;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
     Free,
-    /// Behind a wall that yields, after its onset or in it.
+    /// Behind an elastic wall, or behind a wall after the contact onset.
     Behind(usize),
     Onset(usize),
     Stuck(usize),
@@ -114,13 +115,13 @@ impl March {
         self.gap.dot(&y.fixed_rows::<2>(2))
     }
 
-    /// Acceleration of the gap into a wall, in the free field or behind it.
+    /// Returns the acceleration of the gap into a wall, in the free field or behind the wall.
     fn pressing(&self, y: &Vector, mode: Mode, side: usize) -> f64 {
         let field = if mode == Mode::Free { self.free } else { self.generator(mode) };
         SIGN[side] * self.gap.dot(&(field * y).fixed_rows::<2>(2))
     }
 
-    /// Positive while the present mode goes on.
+    /// Returns a distance that is positive until an event.
     fn distance(&self, y: &Vector, event: Event) -> f64 {
         match event {
             Event::Contact(side) | Event::OnsetEnds(side) => -self.beyond(y, side),
@@ -172,7 +173,7 @@ impl March {
         [y[0], y[2], y[1], y[3]]
     }
 
-    /// When the distance falls through zero; what leaves a wall is off it at once.
+    /// Returns the time at which the distance falls through zero. A gap that leaves a wall is off it at once.
     fn locate(&self, event: Event, span: f64) -> f64 {
         let (mut low, mut high) = (0.0, span);
         for _ in 0..60 {
@@ -182,7 +183,7 @@ impl March {
         high
     }
 
-    /// Shifts the gap on to a wall, the displacement beside it kept.
+    /// Moves the gap onto a wall and keeps the other displacement.
     fn put_on_wall(&mut self, side: usize) {
         let i = usize::from(self.gap[0].abs() < self.gap[1].abs());
         self.y[i] -= SIGN[side] * self.beyond(&self.y.clone(), side) / self.gap[i];
@@ -210,12 +211,12 @@ impl March {
         }
     }
 
-    /// An impulse along the gap that takes `share` of its rate.
+    /// Applies an impulse along the gap that removes `share` of its rate.
     fn push(&mut self, share: f64) {
         let along = self.inverse_mass * self.gap;
-        let taken = along * (share * self.rate(&self.y) / self.gap.dot(&along));
-        self.y[2] -= taken[0];
-        self.y[3] -= taken[1];
+        let impulse = along * (share * self.rate(&self.y) / self.gap.dot(&along));
+        self.y[2] -= impulse[0];
+        self.y[3] -= impulse[1];
     }
 
     fn contact(&mut self, side: usize) {
@@ -224,7 +225,7 @@ impl March {
         let before = self.y;
         if self.oscillator.contacts[side] == Contact::Rigid {
             self.push(1.0);
-            // The limit of ever slower impacts, as near as makes no difference.
+            // Ends an infinite sequence of impacts early enough for these tests.
             if leaving <= threshold.max(1e-9) && self.pressing(&self.y, Mode::Free, side) > 0.0 {
                 self.mode = Mode::Stuck(side);
                 return;

@@ -1,11 +1,11 @@
-//! Walls of every kind, on oscillators of every shape that a model may have.
+//! Walls of every kind, on random oscillators.
 
-mod draw;
+pub(super) mod draw;
 mod march;
 
 use crate::common::apart;
 use crate::common::gpu::open;
-use draw::drawn;
+use draw::random_cell;
 use march::March;
 use nalgebra::Matrix4;
 use rattlemap::gpu::{GpuError, Lane, LaneSettings, Precision};
@@ -20,14 +20,18 @@ use rayon::prelude::*;
 
 const SEEDS: u64 = 64;
 
-type Cell = (Oscillator, Law, State);
+pub(super) type Cell = (Oscillator, Law, State);
 
 fn cells() -> Vec<Cell> {
-    (0..SEEDS).map(drawn).collect()
+    (0..SEEDS).map(random_cell).collect()
 }
 
-/// Records of oscillators, each with its own law and start.
-fn run(precision: Precision, cells: &[Cell], settings: &LaneSettings) -> Result<Vec<Record>, GpuError> {
+/// Returns the records of oscillators, each with its own law and start.
+pub(super) fn run(
+    precision: Precision,
+    cells: &[Cell],
+    settings: &LaneSettings,
+) -> Result<Vec<Record>, GpuError> {
     let flows: Vec<_> = cells.iter().map(|cell| cell.0).collect();
     let laws: Vec<_> = cells.iter().map(|cell| cell.1).collect();
     let lanes: Vec<_> = (0..).zip(cells).map(|(i, cell)| Lane { flow: i, law: i, start: cell.2 }).collect();
@@ -40,39 +44,38 @@ fn march((oscillator, law, _): &Cell, start: State, periods: u32) -> (State, Mar
     (end, march)
 }
 
-/// Whether a wall may be struck infinitely often in finite time.
+/// Whether infinitely many impacts may occur in finite time.
 fn may_chatter((oscillator, law, _): &Cell) -> bool {
     (0..2).any(|side| oscillator.contacts[side] == Contact::Rigid && law.mesh_speed[side] == 0.0)
 }
 
-/// After 20 periods every state, the impacts so far and the time in contact are those of an integrator that has nothing in
-/// common with lanes.
+/// After 20 periods the state, the impacts and the time in contact agree with those of an independent integrator.
 #[test]
-fn motion_is_that_of_plain_steps() {
+fn motion_agrees_with_plain_steps() {
     const HORIZON: u32 = 20;
     let cells = cells();
-    let truth: Vec<_> = cells.par_iter().map(|cell| march(cell, cell.2, HORIZON)).collect();
-    // Measured: medians 1.7e-13 and 2.0e-7, the worst that is no chaos 1.1e-11 and 5.8e-6.
+    let expected: Vec<_> = cells.par_iter().map(|cell| march(cell, cell.2, HORIZON)).collect();
+    // Measured: medians 1.7e-13 and 2.0e-7; worst without chaos 1.1e-11 and 5.8e-6.
     for (precision, median_bar, bar, rounding) in
         [(Precision::F64, 1e-12, 1e-10, 1e-13), (Precision::F32, 1e-6, 3e-5, 1e-7)]
     {
         let records = run(precision, &cells, &LaneSettings::only(HORIZON)).unwrap();
         let mut errors = Vec::new();
         let (mut chaotic, mut impacts, mut rests) = (0, 0, 0);
-        for (seed, ((record, cell), (end, march))) in records.iter().zip(&cells).zip(&truth).enumerate() {
+        for (seed, ((record, cell), (end, march))) in records.iter().zip(&cells).zip(&expected).enumerate() {
             let at = format!("{precision:?}, seed {seed}, {cell:?}");
             assert_eq!(record.status, Status::Ok.code(), "{at}");
             let error = apart(record.strobe, *end);
             errors.push(error);
             if error > bar {
-                // Chaos: as far as rounding of the start takes plain steps.
+                // Chaos: a rounding error of the start must change plain steps as much.
                 let moved = self::march(cell, cell.2.map(|x| x * (1.0 + rounding)), HORIZON).0;
                 assert!(apart(moved, *end) > 0.1 * error, "{at}: off by {error:.1e}");
                 chaotic += 1;
                 continue;
             }
             let time = f64::from(HORIZON) * cell.0.period();
-            // Plain steps end infinite chatter at 1e-9 of a speed.
+            // Plain steps end infinite chatter at a speed of 1e-9.
             assert!((record.mesh_fraction - march.contact / time).abs() < bar + 1e-8, "{at}: contact");
             let counted = (record.impacts_per_period * f64::from(HORIZON)).round() as u32;
             if !may_chatter(cell) {
@@ -92,9 +95,9 @@ fn motion_is_that_of_plain_steps() {
     }
 }
 
-/// The largest multiplier of every cycle is that of differences of neighbours, by plain steps.
+/// The largest multiplier of every cycle agrees with finite differences of plain steps.
 #[test]
-fn multipliers_are_those_of_differences() {
+fn multipliers_agree_with_finite_differences() {
     let cells = cells();
     let records = run(Precision::F64, &cells, &LaneSettings::default()).unwrap();
     let of = |(seed, (record, cell)): (usize, (&Record, &Cell))| {
@@ -103,7 +106,7 @@ fn multipliers_are_those_of_differences() {
             let [x1, _, x2, _] = record.strobe;
             (cell.0.gap[0] * x1 + cell.0.gap[1] * x2 - cell.0.walls[side]).abs() > 1e-3
         });
-        // Rigid walls of neighbours of a cycle that is on one are another motion's.
+        // Neighbours of a cycle that is on a rigid wall at the strobe follow another motion.
         if !is_clear {
             return None;
         }
@@ -131,7 +134,7 @@ fn multipliers_are_those_of_differences() {
     for (seed, radius, multiplier) in found {
         let cell = &cells[seed];
         println!("seed {seed}: {radius:.6} {multiplier:.6} {:?}", cell.0.contacts);
-        // Differences know a multiplier to their step, and where it is nearly double, to the root of that.
+        // Finite differences are accurate to their step; near a double multiplier, to its square root.
         let off = (radius - multiplier).abs();
         assert!(off < 1e-4, "seed {seed}: {radius} {multiplier} {:?}", cells[seed]);
         for side in 0..2 {
@@ -142,17 +145,17 @@ fn multipliers_are_those_of_differences() {
     assert!(kinds.iter().all(|&count| count >= 8), "{kinds:?} walls of each kind");
 }
 
-/// What was compiled without elastic and rigid walls takes none.
+/// Shaders that were compiled without elastic and rigid walls refuse flows that have them.
 #[test]
-fn walls_that_are_left_out_are_refused() {
+fn excluded_walls_are_refused() {
     let rigid = cells().into_iter().find(may_chatter).unwrap();
     let settings = LaneSettings { kinds: false, ..LaneSettings::only(1) };
     let error = run(Precision::F32, &[rigid], &settings).unwrap_err();
     assert!(matches!(error, GpuError::NotCompiled { flow: 0 }), "{error}");
 }
-/// What a cell is, its word, exponent, impacts and time in contact are those of the reference.
+/// Class, word, exponent, impacts and time in contact agree with the reference.
 #[test]
-fn cells_are_those_of_the_reference() {
+fn records_agree_with_the_reference() {
     let cells = cells();
     let budget = Budget {
         settings: Settings::default(),
@@ -162,43 +165,43 @@ fn cells_are_those_of_the_reference() {
         shows_exponent: true,
     };
     let measured = |(oscillator, law, start): &Cell| measure(&Flow::new(oscillator), *law, *start, &budget);
-    let truth: Vec<_> =
+    let expected: Vec<_> =
         cells.par_iter().map(|cell| measured_record(&measured(cell), &Needs::EVERYTHING)).collect();
-    // Measured: 2.3e-12 per unit time and 6.0e-6; of time in contact 8e-14 and 6.3e-8.
+    // Measured: 2.3e-12 per unit time and 6.0e-6; time in contact 8e-14 and 6.3e-8.
     for (precision, exponent_bar, contact_bar) in
         [(Precision::F64, 1e-10, 1e-10), (Precision::F32, 5e-5, 1e-6)]
     {
         let records = run(precision, &cells, &LaneSettings::default()).unwrap();
         let (mut cycles, mut superstable, mut symbols) = (0, 0, 0);
-        for (seed, (record, truth)) in records.iter().zip(&truth).enumerate() {
+        for (seed, (record, expected)) in records.iter().zip(&expected).enumerate() {
             let at = format!("{precision:?}, seed {seed}, {:?}", cells[seed]);
-            assert_eq!(classify(record), classify(truth), "{at}");
-            assert_eq!(record.spelling(), truth.spelling(), "{at}");
-            assert_eq!(record.pattern(), truth.pattern(), "{at}");
-            if !matches!(classify(truth), Class::Periodic { .. }) {
+            assert_eq!(classify(record), classify(expected), "{at}");
+            assert_eq!(record.spelling(), expected.spelling(), "{at}");
+            assert_eq!(record.pattern(), expected.pattern(), "{at}");
+            if !matches!(classify(expected), Class::Periodic { .. }) {
                 continue;
             }
-            assert_eq!(record.impacts_per_period, truth.impacts_per_period, "{at}");
-            let contact = (record.mesh_fraction - truth.mesh_fraction).abs();
-            assert!(contact < contact_bar, "{at}: {} {}", record.mesh_fraction, truth.mesh_fraction);
-            let off = (record.lyapunov - truth.lyapunov).abs();
-            let is_superstable = truth.lyapunov == f64::NEG_INFINITY;
+            assert_eq!(record.impacts_per_period, expected.impacts_per_period, "{at}");
+            let contact = (record.mesh_fraction - expected.mesh_fraction).abs();
+            assert!(contact < contact_bar, "{at}: {} {}", record.mesh_fraction, expected.mesh_fraction);
+            let off = (record.lyapunov - expected.lyapunov).abs();
+            let is_superstable = expected.lyapunov == f64::NEG_INFINITY;
             assert!(
-                if is_superstable { record.lyapunov == truth.lyapunov } else { off < exponent_bar },
+                if is_superstable { record.lyapunov == expected.lyapunov } else { off < exponent_bar },
                 "{at}: {} {}",
                 record.lyapunov,
-                truth.lyapunov
+                expected.lyapunov
             );
             cycles += 1;
             superstable += u32::from(is_superstable);
-            symbols += truth.word_length;
+            symbols += expected.word_length;
         }
         assert!(cycles >= 60 && superstable >= 3 && symbols > 150, "{cycles} {superstable} {symbols}");
     }
 }
 
-/// The same motion in other units: lengths times `2^length`, times times `2^time`.
-fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) -> Cell {
+/// Returns the motion in other units: lengths times `2^length`, times times `2^time`.
+pub(super) fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) -> Cell {
     let (size, rate) = (2f64.powi(length), 2f64.powi(-time));
     let scaled = |m: [[f64; 2]; 2], by: f64| m.map(|row| row.map(|entry| entry * by));
     let domain = |domain: &Domain| Domain {
@@ -219,7 +222,7 @@ fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) -> Cell {
     (other, law, [x1 * size, v1 * size * rate, x2 * size, v2 * size * rate])
 }
 
-/// Thresholds are relative to the motion: units that differ by powers of two leave every bit alone.
+/// Thresholds are relative to the motion: units that differ by powers of two change no bit.
 #[test]
 fn units_change_no_bit() {
     let cells = cells();

@@ -13,7 +13,7 @@ use rattlemap::record::Record;
 use rattlemap::record::classify::{classify, status};
 use rattlemap::validate::{Difference, Draw, Kind, Lanes, Sample, Stratum, Subject, differences, replay};
 use rattlemap_dynamics::model::{GearPair, Model, State};
-use rattlemap_dynamics::orbit::{Class, Measured, Status};
+use rattlemap_dynamics::orbit::{Class, Measurement, Status};
 
 /// How lanes say that they could not go on.
 const CAPS: [Status; 3] = [Status::CapEvents, Status::CapRoot, Status::TooStiff];
@@ -50,7 +50,7 @@ pub(super) struct Comparison {
 pub(super) fn all(
     precision: Precision,
     cells: &[Start],
-    truth: &[Measured],
+    truth: &[Measurement],
     records: &[Record],
     (seed, most): (u64, usize),
     watch: &dyn Watch,

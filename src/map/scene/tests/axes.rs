@@ -13,7 +13,7 @@ fn log(count: &str) -> Scene {
 fn logarithmic_values_have_equal_ratios_and_exact_ends() {
     let values = |scene: &Scene| scene.axes()[0].values().collect::<Vec<_>>();
     assert_eq!(values(&log("3")), [100.0, 1000.0, 10000.0]);
-    // The formula, in the functions of libm.
+    // The formula with the functions of libm.
     let from_to = |i: f64| libm::exp10((libm::log10(100.0) * (5.0 - i) + libm::log10(10000.0) * i) / 5.0);
     assert_eq!(values(&log("6"))[1..5], [1.0, 2.0, 3.0, 4.0].map(from_to));
     assert_eq!(values(&log("6"))[1], 251.188_643_150_957_92, "not the same on every machine");
@@ -27,7 +27,7 @@ fn logarithmic_values_have_equal_ratios_and_exact_ends() {
     assert!(many.windows(2).all(|pair| (pair[1] / pair[0] / ratio - 1.0).abs() < 1e-14));
     assert_eq!([many[0], many[999]], [100.0, 1e4]);
     assert_eq!(scene.cell(&[999]).get("k"), Ok(1e4));
-    // Ends far apart do not overflow.
+    // Distant ends do not overflow.
     let wide = parse(
         GOOD,
         &["e=0.5", "axis.0.parameter=k", "axis.0.min=1e-300", "axis.0.max=1e300", "axis.0.scale=log"],
@@ -36,7 +36,7 @@ fn logarithmic_values_have_equal_ratios_and_exact_ends() {
 }
 
 #[test]
-fn what_a_logarithmic_axis_cannot_be_is_said() {
+fn impossible_logarithmic_axes_are_refused() {
     let refused = |sets: &[&str]| parse(GOOD, sets).unwrap_err().to_string();
     assert_says(
         &refusal("min = 0.1", "min = 0.0\nscale = \"log\""),
@@ -49,9 +49,9 @@ fn what_a_logarithmic_axis_cannot_be_is_said() {
         [&LOG[..3], &["axis.0.max=100.00000000000003", "axis.0.count=50", "axis.0.scale=log"]].concat();
     assert_says(
         &refused(&close),
-        &["`axis.0.count = 50` is out of range: it must be so small that no two values"],
+        &["`axis.0.count = 50` is out of range: it must be so small that neighbouring values"],
     );
-    // A linear one likewise: there is one number between the ends.
+    // There is one number between the ends of this linear axis.
     let ends = ["axis.0.min=0.5", "axis.0.max=0.5000000000000002"];
     let few = |count| [&ends[..], &[count]].concat();
     assert_says(
@@ -62,7 +62,7 @@ fn what_a_logarithmic_axis_cannot_be_is_said() {
 }
 
 #[test]
-fn values_are_taken_as_they_are() {
+fn listed_values_are_used_unchanged() {
     let range = "min = 0.1\nmax = 1\ncount = 4\n";
     let text = GOOD.replace(range, "values = [0.1, 0.25, 0.3, 1]\n");
     let scene = parse(&text, &[]).unwrap();
@@ -70,7 +70,7 @@ fn values_are_taken_as_they_are() {
     assert_eq!(axis.values().collect::<Vec<_>>(), [0.1, 0.25, 0.3, 1.0]);
     assert_eq!((axis.scale(), axis.count(), axis.min(), axis.max()), (Scale::Values, 4, 0.1, 1.0));
     assert_eq!(scene.cell(&[2]).get("e"), Ok(0.3));
-    // An argument wins over the text, on either side.
+    // An argument overrides the text, for values and for a range.
     let by = |text: &str, sets: &[&str]| {
         let scene = parse(text, sets).unwrap();
         scene.axes()[0].values().collect::<Vec<_>>()
@@ -80,31 +80,26 @@ fn values_are_taken_as_they_are() {
 }
 
 #[test]
-fn values_that_are_none_are_named() {
-    let cases = [
-        ("[0.1]", "`axis.0.values = [0.1]` is out of range: it must be a list of 2 to 1000000 numbers"),
-        ("0.1", "`axis.0.values = 0.1` has the wrong type: it must be a list of 2"),
-        (
-            "[0.1, 0.3, 0.2]",
-            "s.toml:9:21: `axis.0.values.2 = 0.2` is out of range: it must be greater than the value before it, 0.3",
-        ),
-        (
-            "[0.1, 0.1]",
-            "`axis.0.values.1 = 0.1` is out of range: it must be greater than the value before it, 0.1",
-        ),
-        ("[0.1, 1.5]", "`axis.0.values.1 = 1.5` is out of range: it must be between 0 and 1, as `e` is"),
-        ("[nan, 0.5]", "`axis.0.values.0 = nan` is out of range"),
-        ("[0.1, \"x\"]", "`axis.0.values.1 = \"x\"` has the wrong type: it must be a number"),
-    ];
-    for (values, expected) in cases {
+fn invalid_values_are_refused_by_index() {
+    for [values, expected] in test_cases(
+        r#"
+[0.1] | `axis.0.values = [0.1]` is out of range: it must be a list of 2 to 1000000 numbers
+0.1 | `axis.0.values = 0.1` has the wrong type: it must be a list of 2
+[0.1, 0.3, 0.2] | s.toml:9:21: `axis.0.values.2 = 0.2` is out of range: it must be greater than the value before it, 0.3
+[0.1, 0.1] | `axis.0.values.1 = 0.1` is out of range: it must be greater than the value before it, 0.1
+[0.1, 1.5] | `axis.0.values.1 = 1.5` is out of range: it must be between 0 and 1, as `e` is
+[nan, 0.5] | `axis.0.values.0 = nan` is out of range
+[0.1, "x"] | `axis.0.values.1 = "x"` has the wrong type: it must be a number
+"#,
+    ) {
         let range = "min = 0.1\nmax = 1\ncount = 4\n";
-        assert_says(&refusal(range, &format!("values = {values}\n")), &[expected, "s.toml:9:"]);
+        assert_says(&refusal(range, &format!("values = {values}\n")), &[&expected, "s.toml:9:"]);
     }
     assert_says(
         &refusal("count = 4", "values = [0.1, 0.2]"),
         &[
             "s.toml:11:10: `axis.0.values = [0.1, 0.2]` does not fit",
-            "`axis.0.min` is given, too; drop either",
+            "`axis.0.min` is given, too; remove one of the two",
         ],
     );
     let message = parse(GOOD, &["axis.0.values=[0.1,0.2]", "axis.0.scale=log"]).unwrap_err().to_string();
@@ -113,19 +108,19 @@ fn values_that_are_none_are_named() {
     assert_says(&message, &["--set axis.0.values=[0.2,0.1]: `axis.0.values.1 = 0.1` is out of range"]);
 }
 
-/// A scale and values are what records depend on; many values are told by their hash.
+/// The identity contains scale and values; many values are replaced by their hash.
 #[test]
-fn the_identity_knows_how_values_follow_each_other() {
+fn the_identity_contains_scale_and_values() {
     let of = |sets: &[&str]| parse(GOOD, sets).unwrap().identity();
-    let told = |list: &[(String, String)], name: &str| {
-        list.iter().find(|(told, _)| told == name).map(|(_, value)| value.clone())
+    let value_of = |list: &[(String, String)], name: &str| {
+        list.iter().find(|(known, _)| known == name).map(|(_, value)| value.clone())
     };
-    assert_eq!(told(&of(&[]), "axis.0.scale"), None);
-    assert_eq!(told(&of(&["axis.0.scale=log"]), "axis.0.scale").as_deref(), Some("log"));
-    assert_eq!(told(&of(&["axis.0.values=[0.1,0.2]"]), "axis.0.values").as_deref(), Some("0.1 0.2"));
+    assert_eq!(value_of(&of(&[]), "axis.0.scale"), None);
+    assert_eq!(value_of(&of(&["axis.0.scale=log"]), "axis.0.scale").as_deref(), Some("log"));
+    assert_eq!(value_of(&of(&["axis.0.values=[0.1,0.2]"]), "axis.0.values").as_deref(), Some("0.1 0.2"));
     let many = |last: &str| {
         let values: Vec<String> = (0..99).map(|i| format!("0.{i:02}1")).collect();
-        told(&of(&[&format!("axis.0.values=[{},{last}]", values.join(","))]), "axis.0.values").unwrap()
+        value_of(&of(&[&format!("axis.0.values=[{},{last}]", values.join(","))]), "axis.0.values").unwrap()
     };
     assert!(many("1").starts_with("100 with the hash ") && many("1").len() < 100, "{}", many("1"));
     assert_ne!(many("1"), many("0.9999"));

@@ -1,5 +1,5 @@
 use rattlemap_dynamics::model::{
-    Boxed, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Stops,
+    CloneModel, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Stops,
 };
 
 use super::*;
@@ -14,7 +14,7 @@ fn refusal(builder: SceneBuilder) -> String {
     builder.build().unwrap_err().to_string()
 }
 
-/// What is built is what the same scene in TOML is, and its own text says so.
+/// A built scene is equal to the one read from its text.
 #[test]
 fn a_built_scene_is_the_one_that_its_text_describes() {
     let pair = GearPair { k: 900.0, ..GearPair::paper(0.5) };
@@ -49,9 +49,9 @@ fn a_built_scene_is_the_one_that_its_text_describes() {
     }
 }
 
-/// Axes of every kind, derived parameters, lists.
+/// Axes of all kinds, derived parameters and lists can be built.
 #[test]
-fn what_else_cells_differ_in_can_be_built() {
+fn all_kinds_of_axes_and_lists_can_be_built() {
     let pair = GearPair { k2: 21.0, ..GearPair::paper(0.5) };
     let scene = Scene::builder(pair)
         .derived("k2", "k1")
@@ -70,9 +70,9 @@ fn what_else_cells_differ_in_can_be_built() {
     assert_says(&refusal(wrong), &["cells:3:1: `omega = -6.0` is out of range"]);
 }
 
-/// The same rules as for files, with the remedy and without a place in a text that nobody wrote.
+/// Errors of built scenes are those of files, without a place in the text.
 #[test]
-fn what_is_wrong_with_a_built_scene_is_said() {
+fn errors_of_built_scenes_name_the_field() {
     for (builder, expected) in [
         (built().parameter("mass", 1.0), "scene: unknown field `parameters.mass = 1.0`"),
         (built().parameter("k", f64::NAN), "scene: `parameters.k = nan` is out of range"),
@@ -100,7 +100,7 @@ fn what_is_wrong_with_a_built_scene_is_said() {
     assert_says(&refusal(stops.start(Start::State([0.0, 0.0, 1.0, 0.0]))), &["two finite numbers, [x, v]"]);
 }
 
-/// A model whose parameters may be in range and make no oscillator: damping that is negative up to `wrong_to`.
+/// A model that has no motion for frequencies in a range: its damping is negative there.
 #[derive(Clone, Debug, PartialEq)]
 struct Driven(Stops, [f64; 2]);
 
@@ -142,12 +142,12 @@ impl Model for Driven {
     }
 }
 
-/// Nothing is computed where the model has no motion: a corner is refused with the scene, the rest by the plan.
+/// Cells without motion are found before the computation: at corners by the scene, elsewhere by the plan.
 #[test]
 fn cells_without_motion_are_named_before_anything_is_computed() {
     let scene = |wrong: [f64; 2]| {
         let model = Driven(Stops::with_restitution(0.5), wrong);
-        assert_eq!(*model.boxed(), model);
+        assert_eq!(*model.clone_model(), model);
         Scene::builder(model).axis("F", 1.0..=2.0, 3).axis("omega", 1.0..=3.0, 5).build()
     };
     let corner = scene([0.0, 1.2]).unwrap_err();

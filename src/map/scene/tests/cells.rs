@@ -13,7 +13,7 @@ fn read(scene: &str, table: &str, sets: &[&str]) -> Result<Scene, SceneError> {
         assert_eq!(file, "points.csv");
         Ok(FileText { name: "dir/points.csv".to_owned(), text: table.to_owned() })
     };
-    Scene::parse_beside(scene, "s.toml", &sets, Purpose::Map, &find)
+    Scene::parse_with_files(scene, "s.toml", &sets, Purpose::Map, None, &find)
 }
 
 fn refused(scene: &str, table: &str, sets: &[&str]) -> String {
@@ -21,7 +21,7 @@ fn refused(scene: &str, table: &str, sets: &[&str]) -> String {
 }
 
 #[test]
-fn a_list_says_which_cells_there_are() {
+fn a_list_defines_the_cells() {
     let scene = read(SCENE, TABLE, &[]).unwrap();
     let list = scene.list().unwrap();
     let names: Vec<&str> = list.parameters().map(|parameter| &*parameter.name).collect();
@@ -31,7 +31,7 @@ fn a_list_says_which_cells_there_are() {
     assert_eq!(scene.outputs().files, [Format::Csv, Format::Npy]);
     assert_eq!(scene.title(), "Gear pair: the cells of points.csv");
     assert!(scene.fixed().all(|(name, _)| name != "e" && name != "omega"));
-    // The same list, written as the folder of a map keeps it.
+    // The list is stored in this form in the folder of a map.
     let text = list.to_csv();
     assert_eq!(text, "e,omega\n0.5,5.6\n0.25,4.0\n0.5,5.6\n0.5,7.0\n");
     let again = read(SCENE, &text, &[]).unwrap();
@@ -44,7 +44,7 @@ fn a_list_says_which_cells_there_are() {
     assert_eq!(differing, ["cells.hash"]);
 }
 
-/// Cells that are equal in what a flow depends on share it, wherever they stand.
+/// Cells with equal parameters of the oscillator share a flow, at any place of the list.
 #[test]
 fn cells_of_a_list_share_flows_and_laws() {
     let scene = read(&format!("{SCENE}[derived]\nk2 = \"4*omega\"\n"), TABLE, &[]).unwrap();
@@ -66,33 +66,31 @@ fn cells_of_a_list_share_flows_and_laws() {
 }
 
 #[test]
-fn tables_that_are_none_are_named_with_line_and_field() {
-    let cases = [
-        ("e,omgea\n", "dir/points.csv:1:2: `column 2 = omgea` is not known; did you mean `omega`?"),
-        ("e;omega\n0.5;1\n", "dir/points.csv:1:1: `column 1 = e;omega` is not known"),
-        ("e,e\n0.5,0.5\n", "dir/points.csv:1:2: `column 2 = e` does not fit: another column sets it already"),
-        (
-            "e,omega\n0.5,5.6\n0.5,x\n",
-            "dir/points.csv:3:2: `omega = x` has the wrong type: it must be a number",
-        ),
-        ("e,omega\n0.5,\n", "dir/points.csv:2:2: `omega = ` has the wrong type"),
-        ("e,omega\n1.5,2\n", "dir/points.csv:2:1: `e = 1.5` is out of range: it must be between 0 and 1"),
-        ("e,omega\n0.5,nan\n", "dir/points.csv:2:2: `omega = nan` is out of range"),
-        ("e,omega\n0.5,1,2\n", "dir/points.csv:2:1: the line has 3 fields and the first line 2"),
-        ("e,omega\n", "dir/points.csv:1:1: it lists no cells"),
-        ("", "dir/points.csv:1:1: it is empty; write a line with names of parameters"),
-    ];
-    for (table, expected) in cases {
-        assert_says(&refused(SCENE, table, &[]), &[expected]);
+fn errors_in_tables_name_line_and_field() {
+    for [table, expected] in test_cases(
+        r#"
+e,omgea\n | dir/points.csv:1:2: `column 2 = omgea` is not known; did you mean `omega`?
+e;omega\n0.5;1\n | dir/points.csv:1:1: `column 1 = e;omega` is not known
+e,e\n0.5,0.5\n | dir/points.csv:1:2: `column 2 = e` does not fit: another column sets it
+e,omega\n0.5,5.6\n0.5,x\n | dir/points.csv:3:2: `omega = x` has the wrong type: it must be a number
+e,omega\n0.5,\n | dir/points.csv:2:2: `omega = ` has the wrong type
+e,omega\n1.5,2\n | dir/points.csv:2:1: `e = 1.5` is out of range: it must be between 0 and 1
+e,omega\n0.5,nan\n | dir/points.csv:2:2: `omega = nan` is out of range
+e,omega\n0.5,1,2\n | dir/points.csv:2:1: the line has 3 fields and the first line 2
+e,omega\n | dir/points.csv:1:1: it has no cells
+ | dir/points.csv:1:1: it is empty; write a line with parameter names
+"#,
+    ) {
+        assert_says(&refused(SCENE, &table, &[]), &[&expected]);
     }
 }
 
 #[test]
-fn what_does_not_go_with_a_list_is_refused() {
+fn settings_that_contradict_a_list_are_refused() {
     let with = |more: &str, sets: &[&str]| refused(&format!("{SCENE}{more}"), TABLE, sets);
     assert_says(
         &with("[[axis]]\nparameter = \"k\"\nmin = 1.0\nmax = 2.0\ncount = 2\n", &[]),
-        &["s.toml:6:1: `axis = [[axis]]`", "does not fit: [cells] says which cells there are"],
+        &["s.toml:6:1: `axis = [[axis]]`", "does not fit: [cells] lists the cells instead of axes"],
     );
     assert_says(
         &with("[refine]\n", &[]),
@@ -107,7 +105,7 @@ fn what_does_not_go_with_a_list_is_refused() {
     for file in ["png", "html"] {
         assert_says(
             &with(&format!("[outputs]\nfiles = [\"csv\", \"{file}\"]\n"), &[]),
-            &["a list of cells has no picture", &format!("drop \"{file}\"")],
+            &["a list of cells has no figures", &format!("remove \"{file}\"")],
         );
     }
     assert_says(
@@ -116,13 +114,13 @@ fn what_does_not_go_with_a_list_is_refused() {
     );
     assert_says(
         &with("[derived]\nomega = \"e\"\n", &[]),
-        &["`derived.omega = \"e\"` does not fit: it is swept, too"],
+        &["`derived.omega = \"e\"` does not fit: it is also swept"],
     );
     assert_says(&refused(SCENE, "omega\n5.6\n", &[]), &["`parameters.e` is missing"]);
     assert_says(&refused("[cells]\n", TABLE, &[]), &["s.toml:1:2: `cells.file` is missing; name a table"]);
     assert_says(
         &parse(SCENE, &[]).unwrap_err().to_string(),
-        &["s.toml:4:1: `cells = { ... }` does not fit: `bifurcation` takes an axis"],
+        &["s.toml:4:1: `cells = { ... }` does not fit: `bifurcation` needs an axis"],
     );
     let nowhere = Scene::parse(SCENE, "s.toml", &[], Purpose::Map).unwrap_err().to_string();
     assert_says(

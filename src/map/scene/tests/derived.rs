@@ -1,9 +1,9 @@
-//! Parameters that follow others.
+//! Derived parameters.
 
 use super::*;
 use crate::map::plan::Plan;
 
-/// A map over the force and the first support's stiffness, to which the second's is coupled.
+/// Reads a map over the force and the stiffness of the first support, with derived parameters.
 fn coupled(derived: &str, sets: &[&str]) -> Result<Scene, SceneError> {
     let text = format!(
         "[parameters]\ne = 0.5\n[derived]\n{derived}\n[[axis]]\nparameter = \"F\"\nmin = 10.0\nmax = 50.0\ncount = 5\n\
@@ -31,16 +31,16 @@ fn derived_parameters_follow_the_cell() {
     let fixed: Vec<&str> = scene.fixed().map(|(name, _)| name).collect();
     assert_eq!(fixed, ["m1", "r1", "r", "k", "omega", "b", "e", "mesh_speed"]);
     let derived: Vec<(&str, &str)> = scene.derived().map(|(p, text)| (&*p.name, text)).collect();
-    // Each after those that it follows.
+    // Each rule comes after those that it needs.
     assert_eq!(derived, [("k2", "0.5*k1"), ("m2", "1.5"), ("r2", "2*r1 + k2/100")]);
     let by_argument = coupled("m2 = 1.5", &["derived.k2=0.25*k1"]).unwrap();
     assert_eq!(by_argument.cell(&[0, 3]).get("k2"), Ok(10.0));
     assert_ne!(scene.identity(), by_argument.identity());
 }
 
-/// Cells share a flow where they agree in all that it depends on, through chains, too.
+/// Cells share a flow if all its parameters are equal, including derived ones.
 #[test]
-fn what_is_derived_from_an_axis_has_flows_of_its_own() {
+fn cells_with_different_derived_parameters_have_different_flows() {
     let scene = |derived: &str| {
         let text = format!(
             "[parameters]\n[derived]\n{derived}\n[[axis]]\nparameter = \"e\"\nmin = 0.25\nmax = 0.75\ncount = 3\n\
@@ -68,30 +68,22 @@ fn what_is_derived_from_an_axis_has_flows_of_its_own() {
 }
 
 #[test]
-fn what_cannot_be_derived_is_said() {
-    let cases = [
-        ("K2 = \"k1\"", "s.toml:4:1: unknown field `derived.K2 = \"k1\"`; did you mean `k2`?"),
-        (
-            "k2 = \"0.5*K1\"",
-            "s.toml:4:6: `derived.k2 = \"0.5*K1\"` has an unknown name, `K1`: did you mean `k1`?",
-        ),
-        (
-            "k2 = \"0.5 k1\"",
-            "`derived.k2 = \"0.5 k1\"` cannot be read from `k1` on; an expression has numbers",
-        ),
-        ("k2 = \"0.5*\"", "`derived.k2 = \"0.5*\"` cannot be read to its end"),
-        ("k2 = \"sqrt(k1, 2)\"", "`sqrt` takes one argument"),
-        ("k2 = true", "`derived.k2 = true` has the wrong type: it must be an expression in quotes"),
-        ("F = \"k1\"", "s.toml:4:5: `derived.F = \"k1\"` does not fit: it is swept, too"),
-        ("e = \"0.5\"", "s.toml:2:5: `parameters.e = 0.5` does not fit: `derived.e` derives it; drop either"),
-        ("k2 = \"r2\"\nr2 = \"2*m2\"\nm2 = \"k2\"", "does not fit: it follows itself: k2 <- r2 <- m2 <- k2"),
-        (
-            "k2 = \"m2\"\nm2 = \"m2 + k1\"",
-            "`derived.m2 = \"m2 + k1\"` does not fit: it follows itself: m2 <- m2",
-        ),
-    ];
-    for (derived, expected) in cases {
-        assert_says(&refused(derived, &[]), &[expected]);
+fn errors_in_expressions_name_the_field() {
+    for [derived, expected] in test_cases(
+        r#"
+K2 = "k1" | s.toml:4:1: unknown field `derived.K2 = "k1"`; did you mean `k2`?
+k2 = "0.5*K1" | s.toml:4:6: `derived.k2 = "0.5*K1"` has an unknown name, `K1`: did you mean `k1`?
+k2 = "0.5 k1" | `derived.k2 = "0.5 k1"` cannot be read from `k1` on; an expression has numbers
+k2 = "0.5*" | `derived.k2 = "0.5*"` cannot be read to its end
+k2 = "sqrt(k1, 2)" | `sqrt` takes one argument
+k2 = true | `derived.k2 = true` has the wrong type: it must be an expression in quotes
+F = "k1" | s.toml:4:5: `derived.F = "k1"` does not fit: it is also swept
+e = "0.5" | s.toml:2:5: `parameters.e = 0.5` does not fit: `derived.e` derives it; remove one of the two
+k2 = "r2"\nr2 = "2*m2"\nm2 = "k2" | does not fit: it depends on itself: k2 <- r2 <- m2 <- k2
+k2 = "m2"\nm2 = "m2 + k1" | `derived.m2 = "m2 + k1"` does not fit: it depends on itself: m2 <- m2
+"#,
+    ) {
+        assert_says(&refused(&derived, &[]), &[&expected]);
     }
     let long = format!("k2 = \"{}\"", "1+".repeat(300));
     assert_says(&refused(&long, &[]), &["it has 600 characters, and may have 500"]);
@@ -99,7 +91,7 @@ fn what_cannot_be_derived_is_said() {
         &refused("k2 = \"k1\"", &["k2=3"]),
         &["--set k2=3: `parameters.k2 = 3` does not fit: `derived.k2`"],
     );
-    // An expression by argument takes the place of the text's value.
+    // An expression in an argument overrides a value in the text.
     let text = "k2 = \"k1\"";
     assert!(coupled(text, &["derived.e=k1/100"]).is_ok());
     assert_says(
@@ -108,7 +100,7 @@ fn what_cannot_be_derived_is_said() {
     );
 }
 
-/// At a corner with the scene, elsewhere by the plan: before anything is computed.
+/// Derived values out of range are found before the computation: at corners by the scene, elsewhere by the plan.
 #[test]
 fn values_out_of_range_are_named_with_their_cell() {
     let message = refused("k2 = \"k1 - 20\"", &[]);

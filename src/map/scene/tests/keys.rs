@@ -1,4 +1,4 @@
-//! The table of keys says what the parser does.
+//! The table of keys agrees with the parser.
 
 use super::*;
 use crate::map::scene::keys::{KEYS, Key, KeyDefault, Takes};
@@ -6,7 +6,7 @@ use crate::map::scene::keys::{KEYS, Key, KeyDefault, Takes};
 const BASE: &str = "[parameters]\n[[axis]]\nparameter = \"e\"\nmin = 0.1\nmax = 0.9\ncount = 4\n\
                     [[axis]]\nparameter = \"omega\"\nmin = 1.0\nmax = 12.0\ncount = 3\n";
 
-/// A map in which `key` applies, with what is set beside it.
+/// Reads a map in which `key` applies, with a value of it.
 fn with(key: &Key, value: Option<&str>) -> Result<Scene, SceneError> {
     let text = if key.table == "refine" { format!("{BASE}[refine]\n") } else { BASE.to_owned() };
     let mut sets = Vec::new();
@@ -23,20 +23,20 @@ fn with(key: &Key, value: Option<&str>) -> Result<Scene, SceneError> {
 }
 
 #[test]
-fn defaults_are_what_holds_without_them() {
-    let mut seen = 0;
+fn written_defaults_change_nothing() {
+    let mut count = 0;
     for key in KEYS {
         if let KeyDefault::Value(value) = key.default {
             let [written, silent] = [with(key, Some(value)), with(key, None)].map(|scene| scene.unwrap());
             assert_eq!(format!("{written:?}"), format!("{silent:?}"), "{}.{} = {value}", key.table, key.name);
-            seen += 1;
+            count += 1;
         }
     }
-    assert!(seen >= 15);
+    assert!(count >= 15);
 }
 
 #[test]
-fn ranges_are_what_is_taken() {
+fn the_parser_accepts_exactly_the_ranges_of_the_table() {
     let good = |key: &Key, value: &str| {
         with(key, Some(value)).unwrap_or_else(|error| panic!("{}.{}: {error}", key.table, key.name));
     };
@@ -60,7 +60,7 @@ fn ranges_are_what_is_taken() {
                 bad(key, "2");
             }
             Takes::OneOf(names) => {
-                // The state has to be there for its policy, and maps do not go both ways.
+                // "state" needs a state, and "both" is for diagrams only.
                 names
                     .iter()
                     .filter(|name| !["state", "both"].contains(*name))

@@ -1,14 +1,10 @@
-//! `--set`: what it changes, and that its messages name the argument.
+//! `--set`: changes of the scene, and messages that name the argument.
 
 use super::*;
 use crate::model_file::FileModel;
 
-fn set_refusal(set: &str) -> String {
-    parse(GOOD, &[set]).expect_err(set).to_string()
-}
-
 #[test]
-fn sets_win_over_the_text() {
+fn arguments_override_the_text() {
     let sets =
         ["F=40", "parameters.omega=.7", "axis.0.count=8", "integration.max_period=2", "title=Set", "F=41"];
     let scene = parse(GOOD, &sets).unwrap();
@@ -20,42 +16,31 @@ fn sets_win_over_the_text() {
 }
 
 #[test]
-fn bad_sets_name_themselves_instead_of_a_line() {
-    let cases = [
-        ("axis.0.count=1", "--set axis.0.count=1: `axis.0.count = 1` is out of range"),
-        ("F=fifty", "--set F=fifty: `parameters.F = fifty` has the wrong type: it must be a number"),
-        ("e=0.5", "--set e=0.5: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`; set `axis.0.min`"),
-        ("omgea=1", "--set omgea=1: unknown field `parameters.omgea = 1`; did you mean `omega`?"),
-        (
-            "integraton.x=1",
-            "--set integraton.x=1: unknown field `integraton = { ... }`; did you mean `integration`?",
-        ),
-        (
-            "axis.1.count=4",
-            "--set axis.1.count=4: unknown field `axis.1.count = 4`; `1` must be a number below 1",
-        ),
-        ("axis.x=4", "`x` must be a number below 1"),
-        ("title.x=4", "--set title.x=4: unknown field `title.x = 4`; `\"A scene\"` has no fields; drop `.x`"),
-        (
-            "start.state=[1,2,nan,4]",
-            "--set start.state=[1,2,nan,4]: `start.state = [1,2,nan,4]` does not fit",
-        ),
-        (
-            "integration=3",
-            "--set integration=3: `integration = 3` has the wrong type: it must be a table, [integration]",
-        ),
-        ("e", "--set e: expected NAME=VALUE"),
-        ("=3", "--set =3: expected NAME=VALUE"),
-        ("F=", "--set F=: expected NAME=VALUE"),
-        ("axis..count=3", "--set axis..count=3: expected NAME=VALUE"),
-    ];
-    for (set, expected) in cases {
-        assert_says(&set_refusal(set), &[expected]);
+fn errors_of_arguments_name_the_argument() {
+    for [set, expected] in test_cases(
+        r#"
+axis.0.count=1 | --set axis.0.count=1: `axis.0.count = 1` is out of range
+F=fifty | --set F=fifty: `parameters.F = fifty` has the wrong type: it must be a number
+e=0.5 | --set e=0.5: `parameters.e = 0.5` does not fit: axis 0 sweeps `e`; set `axis.0.min`
+omgea=1 | --set omgea=1: unknown field `parameters.omgea = 1`; did you mean `omega`?
+integraton.x=1 | --set integraton.x=1: unknown field `integraton = { ... }`; did you mean `integration`?
+axis.1.count=4 | --set axis.1.count=4: unknown field `axis.1.count = 4`; `1` must be a number below 1
+axis.x=4 | `x` must be a number below 1
+title.x=4 | --set title.x=4: unknown field `title.x = 4`; `"A scene"` has no fields; remove `.x`
+start.state=[1,2,nan,4] | --set start.state=[1,2,nan,4]: `start.state = [1,2,nan,4]` does not fit
+integration=3 | --set integration=3: `integration = 3` has the wrong type: it must be a table, [integration]
+e | --set e: expected NAME=VALUE
+=3 | --set =3: expected NAME=VALUE
+F= | --set F=: expected NAME=VALUE
+axis..count=3 | --set axis..count=3: expected NAME=VALUE
+"#,
+    ) {
+        assert_says(&parse(GOOD, &[&set]).expect_err(&set).to_string(), &[&expected]);
     }
 }
 
 #[test]
-fn single_cells_come_from_sets_alone() {
+fn a_single_cell_is_set_by_arguments() {
     let model = FileModel::built_in("gear-pair").unwrap();
     let sets = |sets: &[&str]| single_cell(&model, &sets.iter().map(ToString::to_string).collect::<Vec<_>>());
     assert_eq!(pair(&*sets(&[]).unwrap()), GearPair::paper(0.605));
@@ -71,9 +56,9 @@ fn single_cells_come_from_sets_alone() {
     );
 }
 
-/// Arguments win over the text, so an axis that one names does over the text's value.
+/// An axis whose parameter is named by an argument overrides the value of the parameter in the text.
 #[test]
-fn an_axis_named_by_an_argument_replaces_the_value_of_the_text() {
+fn an_axis_named_by_an_argument_overrides_the_text() {
     let sets = ["e=0.5", "axis.0.parameter=F", "axis.0.min=40", "axis.0.max=60"];
     let scene = parse(GOOD, &sets).unwrap();
     assert_eq!(scene.axes()[0].parameter().name, "F");
@@ -83,9 +68,9 @@ fn an_axis_named_by_an_argument_replaces_the_value_of_the_text() {
         &parse(GOOD, &both).unwrap_err().to_string(),
         &["--set F=50: `parameters.F = 50` does not fit: axis 0 sweeps `F`"],
     );
-    // What was the axis has no value any more.
+    // The parameter of the replaced axis has no value.
     assert_says(&parse(GOOD, &sets[1..]).unwrap_err().to_string(), &["restitution", "no default"]);
-    // Text against text stays an error, whatever else of the axis an argument changes.
+    // If both are in the text it is an error, even if an argument changes the axis' range.
     let text = GOOD.replace("\"e\"", "\"F\"");
     assert_says(
         &parse(&text, &["e=0.5", "axis.0.max=60"]).unwrap_err().to_string(),

@@ -1,11 +1,11 @@
-//! Long texts, many of them, and texts that no terminal should see.
+//! Long texts, many errors, and unprintable characters.
 
 use super::*;
 use crate::map::printable::is_printable;
 use std::time::Instant;
 
 #[test]
-fn a_title_has_an_end() {
+fn long_titles_are_refused() {
     let titled = |count: usize| GOOD.replacen("A scene", &"\u{e9}".repeat(count), 1);
     assert_eq!(parse(&titled(200), &[]).unwrap().title().chars().count(), 200);
     let message = parse(&titled(201), &[]).unwrap_err().to_string();
@@ -20,9 +20,9 @@ fn a_title_has_an_end() {
     assert_says(&built, &["`title = ", "it has 300"]);
 }
 
-/// Every place of a text in which lines are long, and characters have several bytes.
+/// Places in a text with long lines and characters of several bytes.
 #[test]
-fn places_are_where_they_stand() {
+fn errors_show_line_and_column() {
     let mut text = String::from("# \u{3c9} and \u{1f600}\r\n\n[parameters]\n");
     for k in 0..300 {
         let gap = ["", "\n", " # caf\u{e9} \u{2192}\n\n", "\n# \u{1f600}\n"][k % 4];
@@ -33,7 +33,7 @@ fn places_are_where_they_stand() {
     }
     let document = document::read(&text, "s").unwrap();
     let lines: Vec<&str> = text.split('\n').collect();
-    fn walk(node: &Node, lines: &[&str], seen: &mut usize) {
+    fn walk(node: &Node, lines: &[&str], count: &mut usize) {
         let children: Vec<(Option<&str>, &Node)> = match &node.value {
             document::Value::Table(table) => table.iter().map(|(name, node)| (Some(&**name), node)).collect(),
             document::Value::List(items) => items.iter().map(|node| (None, node)).collect(),
@@ -42,7 +42,7 @@ fn places_are_where_they_stand() {
         for (name, child) in children {
             for (place, text) in [
                 (&child.name_place, name),
-                (&child.place, Some(&*child.shown).filter(|shown| *shown != "{ ... }")),
+                (&child.place, Some(&*child.excerpt).filter(|excerpt| *excerpt != "{ ... }")),
             ] {
                 let Some(text) = text else { continue };
                 let Place::Text { line, column, .. } = place else { panic!("{place:?}") };
@@ -51,19 +51,19 @@ fn places_are_where_they_stand() {
                     rest.trim_start_matches('\'').starts_with(text.trim_start_matches('\'')),
                     "{place}: {text} {rest}"
                 );
-                *seen += 1;
+                *count += 1;
             }
-            walk(child, lines, seen);
+            walk(child, lines, count);
         }
     }
-    let mut seen = 0;
-    walk(&document, &lines, &mut seen);
-    assert!(seen > 2000, "{seen}");
+    let mut count = 0;
+    walk(&document, &lines, &mut count);
+    assert!(count > 2000, "{count}");
 }
 
-/// One is told, the others counted; all of it in one pass over the text.
+/// The message names one of many unknown fields and counts the others, in a single pass over the text.
 #[test]
-fn thousands_of_unknown_fields_are_told_at_once() {
+fn thousands_of_unknown_fields_give_one_message() {
     let many: String = (0..20_000).map(|k| format!("unknown{k} = [{k}, 'x']\n")).collect();
     let inline: Vec<String> = (0..20_000).map(|k| format!("unknown{k} = {k}")).collect();
     let clock = Instant::now();
@@ -72,7 +72,7 @@ fn thousands_of_unknown_fields_are_told_at_once() {
         &message,
         &["s.toml:1:1: unknown field `unknown0 = [0, 'x']`; valid names: title", "; 19999 more fields"],
     );
-    // On one line.
+    // All fields on one line.
     let table = format!(
         "parameters = {{ {} }}
 ",
@@ -94,29 +94,29 @@ F = 50.0
     assert_says(&message, &["s.toml:1:16: unknown field `parameters.unknown0 = 0`", "; 19999 more fields"]);
     assert!(clock.elapsed().as_secs() < 4, "{:?}", clock.elapsed());
     let message = refusal("F = 50.0", "f = 1\nG = 2");
-    assert_says(&message, &["`parameters.G = 2`", "; 1 more field beside it is unknown"]);
+    assert_says(&message, &["`parameters.G = 2`", "; 1 more field is unknown"]);
 }
 
-/// A name of a million letters is compared with nothing, and shown as far as one reads.
+/// A name of a million letters is shortened in the message and compared with no known name.
 #[test]
-fn names_without_end_are_cut() {
+fn very_long_names_are_shortened() {
     let name = "omega".repeat(200_000);
     for message in [refusal("F = 50.0", &format!("{name} = 1")), refusal("\"e\"", &format!("'{name}'"))] {
         assert_says(&message, &["omegaomega", "...", "valid names: m1"]);
-        // Beside what the parameters mean, each in brackets.
+        // The message also contains the meanings of the parameters, in parentheses.
         let parameters = rattlemap_dynamics::model::GearPair::PARAMETERS.iter();
         let meanings: usize = parameters.map(|parameter| parameter.meaning.len() + 3).sum();
         assert!(message.len() - meanings < 500, "{}", message.len());
     }
     let message = parse(GOOD, &[&format!("{name}.x=1")]).unwrap_err().to_string();
     assert!(message.len() < 500 && message.contains("..."), "{}", message.len());
-    // Deeper than a recursion should go.
+    // A path with too many names for recursion.
     let message = parse(GOOD, &[&format!("{}=1", vec!["a"; 50_000].join("."))]).unwrap_err().to_string();
-    assert_says(&message, &["no setting lies as deep", "axis.0.count"]);
+    assert_says(&message, &["no setting has so many names", "axis.0.count"]);
     assert!(message.len() < 500, "{}", message.len());
 }
 
-/// Wherever they stand: in names, values, lines that are no TOML, arguments, the file's name.
+/// Unprintable characters are escaped in names, values, syntax errors, arguments and the file's name.
 #[test]
 fn messages_are_one_line_that_a_terminal_shows_as_it_is() {
     let evil = "\u{1b}]0;x\u{7}\u{9b}31m\u{202e}\u{7f}";

@@ -1,4 +1,4 @@
-//! Which filled cells are audited, and what is halved for what that shows?
+//! The audit of filled cells, and the blocks that are halved after it.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -11,53 +11,52 @@ use super::{Adaptive, Stage};
 use crate::map::scene::Continuous;
 use crate::record::{Record, valid};
 
-/// What an audit showed.
+/// Result of an audit.
 struct Verdict {
-    /// Cells that were filled wrongly.
+    /// Cells with wrong filled values.
     wrong: Vec<u32>,
-    /// Kinds that are wrong most often in blocks that may be halved; none if the audit is passed.
+    /// Kinds with the largest fraction of wrong cells in blocks that may be halved; empty if the audit is passed.
     bad: HashSet<u32>,
 }
 
 impl Adaptive {
-    pub(super) fn begin_audit(&mut self, asks: &mut Vec<u32>) {
-        let filled = self.unasked;
-        let sampled = self.sample(self.refine.audited(filled), asks);
+    pub(super) fn begin_audit(&mut self, requests: &mut Vec<u32>) {
+        let filled = self.unrequested;
+        let sampled = self.sample(self.refine.audited(filled), requests);
         self.stage = if sampled == 0 { Stage::Done } else { Stage::Auditing };
         if sampled > 0 {
             self.audits.push(Audit { filled, sampled, ..Audit::default() });
         }
     }
 
-    /// Asks for so many of the cells that nothing is known of, at random.
-    fn sample(&mut self, count: usize, asks: &mut Vec<u32>) -> usize {
-        let count = count.min(self.unasked);
-        let from = asks.len();
-        while asks.len() < from + count {
+    /// Requests `count` random cells that were not requested before.
+    fn sample(&mut self, count: usize, requests: &mut Vec<u32>) -> usize {
+        let count = count.min(self.unrequested);
+        let from = requests.len();
+        while requests.len() < from + count {
             let id = self.random.below(self.labels.len());
-            self.ask(id, asks);
+            self.request(id, requests);
         }
-        self.audited.extend(&asks[from..]);
+        self.audited.extend(&requests[from..]);
         self.samples += usize::from(count > 0);
         count
     }
 
-    /// After an audit blocks with wrong cells are halved down to them. If there are too many of them,
-    /// borders are followed more closely first. If that is done and there still are, all blocks are halved
-    /// that are filled with what is wrong most often: mostly chaos with its
-    /// windows, which the plain regions around need not pay for. If that may be chance, more cells are
-    /// audited before. Where blocks have been halved as often as they may there is nothing left to do.
-    pub(super) fn judge_audit(&mut self, records: &[Record], asks: &mut Vec<u32>) {
+    /// Evaluates an audit. Blocks with wrong cells are halved down to them. If there are too many wrong cells, borders are
+    /// first followed in narrower blocks. If that was done before, all blocks are halved that are filled with the kinds
+    /// that are wrong most often, usually chaos with its windows; blocks of other kinds stay. If the number of wrong cells may be due to
+    /// chance, more cells are audited first. Blocks that may not be halved further remain as they are.
+    pub(super) fn judge_audit(&mut self, records: &[Record], requests: &mut Vec<u32>) {
         let Verdict { wrong, bad } = self.count_wrong(records);
         let audit = *self.audits.last().unwrap_or(&Audit::default());
         let is_over = audit.rate() > self.refine.max_error;
         let closer = if is_over { self.follow_closely() } else { Vec::new() };
-        let is_bad = |tile: Tile| bad.contains(&self.sights[tile].kind);
+        let is_bad = |tile: Tile| bad.contains(&self.blocks[tile].kind);
         let worst: Vec<Tile> = self.tiles_to_halve(is_bad).collect();
         if is_over && closer.is_empty() && !worst.is_empty() {
             let more = audit.more(self.refine.audited(audit.filled), self.refine.max_error);
             if more > 0 {
-                self.sample(more, asks);
+                self.sample(more, requests);
                 return;
             }
         }
@@ -65,22 +64,22 @@ impl Adaptive {
         self.stage = if self.pending.is_empty() { Stage::Mending } else { Stage::Halving };
         for id in wrong {
             let tile = self.tiling.owner(self.at(id));
-            self.sights[tile].is_free = true;
+            self.blocks[tile].is_free = true;
             self.pending.push(tile);
         }
         for id in std::mem::take(&mut self.audited) {
-            self.show(self.at(id), self.labels[id as usize]);
+            self.update(self.at(id), self.labels[id as usize]);
         }
-        self.halve(asks);
+        self.halve(requests);
     }
 
-    /// Compares what was filled into the audited cells with their records.
+    /// Compares the filled values of the audited cells with their records.
     fn count_wrong(&mut self, records: &[Record]) -> Verdict {
         let mut wrong = Vec::new();
         let filled = self.audits.pop().map_or(0, |audit| audit.filled);
         let mut audit = Audit { filled, sampled: self.audited.len(), ..Audit::default() };
         let mut by_kind: BTreeMap<(usize, u32), [usize; 2]> = BTreeMap::new();
-        // Attractors are numbered as their records came; the order in which they are sampled does not depend on that.
+        // Numbers of attractors depend on the order of the records, but their order in the sample does not.
         let mut sampled_kinds: Vec<u32> = Vec::new();
         let mut pairs = Vec::with_capacity(self.audited.len());
         let mut fillings: HashMap<Tile, Filling<'_>> = HashMap::new();
@@ -104,9 +103,9 @@ impl Adaptive {
                     sampled_kinds.len() - 1
                 }
             };
-            let [sampled, amiss] = by_kind.entry((rank, label.kind)).or_default();
+            let [sampled, wrong] = by_kind.entry((rank, label.kind)).or_default();
             *sampled += 1;
-            *amiss += usize::from(is_wrong && self.may_halve(tile));
+            *wrong += usize::from(is_wrong && self.may_halve(tile));
             if fill.valid & valid::WORD != 0 {
                 audit.words += 1;
                 audit.wrong_words += usize::from(word_of(&fill) != word_of(&records[id as usize]));
@@ -125,7 +124,7 @@ impl Adaptive {
         Verdict { wrong, bad: worst(&by_kind, (self.refine.max_error * audit.sampled as f64) as usize) }
     }
 
-    /// The corner that a cell of a block is filled from.
+    /// Returns the corner from which a cell of a block is filled.
     fn corner(&self, tile: Tile, at: [usize; 2]) -> [usize; 2] {
         let block = self.tiling.block(tile);
         block.corners()[block.nearest(at)]
@@ -137,16 +136,16 @@ impl Adaptive {
     }
 }
 
-/// The kinds of which the largest part is wrong, as many as it takes until no more than `allowed` wrong
-/// cells are of other kinds. Equal parts go by the first number. Of every kind it is known how many cells were sampled and were wrong.
+/// Returns the kinds with the largest fractions of wrong cells, so many that at most `allowed` wrong cells are of other
+/// kinds. Equal fractions are ordered by the first number of the key. The values are the numbers of sampled and of wrong cells.
 fn worst(by_kind: &BTreeMap<(usize, u32), [usize; 2]>, allowed: usize) -> HashSet<u32> {
     let mut kinds: Vec<_> = by_kind.iter().collect();
-    // Compares amiss / sampled, without a division.
+    // Compares wrong / sampled, without a division.
     kinds.sort_by(|(_, [n, a]), (_, [m, b])| (b * n).cmp(&(a * m)));
-    let mut left: usize = kinds.iter().map(|(_, [_, amiss])| amiss).sum();
-    let is_needed = |(_, [_, amiss]): &(&(usize, u32), &[usize; 2])| {
+    let mut left: usize = kinds.iter().map(|(_, [_, wrong])| wrong).sum();
+    let is_needed = |(_, [_, wrong]): &(&(usize, u32), &[usize; 2])| {
         let is_needed = left > allowed;
-        left -= amiss;
+        left -= wrong;
         is_needed
     };
     kinds.into_iter().take_while(is_needed).map(|((_, kind), _)| *kind).collect()

@@ -1,6 +1,6 @@
-//! Tests: a cell's class is that of the motion that its start reaches.
+//! Tests of whole cells: the reported class is that of the motion which the start reaches.
 
-use super::{Budget, Class, Measured, Settings, Status, analyse, measure};
+use super::{Budget, Class, Measurement, Settings, Status, analyse, measure};
 use crate::flow::Flow;
 use crate::model::GearPair;
 
@@ -14,7 +14,7 @@ fn budget(early_stop: bool, transient_periods: u32) -> Budget {
     }
 }
 
-fn cell(pair: &GearPair, budget: &Budget) -> Measured {
+fn cell(pair: &GearPair, budget: &Budget) -> Measurement {
     measure(&Flow::new(&pair.oscillator().unwrap()), pair.law(), [0.0; 4], budget)
 }
 
@@ -22,9 +22,19 @@ fn paper(e: f64, omega: f64) -> GearPair {
     GearPair { omega, ..GearPair::paper(e) }
 }
 
-/// Beside each lies a cycle that the motion nears for some twenty periods, and leaves across a threshold of meshing.
 #[test]
-fn cycles_that_the_start_leaves_are_not_named() {
+fn status_codes_round_trip() {
+    for (code, status) in Status::ALL.into_iter().enumerate() {
+        assert_eq!(status.code(), code as u32);
+        assert_eq!(Status::from_code(code as u32), Some(status));
+    }
+    assert_eq!(Status::from_code(9), None);
+}
+
+/// In each cell the motion approaches another cycle for about twenty periods, and then leaves it because an impact
+/// turns into meshing.
+#[test]
+fn a_cycle_that_the_motion_leaves_is_not_reported() {
     for (e, omega, period, impacts) in [
         (0.5949119373776908, 3.7984344422700587, Some(2), 8.5),
         (0.5610367892976589, 3.8959866220735786, None, 12.41),
@@ -40,8 +50,8 @@ fn cycles_that_the_start_leaves_are_not_named() {
     }
 }
 
-/// The strobe lies 0.0002 after a start of meshing. While the motion comes to it from behind the wall, the strobe map has a
-/// fixed point in front of it that is no cycle.
+/// The strobe lies 0.0002 after a start of meshing. While strobe states lie behind the wall, the strobe map has a
+/// fixed point in front of the wall, which is not a cycle.
 #[test]
 fn a_fixed_point_in_another_domain_is_no_cycle() {
     let pair = paper(0.22504892367906065, 3.475538160469667);
@@ -51,12 +61,12 @@ fn a_fixed_point_in_another_domain_is_no_cycle() {
     }
 }
 
-/// Where thresholds of meshing are dense, against brute force that goes on for longer.
+/// Compares early stops with longer integration in a region with many thresholds of meshing.
 #[test]
-fn early_stops_name_what_brute_force_reaches() {
+fn early_stops_agree_with_longer_integration() {
     let (mut compared, mut periodic) = (0, 0);
     for n in 0..1500u32 {
-        // Kronecker's sequence with the plastic number: evenly spread.
+        // Kronecker's sequence with the plastic number: evenly distributed points.
         let [a, b] =
             [0.754_877_666_246_692_7, 0.569_840_290_998_053_2].map(|step| (f64::from(n) * step).fract());
         let pair = paper(0.3 + 0.35 * a, 3.6 + 0.3 * b);
@@ -72,15 +82,15 @@ fn early_stops_name_what_brute_force_reaches() {
                 "{pair:?}"
             );
         } else {
-            assert_eq!(long.status, Status::Slow, "{pair:?} is no cycle");
+            assert_eq!(long.status, Status::Slow, "{pair:?} is not periodic");
         }
     }
     assert!(periodic > 1000 && compared * 100 > periodic * 99, "{compared} of {periodic}");
 }
 
-/// Gear 2 is never touched: whether its own motion would decay makes no difference.
+/// Gear 2 rests and is never touched, so its damping and support make no difference.
 #[test]
-fn contact_free_motion_beside_a_gear_at_rest_is_periodic() {
+fn contact_free_motion_with_one_gear_at_rest_is_periodic() {
     for (r2, k2) in [(0.0, 20.0), (0.6, 0.0), (0.0, 0.0)] {
         let pair = GearPair { r2, k2, ..paper(0.5, 11.0) };
         let pair = GearPair { force: 5.0, ..pair };

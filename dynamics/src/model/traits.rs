@@ -1,4 +1,4 @@
-//! What every model can be asked.
+//! The trait of all models.
 
 use std::any::Any;
 use std::fmt::Debug;
@@ -7,74 +7,73 @@ use thiserror::Error;
 
 use super::{Law, Oscillator, OscillatorError, Parameter, ParameterError};
 
-/// Why a model has no motion.
+/// An error in a model's parameters or in the oscillator that they give.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ModelError {
-    /// A parameter is not one that the model can have.
+    /// A parameter is unknown or out of its range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// The parameters do not make an oscillator.
+    /// The parameters do not give a valid oscillator or contact law.
     #[error(transparent)]
     Oscillator(#[from] OscillatorError),
 }
 
 /// A model with the values of its parameters: one cell of a map.
 ///
-/// Scenes set parameters by name; the engine gets an oscillator and a law. Each parameter says
-/// which of the two it [shapes](super::Shapes): a map derives one flow per distinct oscillator.
-/// What implements it must be `Clone` and `PartialEq`, and is `Clone` and `PartialEq` behind a
-/// `Box<dyn Model>`, too.
-pub trait Model: Boxed + Debug + Send + Sync + Any {
-    /// The name in scenes.
+/// Scenes set parameters by name; engines use the oscillator and the law. [`Parameter::shapes`] says which of the two
+/// depends on a parameter, so that a map computes one flow per distinct oscillator. An implementation must be `Clone`
+/// and `PartialEq`; then `Box<dyn Model>` is, too.
+pub trait Model: CloneModel + Debug + Send + Sync + Any {
+    /// Returns the name in scenes.
     fn name(&self) -> &str;
 
-    /// The name in headings.
+    /// Returns the name in headings.
     fn title(&self) -> &str;
 
-    /// What the model is taken from; none where nothing is said.
+    /// Returns the publication that the model comes from, if it is known.
     fn source(&self) -> Option<&str> {
         None
     }
 
-    /// The parameters that the excitation frequency depends on, by index: without them a time has no scale.
+    /// Returns the indices of the parameters that the excitation frequency depends on.
     fn frequency(&self) -> Vec<usize> {
         self.index("omega").into_iter().collect()
     }
 
-    /// Every parameter, in the order of files and of indices; the same for all values.
+    /// Returns all parameters, in the order of their indices. They do not depend on the values.
     fn parameters(&self) -> &[Parameter];
 
-    /// The value of the parameter with this index.
+    /// Returns the value of the parameter with this index.
     ///
     /// # Panics
-    /// If there is none of this index.
+    /// If the index is out of range.
     fn value(&self, index: usize) -> f64;
 
-    /// Takes a value whatever the parameter's range; [`Model::set_at`] looks at that.
+    /// Sets a value without checking the parameter's range. [`Model::set_at`] checks it.
     ///
     /// # Panics
-    /// If there is none of this index.
+    /// If the index is out of range.
     fn assign(&mut self, index: usize, value: f64);
 
-    /// The description that flow and reference work from, valid as [`Oscillator::validate`] says.
+    /// Returns the oscillator. It is valid as defined by [`Oscillator::validate`].
     ///
     /// # Errors
-    /// [`ModelError`] if a parameter is out of its range, or what they make together is no oscillator.
+    /// [`ModelError`] if a parameter is out of its range, or the oscillator is not valid.
     fn oscillator(&self) -> Result<Oscillator, ModelError>;
 
-    /// The contact law: what an oscillator does not fix.
+    /// Returns the contact law.
     fn law(&self) -> Law;
 
-    /// Names of the state's components: displacement and velocity of each degree of freedom, one or two.
-    /// A model of one has the first half of a [`State`](super::State); the other half stays 0.
+    /// Returns the names of the state's components: displacement and velocity of each degree of freedom. A model of
+    /// one degree of freedom uses the first half of a [`State`](super::State); the other half is 0.
     fn state_names(&self) -> Vec<&str>;
 
-    /// What moves, one name per degree of freedom; the displacements' names unless told.
+    /// Returns the name of the moving body of each degree of freedom. The default is the displacement's name.
     fn bodies(&self) -> Vec<&str> {
         self.state_names().into_iter().step_by(2).collect()
     }
 
-    /// The index of the parameter called `name`.
+    /// Returns the index of the parameter called `name`.
     ///
     /// # Errors
     /// [`ParameterError::Unknown`] if the model has no such parameter.
@@ -86,7 +85,7 @@ pub trait Model: Boxed + Debug + Send + Sync + Any {
         })
     }
 
-    /// The value of the parameter called `name`.
+    /// Returns the value of the parameter called `name`.
     ///
     /// # Errors
     /// [`ParameterError::Unknown`] if the model has no such parameter.
@@ -108,7 +107,7 @@ pub trait Model: Boxed + Debug + Send + Sync + Any {
     /// [`ParameterError::OutOfRange`] with nothing changed.
     ///
     /// # Panics
-    /// If there is none of this index.
+    /// If the index is out of range.
     fn set_at(&mut self, index: usize, value: f64) -> Result<(), ParameterError> {
         let value = self.parameters()[index].check(value)?;
         self.assign(index, value);
@@ -125,17 +124,17 @@ pub trait Model: Boxed + Debug + Send + Sync + Any {
     }
 }
 
-/// Models behind a pointer, cloned and compared. Every [`Model`] that is `Clone` and `PartialEq` has it.
-pub trait Boxed {
-    /// The same model in a box of its own.
-    fn boxed(&self) -> Box<dyn Model>;
+/// Clones and compares models behind a pointer. Every [`Model`] that is `Clone` and `PartialEq` implements it.
+pub trait CloneModel {
+    /// Clones the model into a box.
+    fn clone_model(&self) -> Box<dyn Model>;
 
-    /// Whether the other is of the same kind and has the same values.
+    /// Whether the other model has the same type and the same values.
     fn equals(&self, other: &dyn Model) -> bool;
 }
 
-impl<M: Model + Clone + PartialEq> Boxed for M {
-    fn boxed(&self) -> Box<dyn Model> {
+impl<M: Model + Clone + PartialEq> CloneModel for M {
+    fn clone_model(&self) -> Box<dyn Model> {
         Box::new(self.clone())
     }
 
@@ -145,7 +144,7 @@ impl<M: Model + Clone + PartialEq> Boxed for M {
 }
 
 impl dyn Model {
-    /// The model as what it is, if it is an `M`.
+    /// Returns the model as an `M`, if it is one.
     pub fn downcast_ref<M: Model>(&self) -> Option<&M> {
         let any: &dyn Any = self;
         any.downcast_ref()
@@ -154,7 +153,7 @@ impl dyn Model {
 
 impl Clone for Box<dyn Model> {
     fn clone(&self) -> Self {
-        (**self).boxed()
+        (**self).clone_model()
     }
 }
 
@@ -176,7 +175,7 @@ mod tests {
     use crate::model::{GearPair, Stops};
 
     #[test]
-    fn boxes_are_cloned_and_compared() {
+    fn models_behind_pointers_are_cloned_and_compared() {
         let pair: Box<dyn Model> = Box::new(GearPair::paper(0.5));
         let mut other = pair.clone();
         assert_eq!(&pair, &other);
@@ -201,9 +200,8 @@ mod tests {
         assert!(matches!(stops.oscillator(), Err(ModelError::Parameter(_))));
     }
 
-    /// The parameters that shape the law are those that leave the oscillator alone, and the other way round.
     #[test]
-    fn the_table_says_what_each_parameter_shapes() {
+    fn oscillator_and_law_change_with_the_parameters_that_shape_them() {
         let models: [Box<dyn Model>; 2] =
             [Box::new(GearPair::paper(0.5)), Box::new(Stops::with_restitution(0.5))];
         for model in models {

@@ -1,0 +1,13 @@
+//! Largest values that a scene may contain. The parser checks them, and the table of keys shows them.
+
+/// Largest number of values on one axis.
+pub const MAX_COUNT: u32 = 1_000_000;
+
+/// Largest number of forcing periods in one field.
+pub(super) const MAX_PERIODS: u32 = 1_000_000_000;
+
+/// Largest number of starts per cell: the number of attractors of a cell is stored in one byte.
+pub(super) const MAX_STARTS: u32 = 255;
+
+/// Largest length of a title in characters: figures have one line for it.
+pub(super) const LONGEST_TITLE: usize = 200;
