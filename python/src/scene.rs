@@ -67,7 +67,8 @@ impl Scene {
             }
             _ => Err("names a file, and there is none".to_owned()),
         };
-        let scene = LibraryScene::parse_generated(text, &sets, checked.purpose, checked.along.as_ref(), &find)?;
+        let scene =
+            LibraryScene::parse_generated(text, &sets, checked.purpose, checked.along.as_ref(), &find)?;
         Ok(Scene { scene: Arc::new(scene), sets, purpose: checked })
     }
 

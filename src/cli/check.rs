@@ -2,10 +2,9 @@
 
 use crate::cli::arguments::Check;
 use crate::cli::failure::Failure;
-use crate::cli::say;
+use crate::cli::say::{self, Console};
 use crate::job::check;
 use crate::store::folder::Folder;
-use crate::store::inventory::Finding;
 use crate::store::map::MANIFEST;
 
 /// Names the damaged and missing files, and with `--repair` makes them again.
@@ -16,20 +15,16 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         false => None,
     };
     let checked = check::check(dir)?;
-    print_findings(dir, checked.findings(), quiet);
+    for finding in checked.findings().iter().filter(|finding| finding.is_lost() || !quiet) {
+        say::note(format_args!("{}: {finding}", dir.display()));
+    }
     if checked.findings().is_empty() && !quiet {
         say::note(format_args!("{}: all {} files are as {MANIFEST} says", dir.display(), checked.files()));
     }
-    let repaired = folder.map(|folder| checked.repair(&folder)).transpose()?;
+    let repaired =
+        folder.map(|folder| checked.repair(&folder, &Console::new(quiet, "", false))).transpose()?;
     for name in repaired.iter().flatten().filter(|_| !quiet) {
         say::note(format_args!("{}: {name} was made again", dir.display()));
     }
     Ok(checked.require_good(repaired.as_deref())?)
-}
-
-/// Prints a line about each finding; about unknown files unless quiet.
-pub(super) fn print_findings(dir: &std::path::Path, findings: &[Finding], quiet: bool) {
-    for finding in findings.iter().filter(|finding| finding.is_lost() || !quiet) {
-        say::note(format_args!("{}: {finding}", dir.display()));
-    }
 }

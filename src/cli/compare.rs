@@ -8,7 +8,7 @@ use anyhow::anyhow;
 use super::arguments::{Compare, FigureFormat};
 use super::failure::Failure;
 use super::interrupt::Interrupt;
-use super::say;
+use super::say::{self, Console};
 use super::stdout::print_json;
 use crate::findings::compare::{Comparison, Kind, Tally};
 use crate::job::compare::MapPair;
@@ -27,12 +27,9 @@ pub(crate) fn run(arguments: &Compare) -> Result<(), Failure> {
     let folder = Folder::open(&out, arguments.force)?;
     folder.refuse_links(store::compare::names())?;
     interrupt.wait_for(Some("the maps are read"));
-    let result = pair.compare(interrupt.raised())?;
+    let result = pair.compare(&Console::new(arguments.quiet, "", false), interrupt.raised())?;
     let stopped = || interrupt.failure(format!("interrupted, and nothing was written to {}", out.display()));
     let Some(result) = result.filter(|_| interrupt.wait_for(None)) else { return Err(stopped()) };
-    for warning in result.warnings() {
-        say::note(format_args!("warning: {warning}"));
-    }
     let cells = result.cells();
     let compared = result.compared(&cells);
     let formats = FigureFormat::scene(&arguments.format);

@@ -4,11 +4,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use crate::cli::arguments::Validate;
-use crate::cli::check::print_findings;
 use crate::cli::failure::Failure;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::progress::Progress;
-use crate::cli::say;
+use crate::cli::say::{self, Console};
+use crate::job::observer::Observer;
 use crate::job::validate::{SampleLanes, ValidateJob};
 use crate::validate::{HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation};
 
@@ -16,14 +15,11 @@ use crate::validate::{HORIZON, HalfMesh, Judge, Kind, StratumResult, Validation}
 pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
     let (clock, quiet) = (Instant::now(), arguments.quiet);
     let interrupt = Interrupt::listen(quiet)?;
-    let job = ValidateJob::open(&arguments.folder, arguments.samples as usize, arguments.seed)?;
+    let console = Console::new(quiet, "cells replayed", false);
+    let Validate { folder, samples, seed, .. } = arguments;
+    let job = ValidateJob::open(folder, *samples as usize, *seed, &console)?;
     let (dir, count) = (job.folder().path(), job.sample_count());
-    print_findings(dir, job.findings(), quiet);
-    if let Some(warning) = job.warning() {
-        say::note(format_args!("warning: {warning}"));
-    }
-    let note = |text: String| (!quiet).then(|| say::note(text));
-    note(format!("computing {count} cells of the map again, on a graphics device if there is one"));
+    console.note(&format!("computing {count} cells of the map again, on a graphics device if there is one"));
     let path = dir.display();
     let nothing = format!("none of {count} cells was replayed, and nothing was written to {path}");
     interrupt.ends_at_once(nothing, job.folder().leaver());
@@ -37,19 +33,19 @@ pub(crate) fn run(arguments: &Validate) -> Result<(), Failure> {
         return Err(stopped(0));
     }
     let lanes = lanes?;
-    note(format!("replaying {count} cells without early stops: each may take its whole budget"));
-    let progress = Progress::new(count, 0, "cells replayed", quiet);
+    console.note(&format!("replaying {count} cells without early stops: each may take its whole budget"));
+    console.progress(0, count);
     let replayed = AtomicUsize::new(0);
     let report = |done| {
         replayed.fetch_max(done, Ordering::Relaxed);
-        progress.report(done, count);
+        console.progress(done, count);
     };
     let validation = job
         .replay(&lanes, &report, interrupt.raised())
         .ok_or_else(|| stopped(replayed.load(Ordering::Relaxed)))?;
     let files = job.write(&lanes, &validation, clock.elapsed())?;
     let summary = summary(&validation, &lanes);
-    progress.finish(&format!("{summary}\n{}: {}", say::path(dir), files.join(", ")));
+    console.finish(&format!("{summary}\n{}: {}", say::path(dir), files.join(", ")));
     Ok(job.require_valid(&validation, &files)?)
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap, damage, repair_command};
+use crate::job::observer::Observer;
 use crate::store::finished_map::{self, FinishedMap, FinishedMapError};
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry, Finding};
@@ -73,7 +74,7 @@ impl CheckedFolder {
     /// # Errors
     /// [`JobError`] if the folder is not a map's, if what is damaged cannot be made from records, or if a file cannot be
     /// written.
-    pub fn repair(&self, folder: &Folder) -> Result<Vec<String>, JobError> {
+    pub fn repair(&self, folder: &Folder, observer: &dyn Observer) -> Result<Vec<String>, JobError> {
         let dir = &self.dir;
         let lost: Vec<&str> = self.lost().map(|finding| finding.name.as_str()).collect();
         if lost.is_empty() {
@@ -119,7 +120,7 @@ impl CheckedFolder {
             return Err(cannot(LIST, &why));
         }
         let scene = finished::scene(&map)?;
-        let mut loaded = LoadedMap::read(&map, &scene)?;
+        let mut loaded = LoadedMap::read(&map, &scene, observer)?;
         let survey = loaded.survey();
         let has_validation =
             map.manifest().files.iter().any(|file| file.name == VALIDATION) && !lost.contains(&VALIDATION);

@@ -7,6 +7,7 @@ use crate::findings::coexistence;
 use crate::findings::compare::{self, Comparison, Side};
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap};
+use crate::job::observer::Observer;
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::record::Record;
@@ -62,13 +63,18 @@ impl<'a> MapPair<'a> {
         }
     }
 
-    /// Reads all records and compares them. Returns none if `halt` was raised meanwhile.
+    /// Reads all records and compares them. Damage that cost no record is reported to the observer. Returns none if `halt` was
+    /// raised meanwhile.
     ///
     /// # Errors
     /// [`JobError`] if the records of a map cannot be read.
-    pub fn compare(&self, halt: &AtomicBool) -> Result<Option<MapComparison<'_>>, JobError> {
+    pub fn compare(
+        &self,
+        observer: &dyn Observer,
+        halt: &AtomicBool,
+    ) -> Result<Option<MapComparison<'_>>, JobError> {
         let is_halted = || halt.load(Ordering::Relaxed);
-        let read = |i: usize| LoadedMap::read(&self.maps[i], &self.scenes[i]);
+        let read = |i: usize| LoadedMap::read(&self.maps[i], &self.scenes[i], observer);
         let mut loaded = [read(0)?, read(1)?];
         if is_halted() {
             return Ok(None);
@@ -102,11 +108,6 @@ pub struct MapComparison<'a> {
 }
 
 impl MapComparison<'_> {
-    /// Damage to the record files that cost no record.
-    pub fn warnings(&self) -> impl Iterator<Item = &str> {
-        self.loaded.iter().filter_map(|map| map.stored.warning.as_deref())
-    }
-
     /// The cells of both maps, for [`MapComparison::compared`].
     pub fn cells(&self) -> [Cells<'_>; 2] {
         [0, 1].map(|i| self.loaded[i].cells(&self.pair.scenes[i], &self.surveys[i]))

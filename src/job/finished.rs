@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::job::error::JobError;
+use crate::job::observer::Observer;
 use crate::job::size;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
@@ -28,14 +29,21 @@ pub(crate) struct LoadedMap {
 }
 
 impl LoadedMap {
-    /// Reads all records.
+    /// Reads all records. Damage that cost no record is reported to the observer.
     ///
     /// # Errors
     /// [`JobError`] if records are missing, damaged or another map's.
-    pub(crate) fn read(map: &FinishedMap, scene: &Scene) -> Result<LoadedMap, JobError> {
+    pub(crate) fn read(
+        map: &FinishedMap,
+        scene: &Scene,
+        observer: &dyn Observer,
+    ) -> Result<LoadedMap, JobError> {
         let plan = Plan::new(scene);
         plan.check()?;
         let stored = map.records(scene, &plan)?;
+        if let Some(warning) = &stored.warning {
+            observer.warn(warning);
+        }
         Ok(LoadedMap { plan, stored })
     }
 

@@ -28,7 +28,7 @@ pub fn find(name: &str) -> Result<FileModel, JobError> {
     }
     let names: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
     Err(JobError::Usage(format!(
-        "no model is called `{quoted}`; the models are {}; or give the path of a model's file, such as my-model.toml",
+        "no model is called `{quoted}`; there is {}, or give the path of a model's file, such as my-model.toml",
         names.join(", ")
     )))
 }

@@ -155,12 +155,7 @@ fn replaced(out: &Path) -> u64 {
 ///
 /// # Errors
 /// [`JobError::TooLarge`] with what the map needs and what is free.
-pub fn check_map(
-    scene: &Scene,
-    shard: Option<Shard>,
-    kind: EngineKind,
-    free: &Free,
-) -> Result<(), JobError> {
+pub fn check_map(scene: &Scene, shard: Option<Shard>, kind: EngineKind, free: &Free) -> Result<(), JobError> {
     let remedy = match scene.list() {
         Some(_) => "shorten the list of cells",
         None => "lower axis.0.count or axis.1.count",
@@ -357,9 +352,8 @@ mod tests {
     #[test]
     fn a_map_that_does_not_fit_is_refused_with_a_remedy() {
         // So slow a forcing that the constants of each flow have 650 kB.
-        let scene = |files: &str| {
-            scene("omega", 0.002, 0.003, [2, 8_000], &[&format!("outputs.files=[{files}]")])
-        };
+        let scene =
+            |files: &str| scene("omega", 0.002, 0.003, [2, 8_000], &[&format!("outputs.files=[{files}]")]);
         let [png, all] = [scene("'png'"), scene("'csv','npy','png','html'")];
         let check = |kind, memory, disk| check_map(&all, None, kind, &Free { memory, disk });
         assert!(check(EngineKind::Cpu, Some(2_000_000_000), None).is_ok());

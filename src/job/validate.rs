@@ -9,6 +9,7 @@ use crate::gpu::{self, AdapterChoice, Gpu, Precision};
 use crate::job::check;
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap, damage, repair_command};
+use crate::job::observer::Observer;
 use crate::map::plan::Plan;
 use crate::map::scene::Scene;
 use crate::show::cells::Survey;
@@ -48,19 +49,29 @@ impl SampleLanes {
 }
 
 impl ValidateJob {
-    /// Locks the folder, reads the map, and draws a sample of its cells with a seed.
+    /// Locks the folder, reads the map, and draws a sample of its cells with a seed. Damaged and unknown files are reported to
+    /// the observer.
     ///
     /// # Errors
     /// [`JobError`] if the folder is not that of a finished map of this version, or the map cannot be read.
-    pub fn open(dir: &Path, samples: usize, seed: u64) -> Result<ValidateJob, JobError> {
+    pub fn open(
+        dir: &Path,
+        samples: usize,
+        seed: u64,
+        observer: &dyn Observer,
+    ) -> Result<ValidateJob, JobError> {
         finished::require_folder(dir)?;
         // The lock comes first: another run must not replace the map between reading and writing.
         let folder = Folder::open(dir, true)?;
         folder.refuse_links(map::names())?;
         let map = FinishedMap::open_own(dir)?;
         let findings = check::findings(dir, &map.manifest().files)?;
+        for finding in &findings {
+            let text = format!("{}: {finding}", dir.display());
+            if finding.is_lost() { observer.warn(&text) } else { observer.note(&text) }
+        }
         let scene = finished::scene(&map)?;
-        let mut loaded = LoadedMap::read(&map, &scene)?;
+        let mut loaded = LoadedMap::read(&map, &scene, observer)?;
         let precision = precision(map.manifest())?;
         let survey = loaded.survey();
         let sample = validate::sample(&loaded.plan, &loaded.stored.records, samples, seed);
@@ -75,16 +86,6 @@ impl ValidateJob {
     /// Number of cells in the sample.
     pub fn sample_count(&self) -> usize {
         self.sample.ids().len()
-    }
-
-    /// Damaged, missing and unknown files of the folder.
-    pub fn findings(&self) -> &[Finding] {
-        &self.findings
-    }
-
-    /// Damage to the record file that cost no record.
-    pub fn warning(&self) -> Option<&str> {
-        self.loaded.stored.warning.as_deref()
     }
 
     fn subject(&self) -> Subject<'_> {

@@ -134,7 +134,7 @@ fn bad_orbit_requests_are_refused() {
 }
 
 #[test]
-fn files_in_the_way_of_the_output_are_refused() {
+fn a_file_with_the_name_of_the_output_folder_is_refused() {
     let folder = folder();
     fs::write(folder.path().join("taken"), "precious").unwrap();
     for arguments in [["bifurcation", SMOKE].as_slice(), &["orbit"]] {
@@ -148,7 +148,7 @@ fn files_in_the_way_of_the_output_are_refused() {
 }
 
 #[test]
-fn full_output_folders_are_refused() {
+fn output_folders_with_files_are_refused() {
     let folder = folder();
     let out = folder.path().join("out/smoke");
     fs::create_dir_all(&out).unwrap();
@@ -168,7 +168,7 @@ fn read_only_output_folders_are_refused() {
     let closed = folder.path().join("closed");
     fs::create_dir(&closed).unwrap();
     fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
-    // Root may write anywhere, and then there is nothing to refuse.
+    // Root may write anywhere.
     if fs::write(closed.join("probe"), "").is_ok() {
         return;
     }
@@ -189,7 +189,7 @@ fn every_command_has_help_with_an_example() {
 }
 
 #[test]
-fn shells_and_man_are_told_of_every_command() {
+fn completions_contain_every_command() {
     let told = |target: &str| {
         let run = rattlemap(&folder()).args(["completions", target]).assert().success().stderr("");
         String::from_utf8(run.get_output().stdout.clone()).unwrap()
@@ -205,7 +205,7 @@ fn shells_and_man_are_told_of_every_command() {
     for word in ["rattlemap bifurcation", "rattlemap bench engines", "transient", "repair"] {
         assert!(page.contains(word), "{word}: {page}");
     }
-    // As a shell reads it.
+    // Bash completes an option.
     let script = folder();
     let path = script.path().join("rattlemap");
     fs::write(&path, told("bash")).unwrap();
@@ -231,7 +231,7 @@ fn orbit_json_has_the_fields_of_the_contract() {
     assert_eq!((&orbit["word"], &orbit["pattern"]), (&"36".into(), &"36".into()));
     assert_eq!(orbit["lyapunov_error"], serde_json::Value::Null);
     assert_eq!(orbit["events"].as_array().unwrap().len(), 2);
-    // The transient, a turning tangent vector, one check.
+    // The transient, the alignment of a tangent vector, and one check.
     assert_eq!(orbit["periods_run"], 400 + 50 + 128);
 }
 
@@ -249,9 +249,9 @@ fn orbit_summary_is_for_the_eye() {
     ]));
 }
 
-/// From the start, not from where the motion has settled.
+/// The time counts from the start, not from the end of the transient.
 #[test]
-fn orbit_tells_the_state_at_a_time() {
+fn orbit_prints_the_state_at_a_time() {
     use rattlemap::flow::Flow;
     use rattlemap::model::GearPair;
     use rattlemap::reference::Trajectory;
@@ -311,10 +311,10 @@ fn bifurcation_writes_table_figure_and_manifest() {
     assert!(manifest["elapsed_seconds"].as_f64().unwrap() > 0.0);
 }
 
-/// What a diagram's folder holds.
+/// Files in a diagram's folder.
 const DIAGRAM: [&str; 4] = ["bifurcation.csv", "bifurcation.png", "bifurcation_columns.csv", "manifest.json"];
 
-/// One row per value, with what `orbit` says of it.
+/// Checks that the table has one row per value, with the results of `orbit`.
 fn check_columns(path: &Path) {
     let mut table = csv::Reader::from_path(path).unwrap();
     let header = "e,class,period,word,pattern,lyapunov,lyapunov_error,impacts_per_period,mesh_fraction,symmetric,status,\
@@ -387,7 +387,7 @@ fn second_bifurcation_run_needs_force_and_leaves_other_files_alone() {
 }
 
 #[test]
-fn orbit_help_says_that_periods_are_no_limit() {
+fn orbit_help_explains_periods_and_transient() {
     let run = rattlemap(&folder()).args(["orbit", "--help"]).assert();
-    run.success().stdout(says(&["No limit", "All of them are integrated"]));
+    run.success().stdout(says(&["N does not limit the integration", "It is always integrated whole"]));
 }
